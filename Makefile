@@ -1,0 +1,48 @@
+# Two commands: `make run` shows a head that looks at a person, `make test` proves it works.
+# Both set everything up first: an environment in .venv, with uv if it is there, else pip.
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: run test check bench clean
+
+run: $(VENV)/.installed
+	$(BIN)/gazerig run --mock
+
+test: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest
+
+check: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(VENV)/.installed-dev
+	$(BIN)/python tests/bench/bench_run.py
+
+clean:
+	rm -rf $(VENV) build *.egg-info
+
+# $(call install,WHAT) makes the environment and installs WHAT into it.
+define install
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "$(PYTHON) is older than 3.11: give another, make PYTHON=python3.11 ..." >&2; exit 2; }
+	@if command -v uv >/dev/null 2>&1; then \
+	  { test -x $(BIN)/python || uv venv -q --python $(PYTHON) $(VENV); } \
+	    && uv pip install -q --python $(BIN)/python -e '$(1)'; \
+	else false; fi \
+	|| { { test -x $(BIN)/pip || $(PYTHON) -m venv --clear $(VENV) \
+	         || { $(PYTHON) -m pip install -q --user virtualenv \
+	              && $(PYTHON) -m virtualenv -q --clear $(VENV); }; } \
+	     && $(BIN)/python -m pip install -q -e '$(1)'; }
+	@touch $@
+endef
+
+$(VENV)/.installed: pyproject.toml
+	$(call install,.)
+
+$(VENV)/.installed-dev: pyproject.toml
+	$(call install,.[dev])
+	@touch $(VENV)/.installed

@@ -1,0 +1,1 @@
+"""YAML to frozen values, strictly; the shipped rigs, profiles and scanpaths lie beside it."""

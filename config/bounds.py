@@ -1,0 +1,299 @@
+"""Bounds beside the value: a Params dataclass becomes a strict pydantic model.
+
+A field's metadata may hold
+  low, high: inclusive bounds of a number, or of every number in a tuple or mapping
+  choices:   the values allowed, or those allowed for every item
+  length:    number of items of a tuple
+  unit:      e.g. "deg/s", "" for a bare number
+  says:      what it is, in one line
+and ``__post_init__`` may raise ValueError where two fields contradict each other.
+"""
+
+import dataclasses
+import types
+import typing
+from collections.abc import Callable, Container, Mapping
+from functools import cache, partial
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    WrapValidator,
+    create_model,
+)
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+T = TypeVar("T")
+Step = str | int
+Form = Literal["number", "whole", "bool", "text", "choice", "list", "mapping", "params"]
+
+_PLAIN: dict[object, Form] = {float: "number", int: "whole", bool: "bool", str: "text"}
+_KNOWN_METADATA = {"low", "high", "unit", "says", "choices", "length"}
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Shape:
+    """What may stand at one place of a file.
+
+    inner: shape of the items of a list or mapping
+    params: the dataclass, for form "params"
+    optional: null may stand here
+    low, high, choices, unit, says: the field's metadata; length: number of items of a list
+    """
+
+    form: Form
+    inner: "Shape | None" = None
+    params: type | None = None
+    optional: bool = False
+    choices: tuple[object, ...] = ()
+    low: float | None = None
+    high: float | None = None
+    length: int | None = None
+    unit: str = ""
+    says: str = ""
+
+
+def judge(into: type[T], data: object) -> tuple[T | None, list[ErrorDetails]]:
+    """Turn plain values into the frozen dataclass, or list every error.
+
+    ``data`` holds dicts, tuples, str, int, float, bool and None only.
+    """
+    try:
+        return typing.cast(T, _adapter(typing.cast(Any, into)).validate_python(data)), []
+    except ValidationError as error:
+        return None, [one for one in error.errors(include_url=False) if not _miscounted(one)]
+
+
+def filled(into: type[T], data: object, faulty: Container[tuple[Step, ...]], high: bool) -> T:
+    """Make the dataclass with stand-ins at the faulty paths, without its own rules.
+
+    A stand-in lies at the low or the high end of what may stand there. Lists and
+    mappings have none: reading such a field raises AttributeError.
+    """
+    return typing.cast(T, _fill(Shape("params", params=into), data, (), faulty, high))
+
+
+@cache
+def model_of(params: type) -> type[BaseModel]:
+    """Build the strict pydantic model of a Params dataclass.
+
+    Raises:
+        TypeError: a field has a type or metadata this module does not know.
+    """
+    declared = {f.name: f for f in dataclasses.fields(params) if f.init}
+    columns: dict[str, Any] = {}
+    for name, shape in shapes_of(params).items():
+        column: dict[str, Any] = {"description": _described(shape) or None}
+        if shape.unit:
+            column["json_schema_extra"] = {"unit": shape.unit}
+        if declared[name].default is not dataclasses.MISSING:
+            column["default"] = declared[name].default
+        elif declared[name].default_factory is not dataclasses.MISSING:
+            column["default_factory"] = declared[name].default_factory
+        columns[name] = (_annotation(shape), Field(**column))
+    model: type[BaseModel] = create_model(
+        params.__name__,
+        __config__=ConfigDict(
+            strict=True,
+            defer_build=True,  # nested models are built once, within the whole
+            extra="forbid",
+            validate_default=True,
+            field_title_generator=lambda name, _: name,
+        ),
+        __module__=params.__module__,
+        __doc__=_first_line(params),
+        **columns,
+    )
+    return model
+
+
+@cache
+def shapes_of(params: type) -> dict[str, Shape]:
+    """Give the shape of every field of a Params dataclass, in the order declared.
+
+    Raises:
+        TypeError: a field has a type or metadata this module does not know.
+    """
+    hints = typing.get_type_hints(params)
+    shapes: dict[str, Shape] = {}
+    for f in dataclasses.fields(params):
+        if not f.init:
+            continue
+        place = f"{params.__qualname__}.{f.name}"
+        if strange := set(f.metadata) - _KNOWN_METADATA:
+            raise TypeError(f"{place}: metadata {sorted(strange)} is not among {_KNOWN_METADATA}")
+        shapes[f.name] = _shape(hints[f.name], f.metadata, place)
+    return shapes
+
+
+def _shape(kind: Any, meta: Mapping[str, Any], place: str) -> Shape:
+    """Read one type annotation with its field's metadata."""
+    origin, args = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType) and len(args) == 2 and type(None) in args:
+        kept = args[0] if args[1] is type(None) else args[1]
+        return dataclasses.replace(_shape(kept, meta, place), optional=True)
+    shape: Shape
+    if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+        shape = Shape("params", params=kind)
+    elif origin is tuple and (len(set(args)) == 1 or args[1:] == (...,)):
+        length = meta.get("length") if args[-1] is ... else len(args)
+        items = {k: v for k, v in meta.items() if k != "length"}
+        shape = Shape("list", inner=_shape(args[0], items, place), length=length)
+    elif origin in (dict, Mapping) and args[0] is str:
+        shape = Shape("mapping", inner=_shape(args[1], meta, place))
+    elif origin is Literal:
+        shape = Shape("choice", choices=args)
+    elif kind in _PLAIN:
+        shape = _single(_PLAIN[kind], meta, place)
+    else:
+        raise TypeError(f"{place}: a configuration value cannot have the type {kind}")
+    return dataclasses.replace(shape, unit=meta.get("unit", ""), says=meta.get("says", ""))
+
+
+def _single(form: Form, meta: Mapping[str, Any], place: str) -> Shape:
+    """Read the metadata of a single value."""
+    if "length" in meta:
+        raise TypeError(f"{place}: length is for tuples")
+    if form in ("bool", "text") and ("low" in meta or "high" in meta):
+        raise TypeError(f"{place}: low and high are for numbers")
+    if "choices" in meta:
+        return Shape("choice", choices=tuple(meta["choices"]))
+    return Shape(form, low=meta.get("low"), high=meta.get("high"))
+
+
+def _annotation(shape: Shape) -> Any:
+    """Write a shape as a pydantic type."""
+    kind: Any
+    match shape:
+        case Shape(form="number"):
+            kind = Annotated[float, Field(ge=shape.low, le=shape.high, allow_inf_nan=False)]
+        case Shape(form="whole"):
+            kind = Annotated[int, Field(ge=shape.low, le=shape.high)]
+        case Shape(form="bool"):
+            kind = bool
+        case Shape(form="text"):
+            kind = str
+        case Shape(form="choice"):
+            kind = Annotated[Literal[shape.choices], BeforeValidator(partial(_exact, shape))]
+        case Shape(form="list", inner=Shape() as inner):
+            length = Field(min_length=shape.length, max_length=shape.length)
+            kind = Annotated[types.GenericAlias(tuple, (_annotation(inner), ...)), length]
+        case Shape(form="mapping", inner=Shape() as inner):
+            kind = types.GenericAlias(dict, (str, _annotation(inner)))
+        case Shape(params=type() as params):
+            kind = _frozen(params)
+    return kind | None if shape.optional else kind
+
+
+def _frozen(params: type) -> Any:
+    """Write a dataclass as a pydantic type whose value is the dataclass itself."""
+    return Annotated[model_of(params), WrapValidator(partial(_build, params))]
+
+
+def _exact(shape: Shape, value: object) -> object:
+    """Refuse 57600.0 for 57600, which Literal takes for equal."""
+    if isinstance(value, float) and not any(isinstance(c, float) for c in shape.choices):
+        raise PydanticCustomError("literal_error", "not a whole number")
+    return value
+
+
+def _build(params: type, value: object, validate: Callable[[object], BaseModel]) -> object:
+    """Make the dataclass; its ``__post_init__`` speaks through ValueError."""
+    if isinstance(value, params):  # a default made by the declaring dataclass
+        return value
+    model = validate(value)
+    return params(**{name: getattr(model, name) for name in model.model_fields_set})
+
+
+@cache
+def _adapter(params: type) -> TypeAdapter[Any]:
+    """Keep the validator of a whole file."""
+    return TypeAdapter(_frozen(params))
+
+
+def _first_line(params: type) -> str:
+    """Take the first docstring line, leaving out the one dataclass makes up."""
+    doc = (params.__doc__ or "").strip()
+    return "" if doc.startswith(f"{params.__name__}(") else doc.partition("\n")[0]
+
+
+def _described(shape: Shape) -> str:
+    """Say what a value is, with its unit, for an editor's hover text."""
+    return f"{shape.says} [{shape.unit}]".strip() if shape.unit else shape.says
+
+
+def _miscounted(details: ErrorDetails) -> bool:
+    """Tell a length complaint that only counts the items that were right."""
+    return details["type"] in ("too_short", "too_long") and (
+        len(details["input"]) != details["ctx"]["actual_length"]
+    )
+
+
+_LEFT_OUT: Any = object()
+
+
+def _fill(
+    shape: Shape, data: Any, path: tuple[Step, ...], faulty: Container[tuple[Step, ...]], high: bool
+) -> Any:
+    """Build what stands at a path, all but its faulty parts from ``data``."""
+    if path in faulty:
+        return _stand_in(shape, high)
+    if data is None:
+        return None
+    parts: dict[Any, Any]
+    match shape:
+        case Shape(params=type() as params):
+            parts = {f.name: _default(f) for f in dataclasses.fields(params)}
+            for name, field in shapes_of(params).items():
+                if name in data or (*path, name) in faulty:
+                    parts[name] = _fill(field, data.get(name), (*path, name), faulty, high)
+                elif set(data) - set(parts):  # an unknown key may have been meant for this one
+                    parts[name] = _stand_in(field, high)
+            return _bare(params, parts)
+        case Shape(inner=Shape() as inner):
+            steps = data.items() if isinstance(data, dict) else enumerate(data)
+            parts = {k: _fill(inner, item, (*path, k), faulty, high) for k, item in steps}
+            if any(part is _LEFT_OUT for part in parts.values()):
+                return _LEFT_OUT
+            return parts if isinstance(data, dict) else tuple(parts.values())
+    return float(data) if shape.form == "number" else data
+
+
+def _stand_in(shape: Shape, high: bool) -> Any:
+    """Give a value from one end of what may stand at a place."""
+    match shape:
+        case Shape(form="number" | "whole"):
+            least = shape.low if shape.low is not None else (shape.high or 1.0) - 1.0
+            end = (shape.high if shape.high is not None else least + 1.0) if high else least
+            return int(end) if shape.form == "whole" else float(end)
+        case Shape(form="bool"):
+            return high
+        case Shape(form="text"):
+            return "?" if high else ""
+        case Shape(form="choice"):
+            return shape.choices[-1 if high else 0]
+        case Shape(params=type() as params):
+            fields = shapes_of(params).items()
+            return _bare(params, {name: _stand_in(field, high) for name, field in fields})
+    return _LEFT_OUT
+
+
+def _default(declared: dataclasses.Field[Any]) -> Any:
+    """Give a field's default, if it has one."""
+    if declared.default_factory is not dataclasses.MISSING:
+        return declared.default_factory()
+    return _LEFT_OUT if declared.default is dataclasses.MISSING else declared.default
+
+
+def _bare(params: type, parts: Mapping[str, Any]) -> Any:
+    """Make a dataclass without its ``__post_init__``."""
+    made: object = object.__new__(params)
+    for name, part in parts.items():
+        if part is not _LEFT_OUT:
+            object.__setattr__(made, name, part)
+    return made

@@ -1,0 +1,160 @@
+"""What a Params dataclass tells the outside: a schema to editors, words to people."""
+
+import difflib
+import reprlib
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from pydantic_core import ErrorDetails
+
+from config.bounds import Shape, Step, model_of, shapes_of
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+_TYPE_WORDS: dict[type, str] = {
+    bool: "a truth value",
+    int: "a whole number",
+    float: "a number",
+    str: "text",
+    dict: "a mapping",
+    tuple: "a list",
+}
+
+
+class Complaint(NamedTuple):
+    """One fault in plain values: where, what stands there, and the rule in words."""
+
+    path: tuple[Step, ...]
+    value: str
+    rule: str
+
+
+def json_schema(into: type) -> dict[str, Any]:
+    """Give the JSON Schema (draft 2020-12) of a file that is loaded into ``into``.
+
+    Bounds, choices, descriptions and units are those of the fields; unknown keys are
+    refused. Rules between fields and the difference of 1 and 1.0 are beyond the schema.
+    """
+    return {"$schema": DIALECT, **model_of(into).model_json_schema()}
+
+
+def complaint(into: type, details: ErrorDetails) -> Complaint:
+    """Put one pydantic error into words."""
+    root = Shape("params", params=into)
+    path = details["loc"]
+    if details["type"] == "extra_forbidden":
+        return Complaint(path, shown(details["input"]), _unknown(_at(root, path[:-1]), path))
+    shape = _at(root, path)
+    if details["type"] == "missing":
+        says = f" ({shape.says})" if shape.says else ""
+        return Complaint(path, "", f"missing; wanted {wanted(shape)}{says}")
+    return Complaint(path, shown(details["input"]), _rule(shape, details))
+
+
+def wanted(shape: Shape) -> str:
+    """Say what may stand at a place."""
+    match shape:
+        case Shape(form="number"):
+            text = f"a number{_range(shape)}"
+        case Shape(form="whole"):
+            text = f"a whole number{_range(shape)}"
+        case Shape(form="bool"):
+            text = "true or false"
+        case Shape(form="choice"):
+            text = f"one of {', '.join(map(repr, shape.choices))}"
+        case Shape(form="list", inner=Shape() as inner):
+            count = f" of {shape.length}" if shape.length is not None else ""
+            text = f"a list{count}, each {wanted(inner)}"
+        case Shape(form="mapping", inner=Shape() as inner):
+            text = f"a mapping, each key with {wanted(inner)}"
+        case Shape(params=type() as params):
+            text = f"a mapping with the keys {', '.join(shapes_of(params))}"
+        case _:
+            text = "text"
+    return f"{text} or null" if shape.optional else text
+
+
+def closest(word: str, words: Iterable[str]) -> str:
+    """Ask "; did you mean 'x'?" where a known word is near, else say nothing."""
+    near = difflib.get_close_matches(word, list(words), n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def shown(value: object) -> str:
+    """Write a value for a message, cut where it is long."""
+    writer = reprlib.Repr()
+    writer.maxlevel, writer.maxstring, writer.maxother = 2, 60, 60
+    writer.maxdict = writer.maxtuple = 6
+    return writer.repr(value)
+
+
+def _number(value: float) -> str:
+    """Write a bound as a person would: 2000, not 2000.0 or 2e+03."""
+    return format(value, ".12g")
+
+
+def _rule(shape: Shape, details: ErrorDetails) -> str:
+    """Say which rule a value breaks."""
+    value, unit = details["input"], f" (unit {shape.unit})" if shape.unit else ""
+    match details["type"]:
+        case "greater_than_equal" if shape.low is not None:
+            return f"{shown(value)} is below {_number(shape.low)}{unit}"
+        case "less_than_equal" if shape.high is not None:
+            return f"{shown(value)} is above {_number(shape.high)}{unit}"
+        case "finite_number":
+            return f"{shown(value)} is not a finite number"
+        case "too_short" | "too_long":
+            return f"has length {len(value)}, wanted {shape.length}"
+        case "value_error":
+            return " ".join(str(details["ctx"]["error"]).split())
+        case "literal_error" if isinstance(value, str):
+            return f"{shown(value)} is not {wanted(shape)}{closest(value, map(str, shape.choices))}"
+    return f"{_named(value)}, wanted {wanted(shape)}{_hint(shape, value)}"
+
+
+def _named(value: object) -> str:
+    """Say what stands there and of which type it is."""
+    if value is None:
+        return "is empty"
+    if isinstance(value, dict | tuple):
+        return f"is {_TYPE_WORDS[type(value)]}"
+    return f"{shown(value)} is {_TYPE_WORDS.get(type(value), type(value).__name__)}"
+
+
+def _hint(shape: Shape, value: object) -> str:
+    """Say how a value of the wrong type is mended, where that is plain."""
+    if shape.form == "text" and isinstance(value, bool | int | float):
+        return "; put it in quotes"
+    if shape.form in ("number", "whole") and isinstance(value, str):
+        bare = value.replace(".", "", 1).removeprefix("-").isdecimal()
+        return "; take the quotes away" if bare else ""
+    return ""
+
+
+def _unknown(holder: Shape, path: tuple[Step, ...]) -> str:
+    """Say which keys would have been right."""
+    names = tuple(shapes_of(holder.params)) if holder.params else ()
+    near = closest(str(path[-1]), names) or ";"
+    return f"unknown key {shown(path[-1])}{near} allowed: {', '.join(names) or 'none'}"
+
+
+def _range(shape: Shape) -> str:
+    """Say the bounds and the unit."""
+    unit = f" {shape.unit}" if shape.unit else ""
+    if shape.low is not None and shape.high is not None:
+        return f", {_number(shape.low)} to {_number(shape.high)}{unit}"
+    if shape.low is not None:
+        return f", {_number(shape.low)}{unit} or more"
+    if shape.high is not None:
+        return f", {_number(shape.high)}{unit} or less"
+    return f" in{unit}" if unit else ""
+
+
+def _at(shape: Shape, path: tuple[Step, ...]) -> Shape:
+    """Follow a path through nested shapes."""
+    for step in path:
+        if shape.params is not None:
+            shape = shapes_of(shape.params)[str(step)]
+        elif shape.inner is not None:
+            shape = shape.inner
+    return shape

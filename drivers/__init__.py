@@ -1,0 +1,1 @@
+"""Wires: servo buses, serial ports, cameras and detectors; imports vendor packages only."""

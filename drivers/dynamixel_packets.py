@@ -1,0 +1,130 @@
+"""Packets of Dynamixel Protocol 2.0 as bytes: build instructions, take statuses apart.
+
+The SDK's own builder does not stuff what it sends and its group reads lose every answer
+after a missing one, so the exchanges of the control loop are made here.
+
+instruction  FF FF FD 00 | id | length | instruction | params    | CRC
+status       FF FF FD 00 | id | length | 55 | error  | params    | CRC
+length counts what follows it. Inside, FF FF FD is sent as FF FF FD FD (stuffing).
+"""
+
+import struct
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from fastcrc.crc16 import umts
+
+HEADER = b"\xff\xff\xfd\x00"
+RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
+BROADCAST = 0xFE
+STATUS = 0x55
+SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
+
+STATUS_OVERHEAD = 11
+"""Bytes of a status without params."""
+
+ERROR_NUMBER, ALERT = 0x7F, 0x80
+"""Parts of the error byte: why an instruction failed; a hardware error is latched."""
+
+LONGEST_STATUS = 256
+"""No answer asked for here is longer; a larger length is noise."""
+
+_HEAD = struct.Struct("<4sBHB")
+_SPAN = struct.Struct("<HH")
+_CRC = struct.Struct("<H")
+_VALUE = {1: "B", 2: "h", 4: "i"}
+
+
+def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
+    """Build an instruction packet, stuffed where needed."""
+    if RAW in params:
+        params = params.replace(RAW, STUFFED)
+    packet = _HEAD.pack(HEADER, servo_id, len(params) + 3, code) + params
+    return packet + _CRC.pack(umts(packet))
+
+
+def sync_read(ids: Sequence[int], address: int, length: int, fast: bool = False) -> bytes:
+    """Build a request for the same registers of several servos."""
+    code = FAST_SYNC_READ if fast else SYNC_READ
+    return instruction(BROADCAST, code, _SPAN.pack(address, length) + bytes(ids))
+
+
+class SyncWrite:
+    """Builds the packets that write one register of several servos, everything fixed once."""
+
+    def __init__(self, ids: Sequence[int], address: int, size: int) -> None:
+        self._params = _SPAN.pack(address, size)
+        self._rows = struct.Struct("<" + ("B" + _VALUE[size]) * len(ids))
+        length = 3 + _SPAN.size + self._rows.size
+        self._head = _HEAD.pack(HEADER, BROADCAST, length, SYNC_WRITE) + self._params
+        self._row = [number for servo_id in ids for number in (servo_id, 0)]
+
+    def packet(self, values: Sequence[int]) -> bytes:
+        """Build the packet for one value a servo."""
+        row = self._row
+        row[1::2] = values
+        body = self._rows.pack(*row)
+        if RAW in body:
+            return instruction(BROADCAST, SYNC_WRITE, self._params + body)
+        packet = self._head + body
+        return packet + _CRC.pack(umts(packet))
+
+
+class Status(NamedTuple):
+    """One status as it arrived; ``intact`` tells whether its CRC is right."""
+
+    id: int
+    error: int
+    params: bytes
+    intact: bool
+
+
+def statuses(raw: bytes) -> list[Status]:
+    """Take every complete status out of received bytes; noise, echo and pieces are passed over."""
+    found = []
+    at = raw.find(HEADER)
+    while at >= 0:
+        end = _end(raw, at)
+        if end is None or end > len(raw):
+            at = raw.find(HEADER, at + len(HEADER))
+            continue
+        intact = umts(raw[at : end - 2]) == _CRC.unpack_from(raw, end - 2)[0]
+        params = raw[at + 9 : end - 2].replace(STUFFED, RAW)
+        found.append(Status(raw[at + 4], raw[at + 8], params, intact))
+        at = raw.find(HEADER, end if intact else at + len(HEADER))
+    return found
+
+
+def bytes_missing(raw: bytes, count: int, length: int) -> int:
+    """Count the bytes still to come of ``count`` statuses with ``length`` bytes of params each.
+
+    Stuffing makes a status longer than that; its own length field tells, once it is here.
+    """
+    nominal = length + STATUS_OVERHEAD
+    seen, done = 0, 0
+    at = raw.find(HEADER)
+    while at >= 0:
+        end = _end(raw, at)
+        if end is not None and end <= len(raw):
+            seen, done = seen + 1, end
+        at = raw.find(HEADER, done if done > at else at + len(HEADER))
+    if seen >= count:
+        return 0
+    at = raw.rfind(HEADER, done)
+    end = _end(raw, at) if at >= 0 else None
+    begun = len(raw) - at if at >= 0 else _begun_header(raw[done:])
+    rest = nominal - begun if begun < STATUS_OVERHEAD else 0
+    return (count - seen - 1) * nominal + (end - len(raw) if end is not None else rest)
+
+
+def _begun_header(tail: bytes) -> int:
+    """Count the bytes at the very end that may be the first of a header."""
+    return next((n for n in (3, 2, 1) if tail.endswith(HEADER[:n])), 0)
+
+
+def _end(raw: bytes, at: int) -> int | None:
+    """Give where the status that starts at ``at`` ends, None where none does."""
+    if len(raw) - at < STATUS_OVERHEAD or raw[at + 7] != STATUS:
+        return None
+    length = int.from_bytes(raw[at + 5 : at + 7], "little")
+    return at + 7 + length if 4 <= length <= LONGEST_STATUS else None

@@ -1,0 +1,66 @@
+"""Who is asked in the group read, who is left out of it, and when to ask those again.
+
+Servos later in a group read wait for the ones before them, so one that keeps silent must
+leave the group at once; it is then asked alone, at once and after that ever more seldom.
+"""
+
+from collections.abc import Sequence
+
+AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
+"""Time between attempts at a servo that stays silent: doubled from the first to the last."""
+
+DAMAGED_IN_A_ROW = 3
+"""A servo whose answers arrive damaged so often costs every read its time limit: out."""
+
+
+class Roll:
+    """The servos by id, in the order of the bus."""
+
+    def __init__(self, ids: Sequence[int]) -> None:
+        self._ids = tuple(ids)
+        self._due_s: dict[int, float] = {}
+        self._wait_s: dict[int, float] = {}
+        self._damaged: dict[int, int] = {}
+        self.group = self._ids
+
+    @property
+    def troubled(self) -> bool:
+        """Tell whether anybody is out or has answered badly of late."""
+        return bool(self._due_s or self._damaged)
+
+    def due(self, now_s: float) -> int | None:
+        """Name one servo to be asked alone now; where all are out there is always one."""
+        waiting = self._due_s
+        ready = [i for i, due_s in waiting.items() if due_s <= now_s or not self.group]
+        return min(ready, key=waiting.__getitem__, default=None)
+
+    def silent(self, servo_id: int, now_s: float) -> None:
+        """Note that a servo did not answer; one that is new to that is due at once."""
+        if servo_id in self._due_s:
+            wait_s = self._wait_s.get(servo_id, AGAIN_FIRST_S)
+            self._due_s[servo_id] = now_s + wait_s
+            self._wait_s[servo_id] = min(2.0 * wait_s, AGAIN_LAST_S)
+        else:
+            self._due_s[servo_id] = now_s
+        self._regroup()
+
+    def damaged(self, servo_id: int, now_s: float) -> None:
+        """Note that a servo's answer arrived damaged."""
+        self._damaged[servo_id] = self._damaged.get(servo_id, 0) + 1
+        if self._damaged[servo_id] >= DAMAGED_IN_A_ROW or servo_id in self._due_s:
+            self.silent(servo_id, now_s)
+
+    def answered(self, servo_id: int) -> bool:
+        """Note a good answer; gives whether the servo had been out."""
+        self._damaged.pop(servo_id, None)
+        if self._due_s.pop(servo_id, None) is None:
+            return False
+        self._wait_s.pop(servo_id, None)
+        if not self.group:
+            # The whole line was dead and is back: no reason to let the others wait.
+            self._due_s = dict.fromkeys(self._due_s, 0.0)
+        self._regroup()
+        return True
+
+    def _regroup(self) -> None:
+        self.group = tuple(servo_id for servo_id in self._ids if servo_id not in self._due_s)

@@ -1,0 +1,268 @@
+"""Control tables of the Dynamixel X servos (Protocol 2.0) as data.
+
+Units of the registers: position 1 step = 1/4096 turn; velocity 0.229 rev/min;
+profile acceleration 214.577 rev/min^2; PWM 0.113 %; voltage 0.1 V; temperature 1 degC;
+bus watchdog 20 ms; return delay 2 us; current ``Model.current_unit_ma``.
+Source: ROBOTIS e-Manual, X series.
+"""
+
+from typing import Literal, NamedTuple
+
+Access = Literal["r", "rw"]
+Family = Literal["x330", "x430"]
+
+STEPS_PER_TURN = 4096
+VELOCITY_UNIT_STEPS_S = 0.229 / 60.0 * STEPS_PER_TURN
+ACCELERATION_UNIT_STEPS_S2 = 214.577 / 3600.0 * STEPS_PER_TURN
+WATCHDOG_UNIT_S = 0.02
+
+EEPROM_END = 64
+"""Addresses below are kept without power and locked while the torque is on."""
+
+FAST_READ_SINCE: dict[Family, int] = {"x330": 46, "x430": 45}
+"""First firmware with Fast Sync Read and Fast Bulk Read."""
+
+X330_WIDE_INDIRECT_SINCE = 53
+"""First X330 firmware whose indirect data starts at 224 instead of 208."""
+
+HARDWARE_ERRORS = {
+    0: "input voltage",
+    2: "overheating",
+    3: "encoder",
+    4: "electrical shock",
+    5: "overload",
+}
+"""Bits of Hardware Error Status (70) and Shutdown (63)."""
+
+
+GAINS = (
+    "velocity_i_gain",
+    "velocity_p_gain",
+    "position_d_gain",
+    "position_i_gain",
+    "position_p_gain",
+)
+
+
+class Register(NamedTuple):
+    """One entry of the control table.
+
+    initial: factory value of the EEPROM area, start value of the RAM area;
+        None where the device itself decides
+    low, high: range a write must keep to; None where the model or other registers decide
+    """
+
+    name: str
+    address: int
+    size: int
+    access: Access = "r"
+    initial: int | None = None
+    low: int | None = None
+    high: int | None = None
+    signed: bool = False
+
+    @property
+    def area(self) -> Literal["eeprom", "ram"]:
+        """Name the memory the register lives in."""
+        return "eeprom" if self.address < EEPROM_END else "ram"
+
+
+class Model(NamedTuple):
+    """What differs from model to model.
+
+    temperature_limit .. shutdown: factory values of the registers of that name
+    current_limit: None where the model measures load instead of current
+    gains: factory values of velocity I and P, position D, I and P
+    stall_torque_nm, stall_current_a, no_load_rpm: at rated_v
+    """
+
+    name: str
+    number: int
+    family: Family
+    temperature_limit: int
+    max_voltage: int
+    min_voltage: int
+    current_limit: int | None
+    velocity_limit: int
+    shutdown: int
+    gains: tuple[int, int, int, int, int]
+    stall_torque_nm: float
+    rated_v: float
+    stall_current_a: float
+    no_load_rpm: float
+
+    @property
+    def no_load_steps_s(self) -> float:
+        """Give the speed without load at the rated voltage."""
+        return self.no_load_rpm / 60.0 * STEPS_PER_TURN
+
+    @property
+    def current_unit_ma(self) -> float:
+        """Give one unit of Present Current, 0 where the model has none."""
+        if self.current_limit is None:
+            return 0.0
+        return 1.0 if self.family == "x330" else 2.69
+
+
+# fmt: off
+MODELS: dict[str, Model] = {m.name: m for m in (
+    Model("xl330-m077", 1190, "x330", 70, 70, 35, 1750, 1620, 53,
+          (400, 40, 400, 0, 400), 0.215, 5.0, 1.47, 383.0),
+    Model("xl330-m288", 1200, "x330", 70, 70, 35, 1750, 445, 53,
+          (1600, 180, 0, 0, 400), 0.52, 5.0, 1.47, 103.0),
+    Model("xc330-m181", 1230, "x330", 70, 70, 35, 2352, 545, 52,
+          (1400, 100, 500, 0, 1200), 0.60, 5.0, 1.80, 129.0),
+    Model("xc330-m288", 1240, "x330", 70, 70, 35, 2352, 350, 52,
+          (1600, 50, 500, 0, 1100), 0.93, 5.0, 1.80, 81.0),
+    Model("xc330-t181", 1210, "x330", 70, 140, 55, 910, 510, 52,
+          (1200, 40, 0, 0, 900), 0.80, 12.0, 0.88, 113.0),
+    Model("xc330-t288", 1220, "x330", 70, 140, 55, 910, 320, 52,
+          (1200, 40, 0, 0, 900), 1.00, 12.0, 0.88, 71.0),
+    Model("xl430-w250", 1060, "x430", 72, 140, 60, None, 265, 52,
+          (1000, 100, 4000, 0, 640), 1.5, 12.0, 1.4, 61.0),
+    Model("xm430-w350", 1020, "x430", 80, 160, 95, 1193, 200, 52,
+          (1920, 100, 0, 0, 800), 4.1, 12.0, 2.3, 46.0),
+    Model("xm430-w210", 1030, "x430", 80, 160, 95, 1193, 330, 52,
+          (1920, 100, 0, 0, 800), 3.0, 12.0, 2.3, 77.0),
+    Model("xh430-w350", 1000, "x430", 80, 160, 95, 648, 130, 52,
+          (1920, 100, 0, 0, 900), 3.4, 12.0, 1.3, 30.0),
+    Model("xh430-w210", 1010, "x430", 80, 160, 95, 648, 210, 52,
+          (1920, 100, 0, 0, 900), 2.5, 12.0, 1.3, 50.0),
+)}
+
+_BASE = (
+    Register("model_number",            0, 2),
+    Register("model_information",       2, 4),
+    Register("firmware_version",        6, 1),
+    Register("id",                      7, 1, "rw", 1, 0, 252),
+    Register("baud_rate",               8, 1, "rw", 1, 0, 6),
+    Register("return_delay_time",       9, 1, "rw", 250, 0, 254),
+    Register("drive_mode",             10, 1, "rw", 0, 0, 13),
+    Register("operating_mode",         11, 1, "rw", 3, 0, 16),
+    Register("secondary_id",           12, 1, "rw", 255, 0, 255),
+    Register("protocol_type",          13, 1, "rw", 2, 1, 22),
+    Register("homing_offset",          20, 4, "rw", 0, -1_044_479, 1_044_479, True),
+    Register("moving_threshold",       24, 4, "rw", 10, 0, 1023),
+    Register("temperature_limit",      31, 1, "rw", None, 0, 100),
+    Register("max_voltage_limit",      32, 2, "rw"),
+    Register("min_voltage_limit",      34, 2, "rw"),
+    Register("pwm_limit",              36, 2, "rw", 885, 0, 885),
+    Register("current_limit",          38, 2, "rw"),
+    Register("velocity_limit",         44, 4, "rw"),
+    Register("max_position_limit",     48, 4, "rw", 4095, 0, 4095),
+    Register("min_position_limit",     52, 4, "rw", 0, 0, 4095),
+    Register("startup_configuration",  60, 1, "rw", 0, 0, 3),
+    Register("pwm_slope",              62, 1, "rw", 140, 1, 255),
+    Register("shutdown",               63, 1, "rw", None, 0, 63),
+    Register("torque_enable",          64, 1, "rw", 0, 0, 1),
+    Register("led",                    65, 1, "rw", 0, 0, 1),
+    Register("status_return_level",    68, 1, "rw", 2, 0, 2),
+    Register("registered_instruction", 69, 1, "r", 0),
+    Register("hardware_error_status",  70, 1, "r", 0),
+    Register("velocity_i_gain",        76, 2, "rw", None, 0, 16383),
+    Register("velocity_p_gain",        78, 2, "rw", None, 0, 16383),
+    Register("position_d_gain",        80, 2, "rw", None, 0, 16383),
+    Register("position_i_gain",        82, 2, "rw", None, 0, 16383),
+    Register("position_p_gain",        84, 2, "rw", None, 0, 16383),
+    Register("feedforward_2nd_gain",   88, 2, "rw", 0, 0, 16383),
+    Register("feedforward_1st_gain",   90, 2, "rw", 0, 0, 16383),
+    # The range is that of the written byte: 0 off or clear, 1..127 armed; reads 255 once tripped.
+    Register("bus_watchdog",           98, 1, "rw", 0, 0, 127),
+    Register("goal_pwm",              100, 2, "rw", None, None, None, True),
+    Register("goal_current",          102, 2, "rw", None, None, None, True),
+    Register("goal_velocity",         104, 4, "rw", None, None, None, True),
+    Register("profile_acceleration",  108, 4, "rw", 0, 0, 32767),
+    Register("profile_velocity",      112, 4, "rw", 0, 0, 32767),
+    Register("goal_position",         116, 4, "rw", None, None, None, True),
+    Register("realtime_tick",         120, 2),
+    Register("moving",                122, 1),
+    Register("moving_status",         123, 1),
+    Register("present_pwm",           124, 2, signed=True),
+    Register("present_current",       126, 2, signed=True),
+    Register("present_velocity",      128, 4, signed=True),
+    Register("present_position",      132, 4, signed=True),
+    Register("velocity_trajectory",   136, 4, signed=True),
+    Register("position_trajectory",   140, 4, signed=True),
+    Register("present_input_voltage", 144, 2),
+    Register("present_temperature",   146, 1),
+    Register("backup_ready",          147, 1),
+)
+# fmt: on
+
+REGISTERS: dict[str, Register] = {r.name: r for r in _BASE}
+"""Registers by name with the values all models share; addresses hold for every model."""
+
+
+class IndirectBlock(NamedTuple):
+    """A window of RAM whose bytes stand for other bytes, chosen by two-byte addresses.
+
+    Entry i has its address at ``address_base + 2 i`` and its byte at ``data_base + i``;
+    addresses must lie in target_low .. target_high.
+    """
+
+    address_base: int
+    data_base: int
+    entries: int
+    target_low: int
+    target_high: int
+
+
+def indirect_blocks(model: Model, firmware: int) -> tuple[IndirectBlock, ...]:
+    """List the indirect windows of a model with a firmware version."""
+    if model.family == "x430":
+        return (IndirectBlock(168, 224, 28, 64, 661), IndirectBlock(578, 634, 28, 64, 661))
+    if firmware >= X330_WIDE_INDIRECT_SINCE:
+        return (IndirectBlock(168, 224, 28, 64, 251),)
+    return (IndirectBlock(168, 208, 20, 64, 227),)
+
+
+def registers_of(model: Model) -> tuple[Register, ...]:
+    """List a model's registers with its own initial values and ranges (no indirect windows)."""
+    fitted = (_fit(register, model) for register in _BASE)
+    return tuple(register for register in fitted if register is not None)
+
+
+def _fit(register: Register, model: Model) -> Register | None:
+    """Give the register as this model has it, None where it has none."""
+    name = register.name
+    if model.current_limit is None and name in ("current_limit", "goal_current"):
+        return None
+    if model.family == "x430" and name == "pwm_slope":
+        return None
+    initial = _initials(model).get(name, register.initial)
+    low, high = _ranges(model).get(name, (register.low, register.high))
+    return register._replace(initial=initial, low=low, high=high)
+
+
+def _initials(model: Model) -> dict[str, int | None]:
+    """Give the start values that depend on the model."""
+    return {
+        "model_number": model.number,
+        "temperature_limit": model.temperature_limit,
+        "max_voltage_limit": model.max_voltage,
+        "min_voltage_limit": model.min_voltage,
+        "current_limit": model.current_limit,
+        "velocity_limit": model.velocity_limit,
+        "pwm_slope": 255 if model.name.startswith("xc330-t") else 140,
+        "shutdown": model.shutdown,
+        **dict(zip(GAINS, model.gains, strict=True)),
+    }
+
+
+def _ranges(model: Model) -> dict[str, tuple[int, int]]:
+    """Give the ranges that depend on the model."""
+    small = model.family == "x330"
+    return {
+        "baud_rate": (0, 6 if small else 7),
+        "protocol_type": (2, 22) if small else (1, 2),
+        "max_voltage_limit": (model.min_voltage, model.max_voltage),
+        "min_voltage_limit": (model.min_voltage, model.max_voltage),
+        "current_limit": (0, model.current_limit or 0),
+        "velocity_limit": (0, 2047 if small else 1023),
+    }
+
+
+def name_errors(status: int) -> tuple[str, ...]:
+    """Name the bits of Hardware Error Status that are set."""
+    bits = [bit for bit in range(8) if status >> bit & 1]
+    return tuple(HARDWARE_ERRORS.get(bit, f"error bit {bit}") for bit in bits)

@@ -1,0 +1,184 @@
+"""Values and protocols of the drivers.
+
+A servo bus speaks its servos' own steps (Dynamixel: 4096 a turn, 0.088 deg); what a
+step means at a joint is known by robot.body alone. Times are host monotonic seconds.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Picture = NDArray[np.uint8]
+"""(height, width, 3) BGR."""
+Pixels = NDArray[np.float64]
+"""(n, 2) x right, y down."""
+
+
+class ServoReading(NamedTuple):
+    """One servo's answer.
+
+    position_steps: present position
+    velocity_steps_s: present velocity
+    current_ma: present current, signed (0 where the model has none)
+    at_s: host time at which the answer arrived
+    alert: the servo reports a latched hardware error
+    """
+
+    position_steps: int
+    velocity_steps_s: float
+    current_ma: float
+    at_s: float
+    alert: bool
+
+
+class BusHealth(NamedTuple):
+    """Counts since open: bytes sent and received, and errors by kind."""
+
+    tx_bytes: int
+    rx_bytes: int
+    errors: Mapping[str, int]
+
+
+class ServoSetup(NamedTuple):
+    """What a bus must know of one servo.
+
+    model: name as in the control table, e.g. "xl330-m077"
+    min_steps, max_steps: no goal outside is ever sent
+    max_speed_steps_s: armed in the servo's own profile
+    """
+
+    id: int
+    model: str
+    min_steps: int
+    max_steps: int
+    max_speed_steps_s: float
+
+
+class ServoBus(Protocol):
+    """A chain of servos; all sequences are in the order of the setups it was made with."""
+
+    def open(self) -> None:
+        """Open the port, find every servo, check and prepare it; torque stays off.
+
+        Raises:
+            drivers.errors.PortError: the port cannot be opened.
+            drivers.errors.ServoMissing: servos are absent or of another model.
+        """
+        ...
+
+    def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
+        """Read all servos in one exchange; None where no fresh answer came.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        ...
+
+    def engage(self) -> tuple[int, ...]:
+        """Set every goal to the present position (clipped to its limits), then torque on.
+
+        Returns the goals that are now in force, in steps.
+        """
+        ...
+
+    def write(self, goals_steps: Sequence[int]) -> None:
+        """Send one goal to every servo in one packet; goals are clipped to the limits."""
+        ...
+
+    def faults(self) -> tuple[str, ...]:
+        """Name every latched servo fault found so far, e.g. "servo 7: overload"."""
+        ...
+
+    def release(self) -> None:
+        """Torque off on every servo; never raises for a servo that does not answer."""
+        ...
+
+    def health(self) -> BusHealth:
+        """Give byte and error counts."""
+        ...
+
+    def close(self) -> None:
+        """Close the port."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class DetectedFace:
+    """A face in a picture.
+
+    box_px: x, y, width, height
+    landmarks_px: (5, 2): right eye, left eye, nose tip, right and left mouth corner;
+        left and right are the owner's (the right eye lies left in the picture)
+    confidence: 0..1
+    """
+
+    box_px: tuple[float, float, float, float]
+    landmarks_px: Pixels
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
+class MovingBlob:
+    """Something that moves, with its place in the camera frame (x right, y down, z forward).
+
+    id: identity given by the detector, stable from picture to picture
+    kind: "hand", "thing", ...
+    """
+
+    id: int
+    kind: str
+    p_camera_m: tuple[float, float, float]
+    radius_m: float
+    spin_rad_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Detections:
+    """What was found in one picture.
+
+    captured_s: host time of the exposure; number: counts pictures from 1
+    picture: the BGR picture itself where there is one (never written to after this)
+    """
+
+    captured_s: float
+    number: int
+    width_px: int
+    height_px: int
+    faces: tuple[DetectedFace, ...] = ()
+    blobs: tuple[MovingBlob, ...] = ()
+    picture: Picture | None = None
+
+
+class Camera(Protocol):
+    """A source of detections. The newest is a value in a slot: nothing queues, nothing blocks."""
+
+    def open(self) -> None:
+        """Start looking.
+
+        Raises:
+            drivers.errors.CameraError: it cannot; the message names the thing and the cure.
+        """
+        ...
+
+    def latest(self, now_s: float) -> Detections | None:
+        """Give the newest detections available at ``now_s``, or None before the first.
+
+        Raises:
+            drivers.errors.CameraError: the source has failed for good.
+        """
+        ...
+
+    def close(self) -> None:
+        """Stop and free the source; safe to call twice."""
+        ...
+
+
+class FaceDetector(Protocol):
+    """Finds faces in one picture; pure but for the network's own memory."""
+
+    def find(self, picture: Picture) -> tuple[DetectedFace, ...]:
+        """Find faces, the largest first, in pixels of the picture given."""
+        ...

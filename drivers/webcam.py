@@ -1,0 +1,123 @@
+"""A camera of Video4Linux, read through OpenCV."""
+
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from drivers.errors import CameraError
+from drivers.picture_source import Shot
+from drivers.quiet_opencv import quiet_opencv
+
+# Pictures in a row that may fail before the camera counts as gone; one fails now and
+# then where a cable is long.
+_MOST_FAILURES = 5
+# The kernel's stamp is believed if it is this young on the same clock.
+_OLDEST_STAMP_S = 1.0
+
+
+def open_v4l2(device: str) -> cv2.VideoCapture:
+    """Open a device file by Video4Linux alone."""
+    return cv2.VideoCapture(device, cv2.CAP_V4L2)
+
+
+class Webcam:
+    """A camera at /dev/video<N>, or at a device file such as /dev/v4l/by-id/..."""
+
+    def __init__(
+        self,
+        device: int | str | Path = 0,
+        width_px: int = 640,
+        height_px: int = 480,
+        rate_hz: float = 30.0,
+        capture: Callable[[str], cv2.VideoCapture] = open_v4l2,
+    ) -> None:
+        """Name the camera and what is asked of it; it gives what comes nearest.
+
+        capture: opens a device file; another one serves where there is no camera
+        """
+        self._file = Path(f"/dev/video{device}" if isinstance(device, int) else device)
+        self._wishes = {
+            cv2.CAP_PROP_FRAME_WIDTH: width_px,
+            cv2.CAP_PROP_FRAME_HEIGHT: height_px,
+            cv2.CAP_PROP_FPS: rate_hz,
+            # One buffer: a picture fetched late is a fresh one, not an old one kept.
+            cv2.CAP_PROP_BUFFERSIZE: 1,
+        }
+        self._open_capture = capture
+        self._capture: cv2.VideoCapture | None = None
+        self._number = 0
+
+    def open(self) -> None:
+        """Open the camera and fetch one picture as a proof.
+
+        Raises:
+            drivers.errors.CameraError: it is absent, forbidden, busy or gives no picture.
+        """
+        self.close()
+        self._check_file()
+        with quiet_opencv():
+            capture = self._open_capture(str(self._file))
+            for what, value in self._wishes.items():
+                capture.set(what, value)
+            works = capture.isOpened() and capture.grab()
+        if not works:
+            capture.release()
+            raise CameraError(
+                f"{self._file} gives no picture: it is no camera, or another program uses it; "
+                "close that program or name another camera"
+            )
+        self._capture, self._number = capture, 0
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Wait for the next picture; its time is the kernel's stamp, else that of its arrival.
+
+        Raises:
+            drivers.errors.CameraError: the camera is not open or gives no more pictures.
+        """
+        if self._capture is None:
+            raise CameraError(f"camera {self._file} is not open: call open() before taking")
+        for _ in range(_MOST_FAILURES):
+            if stop.is_set():
+                return None
+            if not self._capture.grab():
+                continue
+            arrived_s = now_s()
+            found, picture = self._capture.retrieve()
+            if found and picture is not None and picture.size:
+                pixels = np.asarray(picture, dtype=np.uint8)
+                pixels.setflags(write=False)
+                self._number += 1
+                return Shot(self._stamp_s(self._capture, arrived_s), self._number, pixels)
+        raise CameraError(
+            f"camera {self._file} gives no more pictures: check its cable, start anew"
+        )
+
+    def close(self) -> None:
+        """Free the camera; safe to call twice."""
+        if self._capture is not None:
+            self._capture.release()
+        self._capture = None
+
+    def _check_file(self) -> None:
+        """Refuse a device file that is absent or forbidden, and say what there is."""
+        if not self._file.exists():
+            there = ", ".join(sorted(str(f) for f in self._file.parent.glob("video*")))
+            raise CameraError(
+                f"no camera at {self._file} (there is: {there or 'none'}): "
+                "plug it in or name another"
+            )
+        if not os.access(self._file, os.R_OK | os.W_OK):
+            raise CameraError(
+                f"{self._file} may not be opened: add yourself to the group video "
+                "(sudo usermod -aG video $USER) and log in again"
+            )
+
+    @staticmethod
+    def _stamp_s(capture: cv2.VideoCapture, arrived_s: float) -> float:
+        """Give the kernel's stamp of the last picture where it is on our clock."""
+        stamp_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        return stamp_s if 0.0 <= arrived_s - stamp_s <= _OLDEST_STAMP_S else arrived_s

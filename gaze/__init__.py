@@ -1,0 +1,1 @@
+"""Pure gaze models: no clock, no I/O, no global dice; imports numpy and nothing else of ours."""

@@ -1,0 +1,164 @@
+"""Directions, great circles and rotations on plain tuples.
+
+Frames and signs as in gaze.types: x forward, y left, z up; yaw + left, pitch + up,
+roll + right ear down. Radians throughout. Scalar arithmetic, because one numpy call on
+three numbers costs as much as the whole of most functions here.
+"""
+
+from math import asin, atan2, cos, hypot, pi, sin, sqrt
+
+from gaze.types import Angles2, Angles3, Mat3, Vec3
+
+
+def wrap(angle_rad: float) -> float:
+    """Bring an angle into -pi..pi."""
+    return (angle_rad + pi) % (2.0 * pi) - pi
+
+
+def add(a: Vec3, b: Vec3) -> Vec3:
+    """Add two vectors."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def sub(a: Vec3, b: Vec3) -> Vec3:
+    """Subtract ``b`` from ``a``."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def scale(a: Vec3, factor: float) -> Vec3:
+    """Multiply a vector by a number."""
+    return (a[0] * factor, a[1] * factor, a[2] * factor)
+
+
+def dot(a: Vec3, b: Vec3) -> float:
+    """Give the inner product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vec3, b: Vec3) -> Vec3:
+    """Give the outer product."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def norm(a: Vec3) -> float:
+    """Give the length of a vector."""
+    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+def unit(a: Vec3) -> Vec3:
+    """Give the direction of a vector; straight ahead for the zero vector."""
+    length = norm(a)
+    if length == 0.0:
+        return (1.0, 0.0, 0.0)
+    return (a[0] / length, a[1] / length, a[2] / length)
+
+
+def direction(yaw_pitch_rad: Angles2) -> Vec3:
+    """Give the unit vector with a yaw and pitch."""
+    yaw, pitch = yaw_pitch_rad
+    return (cos(pitch) * cos(yaw), cos(pitch) * sin(yaw), sin(pitch))
+
+
+def yaw_pitch(v: Vec3) -> Angles2:
+    """Give the yaw and pitch of a vector of any length."""
+    return (atan2(v[1], v[0]), atan2(v[2], hypot(v[0], v[1])))
+
+
+def angle_between(a: Vec3, b: Vec3) -> float:
+    """Give the angle between two vectors of any length, exact also for tiny angles."""
+    return atan2(norm(cross(a, b)), dot(a, b))
+
+
+def along_great_circle(start: Vec3, end: Vec3, fraction: float) -> Vec3:
+    """Give the unit vector a fraction of the way from one unit vector to another.
+
+    0 gives ``start``, 1 gives ``end``; the path is the shorter arc. Opposite vectors
+    have no shortest arc: the turn then goes over the left.
+    """
+    angle = angle_between(start, end)
+    if angle < 1e-9:
+        return end if fraction >= 0.5 else start
+    axis = unit(cross(start, end)) if angle < pi - 1e-6 else (0.0, 0.0, 1.0)
+    return turned(start, axis, angle * fraction)
+
+
+def turned(v: Vec3, axis: Vec3, angle_rad: float) -> Vec3:
+    """Turn a vector about a unit axis (Rodrigues)."""
+    c, s = cos(angle_rad), sin(angle_rad)
+    k = dot(axis, v) * (1.0 - c)
+    x = cross(axis, v)
+    return (
+        v[0] * c + x[0] * s + axis[0] * k,
+        v[1] * c + x[1] * s + axis[1] * k,
+        v[2] * c + x[2] * s + axis[2] * k,
+    )
+
+
+def shortened(v: Vec3, offset_rad: float) -> Vec3:
+    """Bring a direction nearer to straight ahead by ``offset_rad`` along the great circle.
+
+    A direction closer than the offset becomes straight ahead.
+    """
+    ahead = (1.0, 0.0, 0.0)
+    arc = angle_between(ahead, v)
+    if arc <= offset_rad or arc == 0.0:
+        return ahead
+    return along_great_circle(ahead, unit(v), (arc - offset_rad) / arc)
+
+
+def rotation(head_rad: Angles3) -> Mat3:
+    """Give the rotation Rz(yaw) Ry(-pitch) Rx(roll) of a yaw-pitch-roll neck."""
+    yaw, pitch, roll = head_rad
+    cy, sy = cos(yaw), sin(yaw)
+    cp, sp = cos(pitch), sin(pitch)
+    cr, sr = cos(roll), sin(roll)
+    return (
+        (cy * cp, -cy * sp * sr - sy * cr, -cy * sp * cr + sy * sr),
+        (sy * cp, -sy * sp * sr + cy * cr, -sy * sp * cr - cy * sr),
+        (sp, cp * sr, cp * cr),
+    )
+
+
+def angles_of(R: Mat3) -> Angles3:
+    """Give the yaw, pitch and roll of a rotation: the inverse of ``rotation``."""
+    return (
+        atan2(R[1][0], R[0][0]),
+        asin(min(1.0, max(-1.0, R[2][0]))),
+        atan2(R[2][1], R[2][2]),
+    )
+
+
+def rotate(R: Mat3, v: Vec3) -> Vec3:
+    """Give R v: child coordinates to parent coordinates."""
+    return (
+        R[0][0] * v[0] + R[0][1] * v[1] + R[0][2] * v[2],
+        R[1][0] * v[0] + R[1][1] * v[1] + R[1][2] * v[2],
+        R[2][0] * v[0] + R[2][1] * v[1] + R[2][2] * v[2],
+    )
+
+
+def rotate_back(R: Mat3, v: Vec3) -> Vec3:
+    """Give R^T v: parent coordinates to child coordinates."""
+    return (
+        R[0][0] * v[0] + R[1][0] * v[1] + R[2][0] * v[2],
+        R[0][1] * v[0] + R[1][1] * v[1] + R[2][1] * v[2],
+        R[0][2] * v[0] + R[1][2] * v[1] + R[2][2] * v[2],
+    )
+
+
+def compose(A: Mat3, B: Mat3) -> Mat3:
+    """Give A B."""
+    rows = []
+    for a in A:
+        rows.append(
+            (
+                a[0] * B[0][0] + a[1] * B[1][0] + a[2] * B[2][0],
+                a[0] * B[0][1] + a[1] * B[1][1] + a[2] * B[2][1],
+                a[0] * B[0][2] + a[1] * B[1][2] + a[2] * B[2][2],
+            )
+        )
+    return (rows[0], rows[1], rows[2])

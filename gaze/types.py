@@ -1,0 +1,185 @@
+"""Values that flow through the gaze models.
+
+Frames (REP-103): ``world`` at the neck base, x forward, y left, z up; ``head`` midway
+between the eyes with the same axes. Yaw + left, pitch + up, roll + right ear down.
+Radians, metres, seconds. ``R_world_head`` maps head coordinates to world coordinates.
+
+Single points are plain tuples of floats, which in a 5 ms tick are several times
+cheaper than three-element arrays; only sets of bodies are arrays.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vec3 = tuple[float, float, float]
+Mat3 = tuple[Vec3, Vec3, Vec3]
+"""Rows of a rotation matrix."""
+Angles2 = tuple[float, float]
+"""(yaw, pitch) in radians, yaw + left, pitch + up."""
+Angles3 = tuple[float, float, float]
+"""(yaw, pitch, roll) in radians, roll + right ear down."""
+Floats = NDArray[np.float64]
+
+Phase = Literal["fixate", "saccade", "pursue"]
+
+# The eight face parts in the order of the transition matrix (Nakamoto & Tsuruno, eq 1);
+# left and right are the owner's own.
+PARTS = ("DN", "FL", "LE", "M", "N", "FR", "RE", "UP")
+PART_NAMES = {
+    "DN": "chin",
+    "FL": "left side",
+    "LE": "left eye",
+    "M": "mouth",
+    "N": "nose",
+    "FR": "right side",
+    "RE": "right eye",
+    "UP": "forehead",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """Everything that could be looked at, one row a body.
+
+    ids:       stable identity of each body
+    kinds:     "face", "hand", "thing", ... as perception named it
+    p_world_m: (n, 3) positions of the centres
+    v_world_m_s: (n, 3) velocities
+    w_world_rad_s: (n, 3) angular velocities
+    radius_m:  (n,) half the size
+    """
+
+    ids: tuple[int, ...] = ()
+    kinds: tuple[str, ...] = ()
+    p_world_m: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    v_world_m_s: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    w_world_rad_s: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    radius_m: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        """Count the bodies."""
+        return len(self.ids)
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """One person's face in the world.
+
+    id:            stable identity, equal to the id of its row in Bodies
+    p_world_m:     face centre, the nose (Nakamoto & Tsuruno 4.4.2)
+    v_world_m_s:   velocity of the centre
+    R_world_face:  face axes in the world: x out of the face, y to the owner's left, z up
+    parts_world_m: the eight parts in the order of PARTS
+    confidence:    0..1 of the detector
+    """
+
+    id: int
+    p_world_m: Vec3
+    v_world_m_s: Vec3
+    R_world_face: Mat3
+    parts_world_m: tuple[Vec3, ...]
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
+class Percept:
+    """What one picture showed, placed in the world by the head pose at its capture time."""
+
+    captured_s: float
+    bodies: Bodies = field(default_factory=Bodies)
+    faces: tuple[Face, ...] = ()
+
+    def age_s(self, t_s: float) -> float:
+        """Give the age of the picture at ``t_s``."""
+        return t_s - self.captured_s
+
+
+class Target(NamedTuple):
+    """Where to look and why.
+
+    p_world_m, v_world_m_s: the point and its velocity, as at ``at_s``
+    kind:     "face", "hand", "thing", "idle", ...
+    id:       body or face id, -1 where there is nothing
+    pull:     amount of attention A (Mitake et al., eq 1 or the rule's constant)
+    top_down: whether a rule chose it
+    part:     face part code where a face is looked at
+    shift:    counts up whenever another object or part is chosen: the saccade's event flag
+    why:      the reason in words
+    """
+
+    p_world_m: Vec3
+    v_world_m_s: Vec3
+    at_s: float
+    kind: str
+    id: int
+    pull: float
+    top_down: bool
+    part: str | None
+    shift: int
+    why: str
+
+
+class GazeState(NamedTuple):
+    """Where head and eyes are, as measured.
+
+    head_rad, head_rate_rad_s: (yaw, pitch, roll) in space and their rates
+    eye_left_rad, eye_right_rad: (yaw, pitch) in the head
+    R_world_head, p_world_head_m: pose of the head frame
+    p_world_eye_left_m, p_world_eye_right_m: centres of rotation of the eyes
+    lid_left, lid_right: opening, 0 shut .. 1 open
+    """
+
+    head_rad: Angles3
+    head_rate_rad_s: Angles3
+    eye_left_rad: Angles2
+    eye_right_rad: Angles2
+    R_world_head: Mat3
+    p_world_head_m: Vec3
+    p_world_eye_left_m: Vec3
+    p_world_eye_right_m: Vec3
+    lid_left: float
+    lid_right: float
+
+
+class GazeCommand(NamedTuple):
+    """What the models wish for this tick.
+
+    head_rad: (yaw, pitch, roll); eye_left_rad, eye_right_rad: (yaw, pitch) in the head
+    lid_left, lid_right: opening, 0 shut .. 1 open
+    phase:    what the eyes are doing; blink: whether a blink is under way
+    gaze_point_world_m: where both eyes are meant to point now
+    saccades, fixations, blinks: counts since the reset
+    """
+
+    head_rad: Angles3
+    eye_left_rad: Angles2
+    eye_right_rad: Angles2
+    lid_left: float
+    lid_right: float
+    phase: Phase
+    blink: bool
+    gaze_point_world_m: Vec3
+    saccades: int
+    fixations: int
+    blinks: int
+
+
+class HeadGeometry(Protocol):
+    """What the oculomotor models must know of a head's build (robot.kinematics has it)."""
+
+    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
+        """Give R_world_head and p_world_head_m for neck angles."""
+        ...
+
+    def facing(self, p_world_m: Vec3) -> Angles2:
+        """Give the neck yaw and pitch that point the head's x axis through a point."""
+        ...
+
+    def eyes_on(
+        self, p_world_m: Vec3, R_world_head: Mat3, p_world_head_m: Vec3
+    ) -> tuple[Angles2, Angles2]:
+        """Give the left and right eye angles that fixate a point from a head pose."""
+        ...

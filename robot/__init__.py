@@ -1,0 +1,1 @@
+"""The machine: the only place where gaze models and drivers meet."""

@@ -1,0 +1,281 @@
+"""Real or simulated parts to one robot: the only room that sees config and sim_mock."""
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from config.schema import Rig, load_profile, load_walk
+from drivers.camera_thread import CameraThread
+from drivers.dynamixel import DynamixelBus
+from drivers.dynamixel_port import BlockingPort, BusPort
+from drivers.errors import SetupError
+from drivers.face_detector import face_detector
+from drivers.types import Camera
+from drivers.video_file import VideoFile
+from drivers.webcam import Webcam
+from gaze.attention import Attention
+from gaze.bottom_up import BottomUp
+from gaze.field_of_view import FieldOfView
+from gaze.head import Head
+from gaze.idle import Idle
+from gaze.lids import Lids
+from gaze.oculomotor import Oculomotor
+from gaze.pursuit import Pursuit
+from gaze.saccade import Saccade
+from gaze.scanpath import Scanpath
+from gaze.top_down import TopDown
+from gaze.types import Angles2, Mat3, Vec3
+from robot.body import Body, JointParams
+from robot.clock import Clock, RealClock, SimulatedClock
+from robot.frames import CameraMount, CameraParams, PoseHistory, standing_still
+from robot.kinematics import Kinematics
+from robot.loop import LoopParams, Robot
+from robot.perception import Perception
+from robot.safety import Guard
+from robot.tracks import Tracker
+from robot.types import JOINTS, JointAngles
+from sim_mock.film_camera import FilmCamera
+from sim_mock.ports import InProcessPort
+from sim_mock.pty_bus import PtyBus
+from sim_mock.scene_camera import SceneCamera, SceneCameraParams
+from sim_mock.servo_chain import ServoChain, build_chain
+from sim_mock.visitor import scenes
+
+# Emulated joints start a little crooked, as a head that somebody has moved by hand does.
+_CROOKED_DEG = {
+    "left_eye_pan": 6.0,
+    "right_eye_pan": -4.0,
+    "neck_yaw": -12.0,
+    "neck_pitch": -8.0,
+}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What to run: wires or emulation, what to look at, which clock, which dice.
+
+    Exactly one of scene, video and camera is set.
+    """
+
+    mock: bool
+    fast: bool
+    seed: int
+    scene: str | None = None
+    video: Path | None = None
+    camera: int | None = None
+    profile: str | None = None
+    film_delay_s: float = 0.05
+
+
+class Assembly(NamedTuple):
+    """A robot with what belongs to running it.
+
+    sent_digest: gives the SHA-256 of all bytes sent to the emulated bus, None elsewhere
+    close: ends what was started for it; notes: what a person should know
+    """
+
+    robot: Robot
+    clock: Clock
+    loop: LoopParams
+    park_rad: JointAngles
+    mount: CameraMount
+    poses: PoseHistory
+    horizontal_field_deg: float
+    sent_digest: Callable[[], str | None]
+    close: Callable[[], None]
+    notes: tuple[str, ...]
+
+
+class _Wires(NamedTuple):
+    """The servo port and, where it is emulated in this process, the chain behind it."""
+
+    port: BusPort
+    chain: ServoChain | None
+    digest: Callable[[], str | None]
+    close: Callable[[], None]
+
+
+def assemble(rig: Rig, choice: Choice) -> Assembly:
+    """Build the robot of a rig; nothing is opened but the emulated bus.
+
+    Raises:
+        config.load.ConfigError: the profile or walk that the rig names is at fault.
+        drivers.errors.SetupError: a film or model file cannot be used.
+    """
+    if choice.scene is not None and choice.scene not in scenes():
+        known = ", ".join(sorted(scenes()))
+        raise SetupError(f"--scene {choice.scene}: unknown; scenes: {known}")
+    scanpath_dice, lid_dice, camera_dice = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(choice.seed).spawn(3)
+    )
+    clock: Clock = SimulatedClock() if choice.fast else RealClock()
+    kinematics = _kinematics(rig)
+    poses = PoseHistory(kinematics)
+    camera_params, notes = _camera_params(rig, choice, kinematics)
+    mount = CameraMount(camera_params)
+    wires = _wires(rig, choice, clock)
+    try:
+        bus = DynamixelBus(
+            wires.port, [rig.joints[name].setup() for name in JOINTS], rig.bus.dynamixel
+        )
+        body = Body(bus, rig.joints)
+        where = _true_head(wires.chain, body, kinematics, poses)
+        robot = Robot(
+            body,
+            kinematics,
+            _camera(rig, choice, clock, mount, where, camera_dice),
+            Perception(mount, camera_params.horizontal_field_deg, Tracker(rig.tracks)),
+            poses,
+            _attention(rig),
+            Scanpath(rig.gaze.scanpath, load_walk(rig.gaze.scanpath.walk), scanpath_dice),
+            _oculomotor(rig, choice.profile or rig.profile, kinematics, lid_dice),
+            Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS)),
+        )
+    except BaseException:
+        wires.close()
+        raise
+    park = tuple(radians(rig.park_deg.get(name, 0.0)) for name in JOINTS)
+    return Assembly(
+        robot,
+        clock,
+        rig.loop,
+        park,
+        mount,
+        poses,
+        camera_params.horizontal_field_deg,
+        wires.digest,
+        wires.close,
+        notes,
+    )
+
+
+def _kinematics(rig: Rig) -> Kinematics:
+    lids = rig.lid_joints
+    return Kinematics(
+        rig.geometry,
+        (radians(lids.left_shut_deg), radians(lids.right_shut_deg)),
+        (radians(lids.left_open_deg), radians(lids.right_open_deg)),
+    )
+
+
+def _camera_params(
+    rig: Rig, choice: Choice, kinematics: Kinematics
+) -> tuple[CameraParams, tuple[str, ...]]:
+    """Take the rig's camera, standing still where its pictures cannot turn with the head."""
+    still = choice.video is not None or (choice.mock and choice.camera is not None)
+    if not still or rig.camera.mount == "base":
+        return rig.camera, ()
+    what = "a film" if choice.video is not None else "a webcam beside an emulated head"
+    note = f"{what} does not turn with the head: the camera counts as standing still"
+    return standing_still(rig.camera, kinematics), (note,)
+
+
+def _wires(rig: Rig, choice: Choice, clock: Clock) -> _Wires:
+    """Give the real port, an emulated bus in this process, or one on a pseudo-terminal."""
+    if not choice.mock:
+        return _Wires(BlockingPort(rig.bus.port), None, _no_digest, _nothing)
+    specs = [_spec(name, rig.joints[name]) for name in JOINTS]
+    if not choice.fast:
+        bus = PtyBus()
+        return _Wires(BlockingPort(bus.start(specs)), None, _no_digest, bus.stop)
+    sent = hashlib.sha256()
+    chain = build_chain(specs, clock.now_s)
+    return _Wires(InProcessPort(chain, sent.update), chain, sent.hexdigest, _nothing)
+
+
+def _spec(name: str, joint: JointParams) -> tuple[int, str, int]:
+    """Give id, model and start position of the emulated servo of a joint."""
+    return joint.id, joint.model, round(joint.steps(radians(_CROOKED_DEG.get(name, 0.0))))
+
+
+def _no_digest() -> str | None:
+    return None
+
+
+def _nothing() -> None:
+    return None
+
+
+def _true_head(
+    chain: ServoChain | None, body: Body, kinematics: Kinematics, poses: PoseHistory
+) -> Callable[[float], tuple[Mat3, Vec3]]:
+    """Give where the emulated head is: from the servos themselves where they are at hand."""
+    if chain is None:
+        return poses.head_pose
+
+    def now(_: float) -> tuple[Mat3, Vec3]:
+        q = body.angles(list(chain.positions_steps()))
+        return kinematics.head_pose((q[6], q[7], q[8]))
+
+    return now
+
+
+def _camera(
+    rig: Rig,
+    choice: Choice,
+    clock: Clock,
+    mount: CameraMount,
+    where: Callable[[float], tuple[Mat3, Vec3]],
+    rng: np.random.Generator,
+) -> Camera:
+    if choice.scene is not None:
+        params = SceneCameraParams(horizontal_field_deg=rig.camera.horizontal_field_deg)
+        return SceneCamera(params, scenes()[choice.scene], mount, where, rng)
+    detector = face_detector(rig.detector)
+    if choice.video is not None:
+        film = VideoFile(choice.video)
+        if choice.fast:
+            return FilmCamera(film, detector, choice.film_delay_s)
+        return CameraThread(film, detector, clock.now_s)
+    return CameraThread(Webcam(choice.camera or 0), detector, clock.now_s)
+
+
+def _attention(rig: Rig) -> Attention:
+    gaze = rig.gaze
+    return Attention(
+        gaze.attention,
+        FieldOfView(gaze.field_of_view),
+        BottomUp(gaze.bottom_up),
+        TopDown(gaze.top_down),
+        Idle(gaze.idle),
+    )
+
+
+def _oculomotor(
+    rig: Rig, profile_name: str, kinematics: Kinematics, rng: np.random.Generator
+) -> Oculomotor:
+    """Compose the models with the narrower of the rig's and the profile's ranges."""
+    profile = load_profile(profile_name)
+    gaze, joints = rig.gaze, rig.joints
+    eyes = tuple(
+        (
+            _range(joints, f"{side}_eye_pan", profile.eye_yaw_deg),
+            _range(joints, f"{side}_eye_tilt", profile.eye_pitch_deg),
+        )
+        for side in ("left", "right")
+    )
+    neck = (
+        _range(joints, "neck_yaw", profile.neck_yaw_deg),
+        _range(joints, "neck_pitch", 180.0),
+    )
+    smallest = min(abs(end) for eye in eyes for span in eye for end in span)
+    return Oculomotor(
+        gaze.oculomotor,
+        kinematics,
+        (eyes[0], eyes[1]),
+        Saccade(gaze.saccade),
+        Pursuit(gaze.pursuit),
+        Head(gaze.head, smallest, neck),
+        Lids(gaze.lids, rng),
+    )
+
+
+def _range(joints: Mapping[str, JointParams], name: str, most_deg: float) -> Angles2:
+    """Give a joint's range within +-most_deg, in radians."""
+    joint = joints[name]
+    return radians(max(joint.min_deg, -most_deg)), radians(min(joint.max_deg, most_deg))

@@ -1,0 +1,166 @@
+"""Joints to servos and back: the only place that knows what a step means at a joint."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import ceil, floor, pi, radians
+
+from drivers.types import ServoBus, ServoReading, ServoSetup
+from robot.safety import JointLimit
+from robot.types import JOINTS, JointAngles, JointState
+
+_STEPS_PER_RAD = 4096.0 / (2.0 * pi)  # all Dynamixel X servos
+
+
+@dataclass(frozen=True)
+class JointParams:
+    """One joint: its servo, how it is built in, and its limits."""
+
+    id: int = field(metadata={"low": 0, "high": 252, "unit": "", "says": "servo id"})
+    model: str = field(metadata={"unit": "", "says": 'servo model, e.g. "xl330-m077"'})
+    min_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "lowest joint angle"}
+    )
+    max_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "highest joint angle"}
+    )
+    max_speed_deg_s: float = field(
+        metadata={"low": 1.0, "high": 2000.0, "unit": "deg/s", "says": "top speed of the joint"}
+    )
+    max_accel_deg_s2: float = field(
+        metadata={
+            "low": 10.0,
+            "high": 200000.0,
+            "unit": "deg/s2",
+            "says": "top acceleration of the joint",
+        }
+    )
+    sign: int = field(
+        default=1,
+        metadata={
+            "choices": (1, -1),
+            "unit": "",
+            "says": "1 where more steps turn the joint left, up, open or right ear down; else -1",
+        },
+    )
+    ratio: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.05,
+            "high": 50.0,
+            "unit": "",
+            "says": "turns of the servo for one turn of the joint",
+        },
+    )
+    zero_step: int = field(
+        default=2048,
+        metadata={"low": 0, "high": 4095, "unit": "steps", "says": "servo position at 0 deg"},
+    )
+
+    def __post_init__(self) -> None:
+        """Check that the limits fit each other and the servo's one turn.
+
+        Raises:
+            ValueError: they do not; the message says which.
+        """
+        if self.min_deg >= self.max_deg:
+            raise ValueError(f"min_deg {self.min_deg} must be below max_deg {self.max_deg}")
+        if not self.min_deg <= 0.0 <= self.max_deg:
+            raise ValueError("0 deg, the centre, must lie between min_deg and max_deg")
+        for key, angle in (("min_deg", self.min_deg), ("max_deg", self.max_deg)):
+            steps = self.steps(radians(angle))
+            if not 0.0 <= steps <= 4095.0:
+                raise ValueError(
+                    f"{key} {angle} lies at step {steps:.0f}, outside the servo's 0..4095"
+                )
+
+    def steps(self, angle_rad: float) -> float:
+        """Give the servo position of a joint angle, not rounded."""
+        return self.zero_step + self.sign * self.ratio * angle_rad * _STEPS_PER_RAD
+
+    def angle_rad(self, steps: float) -> float:
+        """Give the joint angle of a servo position."""
+        return (steps - self.zero_step) / (self.sign * self.ratio * _STEPS_PER_RAD)
+
+    def limit(self) -> JointLimit:
+        """Give the limits in radians."""
+        return JointLimit(
+            radians(self.min_deg),
+            radians(self.max_deg),
+            radians(self.max_speed_deg_s),
+            radians(self.max_accel_deg_s2),
+        )
+
+    def setup(self) -> ServoSetup:
+        """Give what the bus must know: the range rounded inwards, the speed at the servo."""
+        ends = sorted((self.steps(radians(self.min_deg)), self.steps(radians(self.max_deg))))
+        speed = radians(self.max_speed_deg_s) * self.ratio * _STEPS_PER_RAD
+        return ServoSetup(self.id, self.model, ceil(ends[0]), floor(ends[1]), speed)
+
+
+class Body:
+    """All joints of one rig on one bus."""
+
+    def __init__(self, bus: ServoBus, joints: Mapping[str, JointParams]) -> None:
+        """Take the bus, made with the setups in the order of JOINTS, and the joints."""
+        self.bus = bus
+        self._joints = tuple(joints[name] for name in JOINTS)
+        self._scale = tuple(
+            1.0 / (joint.sign * joint.ratio * _STEPS_PER_RAD) for joint in self._joints
+        )
+        self._zero = tuple(joint.zero_step for joint in self._joints)
+        self._last: list[ServoReading | None] = [None] * len(JOINTS)
+
+    def start(self) -> JointAngles:
+        """Open the bus and switch torque on where the joints are; give the goals in force.
+
+        Raises:
+            drivers.errors.SetupError: port or servos are not as configured.
+        """
+        self.bus.open()
+        try:
+            return self.angles(self.bus.engage())
+        except BaseException:
+            self.stop()
+            raise
+
+    def read(self, t_s: float) -> JointState:
+        """Read all joints; one that does not answer keeps its last value and its age."""
+        readings = self.bus.read(t_s)
+        missing: tuple[str, ...] = ()
+        for i, reading in enumerate(readings):
+            if reading is None:
+                missing = (*missing, JOINTS[i])
+            else:
+                self._last[i] = reading
+        position, velocity, measured = [], [], []
+        for zero, scale, last in zip(self._zero, self._scale, self._last, strict=True):
+            if last is None:
+                # Never answered since the start: the age says so, the value is a centre.
+                position.append(0.0)
+                velocity.append(0.0)
+                measured.append(float("-inf"))
+            else:
+                position.append((last.position_steps - zero) * scale)
+                velocity.append(last.velocity_steps_s * scale)
+                measured.append(last.at_s)
+        return JointState(tuple(position), tuple(velocity), tuple(measured), missing)
+
+    def write(self, command_rad: JointAngles) -> None:
+        """Send one goal to every servo."""
+        self.bus.write(
+            [
+                round(zero + angle / scale)
+                for zero, scale, angle in zip(self._zero, self._scale, command_rad, strict=True)
+            ]
+        )
+
+    def angles(self, steps: tuple[int, ...] | list[float]) -> JointAngles:
+        """Give the joint angles of servo positions in the order of JOINTS."""
+        return tuple(joint.angle_rad(step) for joint, step in zip(self._joints, steps, strict=True))
+
+    def stop(self) -> None:
+        """Torque off and close the bus."""
+        try:
+            self.bus.release()
+        finally:
+            self.bus.close()

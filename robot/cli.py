@@ -1,0 +1,176 @@
+"""The command ``gazerig``: what people type, and what they read on the terminal."""
+
+import contextlib
+import json
+import shutil
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from config.load import ConfigError
+from config.schema import Rig, load_rig
+from drivers.errors import DriverError, SetupError
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Makes an animatronic head look at people the way people look at each other.",
+)
+
+_BAD_INPUT = 2
+_FAULT = 1
+
+RigArgument = Annotated[
+    str, typer.Argument(metavar="RIG", help="A rig's YAML file, or the name of a shipped rig.")
+]
+
+
+@app.command()
+def run(
+    rig: RigArgument = "desk",
+    mock: Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")] = False,
+    scene: Annotated[
+        str | None, typer.Option(help="Look at a simulated scene (default with --mock: visitor).")
+    ] = None,
+    video: Annotated[Path | None, typer.Option(help="Look at a film or picture, looped.")] = None,
+    camera: Annotated[int | None, typer.Option(help="Look through webcam N.")] = None,
+    oak: Annotated[bool, typer.Option(help="Look through an OAK-D (not available yet).")] = False,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all dice.")] = 0,
+    fast: Annotated[
+        bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock, --seconds).")
+    ] = False,
+    profile: Annotated[
+        str | None, typer.Option(help="Ranges of eyes and head: robot, mitake, nakamoto.")
+    ] = None,
+    page: Annotated[str, typer.Option(help="Where the live page is served.")] = "127.0.0.1:8080",
+    no_page: Annotated[bool, typer.Option(help="Without the live page.")] = False,
+    summary: Annotated[
+        str | None, typer.Option(help="Write figures as JSON to this file; - prints them.")
+    ] = None,
+) -> None:
+    """Run the head: gazerig run --mock, then open the page it names."""
+    with _clear_errors():
+        # Vision and emulator are heavy; `check` and `--help` do without them.
+        from robot import session
+        from robot.assemble import assemble
+
+        address = _host_port(page)
+        wanted = session.Wanted(
+            mock=mock,
+            fast=fast,
+            seed=seed,
+            seconds=seconds,
+            scene=scene,
+            video=video,
+            camera=camera,
+            oak=oak,
+            profile=profile,
+            page=None if no_page or fast else address,
+            status_line=not fast and sys.stderr.isatty(),
+        )
+        made = assemble(load_rig(rig), wanted.choice())
+        with _signals() as stopped:
+            figures = session.run(made, wanted, stopped, _say, _status)
+        _write_summary(figures, summary)
+    if str(figures["stopped_by"]).startswith("fault"):
+        raise typer.Exit(_FAULT)
+
+
+@app.command()
+def check(rig: RigArgument = "desk") -> None:
+    """Check a rig's YAML and nothing else: all faults at once, no servo is touched."""
+    with _clear_errors():
+        found: Rig = load_rig(rig)
+        _say(
+            f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
+        )
+
+
+@app.command()
+def schema(
+    out: Annotated[Path | None, typer.Argument(help="File to write; default: print.")] = None,
+) -> None:
+    """Export the JSON Schema of rig files, for editors."""
+    from config.export import json_schema
+
+    text = json.dumps(json_schema(Rig), indent=2) + "\n"
+    if out is None:
+        print(text, end="")
+    else:
+        with _clear_errors():
+            out.write_text(text, encoding="utf-8")
+
+
+def main() -> None:
+    """Run the command line."""
+    app()
+
+
+@contextlib.contextmanager
+def _clear_errors() -> Iterator[None]:
+    """Turn what a person can mend into its message and exit code 2."""
+    try:
+        yield
+    except (ConfigError, SetupError) as error:
+        print(error, file=sys.stderr)
+        raise typer.Exit(_BAD_INPUT) from None
+    except DriverError as error:
+        print(error, file=sys.stderr)
+        raise typer.Exit(_FAULT) from None
+    except OSError as error:
+        print(f"{error.filename or 'file'}: {error.strerror or error}", file=sys.stderr)
+        raise typer.Exit(_BAD_INPUT) from None
+
+
+@contextlib.contextmanager
+def _signals() -> Iterator[Callable[[], str | None]]:
+    """Give whether Ctrl-C or SIGTERM came, by name; a second one is not waited for."""
+    came: list[str] = []
+
+    def note(number: int, _: FrameType | None) -> None:
+        came.append(signal.Signals(number).name)
+        if len(came) > 1:
+            raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: came[0] if came else None
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _host_port(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise SetupError(f"--page {text}: not HOST:PORT, for example 127.0.0.1:8080")
+    return host, int(port)
+
+
+def _write_summary(figures: dict[str, object], where: str | None) -> None:
+    if where is None:
+        return
+    text = json.dumps(figures, indent=2) + "\n"
+    if where == "-":
+        print(text, end="")
+    else:
+        Path(where).write_text(text, encoding="utf-8")
+
+
+def _say(line: str) -> None:
+    """Write a line for people; the status line before it is wiped."""
+    wipe = "\r\x1b[K" if sys.stderr.isatty() else ""
+    print(f"{wipe}{line}", file=sys.stderr, flush=True)
+
+
+def _status(line: str) -> None:
+    """Rewrite the status line."""
+    width = shutil.get_terminal_size().columns - 1
+    print(f"\r\x1b[K{line[:width]}", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,134 @@
+"""Where the head was at an instant in the past, and where the camera sits on it. Pure.
+
+A picture tells of the moment of its exposure. Placing it with the head's pose of now
+throws targets off by the head's motion in between, so poses are remembered.
+"""
+
+from bisect import bisect_left
+from collections import deque
+from dataclasses import dataclass, field
+from math import radians
+
+from gaze.angles import add, compose, rotate, rotation
+from gaze.types import Angles3, HeadGeometry, Mat3, Vec3
+
+_OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
+"""Maps camera optical axes (x right, y down, z forward) to x forward, y left, z up."""
+
+
+@dataclass(frozen=True)
+class CameraParams:
+    """Where the camera sits and what it covers."""
+
+    mount: str = field(
+        default="head",
+        metadata={
+            "choices": ("head", "base"),
+            "unit": "",
+            "says": "head: it turns with the head; base: it stands still",
+        },
+    )
+    position_mm: tuple[float, float, float] = field(
+        default=(20.0, 0.0, 45.0),
+        metadata={
+            "low": -2000.0,
+            "high": 2000.0,
+            "unit": "mm",
+            "says": "lens, ahead, left and above of the point between the eyes (head) or of "
+            "the neck base (base)",
+        },
+    )
+    yaw_deg: float = field(
+        default=0.0,
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "lens turned left"},
+    )
+    pitch_deg: float = field(
+        default=0.0,
+        metadata={"low": -90.0, "high": 90.0, "unit": "deg", "says": "lens turned up"},
+    )
+    horizontal_field_deg: float = field(
+        default=69.0,
+        metadata={
+            "low": 10.0,
+            "high": 150.0,
+            "unit": "deg",
+            "says": "horizontal field of view of the lens",
+        },
+    )
+
+
+class PoseHistory:
+    """The head's angles of the last seconds, and its pose at any instant among them."""
+
+    def __init__(self, geometry: HeadGeometry, ticks: int = 600) -> None:
+        """Keep ``ticks`` entries."""
+        self._geometry = geometry
+        self._times: deque[float] = deque(maxlen=ticks)
+        self._angles: deque[Angles3] = deque(maxlen=ticks)
+
+    def remember(self, t_s: float, head_rad: Angles3) -> None:
+        """Note the head's measured angles; times must grow."""
+        self._times.append(t_s)
+        self._angles.append(head_rad)
+
+    def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
+        """Give R_world_head and p_world_head_m at an instant, interpolated between ticks.
+
+        Before the oldest and after the newest entry that entry's pose is given.
+
+        Raises:
+            LookupError: nothing has been remembered yet.
+        """
+        if not self._times:
+            raise LookupError("no pose has been remembered yet")
+        after = bisect_left(self._times, t_s)
+        if after == 0:
+            return self._geometry.head_pose(self._angles[0])
+        if after == len(self._times):
+            return self._geometry.head_pose(self._angles[-1])
+        t0, t1 = self._times[after - 1], self._times[after]
+        share = (t_s - t0) / (t1 - t0)
+        a, b = self._angles[after - 1], self._angles[after]
+        return self._geometry.head_pose(
+            (
+                a[0] + share * (b[0] - a[0]),
+                a[1] + share * (b[1] - a[1]),
+                a[2] + share * (b[2] - a[2]),
+            )
+        )
+
+
+class CameraMount:
+    """Places the camera in the world."""
+
+    def __init__(self, params: CameraParams) -> None:
+        """Take where it sits."""
+        self.on_head = params.mount == "head"
+        x, y, z = params.position_mm
+        self._p: Vec3 = (x / 1e3, y / 1e3, z / 1e3)
+        turn = rotation((radians(params.yaw_deg), radians(params.pitch_deg), 0.0))
+        self._R = compose(turn, _OPTICAL)
+
+    def pose(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Mat3, Vec3]:
+        """Give R_world_camera and p_world_camera_m for a pose of the head."""
+        if not self.on_head:
+            return self._R, self._p
+        return compose(R_world_head, self._R), add(p_world_head_m, rotate(R_world_head, self._p))
+
+
+def standing_still(params: CameraParams, geometry: HeadGeometry) -> CameraParams:
+    """Give the mount on the base where a head camera is while the head looks straight ahead.
+
+    Films, and webcams beside an emulated head, do not turn with the head.
+    """
+    if params.mount == "base":
+        return params
+    _, (x, y, z) = geometry.head_pose((0.0, 0.0, 0.0))
+    dx, dy, dz = params.position_mm
+    return CameraParams(
+        "base",
+        (x * 1e3 + dx, y * 1e3 + dy, z * 1e3 + dz),
+        params.yaw_deg,
+        params.pitch_deg,
+        params.horizontal_field_deg,
+    )

@@ -1,0 +1,194 @@
+"""The tick, and the loop that keeps its time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import inf, radians
+from typing import NamedTuple
+
+from drivers.errors import DriverError, ServoFault
+from drivers.types import Camera, Detections
+from gaze.attention import Attention
+from gaze.oculomotor import Oculomotor
+from gaze.scanpath import Scanpath
+from gaze.types import GazeCommand, GazeState, Percept, Target
+from robot.body import Body
+from robot.clock import Clock
+from robot.frames import PoseHistory
+from robot.kinematics import Kinematics
+from robot.perception import Perception
+from robot.safety import Guard
+from robot.types import JointAngles, JointState, Verdict
+
+
+class Tick(NamedTuple):
+    """Everything one tick knew and decided; wish, permitted and measured side by side."""
+
+    t_s: float
+    joints: JointState
+    pose: GazeState
+    detections: Detections | None
+    percept: Percept | None
+    target: Target
+    gaze: GazeCommand
+    wish_rad: JointAngles
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class LoopParams:
+    """The control rate."""
+
+    rate_hz: float = field(
+        default=200.0,
+        metadata={"low": 20.0, "high": 1000.0, "unit": "Hz", "says": "control rate"},
+    )
+    park_s: float = field(
+        default=4.0,
+        metadata={
+            "low": 0.0,
+            "high": 30.0,
+            "unit": "s",
+            "says": "longest time for parking before torque goes off",
+        },
+    )
+
+
+class LoopCount(NamedTuple):
+    """How the loop kept its time."""
+
+    ticks: int
+    overruns: int
+    stopped_by: str
+
+
+class Robot:
+    """All rooms of one head, wired."""
+
+    def __init__(
+        self,
+        body: Body,
+        kinematics: Kinematics,
+        camera: Camera,
+        perception: Perception,
+        poses: PoseHistory,
+        attention: Attention,
+        scanpath: Scanpath,
+        oculomotor: Oculomotor,
+        guard: Guard,
+    ) -> None:
+        """Take the parts, real or simulated."""
+        self.body = body
+        self.camera = camera
+        self.perception = perception
+        self.attention = attention
+        self._kinematics = kinematics
+        self._poses = poses
+        self._scanpath = scanpath
+        self._oculomotor = oculomotor
+        self._guard = guard
+        self._settled = True
+
+    def start(self, clock: Clock) -> None:
+        """Open camera and bus, switch torque on where the joints are, begin from there.
+
+        Raises:
+            drivers.errors.SetupError: something is absent or not as configured.
+        """
+        self.camera.open()
+        try:
+            goals = self.body.start()
+        except BaseException:
+            self.camera.close()
+            raise
+        t_s = clock.now_s()
+        self._guard.reset(t_s, goals)
+        joints = self.body.read(t_s)
+        pose = self._kinematics.forward(joints)
+        self._poses.remember(t_s, pose.head_rad)
+        self.attention.reset(t_s)
+        self._scanpath.reset(t_s)
+        self._oculomotor.reset(t_s, pose)
+
+    def tick(self, t_s: float, dt_s: float) -> Tick:
+        """Read, see, choose, plan, guard, write.
+
+        Raises:
+            drivers.errors.DriverError: bus or camera are gone, or a servo has failed.
+        """
+        joints = self.body.read(t_s)
+        pose = self._kinematics.forward(joints)
+        self._poses.remember(t_s, pose.head_rad)
+        detections = self.camera.latest(t_s)
+        percept = self.perception.see(detections, self._poses)
+        target = self.attention.choose(percept, pose, t_s)
+        target = self._scanpath.wander(target, percept, t_s, self._settled)
+        gaze = self._oculomotor.step(target, pose, t_s, dt_s)
+        self._settled = gaze.phase != "saccade"
+        wish = self._kinematics.inverse(gaze)
+        age_s = percept.age_s(t_s) if percept is not None else inf
+        verdict = self._guard.check(wish, joints, age_s, t_s)
+        self.body.write(verdict.command_rad)
+        self._look_for_faults()
+        return Tick(t_s, joints, pose, detections, percept, target, gaze, wish, verdict)
+
+    def park(self, pose_rad: JointAngles, clock: Clock, params: LoopParams) -> bool:
+        """Move slowly to the parking pose; tell whether it was reached in time."""
+        self._guard.go_gently()
+        start_s = clock.now_s()
+        for slot in range(1, int(params.park_s * params.rate_hz) + 1):
+            clock.sleep_until(start_s + slot / params.rate_hz)
+            t_s = clock.now_s()
+            joints = self.body.read(t_s)
+            # Parking goes home whatever the camera shows.
+            self.body.write(self._guard.check(pose_rad, joints, 0.0, t_s).command_rad)
+            errors = zip(pose_rad, joints.position_rad, strict=True)
+            if max(abs(wish - now) for wish, now in errors) < radians(2.0):
+                return True
+        return False
+
+    def stop(self) -> None:
+        """Torque off, close the bus and the camera."""
+        try:
+            self.body.stop()
+        finally:
+            self.camera.close()
+
+    def _look_for_faults(self) -> None:
+        faults = self.body.bus.faults()
+        if faults:
+            raise ServoFault("; ".join(faults))
+
+
+def run(
+    robot: Robot,
+    clock: Clock,
+    params: LoopParams,
+    stop: Callable[[float], str | None],
+    watch: Callable[[Tick], None],
+) -> LoopCount:
+    """Tick at absolute slots until ``stop(seconds)`` gives a reason or something fails.
+
+    A tick that takes too long costs the slots it overran: they are counted and
+    skipped, never caught up in a burst.
+    """
+    period = 1.0 / params.rate_hz
+    start_s = clock.now_s()
+    last_s = start_s
+    slot, ticks, overruns = 0, 0, 0
+    while True:
+        slot += 1
+        clock.sleep_until(start_s + slot * period)
+        t_s = clock.now_s()
+        reason = stop(t_s - start_s)
+        if reason is not None:
+            return LoopCount(ticks, overruns, reason)
+        try:
+            watch(robot.tick(t_s, t_s - last_s))
+        except DriverError as error:
+            return LoopCount(ticks, overruns, f"fault: {error}")
+        last_s = t_s
+        ticks += 1
+        late = int((clock.now_s() - start_s) / period) - slot
+        if late > 0:
+            overruns += late
+            slot += late

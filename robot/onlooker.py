@@ -1,0 +1,183 @@
+"""Shows a running robot to people, beside the control loop and never inside it.
+
+The loop leaves its newest tick in one slot. A thread turns it into the status line,
+the page's snapshots and the camera picture with what was found in it; a slow terminal
+or browser delays nobody but itself.
+"""
+
+import threading
+from collections.abc import Callable
+from math import radians
+
+import numpy as np
+
+from drivers.types import BusHealth, Detections
+from gaze.angles import rotate_back, sub
+from gaze.field_of_view import line_of_sight
+from gaze.types import PART_NAMES, Target, Vec3
+from robot.face_pose import Intrinsics, intrinsics_of_view, project
+from robot.frames import CameraMount, PoseHistory
+from robot.loop import Tick
+from robot.page import Page
+from robot.page_picture import draw_detections, encode
+from robot.types import SeenBody, SeenFace, Snapshot
+
+_SNAPSHOT_S = 0.04
+_PICTURE_S = 0.1
+_LINE_S = 0.2
+
+
+class Onlooker:
+    """One thread that looks at the newest tick."""
+
+    def __init__(
+        self,
+        page: Page | None,
+        say: Callable[[str], None] | None,
+        health: Callable[[], BusHealth],
+        mount: CameraMount,
+        poses: PoseHistory,
+        horizontal_field_deg: float,
+    ) -> None:
+        """Take the page, and where to write the status line (None: nowhere)."""
+        self._page = page
+        self._say = say
+        self._health = health
+        self._mount = mount
+        self._poses = poses
+        self._field_rad = radians(horizontal_field_deg)
+        self._slot: Tick | None = None
+        self._ticks = 0
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="onlooker", daemon=True)
+
+    def start(self) -> None:
+        """Begin to look."""
+        self._thread.start()
+
+    def note(self, tick: Tick) -> None:
+        """Leave the newest tick; called by the loop."""
+        self._slot = tick
+        self._ticks += 1
+
+    def stop(self) -> None:
+        """Stop looking."""
+        self._over.set()
+        self._thread.join(timeout=2.0)
+
+    def _watch(self) -> None:
+        rate = _Rate()
+        round_number, picture_number = 0, 0
+        while not self._over.wait(_SNAPSHOT_S):
+            tick = self._slot
+            if tick is None:
+                continue
+            round_number += 1
+            rate.note(tick.t_s, self._ticks)
+            if self._page is not None:
+                self._page.show(snapshot(tick, rate.hz, _health_words(self._health())))
+            if round_number % round(_PICTURE_S / _SNAPSHOT_S) == 0:
+                picture_number = self._show_picture(tick, picture_number)
+            if self._say is not None and round_number % round(_LINE_S / _SNAPSHOT_S) == 0:
+                self._say(self._line(tick, rate.hz))
+
+    def _show_picture(self, tick: Tick, shown: int) -> int:
+        """Send the camera picture unless it was sent already; give its number."""
+        found = tick.detections
+        if self._page is None or found is None or found.number == shown:
+            return shown
+        lens = intrinsics_of_view(self._field_rad, found.width_px, found.height_px)
+        drawn = draw_detections(found.picture, found, self._gaze_px(tick, found, lens), lens.fx_px)
+        self._page.show_picture(encode(drawn))
+        return found.number
+
+    def _gaze_px(
+        self, tick: Tick, found: Detections, lens: Intrinsics
+    ) -> tuple[float, float] | None:
+        """Give where in the picture the gaze goes, None when it is outside."""
+        R, p = self._mount.pose(*self._poses.head_pose(found.captured_s))
+        x, y, z = rotate_back(R, sub(tick.gaze.gaze_point_world_m, p))
+        if z < 0.05:
+            return None
+        u, v = project(np.array([[x, y, z]]), lens)[0].tolist()
+        return (u, v)
+
+    def _line(self, tick: Tick, rate_hz: float) -> str:
+        note = self._page.notice() if self._page is not None else None
+        url = self._page.url() if self._page is not None else None
+        parts = [
+            f"{rate_hz:5.1f} Hz",
+            f"{target_name(tick.target)} - {tick.target.why}",
+            tick.verdict.level,
+            _health_words(self._health()),
+        ]
+        return " | ".join([*parts, *([note] if note else []), *([url] if url else [])])
+
+
+class _Rate:
+    """Ticks a second over the last second."""
+
+    def __init__(self) -> None:
+        self.hz = 0.0
+        self._from: tuple[float, int] | None = None
+
+    def note(self, t_s: float, ticks: int) -> None:
+        if self._from is None:
+            self._from = (t_s, ticks)
+        elif t_s - self._from[0] >= 1.0:
+            self.hz = (ticks - self._from[1]) / (t_s - self._from[0])
+            self._from = (t_s, ticks)
+
+
+def snapshot(tick: Tick, rate_hz: float, health: str) -> Snapshot:
+    """Give what the page is shown of a tick."""
+    pose, percept, target = tick.pose, tick.percept, tick.target
+    faces = percept.faces if percept is not None else ()
+    bodies = percept.bodies if percept is not None else None
+    return Snapshot(
+        t_s=tick.t_s,
+        measured_rad=tick.joints.position_rad,
+        wish_rad=tick.wish_rad,
+        R_world_head=pose.R_world_head,
+        p_world_head_m=pose.p_world_head_m,
+        p_world_eyes_m=(pose.p_world_eye_left_m, pose.p_world_eye_right_m),
+        gaze_world=(line_of_sight(pose, True), line_of_sight(pose, False)),
+        lids=(pose.lid_left, pose.lid_right),
+        p_world_target_m=tick.gaze.gaze_point_world_m,
+        target_name=target_name(target),
+        why=target.why,
+        phase="blink" if tick.gaze.blink else tick.gaze.phase,
+        level=tick.verdict.level,
+        reasons=tick.verdict.reasons,
+        faces=tuple(
+            SeenFace(face.id, face.p_world_m, face.R_world_face, face.parts_world_m)
+            for face in faces
+        ),
+        bodies=()
+        if bodies is None
+        else tuple(
+            SeenBody(bodies.ids[i], kind, _vec(bodies.p_world_m[i]), float(bodies.radius_m[i]))
+            for i, kind in enumerate(bodies.kinds)
+            if kind != "face"
+        ),
+        rate_hz=rate_hz,
+        health=health,
+    )
+
+
+def target_name(target: Target) -> str:
+    """Give a target's name for people, e.g. "face 3: left eye"."""
+    name = target.kind if target.id < 0 else f"{target.kind} {target.id}"
+    return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
+
+
+def _health_words(health: BusHealth) -> str:
+    errors = sum(health.errors.values())
+    if errors == 0:
+        return "bus ok"
+    return "bus: " + ", ".join(f"{n} {kind}" for kind, n in sorted(health.errors.items()) if n)
+
+
+def _vec(row: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Vec3:
+    x, y, z = row.tolist()
+    return (x, y, z)

@@ -1,0 +1,89 @@
+"""Shapes of the page's scene as triangles: everything is a profile turned about an axis.
+
+Metres. A mesh is vertices (n, 3) and faces (m, 3), counter-clockwise seen from outside.
+"""
+
+from collections.abc import Sequence
+from math import cos, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaze.types import Floats, Vec3
+
+_AROUND = 48
+
+
+class Mesh(NamedTuple):
+    """Triangles: vertices (n, 3) in metres, faces (m, 3) as rows of vertices."""
+
+    vertices: Floats
+    faces: NDArray[np.uint32]
+
+
+def turned(profile: Sequence[tuple[float, float]], around: int = _AROUND) -> Mesh:
+    """Turn a profile of (radius, height) about z; a repeated point makes a sharp edge."""
+    angles = np.arange(around) * (2.0 * pi / around)
+    radius, height = np.asarray(profile, float).T
+    rings = np.stack(
+        (
+            radius[:, None] * np.cos(angles),
+            radius[:, None] * np.sin(angles),
+            np.broadcast_to(height[:, None], (len(radius), around)),
+        ),
+        axis=-1,
+    )
+    return Mesh(rings.reshape(-1, 3), _quads(len(radius), around, closed=True))
+
+
+def cap(radius_m: float, half_angle_rad: float, rings: int = 12) -> Mesh:
+    """Give the part of a sphere within an angle of its x axis; pi is the whole sphere."""
+    angles = np.linspace(half_angle_rad, 0.0, rings)
+    dome = turned([(radius_m * sin(a), radius_m * cos(a)) for a in angles])
+    return Mesh(dome.vertices[:, (2, 0, 1)], dome.faces)
+
+
+def ellipsoid(half_axes_m: Vec3, bulge: float = 1.0, rings: int = 13) -> Mesh:
+    """Give an ellipsoid; a bulge below 1 fills it out towards a rounded box."""
+    angles = np.linspace(-pi / 2, pi / 2, rings)
+    ball = turned([(cos(a), sin(a)) for a in angles], around=2 * rings)
+    filled = np.sign(ball.vertices) * np.abs(ball.vertices) ** bulge
+    return Mesh(filled * np.asarray(half_axes_m), ball.faces)
+
+
+def disc(radius_m: float) -> Mesh:
+    """Give a flat disc that faces up."""
+    return turned([(radius_m, 0.0), (0.0, 0.0)])
+
+
+def lid(radius_m: float, sweep_rad: float) -> Mesh:
+    """Give a lid: the slice of a sphere swept about y, from its edge at +x upwards."""
+    sweep = np.linspace(0.0, sweep_rad, 24)
+    across = np.linspace(pi, 0.0, 32)
+    points = np.stack(
+        (
+            np.cos(sweep)[:, None] * np.sin(across),
+            np.broadcast_to(np.cos(across), (24, 32)),
+            np.sin(sweep)[:, None] * np.sin(across),
+        ),
+        axis=-1,
+    )
+    return Mesh(radius_m * points.reshape(-1, 3), _quads(24, 32, closed=False))
+
+
+def ring(radius_m: float, thickness_m: float) -> Mesh:
+    """Give a torus about x."""
+    angles = np.linspace(0.0, 2.0 * pi, 17)
+    band = turned([(radius_m + thickness_m * cos(a), thickness_m * sin(a)) for a in angles])
+    return Mesh(band.vertices[:, (2, 0, 1)], band.faces)
+
+
+def _quads(rows: int, columns: int, *, closed: bool) -> NDArray[np.uint32]:
+    """Join a grid of points, row after row, to triangles; ``closed`` joins its ends."""
+    row, column = np.mgrid[0 : rows - 1, 0 : columns if closed else columns - 1]
+    right = (column + 1) % columns
+    a, b = row * columns + column, row * columns + right
+    c, d = (row + 1) * columns + right, (row + 1) * columns + column
+    triangles = np.stack((a, b, c, a, c, d), axis=-1)
+    return triangles.reshape(-1, 3).astype(np.uint32)

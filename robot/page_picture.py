@@ -1,0 +1,103 @@
+"""Draw what was found into the camera picture, small enough for the page."""
+
+from typing import cast
+
+import cv2
+import numpy as np
+
+from drivers.types import DetectedFace, Detections, MovingBlob, Picture
+
+PICTURE_WIDTH_PX = 320
+
+_JPEG_QUALITY = 80
+_FACE = (120, 220, 90)  # BGR
+_LANDMARK = (255, 255, 255)
+_BLOB = (255, 170, 60)
+_GAZE = (40, 130, 255)
+_DARK_GROUND = 38
+
+Point = tuple[int, int]
+
+
+def draw_detections(
+    picture: Picture | None,
+    detections: Detections,
+    gaze_px: tuple[float, float] | None,
+    focal_px: float,
+) -> Picture:
+    """Draw faces, landmarks, moving blobs and the gaze point into a small copy.
+
+    picture: the camera's picture, or None where the source has none: a dark ground
+    gaze_px: where the rig looks, pixels of the full picture; None draws none
+    focal_px: focal length that places the blobs (pinhole, principal point in the middle)
+    Returns a picture of at most PICTURE_WIDTH_PX; the one given is left as it is.
+    """
+    scale = min(1.0, PICTURE_WIDTH_PX / detections.width_px)
+    drawn = _small(picture, detections, scale)
+    for face in detections.faces:
+        _draw_face(drawn, face, scale)
+    for blob in detections.blobs:
+        _draw_blob(drawn, blob, detections, focal_px, scale)
+    if gaze_px is not None:
+        _draw_gaze(drawn, _pixel(gaze_px[0], gaze_px[1], scale))
+    return drawn
+
+
+def encode(picture: Picture) -> bytes:
+    """Encode a BGR picture as JPEG."""
+    done, jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    if not done:
+        raise ValueError(f"a picture of shape {picture.shape} cannot be written as JPEG")
+    return jpeg.tobytes()
+
+
+def _small(picture: Picture | None, detections: Detections, scale: float) -> Picture:
+    width = max(1, round(detections.width_px * scale))
+    height = max(1, round(detections.height_px * scale))
+    if picture is None:
+        return np.full((height, width, 3), _DARK_GROUND, np.uint8)
+    if picture.shape[:2] == (height, width):
+        return picture.copy()
+    return cast(Picture, cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+
+
+def _draw_face(drawn: Picture, face: DetectedFace, scale: float) -> None:
+    x, y, width, height = face.box_px
+    corner = _pixel(x, y, scale)
+    cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 1, cv2.LINE_AA)
+    _write(drawn, f"{face.confidence:.2f}", corner, _FACE)
+    for landmark_x, landmark_y in face.landmarks_px:
+        cv2.circle(drawn, _pixel(landmark_x, landmark_y, scale), 2, _LANDMARK, -1, cv2.LINE_AA)
+
+
+def _draw_blob(
+    drawn: Picture, blob: MovingBlob, detections: Detections, focal_px: float, scale: float
+) -> None:
+    x, y, z = blob.p_camera_m
+    if z <= 0.0:  # behind the camera there is no pixel
+        return
+    u = detections.width_px / 2 + focal_px * x / z
+    v = detections.height_px / 2 + focal_px * y / z
+    radius = max(2, _clipped(focal_px * blob.radius_m / z * scale))
+    centre = _pixel(u, v, scale)
+    cv2.circle(drawn, centre, radius, _BLOB, 1, cv2.LINE_AA)
+    _write(drawn, blob.kind, (centre[0] - radius, centre[1] - radius), _BLOB)
+
+
+def _draw_gaze(drawn: Picture, at: Point) -> None:
+    cv2.circle(drawn, at, 7, _GAZE, 2, cv2.LINE_AA)
+    cv2.circle(drawn, at, 2, _GAZE, -1, cv2.LINE_AA)
+
+
+def _write(drawn: Picture, text: str, at: Point, colour: tuple[int, int, int]) -> None:
+    above = (at[0], max(9, at[1] - 3))
+    cv2.putText(drawn, text, above, cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
+
+
+def _pixel(x: float, y: float, scale: float) -> Point:
+    return _clipped(x * scale), _clipped(y * scale)
+
+
+def _clipped(value: float) -> int:
+    """Round; OpenCV draws nothing sensible at coordinates beyond 16 bits."""
+    return round(min(max(value, -30_000.0), 30_000.0))

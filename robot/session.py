@@ -1,0 +1,184 @@
+"""One run from start to torque off: what the command line asks for, carried out."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.errors import DriverError, SetupError
+from robot.assemble import Assembly, Choice
+from robot.clock import RealClock
+from robot.loop import LoopCount, Tick
+from robot.loop import run as run_loop
+from robot.onlooker import Onlooker
+from robot.page import Page
+from robot.summary import Summary
+
+_NO_OAK = (
+    "--oak: cameras of the OAK-D family are not supported yet; "
+    "use --camera N (webcam), --video FILE or --scene NAME"
+)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What was asked for on the command line; None where nothing was said."""
+
+    mock: bool = False
+    fast: bool = False
+    seed: int = 0
+    seconds: float | None = None
+    scene: str | None = None
+    video: Path | None = None
+    camera: int | None = None
+    oak: bool = False
+    profile: str | None = None
+    page: tuple[str, int] | None = None
+    status_line: bool = False
+
+    def choice(self) -> Choice:
+        """Give what to assemble.
+
+        Raises:
+            drivers.errors.SetupError: the options do not fit together.
+        """
+        if self.oak:
+            raise SetupError(_NO_OAK)
+        asked = [name for name in ("scene", "video", "camera") if getattr(self, name) is not None]
+        if len(asked) > 1:
+            options = " and ".join(f"--{name}" for name in asked)
+            raise SetupError(f"{options} exclude each other: the head looks at one of them")
+        scene = self.scene
+        if not asked:
+            if not self.mock:
+                raise SetupError(
+                    "nothing to look at: give --camera N, --video FILE or --scene NAME"
+                )
+            scene = "visitor"
+        if self.fast and not self.mock:
+            raise SetupError("--fast needs --mock: real servos cannot be hurried")
+        if self.fast and self.camera is not None:
+            raise SetupError("--fast cannot be used with --camera: a webcam has real time")
+        if self.fast and self.seconds is None:
+            raise SetupError("--fast needs --seconds S: it would never end")
+        return Choice(
+            mock=self.mock,
+            fast=self.fast,
+            seed=self.seed,
+            scene=scene,
+            video=self.video,
+            camera=self.camera,
+            profile=self.profile,
+        )
+
+
+def run(
+    made: Assembly,
+    wanted: Wanted,
+    stopped: Callable[[], str | None],
+    say: Callable[[str], None],
+    status: Callable[[str], None],
+) -> dict[str, object]:
+    """Run until the time is over, a signal comes or something fails; give the figures.
+
+    stopped: gives the name of a signal that has come; say, status: write a line, and
+    rewrite the status line
+    Raises:
+        drivers.errors.SetupError: before anything moved.
+    """
+    try:
+        return _run(made, wanted, stopped, say, status)
+    finally:
+        made.close()
+
+
+def _run(
+    made: Assembly,
+    wanted: Wanted,
+    stopped: Callable[[], str | None],
+    say: Callable[[str], None],
+    status: Callable[[str], None],
+) -> dict[str, object]:
+    robot, wall = made.robot, RealClock()
+    page = Page(*wanted.page) if wanted.page is not None else None
+    onlooker = Onlooker(
+        page,
+        status if wanted.status_line else None,
+        robot.body.bus.health,
+        made.mount,
+        made.poses,
+        made.horizontal_field_deg,
+    )
+    summary = Summary()
+
+    def watch(tick: Tick) -> None:
+        summary.note(tick)
+        onlooker.note(tick)
+
+    def stop(seconds: float) -> str | None:
+        over = wanted.seconds is not None and seconds >= wanted.seconds - 1e-9
+        return stopped() or ("seconds" if over else None)
+
+    began_s = wall.now_s()
+    count = LoopCount(0, 0, "fault: unexpected error")
+    robot.start(made.clock)
+    for note in made.notes:
+        say(note)
+    try:
+        if page is not None:
+            page.open()
+        if not wanted.fast:
+            onlooker.start()
+        count = run_loop(robot, made.clock, made.loop, stop, watch)
+    finally:
+        wall_s = wall.now_s() - began_s
+        _leave(made, count, say)
+        if not wanted.fast:
+            onlooker.stop()
+        if page is not None:
+            page.close()
+    return _figures(made, summary, count, wall_s)
+
+
+def _leave(made: Assembly, count: LoopCount, say: Callable[[str], None]) -> None:
+    """The one way out: park, torque off, close, and say what of it worked."""
+    robot = made.robot
+    how = "not parked"
+    try:
+        if robot.park(made.park_rad, made.clock, made.loop):
+            how = "parked"
+    except (DriverError, KeyboardInterrupt) as error:
+        how = f"not parked ({error or 'interrupted'})"
+    try:
+        robot.stop()
+        how += ", torque off"
+    except DriverError as error:
+        how += f", torque-off could not be sent ({error}): the servos' watchdog stops them"
+    say(f"stopped by {count.stopped_by}: {how}")
+
+
+def _figures(
+    made: Assembly, summary: Summary, count: LoopCount, wall_s: float
+) -> dict[str, object]:
+    """Join the figures of the ticks, the loop, the pictures and the bus."""
+    robot = made.robot
+    health = robot.body.bus.health()
+    bus: dict[str, object] = {
+        "tx_bytes": health.tx_bytes,
+        "rx_bytes": health.rx_bytes,
+        "errors": {kind: n for kind, n in sorted(health.errors.items()) if n},
+    }
+    digest = made.sent_digest()
+    if digest is not None:
+        bus["tx_sha256"] = digest
+    ticks = summary.figures()
+    return {
+        "seconds": ticks.pop("seconds"),
+        "wall_seconds": round(wall_s, 3),
+        "ticks": count.ticks,
+        "overruns": count.overruns,
+        "faces_seen": robot.perception.pictures_with_face,
+        "pictures": robot.perception.pictures,
+        **ticks,
+        "bus": bus,
+        "stopped_by": count.stopped_by,
+    }

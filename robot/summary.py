@@ -1,0 +1,94 @@
+"""Figures of a run, gathered tick by tick and given as one JSON object at the end."""
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from math import degrees, radians
+
+import numpy as np
+
+from gaze.angles import add, angle_between, scale, sub, unit
+from gaze.field_of_view import line_of_sight
+from gaze.types import Vec3
+from robot.loop import Tick
+
+_FIXATION_RAD_S = radians(40.0)
+"""Slower is fixating; 30 is usual, and one servo step in a 5 ms tick is already 18 deg/s."""
+
+
+class Summary:
+    """Counts and shares over a run."""
+
+    def __init__(self) -> None:
+        """Start with nothing counted."""
+        self._target_s: defaultdict[str, float] = defaultdict(float)
+        self._part_s: defaultdict[str, float] = defaultdict(float)
+        self._limited: Counter[str] = Counter()
+        self._errors_deg: list[float] = []
+        self._first_s: float | None = None
+        self._last: Tick | None = None
+        self._gaze: Vec3 | None = None
+
+    def note(self, tick: Tick) -> None:
+        """Count one tick."""
+        if self._first_s is None or self._last is None:
+            self._first_s = tick.t_s
+            dt_s = 0.0
+        else:
+            dt_s = tick.t_s - self._last.t_s
+        self._last = tick
+        self._target_s[tick.target.kind] += dt_s
+        if tick.target.part is not None:
+            self._part_s[tick.target.part] += dt_s
+        if self._fixates(tick, dt_s):
+            self._errors_deg.append(degrees(gaze_error_rad(tick)))
+        for reason in tick.verdict.reasons:
+            self._limited[reason.partition(": ")[2]] += 1
+
+    def _fixates(self, tick: Tick, dt_s: float) -> bool:
+        """Tell a fixation as an eye tracker does: by the measured speed of the gaze."""
+        before, self._gaze = self._gaze, cyclopean(tick)
+        if before is None or dt_s <= 0.0 or tick.gaze.phase == "saccade":
+            return False
+        return angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s
+
+    def figures(self) -> dict[str, object]:
+        """Give what the ticks themselves tell; the caller adds bus, loop and pictures."""
+        last = self._last
+        errors = np.array(self._errors_deg) if self._errors_deg else np.array([np.nan])
+        median, p95 = np.percentile(errors, [50.0, 95.0]).tolist()
+        return {
+            "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,
+            "fixations": last.gaze.fixations if last else 0,
+            "saccades": last.gaze.saccades if last else 0,
+            "blinks": last.gaze.blinks if last else 0,
+            "target_share": _shares(self._target_s),
+            "part_share": _shares(self._part_s),
+            "gaze_error_deg": {
+                "median": round(median, 4) if self._errors_deg else None,
+                "p95": round(p95, 4) if self._errors_deg else None,
+            },
+            "limited": dict(sorted(self._limited.items())),
+        }
+
+
+def cyclopean(tick: Tick) -> Vec3:
+    """Give the mean of the two measured lines of sight, as a unit vector in the world."""
+    return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
+
+
+def gaze_error_rad(tick: Tick) -> float:
+    """Give the mean angle of the two measured lines of sight off the intended point."""
+    target, pose = tick.target, tick.pose
+    point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, tick.t_s - target.at_s)))
+    left = angle_between(line_of_sight(pose, True), sub(point, pose.p_world_eye_left_m))
+    right = angle_between(line_of_sight(pose, False), sub(point, pose.p_world_eye_right_m))
+    return 0.5 * (left + right)
+
+
+def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
+    """Give shares of the total, largest first."""
+    total = sum(seconds.values())
+    if total <= 0.0:
+        return {}
+    by_time = sorted(seconds.items(), key=lambda item: -item[1])
+    return {name: round(time / total, 4) for name, time in by_time}

@@ -1,0 +1,105 @@
+"""Values of the machine: joints as wished, permitted and measured, and what the page is shown.
+
+Radians, metres, seconds; joints in the order of JOINTS.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from gaze.types import Mat3, Vec3
+
+JOINTS = (
+    "left_eye_pan",
+    "left_eye_tilt",
+    "right_eye_pan",
+    "right_eye_tilt",
+    "left_upper_lid",
+    "right_upper_lid",
+    "neck_yaw",
+    "neck_pitch",
+    "neck_roll",
+)
+
+JointAngles = tuple[float, ...]
+"""One angle a joint, in the order of JOINTS."""
+
+Level = Literal["ok", "limited", "hold", "limp"]
+
+
+class JointState(NamedTuple):
+    """Joints as measured.
+
+    position_rad, velocity_rad_s: last fresh values
+    measured_s: host time of each joint's last fresh answer
+    missing: joints without a fresh answer in this tick
+    """
+
+    position_rad: JointAngles
+    velocity_rad_s: JointAngles
+    measured_s: tuple[float, ...]
+    missing: tuple[str, ...]
+
+
+class Verdict(NamedTuple):
+    """What the guard let through.
+
+    command_rad: permitted joint angles
+    level: ok, limited (changed), hold (neck or all stand still), limp (torque must go)
+    reasons: "joint: reason" for every joint that was changed, empty when ok
+    """
+
+    command_rad: JointAngles
+    level: Level
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SeenFace:
+    """A face as the page draws it: identity, centre, axes and the eight parts, world frame."""
+
+    id: int
+    p_world_m: Vec3
+    R_world_face: Mat3
+    parts_world_m: tuple[Vec3, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SeenBody:
+    """A moving body as the page draws it, world frame."""
+
+    id: int
+    kind: str
+    p_world_m: Vec3
+    radius_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """One frozen look at the running rig, for people to watch.
+
+    measured_rad, wish_rad: joint angles in the order of JOINTS
+    R_world_head, p_world_head_m: measured head frame
+    p_world_eyes_m: left and right eye centres; gaze_world: their unit lines of sight
+    lids: left and right opening 0..1, measured
+    target_name: e.g. "face 3: left eye"; why: why it won
+    rate_hz: control rate of the last second; health: bus figures in words
+    """
+
+    t_s: float
+    measured_rad: JointAngles
+    wish_rad: JointAngles
+    R_world_head: Mat3
+    p_world_head_m: Vec3
+    p_world_eyes_m: tuple[Vec3, Vec3]
+    gaze_world: tuple[Vec3, Vec3]
+    lids: tuple[float, float]
+    p_world_target_m: Vec3
+    target_name: str
+    why: str
+    phase: str
+    level: Level
+    reasons: tuple[str, ...]
+    faces: tuple[SeenFace, ...]
+    bodies: tuple[SeenBody, ...]
+    rate_hz: float
+    health: str

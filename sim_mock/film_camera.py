@@ -1,0 +1,97 @@
+"""A film seen as a camera in simulated time: the same calls give the same detections.
+
+It does not blur, distort, drop or reorder pictures, and its delay is constant.
+"""
+
+from typing import Protocol
+
+from drivers.types import Detections, FaceDetector, Picture
+
+
+class Film(Protocol):
+    """Pictures by number from 1, each due at a film time; without end."""
+
+    def open(self) -> None:
+        """Open at film time 0."""
+        ...
+
+    def due_s(self, number: int) -> float:
+        """Give the film time at which a picture is due."""
+        ...
+
+    def picture(self, number: int) -> Picture:
+        """Read a picture; numbers never run back."""
+        ...
+
+    def close(self) -> None:
+        """Free the file."""
+        ...
+
+
+class FilmCamera:
+    """A film that starts at a simulated time and is watched for faces.
+
+    Every picture is looked at exactly once and in order, however far time jumps, so that
+    the counts are those of any other run to the same time.
+
+    pictures, pictures_with_face: counts of pictures looked at since open
+    """
+
+    def __init__(
+        self, video: Film, detector: FaceDetector, delay_s: float, start_s: float = 0.0
+    ) -> None:
+        """Take the film, what finds faces, and the time from exposure to detections.
+
+        start_s: simulated time of the first exposure
+
+        Raises:
+            ValueError: the delay is negative.
+        """
+        if not delay_s >= 0.0:
+            raise ValueError(f"detections cannot come before their picture: delay {delay_s} s")
+        self._video = video
+        self._detector = detector
+        self._delay_s = delay_s
+        self._start_s = start_s
+        self._newest: Detections | None = None
+        self.pictures = 0
+        self.pictures_with_face = 0
+
+    def open(self) -> None:
+        """Open the film at its first picture.
+
+        Raises:
+            drivers.errors.CameraError: the film cannot be opened.
+        """
+        self._video.open()
+        self._newest = None
+        self.pictures = self.pictures_with_face = 0
+
+    def latest(self, now_s: float) -> Detections | None:
+        """Give the newest detections that have come through by ``now_s``.
+
+        Raises:
+            drivers.errors.CameraError: the film cannot be read any more.
+        """
+        while self._captured_s(self.pictures + 1) + self._delay_s <= now_s:
+            self._look(self.pictures + 1)
+        return self._newest
+
+    def close(self) -> None:
+        """Free the film; safe to call twice."""
+        self._video.close()
+
+    def _captured_s(self, number: int) -> float:
+        """Give the simulated time of a picture's exposure."""
+        return self._start_s + self._video.due_s(number)
+
+    def _look(self, number: int) -> None:
+        """Find the faces of one picture."""
+        picture = self._video.picture(number)
+        faces = self._detector.find(picture)
+        height, width = picture.shape[:2]
+        self.pictures += 1
+        self.pictures_with_face += bool(faces)
+        self._newest = Detections(
+            self._captured_s(number), number, width, height, faces, picture=picture
+        )

@@ -1,0 +1,97 @@
+"""Which room may import which: walks the imports and fails on a wrong arrow."""
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("config", "drivers", "gaze", "robot", "sim_mock")
+
+# The pure parts of the machine that a second world may also stand on.
+PURE = {"robot.clock", "robot.frames", "robot.kinematics", "robot.face_pose"}
+# Where config, the machine and the second world meet.
+TOP = {"robot.assemble", "robot.cli"}
+
+# Vendor packages, and the only modules that may see each.
+OWNERS = {
+    "serial": ("drivers.dynamixel_port", "sim_mock.ports"),
+    "dynamixel_sdk": ("drivers.dynamixel", "sim_mock.ports"),
+    "depthai": ("drivers.oak_camera",),
+    "ruamel": ("config.load",),
+    "pydantic": ("config.",),
+    "pydantic_core": ("config.",),
+    "typer": ("robot.cli",),
+    "viser": ("robot.page_",),
+    "cv2": ("drivers.", "robot.face_pose", "robot.page_", "sim_mock."),
+}
+
+
+def modules() -> list[tuple[str, Path]]:
+    return [
+        (f"{room}.{path.stem}", path)
+        for room in ROOMS
+        for path in sorted((ROOT / room).glob("*.py"))
+    ]
+
+
+def imports(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            assert node.module is not None
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def room_allowed(module: str, wanted: str) -> bool:
+    room, other = module.split(".")[0], wanted.split(".")[0]
+    if other not in ROOMS or other == room:
+        return True
+    if room in ("gaze", "drivers"):
+        return False
+    if room == "robot":
+        return other in ("gaze", "drivers") or module in TOP
+    if room == "config":
+        return other in ("gaze", "drivers", "robot")
+    pure = any(wanted == name or wanted.startswith(f"{name}.") for name in PURE)
+    return other in ("gaze", "drivers") or pure or wanted == "robot"
+
+
+@pytest.mark.parametrize(("module", "path"), modules(), ids=[name for name, _ in modules()])
+def test_arrows(module: str, path: Path) -> None:
+    for wanted in imports(path):
+        if wanted == "robot" and module.startswith("sim_mock"):
+            pytest.fail(f"{module} imports robot as a whole")
+        assert room_allowed(module, wanted), f"{module} must not import {wanted}"
+        package = wanted.split(".")[0]
+        owners = OWNERS.get(package)
+        if owners is not None:
+            assert module.startswith(owners), f"{module} must not import {package}"
+
+
+def test_gaze_stands_on_numpy_alone() -> None:
+    standard = set(sys.stdlib_module_names) | {"numpy", "gaze"}
+    for module, path in modules():
+        if module.startswith("gaze."):
+            packages = {wanted.split(".")[0] for wanted in imports(path)}
+            assert packages <= standard, f"{module}: {packages - standard}"
+
+
+def test_package_files_hold_a_docstring_and_nothing_else() -> None:
+    for room in ROOMS:
+        body = ast.parse((ROOT / room / "__init__.py").read_text(encoding="utf-8")).body
+        assert len(body) == 1 and isinstance(body[0], ast.Expr), room
+
+
+def test_it_would_catch_a_wrong_arrow() -> None:
+    assert not room_allowed("gaze.head", "robot.loop")
+    assert not room_allowed("drivers.webcam", "gaze.types")
+    assert not room_allowed("robot.loop", "sim_mock.visitor")
+    assert not room_allowed("robot.loop", "config.schema")
+    assert not room_allowed("sim_mock.visitor", "robot.loop")
+    assert room_allowed("sim_mock.scene_camera", "robot.frames")

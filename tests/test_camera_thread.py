@@ -1,0 +1,219 @@
+"""The thread leaves the newest find in its slot, and its faults reach the loop."""
+
+import threading
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from drivers.camera_thread import CameraThread
+from drivers.errors import CameraError
+from drivers.picture_source import Shot
+from drivers.types import DetectedFace
+from drivers.video_file import VideoFile
+
+PATIENCE_S = 20.0  # how long a test waits before it calls the thread stuck
+
+FACE = DetectedFace((1.0, 2.0, 3.0, 4.0), np.zeros((5, 2)), 0.9)
+
+
+class Source:
+    """Gives a picture each time it is fed one; picture k is captured at k seconds."""
+
+    def __init__(self, fails_to_open: bool = False) -> None:
+        self.fed = threading.Semaphore(0)
+        self.number = 0
+        self.opened = 0
+        self.closed = 0
+        self.fault: Exception | None = None
+        self.fails_to_open = fails_to_open
+
+    def open(self) -> None:
+        if self.fails_to_open:
+            raise CameraError("no camera: plug it in")
+        self.opened += 1
+        self.number = 0
+
+    def take(self, now_s, stop) -> Shot | None:
+        while not self.fed.acquire(timeout=0.002):
+            if stop.is_set():
+                return None
+        if self.fault is not None:
+            raise self.fault
+        self.number += 1
+        return Shot(float(self.number), self.number, np.zeros((24, 32, 3), np.uint8))
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+class EveryOther:
+    """Finds a face in every second picture."""
+
+    def __init__(self) -> None:
+        self.looked = 0
+
+    def find(self, picture) -> tuple[DetectedFace, ...]:
+        self.looked += 1
+        return (FACE,) if self.looked % 2 == 0 else ()
+
+
+def wait_for(what) -> None:
+    """Wait until something holds."""
+    end = time.monotonic() + PATIENCE_S
+    while not what():
+        assert time.monotonic() < end, "the camera thread is stuck"
+        time.sleep(0.001)
+
+
+@pytest.fixture
+def source():
+    return Source()
+
+
+@pytest.fixture
+def camera(source):
+    thread = CameraThread(source, EveryOther(), time.monotonic)
+    thread.open()
+    yield thread
+    thread.close()
+
+
+def feed(source: Source, camera: CameraThread, count: int) -> None:
+    goal = camera.pictures + count
+    for _ in range(count):
+        source.fed.release()
+    wait_for(lambda: camera.pictures == goal and camera.latest(0.0).number == goal)
+
+
+def test_nothing_before_the_first_picture(camera):
+    assert camera.latest(0.0) is None
+
+
+def test_slot_holds_the_newest_find(source, camera):
+    feed(source, camera, 1)
+    first = camera.latest(0.0)
+    assert (first.number, first.captured_s, first.faces) == (1, 1.0, ())
+    assert (first.width_px, first.height_px) == (32, 24)
+    assert first.picture.shape == (24, 32, 3)
+    feed(source, camera, 1)
+    assert camera.latest(0.0).faces == (FACE,)
+    assert camera.latest(0.0) is camera.latest(99.0)
+    assert first.number == 1  # what was handed out stays as it was
+
+
+def test_pictures_and_pictures_with_a_face_are_counted(source, camera):
+    feed(source, camera, 7)
+    assert (camera.pictures, camera.pictures_with_face) == (7, 3)
+
+
+def test_camera_that_cannot_be_opened_says_so_at_once():
+    thread = CameraThread(Source(fails_to_open=True), EveryOther(), time.monotonic)
+    with pytest.raises(CameraError, match="plug it in"):
+        thread.open()
+    thread.close()
+
+
+def test_fault_of_the_source_reaches_the_loop(source, camera):
+    source.fault = CameraError("camera gone: check its cable")
+    source.fed.release()
+    wait_for(lambda: source.closed)
+    for _ in range(2):
+        with pytest.raises(CameraError, match="check its cable"):
+            camera.latest(0.0)
+
+
+def test_fault_of_the_detector_reaches_the_loop_in_one_line(source):
+    class Broken:
+        def find(self, picture):
+            raise RuntimeError("layer 3\nhas no weights")
+
+    thread = CameraThread(source, Broken(), time.monotonic)
+    thread.open()
+    source.fed.release()
+    wait_for(lambda: source.closed)
+    with pytest.raises(CameraError, match="RuntimeError: layer 3 has no weights") as caught:
+        thread.latest(0.0)
+    assert isinstance(caught.value.__cause__, RuntimeError)
+    thread.close()
+
+
+def test_close_ends_the_thread_and_frees_the_source(source, camera):
+    feed(source, camera, 1)
+    camera.close()
+    assert source.closed == 1
+    assert not [t for t in threading.enumerate() if t.name == "camera"]
+    camera.close()
+    assert camera.latest(0.0).number == 1
+
+
+def test_open_again_starts_anew(source, camera):
+    feed(source, camera, 3)
+    with pytest.raises(CameraError, match="runs already"):
+        camera.open()
+    camera.close()
+    camera.open()
+    assert (camera.latest(0.0), camera.pictures, camera.pictures_with_face) == (None, 0, 0)
+    feed(source, camera, 1)
+    assert source.opened == 2
+
+
+def test_open_again_after_a_fault(source, camera):
+    source.fault = CameraError("camera gone: check its cable")
+    source.fed.release()
+    wait_for(lambda: source.closed)
+    camera.close()
+    source.fault = None
+    camera.open()
+    feed(source, camera, 1)
+
+
+def write_film(path, rate_hz: float):
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), rate_hz, (64, 48))
+    for k in range(10):
+        writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
+    writer.release()
+    return path
+
+
+def test_film_runs_at_its_own_pace(tmp_path):
+    camera = CameraThread(
+        VideoFile(write_film(tmp_path / "film.avi", 100.0)), EveryOther(), time.monotonic
+    )
+    camera.open()
+    wait_for(lambda: camera.latest(0.0) is not None)
+    start = camera.latest(0.0)
+    wait_for(lambda: camera.latest(0.0).number >= start.number + 25)  # past its end, twice
+    later = camera.latest(0.0)
+    camera.close()
+    assert later.captured_s - start.captured_s == pytest.approx(
+        (later.number - start.number) / 100.0
+    )
+    assert later.captured_s <= time.monotonic()
+
+
+def test_slow_detector_skips_pictures_and_queues_none(tmp_path):
+    free = threading.Semaphore(0)
+    clock = [0.0]
+
+    class Slow:
+        def find(self, picture):
+            assert free.acquire(timeout=PATIENCE_S)
+            return ()
+
+    camera = CameraThread(
+        VideoFile(write_film(tmp_path / "film.avi", 10.0)), Slow(), lambda: clock[0]
+    )
+    camera.open()
+    free.release()
+    wait_for(lambda: camera.pictures == 1)
+    clock[0] = 0.15  # picture 2 is due and taken; the detector is busy with it
+    free.release()
+    wait_for(lambda: camera.pictures == 2)
+    clock[0] = 0.95
+    free.release(2)
+    wait_for(lambda: camera.latest(0.0).number >= 10)
+    assert camera.pictures <= 4
+    free.release(100)
+    camera.close()

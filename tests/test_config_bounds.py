@@ -1,0 +1,334 @@
+"""A Params dataclass as a strict model: types, bounds, choices, and the words of a refusal."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import pytest
+
+from config.bounds import filled, judge, model_of
+from config.export import DIALECT, complaint, json_schema
+
+
+@dataclass(frozen=True, slots=True)
+class Lid:
+    """How a lid moves.
+
+    More words that are no headline.
+    """
+
+    shut_ms: float = field(
+        default=90.0, metadata={"low": 40, "high": 200.0, "unit": "ms", "says": "time to shut"}
+    )
+    open_ms: float = field(default=150.0, metadata={"low": 40.0, "unit": "ms"})
+    blinks: bool = True
+
+    def __post_init__(self) -> None:
+        if self.shut_ms > self.open_ms:
+            raise ValueError("shut_ms must not be\nabove open_ms")
+
+
+@dataclass(frozen=True, slots=True)
+class Eye:
+    id: int = field(metadata={"low": 0, "high": 252, "says": "servo id"})
+    name: str = "eye"
+    lid: Lid = Lid()
+    spare: Lid | None = None
+    lids: Mapping[str, Lid] = field(default_factory=dict)
+    kind: str = field(default="gamma", metadata={"choices": ("gamma", "lognormal")})
+    side: Literal["left", "right"] = "left"
+    baud: int = field(default=57_600, metadata={"choices": (57_600, 1_000_000), "says": "bits/s"})
+    offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    matrix: tuple[tuple[float, ...], ...] = field(default=(), metadata={"low": 0, "high": 1})
+    pair: tuple[int, ...] = field(default=(1, 2), metadata={"length": 2, "high": 9})
+    tags: tuple[str, ...] = ()
+    gains: dict[str, float] = field(default_factory=dict, metadata={"low": -1.0, "high": 1.0})
+
+
+def refused(data: dict[str, Any]) -> list[str]:
+    """Judge an Eye and give its faults as "path: rule"."""
+    value, errors = judge(Eye, {"id": 1, **data})
+    assert (value is None) == bool(errors)
+    complaints = [complaint(Eye, error) for error in errors]
+    return [f"{'.'.join(map(str, c.path))}: {c.rule}" for c in complaints]
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {},
+        {"id": 0},
+        {"id": 252},
+        {"offset_m": (1, 2.5, -3)},
+        {"matrix": ((0, 1), (0.5,), ())},
+        {"pair": (9, -9)},
+        {"tags": ("a", "b")},
+        {"gains": {"a": -1, "b": 1.0}},
+        {"lid": {}, "spare": None, "lids": {"upper": {"shut_ms": 40}}},
+        {"spare": {"shut_ms": 200, "open_ms": 200}},
+        {"baud": 1_000_000, "kind": "lognormal", "side": "right"},
+    ],
+)
+def test_right_values_are_taken(data: dict[str, Any]) -> None:
+    assert refused(data) == []
+
+
+def test_the_value_is_the_dataclass_with_floats_tuples_and_its_own_defaults() -> None:
+    value, _ = judge(
+        Eye, {"id": 3, "offset_m": (1, 2, 3), "lid": {"shut_ms": 50}, "lids": {"upper": {}}}
+    )
+    assert value == Eye(
+        id=3, offset_m=(1.0, 2.0, 3.0), lid=Lid(shut_ms=50.0), lids={"upper": Lid()}
+    )
+    assert value is not None
+    assert [type(x) for x in value.offset_m] == [float] * 3
+    assert type(value.lid.shut_ms) is float and type(value.id) is int
+
+
+@pytest.mark.parametrize(
+    ("data", "fault"),
+    [
+        ({"id": True}, "id: True is a truth value, wanted a whole number, 0 to 252"),
+        ({"id": 1.0}, "id: 1.0 is a number, wanted a whole number, 0 to 252"),
+        ({"id": "1"}, "id: '1' is text, wanted a whole number, 0 to 252; take the quotes away"),
+        ({"id": 253}, "id: 253 is above 252"),
+        ({"id": None}, "id: is empty, wanted a whole number, 0 to 252"),
+        ({"name": 5}, "name: 5 is a whole number, wanted text; put it in quotes"),
+        (
+            {"kind": "gama"},
+            "kind: 'gama' is not one of 'gamma', 'lognormal'; did you mean 'gamma'?",
+        ),
+        ({"side": "up"}, "side: 'up' is not one of 'left', 'right'"),
+        ({"baud": 9600}, "baud: 9600 is a whole number, wanted one of 57600, 1000000"),
+        ({"baud": 57_600.0}, "baud: 57600.0 is a number, wanted one of 57600, 1000000"),
+        ({"offset_m": (1, 2)}, "offset_m: has length 2, wanted 3"),
+        ({"offset_m": (1, 2, 3, 4)}, "offset_m: has length 4, wanted 3"),
+        ({"offset_m": 1}, "offset_m: 1 is a whole number, wanted a list of 3, each a number"),
+        ({"pair": (1,)}, "pair: has length 1, wanted 2"),
+        ({"pair": (1, 10)}, "pair.1: 10 is above 9"),
+        ({"matrix": ((0, 1), (0, 1.5))}, "matrix.1.1: 1.5 is above 1"),
+        ({"matrix": (0,)}, "matrix.0: 0 is a whole number, wanted a list, each a number, 0 to 1"),
+        ({"tags": "a"}, "tags: 'a' is text, wanted a list, each text"),
+        ({"gains": {"a": -2}}, "gains.a: -2 is below -1"),
+        ({"gains": {"a": float("nan")}}, "gains.a: nan is not a finite number"),
+        ({"gains": ()}, "gains: is a list, wanted a mapping, each key with a number, -1 to 1"),
+        ({"lid": {"shut_ms": 39}}, "lid.shut_ms: 39 is below 40 (unit ms)"),
+        ({"lid": {"shut_ms": float("inf")}}, "lid.shut_ms: inf is not a finite number"),
+        ({"lid": {"open_ms": "1 s"}}, "lid.open_ms: '1 s' is text, wanted a number, 40 ms or more"),
+        ({"lid": {"blinks": "no"}}, "lid.blinks: 'no' is text, wanted true or false"),
+        ({"lid": {"blinks": 1}}, "lid.blinks: 1 is a whole number, wanted true or false"),
+        ({"lid": None}, "lid: is empty, wanted a mapping with the keys shut_ms, open_ms, blinks"),
+        (
+            {"spare": 1},
+            "spare: 1 is a whole number, "
+            "wanted a mapping with the keys shut_ms, open_ms, blinks or null",
+        ),
+        ({"lid": {"shut_ms": 160}}, "lid: shut_ms must not be above open_ms"),
+        ({"lids": {"upper": {"open_ms": 50}}}, "lids.upper: shut_ms must not be above open_ms"),
+        (
+            {"lid": {"shut": 50}},
+            "lid.shut: unknown key 'shut'; did you mean 'shut_ms'? "
+            "allowed: shut_ms, open_ms, blinks",
+        ),
+        (
+            {"lid": {"zzz": 50}},
+            "lid.zzz: unknown key 'zzz'; allowed: shut_ms, open_ms, blinks",
+        ),
+    ],
+)
+def test_wrong_values_are_refused_in_words(data: dict[str, Any], fault: str) -> None:
+    assert refused(data) == [fault]
+
+
+def test_a_missing_key_is_named_with_its_range_and_meaning() -> None:
+    _, errors = judge(Eye, {})
+    assert [complaint(Eye, error).rule for error in errors] == [
+        "missing; wanted a whole number, 0 to 252 (servo id)"
+    ]
+
+
+def test_a_long_value_is_cut_in_the_message() -> None:
+    (fault,) = refused({"lid": {"shut_ms": "9" * 5000}})
+    assert len(fault) < 200
+
+
+def test_a_default_outside_its_own_bounds_is_found() -> None:
+    @dataclass(frozen=True)
+    class Slip:
+        rate_hz: float = field(default=500.0, metadata={"high": 200.0})
+
+    _, errors = judge(Slip, {})
+    assert [complaint(Slip, error).rule for error in errors] == ["500.0 is above 200"]
+
+
+@dataclass(frozen=True)
+class BadType:
+    x: complex = 0j
+
+
+@dataclass(frozen=True)
+class MixedTuple:
+    x: tuple[int, str] = (1, "a")
+
+
+@dataclass(frozen=True)
+class BadKey:
+    x: dict[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class BadMetadata:
+    x: float = field(default=1.0, metadata={"hihg": 2.0})
+
+
+@dataclass(frozen=True)
+class BoundedText:
+    x: str = field(default="", metadata={"low": 1})
+
+
+@dataclass(frozen=True)
+class LongNumber:
+    x: float = field(default=1.0, metadata={"length": 1})
+
+
+@pytest.mark.parametrize(
+    "params", [BadType, MixedTuple, BadKey, BadMetadata, BoundedText, LongNumber]
+)
+def test_a_declaration_that_cannot_be_checked_is_refused(params: type) -> None:
+    with pytest.raises(TypeError, match=rf"{params.__name__}\.x: "):
+        model_of(params)
+
+
+def test_models_are_built_once() -> None:
+    assert model_of(Eye) is model_of(Eye)
+
+
+@pytest.mark.parametrize(
+    ("high", "id_", "name", "kind", "shut_ms", "gain"),
+    [(False, 0, "", "gamma", 40.0, -1.0), (True, 252, "?", "lognormal", 200.0, 1.0)],
+)
+def test_stand_ins_lie_at_the_ends_of_what_may_stand_there(
+    high: bool, id_: int, name: str, kind: str, shut_ms: float, gain: float
+) -> None:
+    faulty = {("id",), ("name",), ("kind",), ("lid", "shut_ms"), ("gains", "a"), ("offset_m", 1)}
+    data = {"lid": {"shut_ms": 0}, "gains": {"a": "x", "b": 0}, "offset_m": (1, "y", 3)}
+    eye = filled(Eye, data, faulty, high)
+    assert (eye.id, eye.name, eye.kind, eye.lid.shut_ms) == (id_, name, kind, shut_ms)
+    assert eye.gains == {"a": gain, "b": 0.0}
+    assert eye.offset_m == (1.0, float(high), 3.0)
+    assert (eye.lid.open_ms, eye.baud) == (150.0, 57_600)  # defaults where nothing is wrong
+
+
+def test_a_faulty_list_or_mapping_has_no_stand_in() -> None:
+    eye = filled(Eye, {"matrix": ((1,), 3), "gains": 5}, {("matrix", 1), ("gains",)}, False)
+    for name in ("matrix", "gains"):
+        with pytest.raises(AttributeError):
+            getattr(eye, name)
+
+
+def test_beside_an_unknown_key_what_is_absent_may_have_been_meant() -> None:
+    low, high = (
+        filled(Eye, {"id": 1, "lid": {"shut": 60, "blinks": True}}, {("lid", "shut")}, end)
+        for end in (False, True)
+    )
+    assert (low.lid.shut_ms, high.lid.shut_ms) == (40.0, 200.0)
+    assert (low.lid.blinks, high.lid.blinks) == (True, True)
+
+
+# ---- JSON Schema ------------------------------------------------------------------------
+
+_PYTHON_TYPES: dict[str, Any] = {
+    "object": dict,
+    "array": tuple,
+    "string": str,
+    "boolean": bool,
+    "null": type(None),
+    "number": (int, float),
+    "integer": int,
+}
+
+
+def fits(schema: dict[str, Any], value: Any, root: dict[str, Any]) -> bool:
+    """Judge a value as an editor would, by the keywords the export uses."""
+    if "$ref" in schema:
+        return fits(root["$defs"][schema["$ref"].rpartition("/")[2]], value, root)
+    if "anyOf" in schema:
+        return any(fits(one, value, root) for one in schema["anyOf"])
+    kind = schema["type"]
+    if not isinstance(value, _PYTHON_TYPES[kind]) or (
+        isinstance(value, bool) != (kind == "boolean")
+    ):
+        return False
+    if kind == "object":
+        known, others = schema.get("properties", {}), schema["additionalProperties"]
+        if not set(schema.get("required", ())) <= set(value):
+            return False
+        extra = {key: item for key, item in value.items() if key not in known}
+        if others is False:
+            return not extra and all(fits(known[k], v, root) for k, v in value.items())
+        return all(fits(others, item, root) for item in extra.values())
+    if kind == "array":
+        low, high = schema.get("minItems", 0), schema.get("maxItems", len(value))
+        return low <= len(value) <= high and all(fits(schema["items"], v, root) for v in value)
+    if "enum" in schema:
+        return value in schema["enum"]
+    return kind not in ("number", "integer") or (
+        schema.get("minimum", value) <= value <= schema.get("maximum", value)
+    )
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"id": 1},
+        {},
+        {"id": 253},
+        {"id": "1"},
+        {"id": True},
+        {"id": 1, "nmae": "x"},
+        {"id": 1, "lid": {"shut_ms": 39}},
+        {"id": 1, "lid": {"shut_ms": 40}},
+        {"id": 1, "lid": {"shut": 40}},
+        {"id": 1, "lid": None},
+        {"id": 1, "spare": None},
+        {"id": 1, "spare": {"open_ms": 400}},
+        {"id": 1, "lids": {"upper": {}, "lower": {"blinks": False}}},
+        {"id": 1, "lids": {"upper": {"blinks": 0}}},
+        {"id": 1, "kind": "lognormal"},
+        {"id": 1, "kind": "Gamma"},
+        {"id": 1, "side": "right"},
+        {"id": 1, "side": "both"},
+        {"id": 1, "baud": 9600},
+        {"id": 1, "offset_m": (1, 2, 3)},
+        {"id": 1, "offset_m": (1, 2)},
+        {"id": 1, "offset_m": (1, 2, "3")},
+        {"id": 1, "matrix": ((0, 1), (0.5, 0.5))},
+        {"id": 1, "matrix": ((0, 2),)},
+        {"id": 1, "pair": (1, 2, 3)},
+        {"id": 1, "tags": (1,)},
+        {"id": 1, "gains": {"a": 0.5}},
+        {"id": 1, "gains": {"a": 1.5}},
+    ],
+)
+def test_the_schema_agrees_with_the_loader(data: dict[str, Any]) -> None:
+    schema = json_schema(Eye)
+    value, _ = judge(Eye, data)
+    assert fits(schema, data, schema) == (value is not None)
+
+
+def test_the_schema_tells_an_editor_bounds_units_meaning_and_defaults() -> None:
+    schema = json_schema(Eye)
+    assert schema["$schema"] == DIALECT
+    assert schema["additionalProperties"] is False
+    assert schema["required"] == ["id"]
+    assert schema["$defs"]["Lid"]["description"] == "How a lid moves."
+    assert "description" not in schema  # Eye has no docstring of its own
+    assert schema["$defs"]["Lid"]["properties"]["shut_ms"] == {
+        "type": "number",
+        "title": "shut_ms",
+        "description": "time to shut [ms]",
+        "unit": "ms",
+        "minimum": 40,
+        "maximum": 200.0,
+        "default": 90.0,
+    }

@@ -1,0 +1,338 @@
+"""YAML files as they come: unreadable, shipped by name, or any text at all."""
+
+import os
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from config.load import ConfigError, load, read_yaml, shipped, shipped_names
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    id: int = field(metadata={"low": 0, "high": 252})
+    max_speed_deg_s: float = field(default=300.0, metadata={"low": 1.0, "high": 2000.0})
+    low_deg: float = -30.0
+    high_deg: float = 30.0
+
+    def __post_init__(self) -> None:
+        if self.low_deg >= self.high_deg:
+            raise ValueError("low_deg must be below high_deg")
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    fps: int = field(default=30, metadata={"low": 1, "high": 120})
+    face: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    name: str
+    joints: Mapping[str, Joint]
+    camera: Camera = Camera()
+    spare: Camera | None = None
+    dwell: str = field(default="gamma", metadata={"choices": ("gamma", "lognormal")})
+    gains: dict[str, float] = field(default_factory=dict, metadata={"low": 0.0})
+    matrix: tuple[tuple[float, ...], ...] = ()
+    baud: int = 57_600
+
+
+def one_id_each(rig: Rig) -> Iterator[tuple[str, str]]:
+    owners: dict[int, str] = {}
+    for name, joint in rig.joints.items():
+        if joint.id in owners:
+            yield f"joints.{name}.id", f"id {joint.id} is also that of {owners[joint.id]}"
+        owners.setdefault(joint.id, name)
+
+
+GOOD = """\
+# a rig
+name: nod
+joints:
+  neck: {id: 1}
+  pan:
+    id: 2             # ours
+    max_speed_deg_s: 500
+camera:
+  fps: 30
+"""
+
+
+def write(folder: Path, text: str | bytes, name: str = "rig.yaml") -> Path:
+    file = folder / name
+    file.write_bytes(text.encode() if isinstance(text, str) else text)
+    return file
+
+
+def faults_of(folder: Path, text: str | bytes) -> list[str]:
+    """Load a rig that is at fault and give its message without the folder."""
+    with pytest.raises(ConfigError) as caught:
+        load(write(folder, text), Rig)
+    return str(caught.value).replace(f"{folder}{os.sep}", "").splitlines()
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("", "rig.yaml:1: is empty; write 'key: value' lines"),
+        ("# only words\n", "rig.yaml:1: is empty; write 'key: value' lines"),
+        ("\n- a\n", "rig.yaml:2: the top level is no mapping; write 'key: value' lines"),
+        ("null\n", "rig.yaml:1: the top level is no mapping; write 'key: value' lines"),
+        (b"a: 1\nb: \xff\n", "rig.yaml:2: is not UTF-8 text (byte 0xff); save it as UTF-8"),
+        (
+            "a: 1\nb: 2\x07\n",
+            "rig.yaml:2:5: not valid YAML: character '\\x07' is not allowed; take it out",
+        ),
+        (
+            "a:\n\tb: 1\n",
+            "rig.yaml:2:1: not valid YAML: while scanning for the next token, "
+            "found character '\\t' that cannot start any token; indent with spaces",
+        ),
+        (
+            "a: 1\nb: [1, 2\n",
+            "rig.yaml:3:1: not valid YAML: while parsing a flow sequence, expected ',' or ']', "
+            "but got '<stream end>'; check this line and the one above",
+        ),
+        (
+            "a: 1\n  b: 2\n",
+            "rig.yaml:2:4: not valid YAML: mapping values are not allowed here; "
+            "check this line and the one above",
+        ),
+        (
+            "a: *nobody\n",
+            "rig.yaml:1:4: not valid YAML: found undefined alias 'nobody'; "
+            "check this line and the one above",
+        ),
+        (
+            "%YAML 9.9\n---\na: 1\n",
+            "rig.yaml:1:1: not valid YAML: found incompatible YAML document "
+            "(version 1.* is required); check this line and the one above",
+        ),
+        (
+            "a: &a [*a]\n",
+            "rig.yaml:1: nested deeper than 40 levels, or refers to itself; write it flat",
+        ),
+        (
+            "[" * 200,
+            "rig.yaml:1:41: nested deeper than 40 levels, or refers to itself; write it flat",
+        ),
+        (
+            "a0: &a0 [1]\n" + "".join(f"a{n + 1}: &a{n + 1} [{f'*a{n},' * 9}]\n" for n in range(9)),
+            "rig.yaml:1: holds more than 20000 values; write less",
+        ),
+    ],
+)
+def test_a_file_that_cannot_be_used(tmp_path: Path, text: str | bytes, fault: str) -> None:
+    assert faults_of(tmp_path, text) == [fault]
+    with pytest.raises(ConfigError):
+        read_yaml(tmp_path / "rig.yaml")
+
+
+def test_a_file_that_asks_for_yaml_1_1_gets_its_words(tmp_path: Path) -> None:
+    file = write(tmp_path, f"%YAML 1.1\n---\n{GOOD}  face: off\nspare: {{face: yes}}\n")
+    rig = load(file, Rig)
+    assert (rig.camera.face, rig.spare) == (False, Camera(face=True))
+
+
+def test_an_anchor_may_be_set_again(tmp_path: Path) -> None:
+    file = write(tmp_path, "a: &x 1\nb: &x 2\nc: *x\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read_yaml(file).data == {"a": 1, "b": 2, "c": 2}
+
+
+def test_two_documents_in_one_file_are_refused(tmp_path: Path) -> None:
+    (fault,) = faults_of(tmp_path, GOOD + "---\nname: b\n")
+    assert fault.startswith("rig.yaml:10:1: not valid YAML: expected a single document")
+
+
+def test_an_absent_file_is_named_with_a_near_one(tmp_path: Path) -> None:
+    write(tmp_path, GOOD, "nod.yaml")
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path / "nodd.yaml", Rig)
+    assert str(caught.value) == (
+        f"{tmp_path / 'nodd.yaml'}: no such file; did you mean 'nod.yaml'? check the name"
+    )
+
+
+def test_a_directory_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="is a directory; name a file in it"):
+        read_yaml(tmp_path)
+
+
+def test_a_file_below_a_file_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_yaml(write(tmp_path, GOOD) / "rig.yaml")
+
+
+def test_a_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "read_bytes", refuse)  # the tests may run as root
+    with pytest.raises(ConfigError, match=r"rig\.yaml: may not be read"):
+        read_yaml(write(tmp_path, GOOD))
+
+
+def test_a_document_knows_its_lines_and_keeps_its_text(tmp_path: Path) -> None:
+    document = read_yaml(write(tmp_path, "\ufeff" + GOOD + "matrix:\n  - [1]\n  - [2,\n     3]\n"))
+    assert document.data["joints"]["pan"] == {"id": 2, "max_speed_deg_s": 500}
+    assert document.data["matrix"] == ((1,), (2, 3))
+    assert document.text.startswith("# a rig") and "# ours" in document.text
+    lines = {
+        "name": 2,
+        "joints": 3,
+        "joints.neck.id": 4,
+        "joints.pan": 5,
+        "joints.pan.id": 6,
+        "camera.fps": 9,
+        "matrix.0": 11,
+        "matrix.1": 12,
+        "matrix.1.1": 13,
+        "joints.pan.nothing": 5,
+        "": 2,
+    }
+    assert {key: document.line(key) for key in lines} == lines
+
+
+def test_shipped_files_are_found_by_name() -> None:
+    with pytest.raises(ConfigError, match=r"^config/rigs: nothing named '\.\./x' is shipped"):
+        shipped("rigs", "../x")
+    with pytest.raises(ConfigError, match="there are none of this kind"):
+        shipped("hats", "top")
+    for kind in ("rigs", "profiles", "scanpaths"):
+        for name in shipped_names(kind):
+            assert shipped(kind, name).is_file()
+
+
+def test_an_unknown_shipped_name_lists_those_that_exist(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "rigs").mkdir()
+    for name in ("shake.yaml", "nod.yaml", "notes.txt"):
+        write(tmp_path / "rigs", GOOD, name)
+    monkeypatch.setattr("config.load.importlib.resources.files", lambda package: tmp_path)
+    assert shipped("rigs", "nod") == tmp_path / "rigs" / "nod.yaml"
+    with pytest.raises(ConfigError) as caught:
+        shipped("rigs", "nood")
+    assert str(caught.value) == (
+        "config/rigs: nothing named 'nood' is shipped; did you mean 'nod'? there are nod, shake"
+    )
+
+
+# ---- anything at all --------------------------------------------------------------------
+
+_words = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), max_size=12)
+_numbers = st.floats(allow_nan=False, allow_infinity=False)
+_speeds = st.floats(1.0, 2000.0) | st.integers(1, 2000)
+_joints: st.SearchStrategy[dict[str, Any]] = st.builds(
+    dict,
+    id=st.integers(0, 252),
+    max_speed_deg_s=_speeds,
+    low_deg=st.floats(-90.0, -1.0),
+    high_deg=st.floats(1.0, 90.0),
+)
+_rigs = st.fixed_dictionaries(
+    {"name": _words, "joints": st.dictionaries(_words, _joints, max_size=3)},
+    optional={
+        "camera": st.fixed_dictionaries(
+            {}, optional={"fps": st.integers(1, 120), "face": st.booleans()}
+        ),
+        "spare": st.none() | st.fixed_dictionaries({"fps": st.integers(1, 120)}),
+        "gains": st.dictionaries(_words, st.floats(0.0, 1e300), max_size=3),
+        "matrix": st.lists(st.lists(_numbers, max_size=3), max_size=3),
+        "dwell": st.sampled_from(["gamma", "lognormal"]),
+        "baud": st.integers(-(10**30), 10**30),
+    },
+)
+
+
+def as_yaml(value: Any) -> str:
+    """Write a value in YAML's flow style, independent of the reader under test."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"? {as_yaml(k)} : {as_yaml(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(as_yaml, value)) + "]"
+    if isinstance(value, str):
+        return '"' + "".join(f"\\U{ord(letter):08x}" for letter in value) + '"'
+    if value is None:
+        return "null"
+    return repr(value).lower().replace("nan", ".nan").replace("inf", ".inf")
+
+
+def as_lists(value: Any) -> Any:
+    """Give tuples as lists, as they were before they were written."""
+    if isinstance(value, tuple):
+        return [as_lists(item) for item in value]
+    return value
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=_rigs)
+def test_right_values_come_through_unchanged(tmp_path: Path, data: dict[str, Any]) -> None:
+    rig = load(write(tmp_path, as_yaml(data)), Rig)
+    assert rig.name == data["name"]
+    assert rig.joints == {name: Joint(**joint) for name, joint in data["joints"].items()}
+    assert rig.camera == Camera(**data.get("camera", {}))
+    assert rig.spare == (Camera(**data["spare"]) if data.get("spare") else None)
+    for key in ("gains", "matrix", "dwell", "baud"):
+        if key in data:
+            assert as_lists(getattr(rig, key)) == data[key]
+
+
+_junk = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | _words,
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.sampled_from(list(Rig.__slots__)) | _words, inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+@settings(
+    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=_junk)
+def test_other_values_are_refused_or_taken_but_never_crash(tmp_path: Path, data: Any) -> None:
+    file = write(tmp_path, as_yaml(data))
+    try:
+        assert isinstance(load(file, Rig, checks=[one_id_each]), Rig)
+    except ConfigError as error:
+        assert len(str(error).splitlines()) == len(error.faults) > 0
+
+
+_pieces = st.sampled_from(
+    [*GOOD.splitlines(keepends=True), *"-:?!&*{}[],#|>'\"%@`\n\t ", "*a", "&a ", "<<: ", "!!int "]
+    + ["---\n", "...\n", "%YAML 1.1\n---\n", "1_", "0x", "._", "1:30", "\r", "\x00", "\u2028"]
+)
+
+
+@settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(text=st.lists(_pieces, max_size=14).map("".join) | st.text(max_size=30))
+@example(text='"\\U00110000": 1')
+@example(text='"\\UE0000000": 1')
+@example(text="a: 1\n%YAML 9.9\n---\n")
+@example(text="!!set {a}")
+@example(text='"a\\nb\\u2028c": 1')
+@example(text="%YAML 1.1\n---\nname: yes\n")
+@example(text="joints: {a: {id: 0x" + "f" * 5000 + "}}")
+@example(text="baud: " + "9" * 5000)
+@example(text="gains: {x: " + "9" * 39 + "}")
+def test_junk_text_gives_a_config_error_and_nothing_else(tmp_path: Path, text: str) -> None:
+    file = write(tmp_path, text.encode("utf-8", "surrogatepass"))
+    try:
+        assert isinstance(load(file, Rig, checks=[one_id_each]), Rig)
+    except ConfigError as error:
+        assert len(str(error).splitlines()) == len(error.faults) > 0

@@ -1,0 +1,367 @@
+"""YAML to frozen values: every fault with its file and line, layer over layer."""
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from config.load import ConfigError, Fault, load
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    id: int = field(metadata={"low": 0, "high": 252, "says": "servo id"})
+    max_speed_deg_s: float = field(
+        default=300.0, metadata={"low": 1.0, "high": 2000.0, "unit": "deg/s"}
+    )
+    low_deg: float = -30.0
+    high_deg: float = 30.0
+
+    def __post_init__(self) -> None:
+        if self.low_deg >= self.high_deg:
+            raise ValueError("low_deg must be below high_deg")
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    fps: int = field(default=30, metadata={"low": 1, "high": 120, "unit": "Hz"})
+    offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    face: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    name: str
+    joints: Mapping[str, Joint]
+    camera: Camera = Camera()
+    spare: Camera | None = None
+    dwell: str = field(default="gamma", metadata={"choices": ("gamma", "lognormal")})
+    gains: dict[str, float] = field(default_factory=dict, metadata={"low": 0.0})
+    matrix: tuple[tuple[float, ...], ...] = ()
+    baud: int = 57_600
+
+
+def one_id_each(rig: Rig) -> Iterator[tuple[str, str]]:
+    owners: dict[int, str] = {}
+    for name, joint in rig.joints.items():
+        if joint.id in owners:
+            yield f"joints.{name}.id", f"id {joint.id} is also that of {owners[joint.id]}"
+        owners.setdefault(joint.id, name)
+
+
+def has_neck(rig: Rig) -> Iterator[tuple[str, str]]:
+    if "neck" not in rig.joints:
+        yield "joints", "there is no neck"
+
+
+def camera_keeps_up(rig: Rig) -> Iterator[tuple[str, str]]:
+    if rig.camera.fps < 10:
+        yield "camera.fps", "too slow to follow a face"
+
+
+CHECKS = (one_id_each, has_neck, camera_keeps_up)
+
+GOOD = """\
+# a rig
+name: nod
+joints:
+  neck: {id: 1}
+  pan:
+    id: 2             # ours
+    max_speed_deg_s: 500
+camera:
+  offset_m: [0, 0.5, -1e-2]
+"""
+
+
+def write(folder: Path, text: str | bytes, name: str = "rig.yaml") -> Path:
+    file = folder / name
+    file.write_bytes(text.encode() if isinstance(text, str) else text)
+    return file
+
+
+def faults_of(folder: Path, text: str | bytes) -> list[str]:
+    """Load a rig that is at fault and give its message without the folder."""
+    with pytest.raises(ConfigError) as caught:
+        load(write(folder, text), Rig, checks=CHECKS)
+    assert len(caught.value.faults) == len(str(caught.value).splitlines())
+    return str(caught.value).replace(f"{folder}{os.sep}", "").splitlines()
+
+
+def test_a_right_file_becomes_the_frozen_value(tmp_path: Path) -> None:
+    rig = load(write(tmp_path, GOOD), Rig, checks=CHECKS)
+    assert rig == Rig(
+        name="nod",
+        joints={"neck": Joint(1), "pan": Joint(2, max_speed_deg_s=500.0)},
+        camera=Camera(offset_m=(0.0, 0.5, -0.01)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "value"),
+    [
+        ("baud: 0x10", 16),
+        ("baud: 0o17", 15),
+        ("baud: 007", 7),
+        ("baud: 1_000_000", 1_000_000),
+        ("baud: +5", 5),
+        ("baud: !!int '5'", 5),
+    ],
+)
+def test_whole_numbers_are_those_of_yaml_1_2(tmp_path: Path, line: str, value: int) -> None:
+    assert load(write(tmp_path, GOOD + line + "\n"), Rig).baud == value
+
+
+@pytest.mark.parametrize("word", ["no", "on", "yes", "2026-01-31", "1:30", "=", "0.1.2", "'5'"])
+def test_words_that_look_like_something_else_are_text(tmp_path: Path, word: str) -> None:
+    file = write(tmp_path, GOOD.replace("nod", word))
+    assert load(file, Rig).name == word.strip("'")
+
+
+@pytest.mark.parametrize(
+    ("change", "to", "fault"),
+    [
+        ("500", "9000.0", "7: joints.pan.max_speed_deg_s: 9000.0 is above 2000 (unit deg/s)"),
+        ("500", "0", "7: joints.pan.max_speed_deg_s: 0 is below 1 (unit deg/s)"),
+        ("500", ".nan", "7: joints.pan.max_speed_deg_s: nan is not a finite number"),
+        ("500", "-.inf", "7: joints.pan.max_speed_deg_s: -inf is not a finite number"),
+        (
+            "500",
+            "'500'",
+            "7: joints.pan.max_speed_deg_s: '500' is text, "
+            "wanted a number, 1 to 2000 deg/s; take the quotes away",
+        ),
+        (
+            "500",
+            "true",
+            "7: joints.pan.max_speed_deg_s: True is a truth value, "
+            "wanted a number, 1 to 2000 deg/s",
+        ),
+        (
+            "500",
+            "",
+            "7: joints.pan.max_speed_deg_s: is empty, wanted a number, 1 to 2000 deg/s",
+        ),
+        (
+            "max_speed_deg_s",
+            "max_sped_deg_s",
+            "7: joints.pan.max_sped_deg_s: unknown key 'max_sped_deg_s'; "
+            "did you mean 'max_speed_deg_s'? allowed: id, max_speed_deg_s, low_deg, high_deg",
+        ),
+        (
+            "    id: 2 ",
+            "    # 2 ",
+            "5: joints.pan.id: missing; wanted a whole number, 0 to 252 (servo id)",
+        ),
+        (
+            "joints:",
+            "joint:",
+            "2: joints: missing; wanted a mapping, each key with "
+            "a mapping with the keys id, max_speed_deg_s, low_deg, high_deg\n"
+            "3: joint: unknown key 'joint'; did you mean 'joints'? "
+            "allowed: name, joints, camera, spare, dwell, gains, matrix, baud",
+        ),
+        ("max_speed_deg_s: 500", "low_deg: 30", "5: joints.pan: low_deg must be below high_deg"),
+        ("-1e-2]", "-1e-2, 3]", "9: camera.offset_m: has length 4, wanted 3"),
+        ("0.5", "\n   x", "10: camera.offset_m.1: 'x' is text, wanted a number"),
+        ("id: 2", "id: 1", "6: joints.pan.id: id 1 is also that of neck"),
+        ("neck", "nekc", "3: joints: there is no neck"),
+        ("offset_m: [0, 0.5, -1e-2]", "fps: 2", "9: camera.fps: too slow to follow a face"),
+        ("name: nod", "name: nod\nname: x", "3: name: key stands twice, first in line 2"),
+        ("name: nod", "name: nod\n5: x", "3: key '5' is not text; put it in quotes"),
+        ("name: nod", "name: nod\n[a]: x", "3: key this is not text; put it in quotes"),
+        (
+            "pan:\n",
+            "pan:\n    <<: {id: 3}\n",
+            "6: joints.pan: merge keys (<<) are not read; write the keys out",
+        ),
+    ],
+)
+def test_each_fault_alone(tmp_path: Path, change: str, to: str, fault: str) -> None:
+    assert GOOD.count(change) == 1
+    found = faults_of(tmp_path, GOOD.replace(change, to))
+    assert found == [f"rig.yaml:{line}" for line in fault.splitlines()]
+
+
+def test_a_refused_tag_is_named(tmp_path: Path) -> None:
+    found = faults_of(tmp_path, GOOD + "gains: {x: !force 3}\n")
+    assert found[0] == "rig.yaml:10: gains.x: the tag !force is not read; take it out"
+
+
+ALL_WRONG = """\
+joints:
+  neck: {id: 300}
+  pan: {id: 4, max_sped_deg_s: 3}
+  tilt: {id: 5, max_speed_deg_s: 9000.0}
+  roll: {low_deg: true, id: "6"}
+  lid_left: {}
+  lid_right:
+    id: 5
+    low_deg: 40
+    low_deg: 50
+  eye_left: {id: 4}
+  eye_right:
+    id: 5
+camera: {fps: 3.5, offset_m: [1, 2]}
+spare:
+  fps: 9999
+dwell: gama
+gains: {x: -1, y: .inf}
+matrix: [[0, x],
+  [1, 2], 3]
+baud: '57600'
+colour: red
+"""
+
+ALL_FAULTS = """\
+rig.yaml:1: name: missing; wanted text
+rig.yaml:2: joints.neck.id: 300 is above 252
+rig.yaml:3: joints.pan.max_sped_deg_s: unknown key 'max_sped_deg_s'; did you mean \
+'max_speed_deg_s'? allowed: id, max_speed_deg_s, low_deg, high_deg
+rig.yaml:4: joints.tilt.max_speed_deg_s: 9000.0 is above 2000 (unit deg/s)
+rig.yaml:5: joints.roll.id: '6' is text, wanted a whole number, 0 to 252; take the quotes away
+rig.yaml:5: joints.roll.low_deg: True is a truth value, wanted a number
+rig.yaml:6: joints.lid_left.id: missing; wanted a whole number, 0 to 252 (servo id)
+rig.yaml:7: joints.lid_right: low_deg must be below high_deg
+rig.yaml:8: joints.lid_right.id: id 5 is also that of tilt
+rig.yaml:10: joints.lid_right.low_deg: key stands twice, first in line 9
+rig.yaml:11: joints.eye_left.id: id 4 is also that of pan
+rig.yaml:13: joints.eye_right.id: id 5 is also that of tilt
+rig.yaml:14: camera.fps: 3.5 is a number, wanted a whole number, 1 to 120 Hz
+rig.yaml:14: camera.offset_m: has length 2, wanted 3
+rig.yaml:16: spare.fps: 9999 is above 120 (unit Hz)
+rig.yaml:17: dwell: 'gama' is not one of 'gamma', 'lognormal'; did you mean 'gamma'?
+rig.yaml:18: gains.x: -1 is below 0
+rig.yaml:18: gains.y: inf is not a finite number
+rig.yaml:19: matrix.0.1: 'x' is text, wanted a number
+rig.yaml:20: matrix.2: 3 is a whole number, wanted a list, each a number
+rig.yaml:21: baud: '57600' is text, wanted a whole number; take the quotes away
+rig.yaml:22: colour: unknown key 'colour'; allowed: name, joints, camera, spare, dwell, gains, \
+matrix, baud"""
+
+
+def test_all_faults_together_in_one_message(tmp_path: Path) -> None:
+    assert sorted(faults_of(tmp_path, ALL_WRONG)) == sorted(ALL_FAULTS.splitlines())
+
+
+def test_faults_come_in_the_order_of_their_lines(tmp_path: Path) -> None:
+    lines = [int(fault.split(":")[1]) for fault in faults_of(tmp_path, ALL_WRONG)]
+    assert lines == sorted(lines)
+
+
+def test_a_fault_is_also_there_in_parts(tmp_path: Path) -> None:
+    file = write(tmp_path, GOOD.replace("500", "9000.0"))
+    with pytest.raises(ConfigError) as caught:
+        load(file, Rig)
+    assert caught.value.faults == (
+        Fault(
+            str(file),
+            7,
+            "joints.pan.max_speed_deg_s",
+            "9000.0",
+            "9000.0 is above 2000 (unit deg/s)",
+        ),
+    )
+
+
+def is_nod(rig: Rig) -> Iterator[tuple[str, str]]:
+    if rig.name != "nod":
+        yield "name", "is not ours"
+
+
+def gains_name_joints(rig: Rig) -> Iterator[tuple[str, str]]:
+    for name, gain in rig.gains.items():
+        if name not in rig.joints:
+            yield f"gains.{name}", "no such joint"
+        elif gain / rig.joints[name].low_deg > 0:
+            yield f"gains.{name}", "has the wrong sign"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "keys"),
+    [
+        ("name: nod", "name: 5", ["name"]),
+        ("neck: {id: 1}", "neck: {id: 999}", ["joints.neck.id"]),
+        ("neck: {id: 1}", "neck: {idd: 2}", ["joints.neck.idd", "joints.neck.id"]),
+        ("neck: {id: 1}", "neck:", ["joints.neck"]),
+        ("neck: {id: 1}", "neck: {id: 1, low_deg: x}", ["joints.neck.low_deg"]),
+        ("joints:", "joints: 5\nspare:", ["joints", "spare.neck", "spare.pan"]),
+        ("camera:", "camera:\n  fsp: 5", ["camera.fsp"]),
+        ("camera:", "camera:\n  fps: -1", ["camera.fps"]),
+        ("gains:", "gains: {nekc: 1}\nspare:", ["gains.nekc", "spare.neck"]),
+    ],
+)
+def test_a_check_finds_nothing_that_a_right_value_could_mend(
+    tmp_path: Path, old: str, new: str, keys: list[str]
+) -> None:
+    file = write(tmp_path, f"{GOOD}gains:\n  neck: 1\n".replace(old, new))
+    with pytest.raises(ConfigError) as caught:
+        load(file, Rig, checks=(*CHECKS, is_nod, gains_name_joints))
+    assert sorted(fault.key for fault in caught.value.faults) == sorted(keys)
+
+
+def test_a_slip_in_a_check_is_not_taken_for_a_fault_of_the_file(tmp_path: Path) -> None:
+    def slips(rig: Rig) -> Iterator[tuple[str, str]]:
+        yield "name", str(rig.joints["nobody"])
+
+    with pytest.raises(KeyError):
+        load(write(tmp_path, GOOD), Rig, checks=[slips])
+
+
+# ---- layers -----------------------------------------------------------------------------
+
+
+def test_later_layers_win_key_by_key(tmp_path: Path) -> None:
+    base = write(tmp_path, GOOD + "spare: {fps: 10}\nmatrix: [[1], [2]]\n", "base.yaml")
+    middle = write(tmp_path, "joints: {pan: {low_deg: -5}, tilt: {id: 3}}\n", "middle.yaml")
+    top = write(tmp_path, "joints: {pan: {id: 9}}\nspare:\nmatrix: [[3]]\n", "top.yaml")
+    rig = load(top, Rig, defaults=[base, middle], checks=CHECKS)
+    assert rig.joints == {
+        "neck": Joint(1),
+        "pan": Joint(9, max_speed_deg_s=500.0, low_deg=-5.0),
+        "tilt": Joint(3),
+    }
+    assert (rig.name, rig.spare, rig.matrix) == ("nod", None, ((3.0,),))
+    assert rig.camera.offset_m == (0.0, 0.5, -0.01)
+
+
+def test_a_fault_names_the_layer_its_value_comes_from(tmp_path: Path) -> None:
+    base = write(tmp_path, GOOD.replace("500", "9000").replace("nod", "5"), "base.yaml")
+    top = write(
+        tmp_path, "\n\njoints:\n  pan:\n    id: 1\n  tilt: {}\nname: ok\nfps: 3\n", "top.yaml"
+    )
+    with pytest.raises(ConfigError) as caught:
+        load(top, Rig, defaults=[base], checks=CHECKS)
+    assert [(Path(f.file).name, f.line, f.key) for f in caught.value.faults] == [
+        ("base.yaml", 7, "joints.pan.max_speed_deg_s"),
+        ("top.yaml", 5, "joints.pan.id"),
+        ("top.yaml", 6, "joints.tilt.id"),
+        ("top.yaml", 8, "fps"),
+    ]
+
+
+def test_what_is_missing_is_missed_in_the_uppermost_mapping(tmp_path: Path) -> None:
+    base = write(tmp_path, "name: x\njoints:\n  pan:\n    low_deg: 1\n", "base.yaml")
+    top = write(tmp_path, "\njoints:\n  pan: {high_deg: 2}\n", "top.yaml")
+    with pytest.raises(ConfigError) as caught:
+        load(top, Rig, defaults=[base])
+    (fault,) = caught.value.faults
+    assert (Path(fault.file).name, fault.line, fault.key) == ("top.yaml", 3, "joints.pan.id")
+
+
+def test_unreadable_layers_are_all_named(tmp_path: Path) -> None:
+    broken = write(tmp_path, "a: [1\n", "broken.yaml")
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path / "absent.yaml", Rig, defaults=[broken, tmp_path])
+    assert [Path(f.file) for f in caught.value.faults] == [
+        broken,
+        tmp_path,
+        tmp_path / "absent.yaml",
+    ]
+
+
+def test_an_alias_stands_where_it_is_used(tmp_path: Path) -> None:
+    text = "name: x\njoints:\n  neck: &j {id: 1}\n  pan: *j\n"
+    assert faults_of(tmp_path, text) == ["rig.yaml:3: joints.pan.id: id 1 is also that of neck"]

@@ -1,0 +1,210 @@
+"""One behaviour suite for the servo bus, over both twins: in-process port and pseudo-terminal."""
+
+import time
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import pytest
+from dynamixel_sdk import PacketHandler
+
+from drivers.dynamixel import DynamixelBus, DynamixelParams
+from drivers.dynamixel_packets import instruction
+from drivers.dynamixel_port import BlockingPort
+from drivers.errors import BusLost, ServoMissing
+from drivers.types import ServoSetup
+from sim_mock.ports import InProcessPort
+from sim_mock.pty_bus import PtyBus
+from sim_mock.servo import ServoSpec
+from sim_mock.servo_chain import build_chain
+
+SPEED = 6000.0
+REBOOT = 8
+SPECS = (
+    ServoSpec(3, "xl330-m077", 1800),
+    ServoSpec(1, "xl330-m077", 2048),
+    ServoSpec(12, "xc330-m288", 2300),
+    ServoSpec(7, "xc330-m288", 2048),
+)
+SETUPS = tuple(ServoSetup(s.id, s.model, 1000, 3000, SPEED) for s in SPECS)
+
+
+class Twin(NamedTuple):
+    """A bus with its port and its way to let time pass."""
+
+    port: object
+    wait: Callable[[float], None]
+
+    def bus(self, setups=SETUPS, **params) -> DynamixelBus:
+        # A shared machine may stall a process for longer than real servos ever wait.
+        chosen = {"reply_timeout_ms": 100.0, "watchdog_ms": 0, **params}
+        return DynamixelBus(self.port, setups, DynamixelParams(**chosen))
+
+    def run(self, bus, seconds, goals=None):
+        """Tick every 10 ms; give the last readings."""
+        end_s = self.port.now_s() + seconds
+        while True:
+            readings = bus.read(self.port.now_s())
+            if goals is not None:
+                bus.write(goals)
+            if self.port.now_s() >= end_s:
+                return readings
+            self.wait(0.01)
+
+
+def make_twin(kind: str, specs=SPECS) -> Iterator[Twin]:
+    if kind == "in-process":
+        now = [0.0]
+
+        def wait(seconds: float) -> None:
+            now[0] += seconds
+
+        yield Twin(InProcessPort(build_chain(specs, lambda: now[0])), wait)
+        return
+    with PtyBus() as server:
+        port = BlockingPort(server.start(specs))
+        yield Twin(port, time.sleep)
+        port.closePort()
+
+
+@pytest.fixture(params=["in-process", "pty"])
+def twin(request):
+    yield from make_twin(request.param)
+
+
+@pytest.fixture(params=[True, False], ids=["fast", "plain"])
+def bus(request, twin):
+    made = twin.bus(fast_sync_read=request.param)
+    made.open()
+    yield made
+    made.release()
+    made.close()
+
+
+def registers(twin, address, size, ids=(3, 1, 12, 7)):
+    """Read one register of some servos through the SDK, apart from the driver."""
+    read = getattr(PacketHandler(2.0), f"read{size}ByteTxRx")
+    return {i: read(twin.port, i, address)[0] for i in ids}
+
+
+def places(readings):
+    return [None if r is None else r.position_steps for r in readings]
+
+
+def test_open_reads_in_the_order_of_the_setups_and_leaves_the_torque_off(twin, bus):
+    assert places(bus.read(twin.port.now_s())) == [1800, 2048, 2300, 2048]
+    bus.write([2000] * 4)
+    twin.run(bus, 0.1)
+    assert places(bus.read(twin.port.now_s())) == [1800, 2048, 2300, 2048]
+    assert bus.health().errors == {}
+    assert bus.health().tx_bytes > 0 < bus.health().rx_bytes
+
+
+def test_readings_are_stamped_with_the_ports_time(twin, bus):
+    before_s = twin.port.now_s()
+    readings = bus.read(before_s)
+    assert all(before_s <= r.at_s <= twin.port.now_s() and not r.alert for r in readings)
+
+
+def test_engage_holds_every_servo_where_it_is(twin, bus):
+    assert bus.engage() == (1800, 2048, 2300, 2048)
+    for place, start in zip(places(twin.run(bus, 0.2)), (1800, 2048, 2300, 2048), strict=True):
+        assert abs(place - start) <= 1
+
+
+def test_goals_are_followed(twin, bus):
+    bus.engage()
+    twin.run(bus, 0.6, [1900, 1900, 2200, 2200])
+    assert places(bus.read(twin.port.now_s())) == [1900, 1900, 2200, 2200]
+
+
+def test_goals_are_clipped_to_the_setup(twin, bus):
+    bus.engage()
+    twin.run(bus, 1.2, [-5000, 99999, 999, 3001])
+    assert places(bus.read(twin.port.now_s())) == [1000, 3000, 1000, 3000]
+
+
+def test_release_takes_the_torque_and_is_verified(twin, bus):
+    bus.engage()
+    twin.run(bus, 0.05)
+    bus.release()
+    bus.write([2500] * 4)
+    assert places(twin.run(bus, 0.1)) == [1800, 2048, 2300, 2048]
+    assert registers(twin, 64, 1) == {3: 0, 1: 0, 12: 0, 7: 0}
+    assert "refused" not in bus.health().errors
+
+
+def test_a_silent_servo_costs_only_itself_and_is_taken_back(twin, bus):
+    bus.engage()
+    twin.port.write(instruction(1, REBOOT))
+    twin.port.drain()
+    bus.read(twin.port.now_s())
+    second = places(bus.read(twin.port.now_s()))
+    assert second[1] is None
+    assert None not in second[:1] + second[2:]
+    assert bus.health().errors["timeout"] >= 1
+    last = twin.run(bus, 1.2)
+    assert places(last) == [1800, 2048, 2300, 2048]
+    assert bus.faults() == ("servo 1: restarted, torque off",)
+
+
+def test_open_names_every_problem_at_once(twin):
+    setups = (
+        *SETUPS[:3],
+        SETUPS[3]._replace(model="xl430-w250"),
+        ServoSetup(99, "xl330-m288", 0, 4095, SPEED),
+    )
+    with pytest.raises(ServoMissing) as caught:
+        twin.bus(setups).open()
+    message = str(caught.value)
+    assert "servo 7 is xc330-m288, not xl430-w250" in message
+    assert "servo 99 does not answer" in message
+    assert twin.port.port_name in message
+    assert "\n" not in message
+
+
+def test_open_tells_a_dead_bus_from_a_missing_servo(twin):
+    with pytest.raises(ServoMissing, match="no servo answers: check servo power"):
+        twin.bus([ServoSetup(i, "xl330-m288", 0, 4095, SPEED) for i in (50, 51)]).open()
+
+
+def test_a_bus_can_be_opened_again(twin):
+    bus = twin.bus()
+    for _ in range(2):
+        bus.open()
+        bus.engage()
+        assert places(bus.read(twin.port.now_s())) == [1800, 2048, 2300, 2048]
+        bus.release()
+        bus.close()
+    bus.close()
+
+
+@pytest.mark.parametrize("kind", ["in-process", "pty"])
+def test_a_joint_outside_its_limits_comes_in_slowly(kind):
+    specs = (ServoSpec(1, "xl330-m077", 900), ServoSpec(2, "xl330-m077", 3170))
+    for twin in make_twin(kind, specs):
+        bus = twin.bus([ServoSetup(i, "xl330-m077", 1000, 3000, SPEED) for i in (1, 2)])
+        bus.open()
+        assert bus.engage() == (1000, 3000)
+        slowest = 30 / 360 * 4096
+        for _ in range(60):
+            readings = bus.read(twin.port.now_s())
+            outside = [r for r in readings if not 1000 <= r.position_steps <= 3000]
+            assert all(abs(r.velocity_steps_s) <= slowest + 16 for r in outside)
+            twin.wait(0.02)
+        assert places(readings) == [1000, 3000]
+        assert registers(twin, 112, 4, ids=(1, 2)) == {1: 383, 2: 383}
+        bus.release()
+        bus.close()
+
+
+def test_a_vanished_terminal_is_a_lost_bus():
+    with PtyBus() as server:
+        port = BlockingPort(server.start(SPECS))
+        bus = DynamixelBus(port, SETUPS, DynamixelParams())
+        bus.open()
+        server.stop()
+        with pytest.raises(BusLost, match=f"{port.port_name} is gone"):
+            for _ in range(3):
+                bus.read(port.now_s())
+        assert not port.is_using
+        bus.close()

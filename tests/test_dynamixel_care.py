@@ -1,0 +1,139 @@
+"""Servos that stop, restart or start outside their limits while the driver looks after them."""
+
+import pytest
+
+from drivers.dynamixel import DynamixelBus, DynamixelParams
+from drivers.types import ServoSetup
+from sim_mock.ports import InProcessPort
+from sim_mock.servo import ServoSpec
+from sim_mock.servo_chain import build_chain
+
+IDS = (1, 2, 3)
+
+
+class Rig:
+    """Three servos in this process, a driver, and a clock set by hand."""
+
+    def __init__(self, fast=True, starts=(2001, 2002, 2003), **params):
+        self.now_s = 100.0
+        specs = [ServoSpec(i, "xl330-m077", at) for i, at in zip(IDS, starts, strict=True)]
+        self.chain = build_chain(specs, lambda: self.now_s)
+        setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
+        self.bus = DynamixelBus(
+            InProcessPort(self.chain), setups, DynamixelParams(fast_sync_read=fast, **params)
+        )
+        self.bus.open()
+
+    def tick(self, goals=None):
+        self.now_s += 0.005
+        readings = self.bus.read(self.now_s)
+        if goals is not None:
+            self.bus.write(goals)
+        return readings
+
+    def places(self):
+        return [r.position_steps for r in self.tick()]
+
+    def errors(self):
+        return self.bus.health().errors
+
+
+@pytest.fixture(params=[True, False], ids=["fast", "plain"])
+def rig(request):
+    return Rig(request.param)
+
+
+def test_the_watchdog_stops_the_servos_when_the_host_falls_silent():
+    rig = Rig(watchdog_ms=100)
+    rig.bus.engage()
+    rig.tick([3000] * 3)
+    rig.now_s += 5.0
+    stopped = rig.chain.positions_steps()
+    assert all(2001 < x < 2900 for x in stopped)
+
+
+def test_a_host_that_stalled_brings_the_servos_back_without_a_jump(rig):
+    rig.bus.engage()
+    rig.tick([3000] * 3)
+    rig.now_s += 5.0
+    stopped = rig.chain.positions_steps()
+    # The first exchange shows the stall, the next one heals it.
+    rig.tick()
+    rig.tick()
+    assert rig.errors() == {"watchdog": 3}
+    assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [10] * 3
+    rig.now_s += 0.1
+    assert all(abs(a - b) <= 1 for a, b in zip(rig.chain.positions_steps(), stopped, strict=True))
+    for _ in range(200):
+        rig.tick([2500] * 3)
+    assert rig.places() == [2500] * 3
+    assert rig.errors() == {"watchdog": 3}
+
+
+def test_a_stall_shown_by_a_write_is_healed_by_the_next_write(rig):
+    rig.bus.engage()
+    rig.now_s += 1.0
+    rig.bus.write([2500] * 3)
+    rig.bus.write([2500] * 3)
+    rig.now_s += 0.19
+    assert all(x > 2100 for x in rig.chain.positions_steps())
+    assert rig.errors() == {"watchdog": 3}
+
+
+def test_a_sleep_that_the_clock_does_not_show_is_found_by_asking(rig):
+    """A suspended laptop's monotonic clock stands still; the servos' time goes on."""
+    rig.bus.engage()
+    for servo in rig.chain.servos:
+        servo._trip(0, 0)
+    for _ in range(250):
+        rig.tick([2500] * 3)
+    assert rig.errors() == {"watchdog": 3}
+    assert rig.places() == [2500] * 3
+
+
+def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_found():
+    rig = Rig(watchdog_ms=0)
+    rig.bus.engage()
+    assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [0] * 3
+    rig.now_s += 60.0
+    rig.chain[2].reboot()
+    for _ in range(300):
+        rig.tick([2500] * 3)
+    assert rig.bus.faults() == ("servo 2: restarted, torque off",)
+
+
+def test_a_quick_restart_between_two_reads_is_found_by_asking(rig):
+    rig.bus.engage()
+    rig.chain[2].reboot()
+    rig.chain[2]._deaf_until_ms = 0
+    for _ in range(700):
+        rig.tick([2500] * 3)
+    assert rig.bus.faults() == ("servo 2: restarted, torque off",)
+    assert rig.places() == [2500, 2002, 2500]
+
+
+def test_healing_keeps_to_the_limits():
+    rig = Rig(starts=(900, 2002, 2003))
+    rig.bus.engage()
+    rig.tick()
+    rig.now_s += 1.0
+    rig.tick()
+    rig.tick()
+    assert rig.errors() == {"watchdog": 3}
+    assert rig.chain[1].memory.get("goal_position") == 1000
+
+
+def test_an_alert_whose_name_is_not_told_is_asked_about_seldom(rig):
+    rig.bus.engage()
+    rig.chain[2].alert = 0x20
+    for _ in range(50):
+        rig.tick()
+    before = rig.bus.health().tx_bytes
+    rig.tick()
+    quiet = rig.bus.health().tx_bytes - before
+    assert rig.bus.faults() == ()
+    rig.chain[2].fail("overload")
+    for _ in range(101):
+        rig.tick()
+    assert rig.bus.faults() == ("servo 2: overload",)
+    assert quiet == 14 + 3

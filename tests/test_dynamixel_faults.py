@@ -1,0 +1,354 @@
+"""What the servo driver does when bytes, servos or the whole line misbehave."""
+
+import struct
+
+import pytest
+
+from drivers.dynamixel import DynamixelBus, DynamixelParams
+from drivers.dynamixel_packets import instruction
+from drivers.errors import BusLost, ServoFault, ServoMissing
+from drivers.types import ServoSetup
+from sim_mock.ports import InProcessPort
+from sim_mock.servo import ServoSpec
+from sim_mock.servo_chain import build_chain, status
+
+IDS = (1, 2, 3)
+GROUP_READS = (0x82, 0x8A)
+
+
+class UnkindPort(InProcessPort):
+    """A port whose wire can be spoilt: ``spoil(instruction, answer)`` gives what arrives."""
+
+    def __init__(self, chain, tap=None):
+        super().__init__(chain, tap)
+        self.spoil = None
+        self.gone = False
+
+    def write(self, data):
+        if self.gone:
+            raise BusLost(f"{self.port_name} is gone")
+        before = len(self._waiting)
+        super().write(data)
+        if self.spoil is not None:
+            answer = self.spoil(data[7], self._waiting[before:])
+            self._waiting = self._waiting[:before] + answer
+
+
+class Rig:
+    """Three servos in this process, a driver, and a clock set by hand."""
+
+    def __init__(self, fast=True):
+        self.now_s = 100.0
+        self.sent = []
+        specs = [ServoSpec(i, "xl330-m077", 2000 + i) for i in IDS]
+        self.chain = build_chain(specs, lambda: self.now_s)
+        self.port = UnkindPort(self.chain, self.sent.append)
+        setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
+        self.bus = DynamixelBus(self.port, setups, DynamixelParams(fast_sync_read=fast))
+
+    def open(self):
+        self.bus.open()
+        return self
+
+    def tick(self, goals=None, dt_s=0.005):
+        self.now_s += dt_s
+        readings = self.bus.read(self.now_s)
+        if goals is not None:
+            self.bus.write(goals)
+        return readings
+
+    def places(self):
+        return [None if r is None else r.position_steps for r in self.tick()]
+
+    def errors(self):
+        return self.bus.health().errors
+
+
+@pytest.fixture(params=[True, False], ids=["fast", "plain"])
+def rig(request):
+    return Rig(request.param).open()
+
+
+def flipped(raw, at):
+    return raw[:at] + bytes([raw[at] ^ 0x10]) + raw[at + 1 :]
+
+
+def data_of(raw, servo_id, fast):
+    """Give the offset of the first byte of a servo's data in an answer of three."""
+    size, head = ((len(raw) - 8) // 3, 8 + 2) if fast else (len(raw) // 3, 9)
+    return head + size * IDS.index(servo_id)
+
+
+# --- bytes
+
+
+@pytest.mark.parametrize("victim", IDS)
+def test_a_damaged_answer_costs_only_its_servo_and_only_once(rig, victim):
+    fast = rig.bus._fast
+    rig.port.spoil = lambda code, raw: flipped(raw, data_of(raw, victim, fast))
+    expected = [None if i == victim else 2000 + i for i in IDS]
+    assert rig.places() == expected
+    rig.port.spoil = None
+    assert rig.places() == [2001, 2002, 2003]
+    assert rig.errors() == {"corrupt": 1}
+
+
+def test_a_servo_that_only_garbles_leaves_the_group_until_it_is_well(rig):
+    fast = rig.bus._fast
+
+    def garble(code, raw):
+        asked = rig.sent[-1][12:-2]
+        if 2 not in asked:
+            return raw
+        return flipped(raw, len(raw) - 3 if len(asked) == 1 else data_of(raw, 2, fast))
+
+    rig.port.spoil = garble
+    for _ in range(3):
+        assert rig.places() == [2001, None, 2003]
+    # Out of the group now: asked alone at once, then the others have the line to themselves.
+    rig.sent.clear()
+    for _ in range(2):
+        assert rig.places() == [2001, None, 2003]
+    assert [packet[12:-2] for packet in rig.sent] == [b"\x01\x03", b"\x02", b"\x01\x03"]
+    rig.port.spoil = None
+    rig.now_s += 0.1
+    assert rig.places() == [2001, 2002, 2003]
+
+
+@pytest.mark.parametrize("kept", range(3))
+def test_a_truncated_answer_gives_what_arrived(rig, kept):
+    fast = rig.bus._fast
+    size = 8 + 14 * kept + 3 if fast else 21 * kept + 3
+    rig.port.spoil = lambda code, raw: raw[:size]
+    assert rig.places() == [2000 + i if i <= kept else None for i in IDS]
+    rig.port.spoil = None
+    assert rig.places() == [2001, 2002, 2003]
+
+
+def test_a_repeated_answer_is_not_taken_for_the_next_one(rig):
+    rig.bus.engage()
+    size = 50 if rig.bus._fast else 21
+    rig.port.spoil = lambda code, raw: raw + raw[-size:]
+    for k in range(20):
+        rig.now_s += 0.005
+        truth = [round(x) for x in rig.chain.positions_steps()]
+        assert [r.position_steps for r in rig.tick([2100 + 20 * k] * 3, dt_s=0.0)] == truth
+
+
+def test_noise_around_an_answer_does_no_harm(rig):
+    rig.port.spoil = lambda code, raw: b"\xff\xff\xfd\x00\x55" + raw + b"\x00\xff"
+    for _ in range(3):
+        assert rig.places() == [2001, 2002, 2003]
+
+
+def test_an_echo_of_the_own_bytes_does_no_harm(rig):
+    rig.port.spoil = lambda code, raw: rig.sent[-1] + raw
+    assert rig.places() == [2001, 2002, 2003]
+
+
+def test_the_everyday_stuffed_answer_is_read():
+    rig = Rig(fast=False).open()
+    everyday = struct.pack("<hii", -1, -3, 2048)
+    rig.port.spoil = lambda code, raw: b"".join(status(i, 0, everyday) for i in IDS)
+    readings = rig.tick()
+    assert [r.position_steps for r in readings] == [2048] * 3
+    assert readings[0].current_ma == -1.0
+    assert readings[0].velocity_steps_s == pytest.approx(-3 * 0.229 / 60 * 4096)
+    assert rig.errors() == {}
+
+
+@pytest.mark.parametrize("delay", [1, 2, 3])
+def test_a_late_answer_is_never_taken_for_a_fresh_one(rig, delay):
+    """All answers come ``delay`` exchanges late while the joints move."""
+    rig.bus.engage()
+    held: list[bytes] = []
+
+    def late(code, raw):
+        if code not in GROUP_READS:
+            return raw
+        held.append(raw)
+        return held.pop(0) if len(held) > delay else b""
+
+    rig.port.spoil = late
+    for k in range(60):
+        truth = [round(x) for x in rig.chain.positions_steps()]
+        for reading in rig.tick([1200 + 30 * k] * 3, dt_s=0.0):
+            assert reading is None or reading.position_steps in truth
+        rig.now_s += 0.005
+    rig.port.spoil = None
+    for _ in range(8):
+        rig.now_s += 0.02
+        last = rig.tick(dt_s=0.0)
+    assert [r.position_steps for r in last] == [round(x) for x in rig.chain.positions_steps()]
+
+
+def test_a_refused_read_is_counted_and_has_no_value():
+    rig = Rig(fast=False).open()
+    rig.port.spoil = lambda code, raw: raw[:21] + status(2, 7, b"") + raw[42:]
+    assert rig.places() == [2001, None, 2003]
+    assert rig.errors() == {"refused": 1}
+
+
+# --- servos
+
+
+def test_two_silent_servos_cost_only_themselves(rig):
+    rig.bus.engage()
+    for servo_id in (1, 3):
+        rig.port.write(instruction(servo_id, 8))
+    rig.port.drain()
+    for _ in range(3):
+        rig.tick()
+    assert rig.places() == [None, 2002, None]
+    for _ in range(300):
+        rig.tick()
+    assert rig.places() == [2001, 2002, 2003]
+
+
+def test_a_silent_servo_is_asked_seldom(rig):
+    rig.chain[2]._deaf_until_ms = 10**9
+    for _ in range(300):
+        rig.tick()
+    rig.sent.clear()
+    for _ in range(400):
+        rig.tick()
+    alone = [packet for packet in rig.sent if packet[12:-2] == b"\x02"]
+    assert len(alone) == 4
+
+
+def test_an_alert_keeps_its_value_and_is_named_once(rig):
+    rig.bus.engage()
+    rig.chain[2].fail("overload")
+    readings = rig.tick([2500] * 3)
+    assert [r.alert for r in readings] == [False, True, False]
+    assert readings[1].position_steps == 2002
+    assert rig.bus.faults() == ("servo 2: overload",)
+    for _ in range(5):
+        rig.tick([2500] * 3)
+    assert rig.errors() == {"alert": 1}
+
+
+def test_an_alert_that_was_there_before_opening_is_named():
+    rig = Rig()
+    rig.chain[3].fail("overheating")
+    rig.open()
+    assert rig.bus.faults() == ("servo 3: overheating",)
+
+
+def test_engaging_a_latched_servo_names_it_and_leaves_all_without_torque():
+    rig = Rig().open()
+    rig.chain[3].fail("overload")
+    with pytest.raises(ServoFault, match="servo 3: overload: let it cool"):
+        rig.bus.engage()
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def test_engaging_a_silent_servo_names_it_and_leaves_all_without_torque():
+    rig = Rig().open()
+    rig.chain[2].reboot()
+    with pytest.raises(ServoMissing, match="no answer from servo 2"):
+        rig.bus.engage()
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def test_a_position_that_wraps_as_the_torque_comes_on_is_found():
+    rig = Rig().open()
+    servo = rig.chain[2]
+
+    def wrap(code, raw):
+        if servo.torque and servo.shaft.x < 4000:
+            servo.shaft.x += 4096
+        return raw
+
+    rig.port.spoil = wrap
+    with pytest.raises(ServoFault, match="servo 2: position jumped from 2002 to 6098"):
+        rig.bus.engage()
+    assert not any(s.torque for s in rig.chain.servos)
+
+
+def test_a_joint_moved_by_hand_is_held_where_it_is_now():
+    rig = Rig().open()
+    rig.bus.engage()
+    rig.bus.release()
+    rig.chain[1].shaft.place(2400)
+    assert rig.bus.engage()[0] == 2400
+    for _ in range(20):
+        assert abs(rig.tick()[0].position_steps - 2400) <= 1
+
+
+def test_torque_does_not_come_on_before_the_goal_is_known_to_be_kept():
+    rig = Rig().open()
+    rig.chain[1].shaft.place(2400)
+    real = rig.chain[1].write
+    refused = []
+
+    def deaf_to_goals(address, data):
+        if address == 116:
+            refused.append(data)
+            return 6
+        return real(address, data)
+
+    rig.chain[1].write = deaf_to_goals
+    with pytest.raises(ServoMissing, match="goal_position is not taken .servo 1: 2400."):
+        rig.bus.engage()
+    assert len(refused) == 3
+    assert rig.chain[1].shaft.x == 2400
+
+
+# --- the bus
+
+
+def test_a_bus_without_any_answer_is_lost_after_half_a_second(rig):
+    rig.bus.engage()
+    rig.port.spoil = lambda code, raw: b""
+    start_s = rig.now_s
+    with pytest.raises(BusLost, match="no servo has answered for 0.5 s"):
+        for _ in range(1000):
+            assert rig.tick() == (None, None, None)
+    assert 0.5 <= rig.now_s - start_s <= 0.52
+
+
+def test_release_survives_a_dead_bus(rig):
+    rig.bus.engage()
+    rig.port.spoil = lambda code, raw: b""
+    rig.bus.release()
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def test_release_repeats_until_the_torque_is_off(rig):
+    rig.bus.engage()
+    stubborn = rig.chain[2]
+    real, ignored = stubborn.write, []
+
+    def hard_of_hearing(address, data):
+        if address == 64 and len(ignored) < 3:
+            ignored.append(data)
+            return 0
+        return real(address, data)
+
+    stubborn.write = hard_of_hearing
+    rig.bus.release()
+    assert len(ignored) == 3
+    assert not stubborn.torque
+
+
+def test_release_counts_a_servo_that_keeps_its_torque(rig):
+    rig.bus.engage()
+    rig.chain[2].write = lambda address, data: 0
+    rig.bus.release()
+    assert rig.errors() == {"refused": 1}
+
+
+def test_a_lost_port_is_passed_on(rig):
+    rig.bus.engage()
+    rig.port.gone = True
+    for call in (lambda: rig.tick(), lambda: rig.bus.write([2000] * 3), rig.bus.release):
+        with pytest.raises(BusLost, match="is gone"):
+            call()
+
+
+def test_release_and_close_before_open_do_nothing():
+    rig = Rig()
+    rig.bus.release()
+    rig.bus.close()
+    assert rig.sent == []

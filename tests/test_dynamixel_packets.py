@@ -1,0 +1,96 @@
+"""Packets of the driver: byte-exact instructions, and statuses out of any heap of bytes."""
+
+import struct
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.dynamixel_packets import (
+    SyncWrite,
+    bytes_missing,
+    instruction,
+    statuses,
+    sync_read,
+)
+from sim_mock.servo_chain import status
+
+
+def vector(text: str) -> bytes:
+    return bytes.fromhex(text.replace(" ", ""))
+
+
+EVERYDAY = vector("FF FF FD 00 01 0F 00 55 00 FF FF FD FD FF FF FF 00 08 00 00 49 F0")
+
+
+def test_instructions_are_the_protocols():
+    assert instruction(1, 1) == vector("FF FF FD 00 01 03 00 01 19 4E")
+    assert instruction(0xFE, 1) == vector("FF FF FD 00 FE 03 00 01 31 42")
+    assert instruction(1, 2, struct.pack("<HH", 132, 4)) == vector(
+        "FF FF FD 00 01 07 00 02 84 00 04 00 1D 15"
+    )
+    assert instruction(1, 3, struct.pack("<Hi", 116, 512)) == vector(
+        "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89"
+    )
+    assert instruction(1, 4, struct.pack("<Hi", 104, 200)) == vector(
+        "FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E"
+    )
+    assert instruction(1, 5) == vector("FF FF FD 00 01 03 00 05 02 CE")
+    assert instruction(1, 8) == vector("FF FF FD 00 01 03 00 08 2F 4E")
+    assert sync_read((1, 2), 132, 4) == vector("FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA")
+    assert sync_read((3, 7, 4), 132, 4, fast=True) == vector(
+        "FF FF FD 00 FE 0A 00 8A 84 00 04 00 03 07 04 20 F2"
+    )
+    assert SyncWrite((1, 2), 116, 4).packet((150, 170)) == vector(
+        "FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87"
+    )
+
+
+def test_what_looks_like_a_header_is_stuffed():
+    assert instruction(1, 3, b"\x68\x00\xff\xff\xfd\x00") == vector(
+        "FF FF FD 00 01 0A 00 03 68 00 FF FF FD FD 00 E2 7A"
+    )
+    packet = SyncWrite((1, 2), 116, 4).packet((-1, 0x00FDFFFF))
+    assert b"\xff\xff\xfd\xfd" in packet
+    assert int.from_bytes(packet[5:7], "little") == len(packet) - 7
+
+
+def test_the_everyday_stuffed_status_is_understood():
+    (found,) = statuses(EVERYDAY)
+    assert (found.id, found.error, found.intact) == (1, 0, True)
+    assert struct.unpack("<hii", found.params) == (-1, -3, 2048)
+
+
+def test_echo_and_noise_are_passed_over():
+    request = sync_read((1,), 126, 10)
+    found = statuses(request + b"\xff\xff\xfd" + EVERYDAY + b"\x00")
+    assert [(s.id, s.intact) for s in found] == [(1, True)]
+
+
+def test_a_damaged_length_hides_only_its_own_status():
+    bad = bytearray(status(1, 0, bytes(10)))
+    bad[5] = 200
+    found = statuses(bytes(bad) + status(2, 0, bytes(10)))
+    assert [s.id for s in found if s.intact] == [2]
+
+
+@given(st.lists(st.tuples(st.integers(0, 252), st.integers(0, 255), st.binary(max_size=12))))
+def test_every_status_comes_back_as_it_was(rows):
+    raw = b"".join(status(i, error, params) for i, error, params in rows)
+    assert [(s.id, s.error, s.params, s.intact) for s in statuses(raw)] == [
+        (*r, True) for r in rows
+    ]
+
+
+@given(
+    st.lists(
+        st.sampled_from([b"\x00" * 10, b"\xff\xff\xfd" * 3 + b"\x00"]), min_size=1, max_size=5
+    ),
+    st.integers(0, 100),
+)
+def test_bytes_missing_never_asks_for_too_much_and_gets_there(params, cut):
+    raw = b"".join(status(i, 0, p) for i, p in enumerate(params))
+    got = raw[: cut % (len(raw) + 1)]
+    while missing := bytes_missing(got, len(params), 10):
+        assert len(got) + missing <= len(raw)
+        got = raw[: len(got) + missing]
+    assert got == raw

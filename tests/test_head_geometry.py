@@ -1,0 +1,91 @@
+"""Kinematics: forward and inverse against each other over the whole range."""
+
+from math import radians
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gaze.angles import angle_between, angles_of, norm, rotate, rotate_back, rotation, sub
+from gaze.field_of_view import line_of_sight
+from gaze.types import GazeCommand
+from robot.kinematics import GeometryParams, Kinematics
+from robot.types import JointState
+
+KINEMATICS = Kinematics(
+    GeometryParams(62.0, 38.0, 51.0), (radians(-25), radians(25)), (radians(20), radians(-20))
+)
+degree = st.floats(-1.0, 1.0)
+
+
+def joints_at(*angles: float) -> JointState:
+    return JointState(tuple(angles), (0.0,) * 9, (0.0,) * 9, ())
+
+
+@given(
+    head=st.tuples(degree, degree, degree),
+    point=st.tuples(st.floats(0.3, 5.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.5)),
+)
+def test_eyes_on_a_point_and_the_lines_of_sight_meet_in_it(
+    head: tuple[float, float, float], point: tuple[float, float, float]
+) -> None:
+    angles = (head[0] * 1.2, head[1] * 0.6, head[2] * 0.5)
+    R, p = KINEMATICS.head_pose(angles)
+    left, right = KINEMATICS.eyes_on(point, R, p)
+    state = KINEMATICS.forward(joints_at(*left, *right, 0.0, 0.0, *angles))
+    for is_left in (True, False):
+        eye = state.p_world_eye_left_m if is_left else state.p_world_eye_right_m
+        assert angle_between(line_of_sight(state, is_left), sub(point, eye)) < 1e-9
+
+
+@given(
+    q=st.tuples(*[st.floats(-0.6, 0.6)] * 4),
+    lids=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)),
+    head=st.tuples(st.floats(-1.5, 1.5), st.floats(-0.7, 0.7), st.floats(-0.5, 0.5)),
+)
+def test_forward_of_inverse_is_the_identity(
+    q: tuple[float, ...], lids: tuple[float, float], head: tuple[float, float, float]
+) -> None:
+    command = GazeCommand(
+        head, (q[0], q[1]), (q[2], q[3]), *lids, "fixate", False, (1.0, 0.0, 0.0), 0, 0, 0
+    )
+    state = KINEMATICS.forward(joints_at(*KINEMATICS.inverse(command)))
+    assert state.head_rad == head
+    assert (*state.eye_left_rad, *state.eye_right_rad) == q
+    assert (state.lid_left, state.lid_right) == pytest.approx(lids, abs=1e-9)
+
+
+@given(
+    point=st.tuples(st.floats(0.3, 5.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.5)),
+)
+def test_facing_leads_the_head_axis_through_the_point(point: tuple[float, float, float]) -> None:
+    yaw, pitch = KINEMATICS.facing(point)
+    R, p = KINEMATICS.head_pose((yaw, pitch, 0.0))
+    assert angle_between(rotate(R, (1.0, 0.0, 0.0)), sub(point, p)) < 1e-9
+
+
+@given(st.tuples(st.floats(-3.0, 3.0), st.floats(-1.5, 1.5), st.floats(-3.0, 3.0)))
+def test_rotations_turn_back(angles: tuple[float, float, float]) -> None:
+    R = rotation(angles)
+    assert angles_of(R) == pytest.approx(angles, abs=1e-9)
+    v = (0.3, -1.2, 0.7)
+    assert rotate_back(R, rotate(R, v)) == pytest.approx(v, abs=1e-12)
+    assert np.linalg.det(np.array(R)) == pytest.approx(1.0)
+
+
+def test_signs_are_left_up_and_right_ear_down() -> None:
+    R, _ = KINEMATICS.head_pose((radians(10), 0.0, 0.0))
+    assert rotate(R, (1.0, 0.0, 0.0))[1] > 0.0
+    R, _ = KINEMATICS.head_pose((0.0, radians(10), 0.0))
+    assert rotate(R, (1.0, 0.0, 0.0))[2] > 0.0
+    R, _ = KINEMATICS.head_pose((0.0, 0.0, radians(10)))
+    assert rotate(R, (0.0, -1.0, 0.0))[2] < 0.0
+
+
+def test_eyes_are_where_the_geometry_says() -> None:
+    state = KINEMATICS.forward(joints_at(*[0.0] * 9))
+    assert state.p_world_head_m == pytest.approx((0.038, 0.0, 0.113))
+    gap = sub(state.p_world_eye_left_m, state.p_world_eye_right_m)
+    assert norm(gap) == pytest.approx(0.0619)
+    assert gap[1] > 0.0

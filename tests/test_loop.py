@@ -1,0 +1,188 @@
+"""The loop's slots, the start without a jump, faults, parking; and the percept's place."""
+
+from collections.abc import Callable
+from math import radians
+from typing import Any
+
+import numpy as np
+import pytest
+
+from config.schema import load_rig
+from drivers.types import DetectedFace, Detections, MovingBlob
+from gaze.angles import angle_between, rotate_back, sub
+from robot.assemble import Assembly, Choice, assemble
+from robot.clock import RealClock, SimulatedClock
+from robot.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
+from robot.frames import CameraMount, CameraParams, PoseHistory
+from robot.kinematics import GeometryParams, Kinematics
+from robot.loop import LoopParams, Tick, run
+from robot.perception import Perception
+from robot.tracks import Tracker, TrackParams
+from robot.types import JOINTS
+from sim_mock.visitor import Visitor
+
+
+def made(seed: int = 0) -> Assembly:
+    return assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=seed, scene="visitor"))
+
+
+def ticks(assembly: Assembly, seconds: float) -> list[Tick]:
+    seen: list[Tick] = []
+    assembly.robot.start(assembly.clock)
+    run(assembly.robot, assembly.clock, assembly.loop, until(seconds), seen.append)
+    return seen
+
+
+def until(seconds: float) -> Callable[[float], str | None]:
+    return lambda s: "seconds" if s >= seconds else None
+
+
+def test_it_starts_slowly_from_where_the_joints_are() -> None:
+    seen = ticks(made(), 3.0)
+    neck = np.degrees([tick.joints.position_rad[6] for tick in seen])
+    eye = np.degrees([tick.joints.position_rad[0] for tick in seen])
+    assert neck[0] == pytest.approx(-12.0, abs=0.1)
+    assert eye[0] == pytest.approx(6.0, abs=0.1)
+    # One servo step in a tick is 18 deg/s; a saccade would reach 500.
+    assert np.abs(eye[2:190] - eye[:188]).max() / 0.010 < 60.0 + 18.0
+    assert abs(neck[-1]) < 8.0
+
+
+def test_every_goal_on_the_bus_is_inside_the_limits() -> None:
+    rig = load_rig("desk")
+    commands = np.array([tick.verdict.command_rad for tick in ticks(made(3), 30.0)])
+    speeds = np.diff(commands, axis=0) / 0.005
+    for i, name in enumerate(JOINTS):
+        limit = rig.joints[name].limit()
+        assert commands[:, i].min() >= limit.low_rad and commands[:, i].max() <= limit.high_rad
+        assert np.abs(speeds[:, i]).max() <= limit.speed_rad_s + 1e-6
+        hardest = np.abs(np.diff(speeds[:, i])).max() / 0.005
+        assert hardest <= limit.accel_rad_s2 * (1.0 + 1e-6)
+
+
+def test_a_servo_fault_ends_the_loop_with_its_cause() -> None:
+    assembly = made()
+    assembly.robot.start(assembly.clock)
+    chain = assembly.robot.body.bus._port.chain  # type: ignore[attr-defined]
+    seen: list[Tick] = []
+
+    def watch(tick: Tick) -> None:
+        seen.append(tick)
+        if len(seen) == 100:
+            chain[7].fail("overload")
+
+    count = run(assembly.robot, assembly.clock, assembly.loop, until(5.0), watch)
+    assert count.stopped_by.startswith("fault: ")
+    assert "7" in count.stopped_by and "overload" in count.stopped_by
+    assert count.ticks <= 105
+
+
+def test_parking_reaches_the_pose_and_torque_goes_off() -> None:
+    assembly = made()
+    ticks(assembly, 4.0)
+    assert assembly.robot.park(assembly.park_rad, assembly.clock, assembly.loop)
+    chain = assembly.robot.body.bus._port.chain  # type: ignore[attr-defined]
+    parked = assembly.robot.body.angles(list(chain.positions_steps()))
+    assert np.degrees(parked) == pytest.approx(np.degrees(assembly.park_rad), abs=2.5)
+    assembly.robot.stop()
+    assert [chain[i].read(64, 1) for i in range(1, 10)] == [b"\x00"] * 9
+
+
+class SlowRobot:
+    """Costs time as it is told, on a simulated clock."""
+
+    def __init__(self, clock: SimulatedClock, cost_s: Callable[[int], float]) -> None:
+        self.clock, self.cost_s, self.times = clock, cost_s, []
+
+    def tick(self, t_s: float, dt_s: float) -> Any:
+        self.times.append((t_s, dt_s))
+        self.clock.sleep_until(t_s + self.cost_s(len(self.times)))
+
+
+def test_slots_are_absolute_and_overruns_are_skipped_not_caught_up() -> None:
+    clock = SimulatedClock()
+    robot = SlowRobot(clock, lambda n: 0.0231 if n == 10 else 0.001)
+    count = run(robot, clock, LoopParams(), until(1.0), lambda tick: None)  # type: ignore[arg-type]
+    slots = np.array([t for t, _ in robot.times]) / 0.005
+    assert np.abs(slots - np.round(slots)).max() < 1e-6
+    assert count.overruns == 4
+    assert count.ticks == 199 - 4
+    assert np.diff(slots).min() > 0.5
+    assert robot.times[10][1] == pytest.approx(0.025)
+
+
+def test_clocks() -> None:
+    clock = SimulatedClock(5.0)
+    clock.sleep_until(4.0)
+    assert clock.now_s() == 5.0
+    clock.sleep_until(6.5)
+    assert clock.now_s() == 6.5
+    real = RealClock()
+    before = real.now_s()
+    real.sleep_until(before + 0.02)
+    assert real.now_s() >= before + 0.02
+    real.sleep_until(before)
+
+
+KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), (-0.4, -0.4), (0.4, 0.4))
+MOUNT = CameraMount(CameraParams())
+
+
+def seen_from(head_yaw: float, t_s: float, number: int) -> Detections:
+    """Show a face that stands still at (1, 0.2, 0.2) from a head that is turned."""
+    R, p = MOUNT.pose(*KINEMATICS.head_pose((head_yaw, 0.0, 0.0)))
+    nose = np.array([1.0, 0.2, 0.2])
+    towards = (np.array(p) - nose) / np.linalg.norm(np.array(p) - nose)
+    left = np.cross([0.0, 0.0, 1.0], towards)
+    left /= np.linalg.norm(left)
+    axes = np.stack([towards, left, np.cross(towards, left)], axis=1)
+    points = [rotate_back(R, sub(tuple(q), p)) for q in nose + LANDMARKS_FACE_M @ axes.T]
+    px = project(np.array(points), intrinsics_of_view(radians(69.0), 640, 400))
+    hand = MovingBlob(1, "hand", rotate_back(R, sub((0.8, -0.2, 0.1), p)), 0.07)
+    face = DetectedFace((0, 0, 100, 100), px, 0.9)
+    return Detections(t_s, number, 640, 400, (face,), (hand,))
+
+
+def test_a_picture_is_placed_where_the_head_was_when_it_was_taken() -> None:
+    perception = Perception(MOUNT, 69.0, Tracker(TrackParams()))
+    poses = PoseHistory(KINEMATICS)
+    errors, speeds = [], []
+    for k in range(200):
+        t = k * 0.005
+        poses.remember(t, (radians(100.0 * t), 0.0, 0.0))  # the head turns with 100 deg/s
+        if k % 7 == 0 and k >= 14:  # a picture that is 60 ms old
+            taken = t - 0.06
+            yaw = radians(100.0 * max(0.0, taken))
+            percept = perception.see(seen_from(yaw, taken, k), poses)
+            assert percept is not None and len(percept.faces) == 1
+            face = percept.faces[0]
+            errors.append(angle_between(face.p_world_m, (1.0, 0.2, 0.2)))
+            speeds.append(np.linalg.norm(face.v_world_m_s))
+            assert percept.bodies.kinds.count("hand") == 1
+            if yaw > 0.45:  # the face leaves the camera's field
+                break
+    assert np.degrees(max(errors)) < 0.4  # without the history it would be 6
+    assert max(speeds) < 0.1
+    assert perception.pictures == perception.pictures_with_face == len(errors)
+
+
+def test_the_same_picture_is_seen_once() -> None:
+    perception = Perception(MOUNT, 69.0, Tracker(TrackParams()))
+    poses = PoseHistory(KINEMATICS)
+    poses.remember(0.0, (0.0, 0.0, 0.0))
+    assert perception.see(None, poses) is None
+    first = perception.see(seen_from(0.0, 0.0, 1), poses)
+    assert perception.see(seen_from(0.0, 0.0, 1), poses) is first
+    assert perception.pictures == 1
+
+
+def test_the_visitor_comes_moves_waves_leaves_and_comes_back() -> None:
+    scene = Visitor()
+    faces = [scene.people(t)[0].p_world_face_m for t in np.arange(0.0, 44.0, 0.1)]
+    assert max(y for _, y, _ in faces) > 0.25 and min(y for _, y, _ in faces) < -3.0
+    assert np.linalg.norm(np.array(faces[0]) - faces[-1]) < 0.1
+    steps = np.linalg.norm(np.diff(faces, axis=0), axis=1) / 0.1
+    assert steps.max() < 2.7  # m/s, walking
+    hands = [scene.people(t)[0].hand is not None for t in np.arange(0.0, 44.0, 0.1)]
+    assert 30 <= sum(hands) <= 40
+    assert scene.people(10.0) == scene.people(10.0)

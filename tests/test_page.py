@@ -1,0 +1,326 @@
+"""The page takes snapshots without ever holding up its caller, and shows a head that looks.
+
+As a script it photographs a page: ``python tests/test_page.py OUT.png [URL]``; without a
+URL it feeds a page of its own with the snapshots made here.
+"""
+
+import base64
+import itertools
+import json
+import math
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import cv2
+import numpy as np
+import pytest
+from websockets.sync.client import connect
+
+from gaze.types import PART_NAMES, PARTS
+from robot.page import Page, pack, unpack
+from robot.page_picture import encode
+from robot.types import SeenBody, SeenFace, Snapshot
+
+T = TypeVar("T")
+PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes
+REPOSITORY = Path(__file__).parents[1]
+WINDOW_PX = (1280, 800)
+WINDOW_SMALL_PX = (900, 500)  # a processor that does a graphics card's work has less to do
+PANEL_PX = 370
+CLOSE_TO_THE_RIG = "?initialCameraPosition=0.45,-0.3,0.2&initialCameraLookAt=0,0,0.12"
+
+# A person's face in its own frame (x out of the face, y to the owner's left, z up), in the
+# order chin, left side, left eye, mouth, nose, right side, right eye, forehead.
+PARTS_M = np.array(
+    [
+        (-0.015, 0.0, -0.085),
+        (-0.045, 0.062, -0.020),
+        (-0.022, 0.031, 0.035),
+        (-0.010, 0.0, -0.045),
+        (0.0, 0.0, 0.0),
+        (-0.045, -0.062, -0.020),
+        (-0.022, -0.031, 0.035),
+        (-0.020, 0.0, 0.080),
+    ]
+)
+LEFT_EYE = 2
+PICTURE = np.full((200, 320, 3), (140, 120, 100), np.uint8)
+
+
+def turned_left(angle_rad: float) -> np.ndarray:
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+
+
+def rows(array: np.ndarray) -> tuple:
+    return tuple(rows(row) if row.ndim else float(row) for row in array)
+
+
+def face_at(p_world_m: tuple[float, float, float], id: int = 3) -> SeenFace:
+    """A face that looks back along the x axis, a little aside."""
+    R_world_face = turned_left(math.pi + 0.2)
+    parts_m = np.array(p_world_m) + PARTS_M @ R_world_face.T
+    return SeenFace(id, p_world_m, rows(R_world_face), rows(parts_m))
+
+
+def looking(
+    t_s: float = 0.0,
+    face: SeenFace | None = None,
+    part: int = LEFT_EYE,
+    lids: tuple[float, float] = (0.8, 0.8),
+    bodies: tuple[SeenBody, ...] = (),
+) -> Snapshot:
+    """A snapshot of a head that looks at a part of a face; the neck takes a share of the way."""
+    face = face_at((0.9, 0.1, 0.25)) if face is None else face
+    target = np.array(face.parts_world_m[part])
+    head_yaw = 0.6 * math.atan2(target[1], target[0])
+    R_world_head = turned_left(head_yaw)
+    p_head = R_world_head @ (0.03, 0.0, 0.14)
+    eyes = [p_head + R_world_head @ (0.0, y, 0.0) for y in (0.031, -0.031)]
+    gaze = [(target - eye) / np.linalg.norm(target - eye) for eye in eyes]
+    in_head = [R_world_head.T @ g for g in gaze]
+    angles = [(math.atan2(g[1], g[0]), math.asin(g[2])) for g in in_head]
+    joints = (*angles[0], *angles[1], *lids, head_yaw, 0.0, 0.0)
+    return Snapshot(
+        t_s=t_s,
+        measured_rad=joints,
+        wish_rad=joints,
+        R_world_head=rows(R_world_head),
+        p_world_head_m=rows(p_head),
+        p_world_eyes_m=(rows(eyes[0]), rows(eyes[1])),
+        gaze_world=(rows(gaze[0]), rows(gaze[1])),
+        lids=lids,
+        p_world_target_m=rows(target),
+        target_name=f"face {face.id}: {PART_NAMES[PARTS[part]]}",
+        why="a face in view: the rule 'person' pulls with 0.80",
+        phase="fixate",
+        level="ok",
+        reasons=(),
+        faces=(face,),
+        bodies=(SeenBody(face.id, "face", face.p_world_m, 0.1), *bodies),
+        rate_hz=200.0,
+        health="bus: 61 200 reads, 3 lost, 0 faults",
+    )
+
+
+def life(t_s: float) -> Snapshot:
+    """A person who sways, and a head that follows and blinks."""
+    face = face_at((0.9, 0.1 + 0.15 * math.sin(0.5 * t_s), 0.25))
+    opening = 0.05 if t_s % 4.0 > 3.8 else 0.8
+    part = (2, 6, 4, 3)[int(t_s / 0.7) % 4]
+    hand = SeenBody(7, "hand", (0.6, 0.35, 0.1), 0.04)
+    return looking(t_s, face, part, (opening, opening), (hand,))
+
+
+def wait_for(ready: Callable[[], T | None], what: str) -> T:
+    """Ask again and again until there is something that is neither None nor False."""
+    last_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < last_s:
+        found = ready()
+        if found is not None and found is not False:
+            return found
+        time.sleep(0.02)
+    raise AssertionError(f"{what} did not come within {PATIENCE_S:.0f} s")
+
+
+def free_port() -> int:
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        return trial.getsockname()[1]
+
+
+@contextmanager
+def running_page(port: int | None = None) -> Iterator[tuple[Page, str]]:
+    page = Page("127.0.0.1", free_port() if port is None else port)
+    page.open()
+    try:
+        yield page, wait_for(page.url, "the page's address")
+    finally:
+        page.close()
+
+
+# --- a browser --------------------------------------------------------------------------
+
+
+def chromium() -> str | None:
+    names = ("chromium", "chromium-browser", "google-chrome")
+    return next((path for name in names if (path := shutil.which(name))), None)
+
+
+class Browser:
+    """One tab of a headless Chromium, driven through its debugging port."""
+
+    def __init__(self, debugging_port: int, window_px: tuple[int, int]) -> None:
+        self.width_px, height_px = window_px
+        self._ids = itertools.count(1)
+        self.asked_for: list[str] = []
+        with urllib.request.urlopen(f"http://127.0.0.1:{debugging_port}/json/list") as answer:
+            tab = next(t for t in json.load(answer) if t["type"] == "page")
+        self._socket = connect(tab["webSocketDebuggerUrl"], max_size=None)
+        self._ask("Network.enable")
+        shape = {"width": self.width_px, "height": height_px, "deviceScaleFactor": 1}
+        self._ask("Emulation.setDeviceMetricsOverride", **shape, mobile=False)
+
+    def _ask(self, method: str, **params: object) -> dict:
+        number = next(self._ids)
+        self._socket.send(json.dumps({"id": number, "method": method, "params": params}))
+        while True:
+            answer = json.loads(self._socket.recv(timeout=PATIENCE_S))
+            if answer.get("method") == "Network.requestWillBeSent":
+                self.asked_for.append(answer["params"]["request"]["url"])
+            if answer.get("id") == number:
+                return answer["result"]
+
+    def go(self, url: str) -> None:
+        self._ask("Page.navigate", url=url)
+
+    def words(self) -> str:
+        """Everything there is to read on the page."""
+        answer = self._ask("Runtime.evaluate", expression="document.body.innerText")
+        return answer["result"].get("value", "")
+
+    def photograph(self) -> bytes:
+        """A PNG of the page, without the notice that this browser has no graphics card."""
+        hide = (
+            "document.querySelectorAll('.mantine-Notifications-root')"
+            ".forEach(notice => { notice.style.display = 'none' })"
+        )
+        self._ask("Runtime.evaluate", expression=hide)
+        return base64.b64decode(self._ask("Page.captureScreenshot", format="png")["data"])
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+CHROMIUM_FLAGS = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+    *("--disable-sync", "--disable-background-networking", "--disable-component-update"),
+    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars"),
+    # No name resolves: a page that needed anything from elsewhere would stay empty.
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+    "--remote-debugging-port=0",
+)
+
+
+@contextmanager
+def browsing(window_px: tuple[int, int] = WINDOW_PX) -> Iterator[Browser]:
+    program = chromium()
+    if program is None:
+        pytest.skip("no chromium, chromium-browser or google-chrome in the path")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        process = subprocess.Popen(
+            [program, *CHROMIUM_FLAGS, f"--user-data-dir={folder}", "about:blank"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        try:
+            with closing(Browser(debugging_port(Path(folder)), window_px)) as browser:
+                yield browser
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def debugging_port(folder: Path) -> int:
+    """The port that Chromium writes into its folder once it listens."""
+    file = folder / "DevToolsActivePort"
+    wait_for(lambda: file.exists() and "\n" in file.read_text(), "the browser")
+    return int(file.read_text().splitlines()[0])
+
+
+@contextmanager
+def feeding(page: Page, source: Callable[[float], Snapshot]) -> Iterator[None]:
+    """Feed the page from a thread, as a running rig does."""
+    done = threading.Event()
+    jpeg = encode(PICTURE)
+
+    def feed() -> None:
+        for tick in itertools.count():
+            page.show(source(0.01 * tick))
+            if tick % 5 == 0:
+                page.show_picture(jpeg)
+            if done.wait(0.01):
+                return
+
+    thread = threading.Thread(target=feed)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
+
+
+# --- what goes over and what a person sees ---------------------------------------------
+
+
+def test_snapshot_survives_the_way() -> None:
+    snapshot = looking(1.5, bodies=(SeenBody(7, "hand", (0.6, 0.3, 0.1), 0.04),))
+    assert unpack(pack(snapshot)) == snapshot
+    numpys = replace(snapshot, rate_hz=np.float64(99.5), lids=tuple(np.array((0.25, 0.5))))
+    assert unpack(pack(numpys)) == numpys
+
+
+def irises(browser: Browser) -> np.ndarray:
+    """Pixels (n, 2) of the rig's blue irises, the only strong blue left of the panel."""
+    png = np.frombuffer(browser.photograph(), np.uint8)
+    scene = cv2.imdecode(png, cv2.IMREAD_COLOR)[:, : browser.width_px - PANEL_PX].astype(int)
+    blue, green, red = scene[..., 0], scene[..., 1], scene[..., 2]
+    return np.argwhere((blue > red + 70) & (blue > green + 20))
+
+
+def test_page_shows_a_head_that_turns() -> None:
+    def eyes() -> np.ndarray | None:
+        seen = irises(browser)
+        return seen if len(seen) > 30 else None
+
+    def eyes_elsewhere() -> bool:
+        seen = eyes()
+        return seen is not None and bool(np.linalg.norm(seen.mean(axis=0) - before) > 4.0)
+
+    def reads(*said: str) -> bool:
+        words = browser.words()
+        return all(word in words for word in said)
+
+    with browsing(WINDOW_SMALL_PX) as browser, running_page() as (page, url):
+        # All is sent before the browser comes: who is late sees the whole scene.
+        page.show(looking(1.0, face_at((0.9, -0.2, 0.25))))
+        page.show_picture(encode(PICTURE))
+        browser.go(url + CLOSE_TO_THE_RIG)
+        wait_for(lambda: reads("nothing has come from the rig", "camera"), "the silence")
+        before = wait_for(eyes, "the rig's eyes").mean(axis=0)
+        there = looking(2.0, face_at((0.9, 0.6, 0.25)))
+        with feeding(page, lambda _: there):
+            wait_for(eyes_elsewhere, "the turn of the head")
+            wait_for(lambda: reads("face 3: left eye", "pulls with", "fixate", "bus:"), "the words")
+        own = (url, "data:", f"blob:{url}")
+        assert [asked for asked in browser.asked_for if not asked.startswith(own)] == []
+        assert any(asked.startswith(url) for asked in browser.asked_for)
+
+
+def main(out: Path, url: str | None) -> None:
+    with browsing() as browser, ExitStack() as stack:
+        if url is None:
+            page, url = stack.enter_context(running_page())
+            stack.enter_context(feeding(page, life))
+        browser.go(url)
+        time.sleep(12.0)  # a full trace
+        out.write_bytes(browser.photograph())
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else None)

@@ -1,0 +1,250 @@
+"""The page's process: it holds up nobody, ends with its parent and finds itself a port."""
+
+import itertools
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+
+from robot.page import Page
+from robot.page_view import free_port as first_free_port
+from robot.types import SeenFace, Snapshot
+
+T = TypeVar("T")
+REPOSITORY = Path(__file__).parents[1]
+PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes
+
+AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+SNAPSHOT = Snapshot(
+    t_s=1.0,
+    measured_rad=(0.1,) * 9,
+    wish_rad=(0.1,) * 9,
+    R_world_head=AHEAD,
+    p_world_head_m=(0.03, 0.0, 0.14),
+    p_world_eyes_m=((0.03, 0.031, 0.14), (0.03, -0.031, 0.14)),
+    gaze_world=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    lids=(0.8, 0.8),
+    p_world_target_m=(0.9, 0.1, 0.25),
+    target_name="face 3: nose",
+    why="it is there",
+    phase="fixate",
+    level="ok",
+    reasons=(),
+    faces=(SeenFace(3, (0.9, 0.1, 0.25), AHEAD, ((0.9, 0.1, 0.25), (0.9, 0.15, 0.3)) * 4),),
+    bodies=(),
+    rate_hz=200.0,
+    health="0 lost",
+)
+
+
+def wait_for(ready: Callable[[], T | None], what: str) -> T:
+    """Ask again and again until there is something that is neither None nor False."""
+    last_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < last_s:
+        found = ready()
+        if found is not None and found is not False:
+            return found
+        time.sleep(0.02)
+    raise AssertionError(f"{what} did not come within {PATIENCE_S:.0f} s")
+
+
+def free_port() -> int:
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        return trial.getsockname()[1]
+
+
+@contextmanager
+def running_page(port: int | None = None) -> Iterator[tuple[Page, str]]:
+    page = Page("127.0.0.1", free_port() if port is None else port)
+    page.open()
+    try:
+        yield page, wait_for(page.url, "the page's address")
+    finally:
+        page.close()
+
+
+def page_process(parent: int) -> int | None:
+    """The process of the page that a process has started, alive or stopped."""
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit():
+            continue
+        try:
+            words = (entry / "cmdline").read_bytes().split(b"\0")
+            state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:  # it has ended meanwhile
+            continue
+        if b"robot.page_view" in words and state != "Z":
+            _fd, its_parent, *_ = words[words.index(b"robot.page_view") + 1 :]
+            if int(its_parent) == parent:
+                return int(entry.name)
+    return None
+
+
+def in_time(work: Callable[[], None]) -> bool:
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    thread.join(PATIENCE_S)
+    return not thread.is_alive()
+
+
+def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
+    check = "import robot.page, sys; sys.exit(bool({'viser', 'cv2'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", check], cwd=REPOSITORY).returncode == 0
+
+
+def test_unopened_page_drops() -> None:
+    page = Page("127.0.0.1", 8080)
+    page.show(SNAPSHOT)
+    page.show_picture(b"jpeg")
+    assert (page.dropped, page.pictures_dropped, page.url(), page.notice()) == (1, 1, None, None)
+    page.close()
+
+
+def test_more_than_the_page_can_show_is_passed_over() -> None:
+    page = Page("127.0.0.1", 8080)
+    for tick in range(200):
+        page.show(replace(SNAPSHOT, t_s=5.0 + 0.005 * tick))
+    assert page.dropped == 100  # every second one was offered, and dropped as nothing is open
+    page.show(replace(SNAPSHOT, t_s=0.0))  # the clock was started anew
+    assert page.dropped == 101
+
+
+def test_frozen_page_holds_up_nobody_and_wakes_again() -> None:
+    times_s = itertools.count(100.0)
+
+    def taken() -> bool:
+        before = page.dropped
+        page.show(replace(SNAPSHOT, t_s=next(times_s)))
+        return page.dropped == before
+
+    def show_many() -> None:
+        for tick in range(3000):
+            page.show(replace(SNAPSHOT, t_s=0.01 * tick))
+
+    with running_page() as (page, _):
+        process = page_process(os.getpid())
+        assert process is not None
+        os.kill(process, signal.SIGSTOP)
+        assert in_time(show_many)
+        assert 2000 < page.dropped < 3000
+        assert in_time(lambda: page.show_picture(bytes(100_000)))
+        assert page.pictures_dropped == 1
+        os.kill(process, signal.SIGCONT)
+        wait_for(taken, "room for a snapshot")
+        page.show_picture(b"no picture at all")
+        assert page.url() is not None
+
+
+def test_close_ends_even_a_frozen_page() -> None:
+    with running_page() as (page, _):
+        process = page_process(os.getpid())
+        assert process is not None
+        os.kill(process, signal.SIGSTOP)
+    assert page_process(os.getpid()) is None
+    page.close()
+    assert page.url() is None
+
+
+def test_crashed_page_is_reported_once_and_hurts_nobody() -> None:
+    with running_page() as (page, _):
+        process = page_process(os.getpid())
+        assert process is not None
+        os.kill(process, signal.SIGKILL)
+        words = wait_for(page.notice, "the notice")
+        assert words.startswith("the page has stopped")
+        page.show(SNAPSHOT)
+        assert (page.dropped, page.url(), page.notice()) == (1, None, None)
+
+
+def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
+    with running_page() as (page, _):
+        page.show(replace(SNAPSHOT, level="mad"))
+        assert "KeyError: 'mad'" in wait_for(page.notice, "the notice")
+
+
+PARENT = """
+import os, sys, time
+from robot.page import Page
+page = Page("127.0.0.1", int(sys.argv[1]))
+page.open()
+while page.url() is None:
+    time.sleep(0.02)
+child = os.fork() if sys.argv[2] == "forks" else -1
+if child == 0:
+    time.sleep(60.0)
+print(child, flush=True)
+time.sleep(60.0)
+"""
+
+
+@pytest.mark.parametrize("habit", ["alone", "forks"])
+def test_page_ends_when_the_parent_is_killed(habit: str) -> None:
+    command = [sys.executable, "-c", PARENT, str(free_port()), habit]
+    with subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        sibling = int(parent.stdout.readline())
+        assert page_process(parent.pid) is not None
+        parent.kill()
+        try:
+            wait_for(lambda: page_process(parent.pid) is None, "the end of the page")
+        finally:
+            if sibling > 0:
+                os.kill(sibling, signal.SIGKILL)
+
+
+def test_busy_port_moves_on_and_says_so() -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        busy = other.getsockname()[1]
+        with running_page(busy) as (page, url):
+            port = int(url.rpartition(":")[2])
+            assert port > busy
+            assert page.notice() == f"port {busy} is busy, using {port}"
+            with urllib.request.urlopen(url) as answer:
+                assert answer.status == 200
+                assert b"<html" in answer.read().lower()
+
+
+def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c() -> None:
+    with running_page() as (page, url):
+        port = int(url.rpartition(":")[2])
+        # The whole of 127.0.0.0/8 is this machine: a page on every address would answer here.
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection(("127.0.0.2", port))
+        process = page_process(os.getpid())
+        assert process is not None
+        os.kill(process, signal.SIGINT)
+        with urllib.request.urlopen(url) as answer:
+            assert answer.status == 200
+        assert page.notice() is None
+        assert page_process(os.getpid()) == process
+
+
+def test_address_of_another_machine_is_refused_in_words() -> None:
+    page = Page("192.0.2.1", 8080)
+    page.open()
+    words = wait_for(page.notice, "the notice")
+    assert "cannot open 192.0.2.1 port 8080" in words
+    page.close()
+
+
+def test_free_port_takes_the_first_free_one() -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        free = other.getsockname()[1]
+        other.listen()
+        assert first_free_port("127.0.0.1", free) > free
+    assert first_free_port("127.0.0.1", free) == free

@@ -1,0 +1,133 @@
+"""The Markov walk over face parts (Nakamoto & Tsuruno). Checks are listed in docs/checks.md."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from config.load import load, shipped
+from gaze.scanpath import Scanpath, ScanpathParams, Walk, normalised
+from gaze.types import PARTS, Bodies, Face, Percept, Target
+
+WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
+NO_FLOOR = ScanpathParams(shortest_dwell_ms=0.0)
+
+
+def walker(seed: int = 1, params: ScanpathParams = NO_FLOOR) -> Scanpath:
+    return Scanpath(params, WALK, np.random.default_rng(seed))
+
+
+def drawn(count: int) -> np.ndarray:
+    walk, parts = walker(), [0]
+    for _ in range(count):
+        parts.append(walk.next_part(parts[-1]))
+    return np.array(parts)
+
+
+def test_printed_matrix_is_as_printed() -> None:
+    assert [round(sum(row), 1) for row in WALK.matrix] == [0.9, 0.8, 1.1, 1.1, 0.9, 1.0, 1.0, 0.9]
+    assert WALK.order == ("DN", "FL", "LE", "M", "N", "FR", "RE", "UP")
+    assert WALK.start == "FR"
+
+
+def test_e35_transitions_follow_the_normalised_matrix() -> None:
+    parts = drawn(200_000)
+    counts = np.zeros((8, 8))
+    np.add.at(counts, (parts[:-1], parts[1:]), 1)
+    wanted = normalised(WALK.matrix)
+    assert np.abs(counts / counts.sum(axis=1, keepdims=True) - wanted).max() < 0.02
+    assert counts[wanted == 0.0].sum() == 0
+
+
+def test_e36_rows_are_from_and_columns_to() -> None:
+    parts = drawn(200_000)
+    share = np.bincount(parts, minlength=8) / len(parts)
+    assert share[WALK.order.index("N")] == pytest.approx(0.222, abs=0.010)
+    assert share[WALK.order.index("RE")] == pytest.approx(0.255, abs=0.010)
+
+
+FACE = Face(
+    3,
+    (1.0, 0.0, 0.2),
+    (0.0, 0.0, 0.0),
+    ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    tuple((1.0, 0.01 * i, 0.2) for i in range(8)),
+    0.9,
+)
+PERCEPT = Percept(0.0, Bodies(), (FACE,))
+TARGET = Target(FACE.p_world_m, (0, 0, 0), 0.0, "face", 3, 0.5, True, None, 1, "face 3")
+
+
+def test_e37_face_time_share() -> None:
+    walk, dt = walker(2), 0.01
+    time = dict.fromkeys(PARTS, 0.0)
+    for k in range(360_000):
+        part = walk.wander(TARGET, PERCEPT, k * dt, settled=True).part
+        time[part] += dt
+    expected = {
+        "DN": 0.0654, "FL": 0.1146, "LE": 0.0580, "M": 0.1077,
+        "N": 0.2012, "FR": 0.1073, "RE": 0.2892, "UP": 0.0566,
+    }  # fmt: skip
+    total = sum(time.values())
+    for part, share in expected.items():
+        assert time[part] / total == pytest.approx(share, abs=0.03), part
+
+
+def test_e40_dwell_times() -> None:
+    walk = walker(3)
+    for part in range(8):
+        times = np.array([walk.dwell_s(part) for _ in range(200_000)])
+        assert times.min() > 0.0
+        assert times.mean() == pytest.approx(WALK.dwell_mean_s[part], rel=0.04)
+        assert times.std() == pytest.approx(WALK.dwell_sd_s[part], rel=0.10)
+
+
+def test_floor_and_tempo() -> None:
+    floored = walker(4, ScanpathParams(shortest_dwell_ms=120.0))
+    assert min(floored.dwell_s(2) for _ in range(2000)) == 0.12
+    slow = walker(5, ScanpathParams(shortest_dwell_ms=0.0, tempo=0.5))
+    quick = walker(5, NO_FLOOR)
+    assert slow.dwell_s(1) == pytest.approx(2.0 * quick.dwell_s(1))
+
+
+def test_walk_waits_for_arrival_and_starts_at_the_right_side() -> None:
+    walk = walker(6)
+    for k in range(100):
+        assert walk.wander(TARGET, PERCEPT, k * 0.1, settled=False).part == "FR"
+
+
+def test_shift_counts_up_with_every_new_part_only() -> None:
+    walk, last, part = walker(7), None, None
+    for k in range(4000):
+        now = walk.wander(TARGET, PERCEPT, k * 0.01, settled=True)
+        if last is not None:
+            assert now.shift - last == (now.part != part)
+        last, part = now.shift, now.part
+    assert last is not None and last > 60
+
+
+def test_last_known_parts_serve_while_the_face_is_out_of_sight() -> None:
+    walk = walker(8)
+    seen = walk.wander(TARGET, PERCEPT, 0.0, settled=False)
+    unseen = walk.wander(TARGET, Percept(0.1), 0.1, settled=False)
+    assert unseen.p_world_m == seen.p_world_m
+
+
+def test_other_targets_pass_through_and_a_new_face_starts_anew() -> None:
+    walk = walker(9)
+    for k in range(300):
+        walk.wander(TARGET, PERCEPT, k * 0.01, settled=True)
+    hand = TARGET._replace(kind="hand", id=9)
+    assert walk.wander(hand, PERCEPT, 3.1, settled=True).part is None
+    assert walk.wander(TARGET, PERCEPT, 3.2, settled=True).part == "FR"
+
+
+def test_wrong_shapes_are_named() -> None:
+    with pytest.raises(ValueError, match="8 rows of 8"):
+        replace(WALK, matrix=WALK.matrix[:7])
+    with pytest.raises(ValueError, match="each of DN"):
+        replace(WALK, order=("DN",) * 8)
+    with pytest.raises(ValueError, match="positive"):
+        replace(WALK, matrix=(*WALK.matrix[:7], (0.0,) * 8))
+    with pytest.raises(ValueError, match="8 numbers each"):
+        replace(WALK, dwell_sd_s=(0.1,))

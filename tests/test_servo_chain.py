@@ -1,0 +1,370 @@
+"""The emulated chain against byte-exact packets and the written rules of the protocol."""
+
+import struct
+
+import pytest
+from fastcrc.crc16 import umts
+
+from sim_mock.servo_chain import ServoChain, build_chain, status
+
+ALERT = 0x80
+
+
+def vector(text: str) -> bytes:
+    return bytes.fromhex(text.replace(" ", ""))
+
+
+def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
+    packet = b"\xff\xff\xfd\x00" + struct.pack("<BHB", servo_id, len(params) + 3, code) + params
+    return packet + struct.pack("<H", umts(packet))
+
+
+class Bench:
+    """A chain with a clock that is set by hand."""
+
+    def __init__(self, *specs, **options):
+        self.now_s = 0.0
+        self.chain: ServoChain = build_chain(specs, lambda: self.now_s, **options)
+
+    def write(self, servo_id: int, address: int, size: int, value: int) -> int:
+        """Write one register; give the error byte, -1 for silence."""
+        data = value.to_bytes(size, "little", signed=value < 0)
+        answer = self.chain.receive(instruction(servo_id, 3, struct.pack("<H", address) + data))
+        return answer[8] if answer else -1
+
+    def read(self, servo_id: int, address: int, size: int, signed: bool = False) -> int:
+        """Read one register; the error number must be 0."""
+        answer = self.chain.receive(instruction(servo_id, 2, struct.pack("<HH", address, size)))
+        assert answer[8] & 0x7F == 0
+        return int.from_bytes(
+            answer[9:-2].replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd"), "little", signed=signed
+        )
+
+    def error_of_read(self, servo_id: int, address: int, size: int) -> tuple[int, int]:
+        """Give error byte and number of bytes of a read."""
+        answer = self.chain.receive(instruction(servo_id, 2, struct.pack("<HH", address, size)))
+        return answer[8], len(answer) - 11
+
+    def engage(self, servo_id: int, goal: int | None = None) -> None:
+        assert self.write(servo_id, 64, 1, 1) == 0
+        if goal is not None:
+            assert self.write(servo_id, 116, 4, goal) == 0
+
+
+PING = vector("FF FF FD 00 01 03 00 01 19 4E")
+
+
+def test_the_crc_is_the_protocols():
+    assert umts(b"123456789") == 0xFEE8
+
+
+def test_ping():
+    bench = Bench((1, "xm430-w210", 2048, 38))
+    assert bench.chain.receive(PING) == vector("FF FF FD 00 01 07 00 55 00 06 04 26 65 5D")
+
+
+def test_broadcast_ping_answers_in_the_order_of_ids():
+    bench = Bench((7, "xm430-w210"), (1, "xm430-w210", 2048, 38))
+    answer = bench.chain.receive(vector("FF FF FD 00 FE 03 00 01 31 42"))
+    assert answer[:14] == vector("FF FF FD 00 01 07 00 55 00 06 04 26 65 5D")
+    assert answer[14 + 4] == 7
+    assert len(answer) == 28
+
+
+def test_read():
+    bench = Bench((1, "xm430-w210", 166))
+    answer = bench.chain.receive(vector("FF FF FD 00 01 07 00 02 84 00 04 00 1D 15"))
+    assert answer == vector("FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0")
+
+
+def test_write():
+    bench = Bench((1, "xm430-w210"))
+    answer = bench.chain.receive(vector("FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89"))
+    assert answer == vector("FF FF FD 00 01 04 00 55 00 A1 0C")
+    assert bench.read(1, 116, 4) == 512
+
+
+def test_registered_write_waits_for_action():
+    bench = Bench((1, "xm430-w210"))
+    packet = vector("FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E")
+    assert bench.chain.receive(packet) == vector("FF FF FD 00 01 04 00 55 00 A1 0C")
+    assert (bench.read(1, 69, 1), bench.read(1, 104, 4)) == (1, 330)
+    action = vector("FF FF FD 00 01 03 00 05 02 CE")
+    assert bench.chain.receive(action)[8] == 0
+    assert (bench.read(1, 69, 1), bench.read(1, 104, 4)) == (0, 200)
+    assert bench.chain.receive(action)[8] == 2
+
+
+def test_reboot_is_confirmed_then_deaf_for_0_4_s():
+    bench = Bench((1, "xl330-m288", 1000))
+    bench.engage(1, 1500)
+    bench.write(1, 112, 4, 50)
+    answer = bench.chain.receive(vector("FF FF FD 00 01 03 00 08 2F 4E"))
+    assert answer == vector("FF FF FD 00 01 04 00 55 00 A1 0C")
+    bench.now_s = 0.39
+    assert bench.chain.receive(PING) == b""
+    bench.now_s = 0.4
+    assert bench.chain.receive(PING) != b""
+    assert (bench.read(1, 64, 1), bench.read(1, 112, 4)) == (0, 0)
+    assert bench.read(1, 116, 4) == bench.read(1, 132, 4)
+
+
+def test_sync_read_gives_one_status_a_servo_in_the_order_asked():
+    bench = Bench((1, "xm430-w210", 166), (2, "xm430-w210", 2079))
+    answer = bench.chain.receive(vector("FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA"))
+    assert answer[:15] == vector("FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0")
+    assert answer[15:] == status(2, 0, struct.pack("<i", 2079))
+
+
+def test_sync_write_answers_nothing():
+    bench = Bench((1, "xm430-w210"), (2, "xm430-w210"))
+    packet = vector("FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87")
+    assert bench.chain.receive(packet) == b""
+    assert (bench.read(1, 116, 4), bench.read(2, 116, 4)) == (150, 170)
+
+
+def test_fast_sync_read_is_one_packet_with_running_crcs():
+    bench = Bench((3, "xm430-w210", 166), (7, "xm430-w210", 2079), (4, "xm430-w210", 1023))
+    answer = bench.chain.receive(vector("FF FF FD 00 FE 0A 00 8A 84 00 04 00 03 07 04 20 F2"))
+    assert answer == vector(
+        "FF FF FD 00 FE 19 00 55 00 03 A6 00 00 00 84 08 00 07 1F 08 00 00 16 CA"
+        "00 04 FF 03 00 00 D1 9E"
+    )
+
+
+def test_bulk_read_and_write():
+    bench = Bench((1, "xm430-w210"), (2, "xm430-w210"))
+    read = vector("FF FF FD 00 FE 0D 00 92 01 90 00 02 00 02 92 00 01 00 1A 05")
+    assert bench.chain.receive(read) == status(1, 0, b"\x78\x00") + status(2, 0, b"\x1e")
+    write = vector("FF FF FD 00 FE 10 00 93 01 20 00 02 00 A0 00 02 1F 00 01 00 50 B7 68")
+    assert bench.chain.receive(write) == b""
+    assert (bench.read(1, 32, 2), bench.read(2, 31, 1)) == (160, 80)
+
+
+def test_fast_bulk_read():
+    bench = Bench((3, "xm430-w210", 166), (7, "xl430-w250"), (4, "xl430-w250"))
+    rows = struct.pack("<BHHBHHBHH", 3, 132, 4, 7, 124, 2, 4, 146, 1)
+    answer = bench.chain.receive(instruction(0xFE, 0x9A, rows))
+    assert answer[:16] == vector("FF FF FD 00 FE 14 00 55 00 03 A6 00 00 00 67 A4")
+    assert (answer[17], answer[23], len(answer)) == (7, 4, 27)
+    assert umts(answer[:-2]) == int.from_bytes(answer[-2:], "little")
+
+
+def test_clear_brings_many_turns_back_into_one():
+    bench = Bench((1, "xm430-w210"))
+    bench.write(1, 11, 1, 4)
+    bench.chain[1].shaft.place(4096 * 3 + 100)
+    clear = vector("FF FF FD 00 01 08 00 10 01 44 58 4C 22 B1 DC")
+    assert bench.chain.receive(clear)[8] == 0
+    assert bench.read(1, 132, 4) == 100
+    assert bench.chain.receive(instruction(1, 0x10, b"\x02"))[8] == 4
+
+
+def test_factory_reset_keeps_the_id_when_asked_to():
+    bench = Bench((5, "xl330-m288"))
+    bench.write(5, 9, 1, 0)
+    assert bench.chain.receive(instruction(5, 6, b"\x01"))[8] == 0
+    bench.now_s = 0.5
+    assert (bench.read(5, 9, 1), bench.read(5, 7, 1)) == (250, 5)
+    bench.chain.receive(instruction(5, 6, b"\xff"))
+    bench.now_s = 1.0
+    assert bench.read(1, 7, 1) == 1
+
+
+def test_what_the_shaft_holds_still_with_is_stuffed():
+    everyday = struct.pack("<hii", -1, -3, 2048)
+    assert status(1, 0, everyday) == vector(
+        "FF FF FD 00 01 0F 00 55 00 FF FF FD FD FF FF FF 00 08 00 00 49 F0"
+    )
+
+
+def test_stuffed_write_is_unstuffed():
+    bench = Bench((1, "xm430-w210"))
+    bench.write(1, 11, 1, 1)
+    packet = vector("FF FF FD 00 01 0A 00 03 68 00 FF FF FD FD 00 E2 7A")
+    # The value 0x00FDFFFF is out of range for Goal Velocity, and is refused as such.
+    assert bench.chain.receive(packet)[8] == 6
+    indirect = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\xfd\x00")
+    assert bench.chain.receive(indirect)[8] == 0
+    assert bench.read(1, 224, 4) == 0x00FDFFFF
+
+
+# --- resynchronisation
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [b"\x00", b"\xff", b"\xff\xff\xfd", b"\xff\xff\xff\xfd", b"\xff\xff\xfd\x00", b"U" * 40],
+    ids=repr,
+)
+def test_noise_before_a_packet_is_passed_over(noise):
+    bench = Bench((1, "xm430-w210"))
+    assert len(bench.chain.receive(noise + PING)) == 14
+    assert bench.chain.receive(noise) == b""
+    bench.now_s = 0.01
+    assert len(bench.chain.receive(PING)) == 14
+
+
+def test_a_packet_may_arrive_byte_by_byte():
+    bench = Bench((1, "xm430-w210"))
+    answers = [bench.chain.receive(bytes([byte])) for byte in PING]
+    assert answers[:-1] == [b""] * 9
+    assert len(answers[-1]) == 14
+
+
+def test_a_torn_packet_is_forgotten_after_the_gap():
+    bench = Bench((1, "xm430-w210"))
+    bench.chain.receive(PING[:5])
+    bench.now_s = 0.002
+    assert bench.chain.receive(PING[5:]) == b""
+    assert bench.chain.receive(PING) != b""
+
+
+@pytest.mark.parametrize("at", range(4, 10))
+def test_a_damaged_instruction_is_met_with_silence(at):
+    bench = Bench((1, "xm430-w210"), (0, "xm430-w210"))
+    bad = PING[:at] + bytes([PING[at] ^ 1]) + PING[at + 1 :]
+    assert bench.chain.receive(bad) == b""
+    bench.now_s = 0.01
+    assert len(bench.chain.receive(PING)) == 14
+
+
+def test_two_packets_in_one_piece_are_both_answered():
+    bench = Bench((1, "xm430-w210"))
+    assert len(bench.chain.receive(PING + PING)) == 28
+
+
+# --- rules
+
+
+def test_reading_what_is_not_there_gives_an_error_and_no_bytes():
+    bench = Bench((1, "xl330-m288"))
+    assert bench.error_of_read(1, 64, 4) == (7, 0)
+    assert bench.error_of_read(1, 1000, 2) == (7, 0)
+    assert bench.error_of_read(1, 124, 23) == (0, 23)
+
+
+def test_unknown_instruction():
+    bench = Bench((1, "xl330-m288"))
+    assert bench.chain.receive(instruction(1, 0x77))[8] == 2
+    assert bench.chain.receive(instruction(0xFE, 0x77)) == b""
+
+
+def test_status_return_level():
+    bench = Bench((1, "xl330-m288"))
+    assert bench.write(1, 68, 1, 1) == 0
+    assert bench.write(1, 65, 1, 1) == -1
+    assert bench.read(1, 65, 1) == 1
+    bench.write(1, 68, 1, 0)
+    assert bench.chain.receive(instruction(1, 2, struct.pack("<HH", 65, 1))) == b""
+    assert bench.chain.receive(PING) != b""
+
+
+def test_broadcast_writes_are_carried_out_silently():
+    bench = Bench((1, "xl330-m288"), (2, "xl330-m288"))
+    assert bench.write(0xFE, 65, 1, 1) == -1
+    assert (bench.read(1, 65, 1), bench.read(2, 65, 1)) == (1, 1)
+
+
+def test_a_new_id_answers_once_under_the_old_one():
+    bench = Bench((1, "xl330-m288"))
+    answer = bench.chain.receive(instruction(1, 3, struct.pack("<HB", 7, 9)))
+    assert answer[4] == 1
+    assert bench.chain.receive(PING) == b""
+    assert bench.read(9, 7, 1) == 9
+
+
+def test_missing_id_silences_later_ones_or_not():
+    wanted = struct.pack("<HH", 132, 4) + bytes((1, 9, 2))
+    servos = ((1, "xl330-m288"), (2, "xl330-m288"))
+    quiet, skipping = Bench(*servos), Bench(*servos, after_missing="skip")
+    assert len(quiet.chain.receive(instruction(0xFE, 0x82, wanted))) == 15
+    assert len(skipping.chain.receive(instruction(0xFE, 0x82, wanted))) == 30
+    cut = quiet.chain.receive(instruction(0xFE, 0x8A, wanted))
+    assert len(cut) == 8 + 8
+    assert int.from_bytes(cut[5:7], "little") == 1 + 3 * 8
+
+
+def test_old_firmware_knows_no_fast_read():
+    bench = Bench((1, "xl330-m288", 2048, 45))
+    wanted = struct.pack("<HH", 132, 4) + bytes((1,))
+    assert bench.chain.receive(instruction(0xFE, 0x8A, wanted)) == b""
+    assert len(bench.chain.receive(instruction(0xFE, 0x82, wanted))) == 15
+
+
+def test_a_latched_error_takes_the_torque_and_marks_every_status():
+    bench = Bench((1, "xl330-m288", 1000))
+    bench.engage(1, 3000)
+    bench.now_s = 0.05
+    bench.read(1, 132, 4)
+    bench.chain[1].fail("overload")
+    assert bench.write(1, 65, 1, 1) == ALERT
+    assert (bench.read(1, 70, 1), bench.read(1, 64, 1)) == (0x20, 0)
+    assert bench.write(1, 64, 1, 1) == ALERT
+    stopped = bench.read(1, 132, 4)
+    bench.now_s = 1.0
+    assert (bench.read(1, 64, 1), bench.read(1, 132, 4)) == (0, stopped)
+    bench.chain.receive(instruction(1, 8))
+    bench.now_s = 2.0
+    assert bench.write(1, 64, 1, 1) == 0
+
+
+def test_an_error_outside_shutdown_only_marks_the_status():
+    bench = Bench((1, "xc330-m288"))
+    bench.engage(1)
+    bench.chain[1].fail("input voltage")
+    assert bench.write(1, 116, 4, 2100) == ALERT
+    assert bench.read(1, 64, 1) == 1
+
+
+# --- bus watchdog
+
+
+def test_the_watchdog_stops_motion_and_refuses_goals_until_cleared():
+    bench = Bench((1, "xl330-m288", 1000), (2, "xl330-m288"))
+    bench.engage(1, 3000)
+    bench.write(1, 98, 1, 5)
+    bench.now_s = 0.1
+    (at_trip, _) = bench.chain.positions_steps()
+    bench.now_s = 0.5
+    assert bench.read(1, 98, 1) == 255
+    assert bench.chain.positions_steps()[0] == at_trip
+    assert 1000 < at_trip < 3000
+    assert [bench.write(1, address, 4, 1000) for address in (104, 116)] == [4, 4]
+    assert bench.write(1, 98, 1, 0) == 0
+    assert bench.write(1, 116, 4, 1000) == 0
+
+
+def test_any_packet_feeds_the_watchdog():
+    bench = Bench((1, "xl330-m288", 1000), (2, "xl330-m288"))
+    bench.engage(1)
+    bench.write(1, 98, 1, 1)
+    for _ in range(20):
+        bench.now_s += 0.019
+        bench.read(2, 65, 1)
+    assert bench.read(1, 98, 1) == 1
+    bench.now_s += 0.021
+    assert bench.read(1, 98, 1) == 255
+
+
+def test_the_watchdog_sleeps_without_torque():
+    bench = Bench((1, "xl330-m288"))
+    bench.write(1, 98, 1, 1)
+    bench.now_s = 5.0
+    assert bench.read(1, 98, 1) == 1
+
+
+def test_results_do_not_depend_on_how_often_one_looks():
+    seldom, often = Bench((1, "xl330-m077", 1000)), Bench((1, "xl330-m077", 1000))
+    seen = []
+    for bench, looks in ((seldom, 1), (often, 17)):
+        bench.write(1, 112, 4, 120)
+        bench.engage(1, 3000)
+        for tick in range(1, 41):
+            for look in range(looks):
+                bench.now_s = (tick - 1) * 0.005 + 0.005 * (look + 1) / looks
+                bench.chain.positions_steps()
+            if tick == 20:
+                bench.write(1, 116, 4, 500)
+        seen.append(bench.chain.positions_steps())
+    assert seen[0] == seen[1]

@@ -1,0 +1,100 @@
+"""The vendor's SDK, unchanged, on the in-process port."""
+
+import pytest
+from dynamixel_sdk import (
+    COMM_RX_TIMEOUT,
+    COMM_SUCCESS,
+    GroupBulkRead,
+    GroupSyncRead,
+    GroupSyncWrite,
+    PacketHandler,
+)
+
+from sim_mock.ports import InProcessPort
+from sim_mock.servo_chain import build_chain
+
+
+class World:
+    def __init__(self):
+        self.now_s = 0.0
+        self.sent: list[bytes] = []
+        specs = [(1, "xl330-m288", 2048), (2, "xl330-m288", 1000), (3, "xl330-m288", 3000)]
+        self.chain = build_chain(specs, lambda: self.now_s)
+        self.port = InProcessPort(self.chain, self.sent.append)
+        self.packets = PacketHandler(2.0)
+        assert self.port.openPort()
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+def test_ping_and_broadcast_ping(world):
+    assert world.packets.ping(world.port, 2) == (1200, COMM_SUCCESS, 0)
+    found, result = world.packets.broadcastPing(world.port)
+    assert result == COMM_SUCCESS
+    assert found == {i: [1200, 53] for i in (1, 2, 3)}
+
+
+def test_a_missing_servo_costs_no_time(world):
+    assert world.packets.ping(world.port, 99)[1] == COMM_RX_TIMEOUT
+    assert world.now_s == 0.0
+
+
+def test_registers_read_and_write(world):
+    read, write = world.packets.read4ByteTxRx, world.packets.write4ByteTxRx
+    assert read(world.port, 3, 132) == (3000, COMM_SUCCESS, 0)
+    assert write(world.port, 3, 116, 5000) == (COMM_SUCCESS, 6)
+    assert write(world.port, 3, 112, 40) == (COMM_SUCCESS, 0)
+    assert read(world.port, 3, 112) == (40, COMM_SUCCESS, 0)
+
+
+def test_group_write_and_both_group_reads(world):
+    goals = GroupSyncWrite(world.port, world.packets, 116, 4)
+    places = GroupSyncRead(world.port, world.packets, 132, 4)
+    for servo_id in (1, 2, 3):
+        world.packets.write1ByteTxRx(world.port, servo_id, 64, 1)
+        goals.addParam(servo_id, [0xDC, 0x05, 0, 0])
+        places.addParam(servo_id)
+    assert goals.txPacket() == COMM_SUCCESS
+    world.now_s = 1.0
+    for read in (places.txRxPacket, places.fastSyncRead):
+        assert read() == COMM_SUCCESS
+        assert [places.getData(i, 132, 4) for i in (1, 2, 3)] == [1500] * 3
+
+
+def test_bulk_read(world):
+    bulk = GroupBulkRead(world.port, world.packets)
+    bulk.addParam(1, 132, 4)
+    bulk.addParam(3, 146, 1)
+    assert bulk.txRxPacket() == COMM_SUCCESS
+    assert (bulk.getData(1, 132, 4), bulk.getData(3, 146, 1)) == (2048, 30)
+
+
+def test_registered_write_action_reboot_and_reset(world):
+    packets, port = world.packets, world.port
+    assert packets.regWriteTxRx(port, 1, 65, 1, [1]) == (COMM_SUCCESS, 0)
+    assert packets.action(port, 1) == COMM_SUCCESS
+    port.drain()
+    assert packets.read1ByteTxRx(port, 1, 65)[0] == 1
+    assert packets.reboot(port, 1) == (COMM_SUCCESS, 0)
+    assert packets.ping(port, 1)[1] == COMM_RX_TIMEOUT
+    world.now_s = 0.5
+    assert packets.read1ByteTxRx(port, 1, 65)[0] == 0
+    assert packets.clearMultiTurn(port, 1) == (COMM_SUCCESS, 0)
+    assert packets.factoryReset(port, 2, 2) == (COMM_SUCCESS, 0)
+
+
+def test_the_tap_hears_every_byte_the_host_sends(world):
+    world.packets.ping(world.port, 1)
+    assert world.sent == [bytes.fromhex("FFFFFD0001030001194E")]
+
+
+def test_reading_part_of_an_answer_leaves_the_rest(world):
+    world.port.write(bytes.fromhex("FFFFFD0001030001194E"))
+    assert world.port.getBytesAvailable() == 14
+    first = world.port.read_until(4, 0.0)
+    assert (first, world.port.getBytesAvailable()) == (b"\xff\xff\xfd\x00", 10)
+    assert world.port.drain() == 10
+    assert world.port.read_until(4, 0.0) == b""
