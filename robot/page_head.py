@@ -1,6 +1,6 @@
 """Draw the rig's head on the page as measured: neck, shell, eyes, lids and lines of sight.
 
-Sizes are those of a common build, for the eye alone; every pose comes from the snapshot.
+Every pose comes from the snapshot; the sizes of shell, eyeballs and stand are for looks only.
 """
 
 from math import atan2, dist, hypot, pi, radians

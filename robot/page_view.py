@@ -36,7 +36,7 @@ _FOV_STEP_RAD = 0.01
 # Name of the view: where the camera is and what it looks at.
 VIEWS = {
     "both": ((0.72, -0.74, 0.38), (0.52, 0.0, 0.145)),
-    "rig": ((0.40, -0.13, 0.20), (0.0, 0.0, 0.12)),
+    "rig": ((0.34, -0.11, 0.19), (0.0, 0.0, 0.11)),
     "over its shoulder": ((-0.52, 0.22, 0.42), (0.60, 0.0, 0.16)),
 }
 
