@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaze.angles import compose, direction, rotate, rotation
-from gaze.types import Angles2, Bodies, Floats, GazeState, Mat3, Vec3
+from gaze.types import Angles2, Bodies, GazeState, Mat3, Vec3
+
+_TO_THE_TEMPLE = np.array([[1.0], [-1.0]])
+"""Left eye: + is left; right eye: + is right."""
 
 
 @dataclass(frozen=True)
@@ -45,27 +48,21 @@ class FieldOfView:
 
     def visible(self, bodies: Bodies, state: GazeState) -> NDArray[np.bool_]:
         """Give (n,) whether each body's centre is in the field of at least one eye."""
-        left = self._in_field(bodies.p_world_m, state, left=True)
-        right = self._in_field(bodies.p_world_m, state, left=False)
-        return left | right
-
-    def _in_field(self, p_world_m: Floats, state: GazeState, left: bool) -> NDArray[np.bool_]:
-        """Compare each body's eccentricity with the field's limit on its meridian."""
-        p_eye = state.p_world_eye_left_m if left else state.p_world_eye_right_m
-        R_world_eye = eye_axes(state, left)
-        rel = (p_world_m - np.asarray(p_eye)) @ np.asarray(R_world_eye)
-        side = rel[:, 1] if left else -rel[:, 1]  # + towards the temple
-        off_axis = np.hypot(side, rel[:, 2])
-        eccentricity = np.arctan2(off_axis, rel[:, 0])
+        p_eyes = np.array([state.p_world_eye_left_m, state.p_world_eye_right_m])
+        R_world_eyes = np.array([eye_axes(state, left=True), eye_axes(state, left=False)])
+        rel = (bodies.p_world_m - p_eyes[:, None, :]) @ R_world_eyes  # (2, n, 3), in each eye
+        ahead, side, up = rel[..., 0], rel[..., 1] * _TO_THE_TEMPLE, rel[..., 2]
+        off_axis2 = side * side + up * up
+        eccentricity = np.arctan2(np.sqrt(off_axis2), ahead)
         horizontal = np.where(side >= 0.0, self._temporal, self._nasal)
-        vertical = np.where(rel[:, 2] >= 0.0, self._up, self._down)
-        # Each quadrant is bounded by a quarter ellipse between its two limits.
-        safe = np.where(off_axis > 0.0, off_axis, 1.0)
-        cos_m, sin_m = side / safe, rel[:, 2] / safe
-        limit = 1.0 / np.sqrt((cos_m / horizontal) ** 2 + (sin_m / vertical) ** 2 + 1e-12)
-        inside: NDArray[np.bool_] = (off_axis == 0.0) & (rel[:, 0] > 0.0)
-        inside |= (off_axis > 0.0) & (eccentricity <= limit)
-        return inside
+        vertical = np.where(up >= 0.0, self._up, self._down)
+        # Each quadrant is bounded by a quarter ellipse between its two limits; multiplied
+        # out, so that a body right on the axis needs no division.
+        reach2 = (side / horizontal) ** 2 + (up / vertical) ** 2
+        inside = eccentricity * eccentricity * reach2 <= off_axis2
+        inside &= (off_axis2 > 0.0) | (ahead > 0.0)
+        either: NDArray[np.bool_] = inside[0] | inside[1]
+        return either
 
 
 def eye_axes(state: GazeState, left: bool) -> Mat3:

@@ -218,18 +218,20 @@ def main(arguments: list[str]) -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICENESS)
     fd, parent, host, port = arguments
-    with socket.socket(fileno=int(fd)) as feed:
-        try:
-            server, url, words = serve(host, int(port))
-        except OSError as error:
-            sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
-            return 1
-        if words is not None:
-            feed.send(NOTICE + words.encode())
-        view = View(server)
-        feed.send(URL + url.encode())
-        watch(feed, view, int(parent))
-        server.stop()
+    # Not closed by hand: its end tells the other side to read this process's last words,
+    # and those of an exception are written only after a ``with`` has been left.
+    feed = socket.socket(fileno=int(fd))
+    try:
+        server, url, words = serve(host, int(port))
+    except OSError as error:
+        sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
+        return 1
+    if words is not None:
+        feed.send(NOTICE + words.encode())
+    view = View(server)
+    feed.send(URL + url.encode())
+    watch(feed, view, int(parent))
+    server.stop()
     return 0
 
 

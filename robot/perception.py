@@ -66,6 +66,7 @@ class Perception:
                     _FACE_RADIUS_M,
                     0.0,
                     face.confidence,
+                    pose.length,
                 )
             )
         for blob in found.blobs:
@@ -100,11 +101,12 @@ def _face(track: Track) -> Face:
     R = track.R_world_face
     assert R is not None  # faces are tracked with their pose
     p = track.p_world_m
+    parts = ((x, y, z * track.face_length) for x, y, z in (PARTS_FACE_M[code] for code in PARTS))
     return Face(
         track.id,
         p,
         track.v_world_m_s,
         R,
-        tuple(add(p, rotate(R, PARTS_FACE_M[part])) for part in PARTS),
+        tuple(add(p, rotate(R, part)) for part in parts),
         track.sighting.confidence,
     )

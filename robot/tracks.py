@@ -89,7 +89,8 @@ class TrackParams:
 class Sighting:
     """One thing as one picture shows it, placed in the world.
 
-    R_world_face: only of faces; parts_face_m stay with the perception
+    R_world_face: axes of a face, None of anything else
+    face_length: of a face, in lengths of the canonical one
     """
 
     kind: str
@@ -98,6 +99,7 @@ class Sighting:
     radius_m: float
     spin_rad_s: float
     confidence: float
+    face_length: float = 1.0
 
 
 @dataclass(slots=True)
@@ -111,6 +113,7 @@ class Track:
     R_world_face: Mat3 | None
     seen_s: float
     at_s: float
+    face_length: float
 
     def expected(self, t_s: float) -> Vec3:
         """Give where it should be."""
@@ -161,7 +164,14 @@ class Tracker:
 
     def _begin(self, sighting: Sighting, t_s: float) -> Track:
         track = Track(
-            self._next_id, sighting, sighting.p_world_m, _STILL, sighting.R_world_face, t_s, t_s
+            self._next_id,
+            sighting,
+            sighting.p_world_m,
+            _STILL,
+            sighting.R_world_face,
+            t_s,
+            t_s,
+            sighting.face_length,
         )
         self._next_id += 1
         return track
@@ -186,6 +196,7 @@ class Tracker:
             track.v_world_m_s = add(track.v_world_m_s, change)
         if track.R_world_face is not None and sighting.R_world_face is not None:
             track.R_world_face = blended(track.R_world_face, sighting.R_world_face, par.turn_gain)
+            track.face_length += par.along_gain * (sighting.face_length - track.face_length)
         track.sighting, track.seen_s, track.at_s = sighting, t_s, t_s
 
 
