@@ -14,7 +14,7 @@ FIXATED_WITHIN_M = 0.02
 _SKIN: Colour = (224, 172, 140)
 _BODY: Colour = (86, 130, 230)
 _TARGET: Colour = (255, 120, 40)
-_OVAL_DEPTH_M = 0.075
+_OVAL_DEPTH_M = 0.085
 _OVAL_WIDER = 1.25
 
 # What stands for each part: half axes in m (out of the face, across, up) and colour.
@@ -67,13 +67,14 @@ class _FaceView:
         )
 
     def _add_oval(self, parts_m: Floats) -> None:
-        """Fit an oval around the parts whose front lies behind every one of them."""
+        """Fit an oval around the parts that passes behind the front ones; the sides lie in it."""
         highest, lowest = parts_m.max(axis=0), parts_m.min(axis=0)
         _, y, z = (highest + lowest) / 2
         _, half_y, half_z = (highest - lowest) / 2 * _OVAL_WIDER
         out = ((parts_m[:, 1] - y) / half_y) ** 2 + ((parts_m[:, 2] - z) / half_z) ** 2
         rise = np.sqrt(np.maximum(0.0, 1.0 - out))
-        x = float((parts_m[:, 0] - _OVAL_DEPTH_M * rise).min())
+        behind = parts_m[:, 0] - _OVAL_DEPTH_M * rise
+        x = float(min(behind[i] for i, part in enumerate(PARTS) if part not in ("FL", "FR")))
         oval = self._add("oval", ellipsoid((_OVAL_DEPTH_M, half_y, half_z), rings=25), _SKIN)
         oval.position = (x, y, z)
 
