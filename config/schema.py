@@ -10,7 +10,7 @@ from pathlib import Path
 from config.load import ConfigError, Fault, load, shipped, shipped_names
 from drivers.dynamixel import DynamixelParams
 from drivers.dynamixel_table import MODELS
-from drivers.face_detector import FaceDetectorParams
+from drivers.face_params import FaceDetectorParams
 from gaze.attention import AttentionParams
 from gaze.bottom_up import BottomUpParams
 from gaze.field_of_view import FieldOfViewParams

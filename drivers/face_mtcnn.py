@@ -12,18 +12,16 @@ import hashlib
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import ModelFileError
+from drivers.face_params import FaceDetectorParams
 from drivers.face_picture import largest_first, prepare
 from drivers.types import DetectedFace, Picture
-
-if TYPE_CHECKING:
-    from drivers.face_detector import FaceDetectorParams
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -71,7 +69,7 @@ class _Sizes(NamedTuple):
 class MtcnnDetector:
     """Finds faces with five landmarks."""
 
-    def __init__(self, params: "FaceDetectorParams") -> None:
+    def __init__(self, params: FaceDetectorParams) -> None:
         """Load the networks.
 
         Raises:

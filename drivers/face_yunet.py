@@ -1,19 +1,16 @@
 """Faces by YuNet: a network file the user names, run by OpenCV's own decoder."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import ModelFileError
+from drivers.face_params import FaceDetectorParams
 from drivers.face_picture import largest_first, prepare
 from drivers.quiet_opencv import quiet_opencv
 from drivers.types import DetectedFace, Picture
-
-if TYPE_CHECKING:
-    from drivers.face_detector import FaceDetectorParams
 
 _CURE = (
     "get face_detection_yunet_2023mar.onnx or a later one from the OpenCV zoo"
@@ -27,7 +24,7 @@ _SAME, _MOST = 0.3, 5000
 class YunetDetector:
     """Finds faces with five landmarks."""
 
-    def __init__(self, params: "FaceDetectorParams", model_file: str) -> None:
+    def __init__(self, params: FaceDetectorParams, model_file: str) -> None:
         """Load the network and try it on an empty picture.
 
         Raises:
@@ -42,6 +39,9 @@ class YunetDetector:
         if prepared is None:
             return ()
         height, width = prepared.small.shape[:2]
+        if min(height, width) < self._params.min_face_px:
+            # No face fits; and OpenCV reads beyond the memory of strips a few pixels wide.
+            return ()
         self._net.setInputSize((width, height))
         rows = self._net.detect(prepared.small)[1]
         if rows is None:  # OpenCV's word for no face
@@ -50,7 +50,7 @@ class YunetDetector:
             [
                 _face(prepared.stretch, row)
                 for row in np.asarray(rows, dtype=np.float64)
-                if row[3] >= self._params.min_face_px
+                if np.isfinite(row).all() and row[3] >= self._params.min_face_px
             ]
         )
 

@@ -95,8 +95,10 @@ class Lids:
         self._onset_s = float("-inf")
         self._next_s = t_s + self._interval_s()
 
-    def step(self, t_s: float, eye_pitch_rad: float, shift_rad: float | None) -> tuple[float, bool]:
-        """Give the opening of the lids and whether a blink is under way.
+    def step(
+        self, t_s: float, eye_pitch_rad: float, shift_rad: float | None
+    ) -> tuple[float, float, bool]:
+        """Give the opening of the left and right lid and whether a blink is under way.
 
         shift_rad: size of a gaze shift that begins in this very tick, else None
         """
@@ -107,7 +109,8 @@ class Lids:
         closure = self.closure(t_s - self._onset_s)
         par = self._params
         follow = par.rest_opening + par.follow_per_deg * degrees(eye_pitch_rad)
-        return min(1.0, max(0.0, follow)) * (1.0 - closure), closure > 0.0
+        opening = min(1.0, max(0.0, follow)) * (1.0 - closure)
+        return opening, opening, closure > 0.0
 
     def closure(self, since_onset_s: float) -> float:
         """Give how far a blink has shut the lid, 0..1, a time after its onset."""

@@ -154,11 +154,16 @@ class Oculomotor:
         )
         left, right = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
         left, right = _clip(left, self._eye_limits[0]), _clip(right, self._eye_limits[1])
-        lid, blinking = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
-        return self._command(head, left, right, lid, blinking, target)
+        lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
+        return self._command(head, left, right, lids, target)
 
     def _command(
-        self, head: Angles3, left: Angles2, right: Angles2, lid: float, blink: bool, target: Target
+        self,
+        head: Angles3,
+        left: Angles2,
+        right: Angles2,
+        lids: tuple[float, float, bool],
+        target: Target,
     ) -> GazeCommand:
         moving = norm(target.v_world_m_s) > 0.05
         phase: Phase = "saccade" if self._flight else "pursue" if moving else "fixate"
@@ -166,10 +171,9 @@ class Oculomotor:
             head,
             left,
             right,
-            lid,
-            lid,
+            *lids[:2],
             phase,
-            blink,
+            lids[2],
             self._gaze,
             self.saccades,
             self.fixations,

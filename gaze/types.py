@@ -97,6 +97,26 @@ class Percept:
         return t_s - self.captured_s
 
 
+class Pull(NamedTuple):
+    """What pulls the gaze to one body, term by term (Mitake et al., eq 1 and the rules).
+
+    slide, loom, spin: the three terms of eq 1; onset: of having just come into view
+    rule:     constant of the rule that points at it, 0 without one
+    interest: factor 0..1 of habituation and inhibition of return
+    total:    the amount of attention that was compared
+    """
+
+    id: int
+    kind: str
+    slide: float
+    loom: float
+    spin: float
+    onset: float
+    rule: float
+    interest: float
+    total: float
+
+
 class Target(NamedTuple):
     """Where to look and why.
 
@@ -108,6 +128,8 @@ class Target(NamedTuple):
     part:     face part code where a face is looked at
     shift:    counts up whenever another object or part is chosen: the saccade's event flag
     why:      the reason in words
+    centre_world_m: where the head turns to, e.g. the face's centre; None: the point itself
+    pulls:    the winner's pull and those of the next three, strongest first
     """
 
     p_world_m: Vec3
@@ -120,6 +142,8 @@ class Target(NamedTuple):
     part: str | None
     shift: int
     why: str
+    centre_world_m: Vec3 | None = None
+    pulls: tuple[Pull, ...] = ()
 
 
 class GazeState(NamedTuple):

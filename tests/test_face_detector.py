@@ -9,8 +9,9 @@ import pytest
 from skimage import data
 
 from drivers.errors import ModelFileError
-from drivers.face_detector import FaceDetectorParams, face_detector
+from drivers.face_detector import face_detector
 from drivers.face_mtcnn import package_folder, read_model
+from drivers.face_params import FaceDetectorParams
 from drivers.face_picture import prepare
 from drivers.types import DetectedFace, FaceDetector, Picture, Pixels
 from drivers.video_file import VideoFile

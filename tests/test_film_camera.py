@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from drivers.errors import CameraError
-from drivers.face_detector import FaceDetectorParams, face_detector
+from drivers.face_detector import face_detector
+from drivers.face_params import FaceDetectorParams
 from drivers.types import DetectedFace
 from drivers.video_file import VideoFile
 from sim_mock.film_camera import FilmCamera
