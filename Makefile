@@ -6,7 +6,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: run test check bench clean
+.PHONY: run test check bench figures clean
 
 run: $(VENV)/.installed
 	$(BIN)/gazerig run --mock
@@ -21,6 +21,10 @@ check: $(VENV)/.installed-dev
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_run.py
+	$(BIN)/python tests/bench/bench_gaze.py
+
+figures: $(VENV)/.installed-dev
+	$(BIN)/python docs/make_figures.py
 
 clean:
 	rm -rf $(VENV) build *.egg-info

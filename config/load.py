@@ -358,12 +358,15 @@ def _steps(key: str) -> tuple[str, ...]:
 
 
 def _merged(low: Entry, high: Entry) -> Entry:
-    """Lay one entry over another: mappings key by key, all else whole."""
+    """Lay one entry over another: mappings key by key, all else whole.
+
+    A mapping keeps the place it has in the lowest file, where a missing key belongs.
+    """
     if not (isinstance(low.value, dict) and isinstance(high.value, dict)):
         return high
     below = low.value
     over = {k: _merged(below[k], e) if k in below else e for k, e in high.value.items()}
-    return Entry({**below, **over}, high.file, high.line)
+    return Entry({**below, **over}, low.file, low.line)
 
 
 def _placed(root: Entry, complaint: Complaint) -> Fault:

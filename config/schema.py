@@ -7,12 +7,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from config.load import ConfigError, Fault, load, shipped, shipped_names
+from config.load import load, read_yaml, shipped
 from drivers.dynamixel import DynamixelParams
 from drivers.dynamixel_table import MODELS
 from drivers.face_params import FaceDetectorParams
 from gaze.attention import AttentionParams
+from gaze.aversion import AversionParams
 from gaze.bottom_up import BottomUpParams
+from gaze.breathing import BreathingParams
 from gaze.field_of_view import FieldOfViewParams
 from gaze.head import HeadParams
 from gaze.idle import IdleParams
@@ -22,6 +24,7 @@ from gaze.pursuit import PursuitParams
 from gaze.saccade import SaccadeParams
 from gaze.scanpath import ScanpathParams, Walk
 from gaze.top_down import TopDownParams
+from gaze.types import PARTS
 from robot.body import JointParams
 from robot.frames import CameraParams
 from robot.kinematics import GeometryParams
@@ -32,8 +35,8 @@ from robot.types import JOINTS
 
 
 @dataclass(frozen=True)
-class Profile:
-    """Ranges a style of gaze keeps to, inside those of the rig."""
+class Ranges:
+    """Ranges a style of gaze keeps to, inside those of the rig's joints."""
 
     eye_yaw_deg: float = field(
         metadata={"low": 1.0, "high": 90.0, "unit": "deg", "says": "eye range to each side"}
@@ -100,6 +103,9 @@ class GazeConfig:
         default_factory=AttentionParams, metadata={"says": "who wins"}
     )
     idle: IdleParams = field(default_factory=IdleParams, metadata={"says": "when nothing is there"})
+    aversion: AversionParams = field(
+        default_factory=AversionParams, metadata={"says": "looking away while talking"}
+    )
     scanpath: ScanpathParams = field(
         default_factory=ScanpathParams, metadata={"says": "the walk over a face"}
     )
@@ -110,6 +116,9 @@ class GazeConfig:
         default_factory=PursuitParams, metadata={"says": "how the eyes follow"}
     )
     head: HeadParams = field(default_factory=HeadParams, metadata={"says": "how the head joins"})
+    breathing: BreathingParams = field(
+        default_factory=BreathingParams, metadata={"says": "the head's slow sway"}
+    )
     lids: LidParams = field(default_factory=LidParams, metadata={"says": "blinks"})
     oculomotor: OculomotorParams = field(
         default_factory=OculomotorParams, metadata={"says": "how it all fits together"}
@@ -124,6 +133,7 @@ class Rig:
     profile: str = field(
         metadata={"unit": "", "says": "name of a shipped profile or path of a YAML file"}
     )
+    ranges: Ranges = field(metadata={"says": "how far eyes and head go; the profile says"})
     bus: BusConfig = field(metadata={"says": "servo bus"})
     geometry: GeometryParams = field(metadata={"says": "measures of the head"})
     joints: Mapping[str, JointParams] = field(metadata={"says": "one entry a joint"})
@@ -142,6 +152,16 @@ class Rig:
     detector: FaceDetectorParams = field(
         default_factory=FaceDetectorParams, metadata={"says": "how faces are found"}
     )
+    face_parts_mm: Mapping[str, tuple[float, float, float]] = field(
+        default_factory=dict,
+        metadata={
+            "low": -300.0,
+            "high": 300.0,
+            "unit": "mm",
+            "says": "a person's own places of face parts (DN FL LE M N FR RE UP) from the nose "
+            "tip: out of the face, to the owner's left, up; those left out are an adult's",
+        },
+    )
     tracks: TrackParams = field(
         default_factory=TrackParams, metadata={"says": "how identities are kept"}
     )
@@ -150,23 +170,23 @@ class Rig:
     gaze: GazeConfig = field(default_factory=GazeConfig, metadata={"says": "gaze models"})
 
 
-def load_rig(name_or_path: str) -> Rig:
+def load_rig(name_or_path: str, character: str | None = None, profile: str | None = None) -> Rig:
     """Read a rig by shipped name or by path, with every rule checked.
 
-    Raises:
-        config.load.ConfigError: with every fault.
-    """
-    rules = (_joint_names, _servo_ids, _models, _lid_ranges, _park_ranges)
-    return load(_find("rigs", name_or_path), Rig, checks=rules)
-
-
-def load_profile(name_or_path: str) -> Profile:
-    """Read a profile by shipped name or by path.
+    profile: name or path of a style of gaze, instead of the one that the rig names
+    character: name or path of a file with differences, laid over both
 
     Raises:
         config.load.ConfigError: with every fault.
     """
-    return load(_find("profiles", name_or_path), Profile)
+    rules = (_joint_names, _servo_ids, _models, _lid_ranges, _park_ranges, _part_names)
+    layers = [_find("rigs", name_or_path)]
+    named = profile or read_yaml(layers[0]).data.get("profile")
+    if isinstance(named, str):
+        layers.append(_find("profiles", named))
+    if character is not None:
+        layers.append(_find("characters", character))
+    return load(layers[-1], Rig, defaults=layers[:-1], checks=rules)
 
 
 def load_walk(name_or_path: str) -> Walk:
@@ -183,12 +203,7 @@ def _find(kind: str, name_or_path: str) -> Path:
     looks_like_path = "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
     if looks_like_path:
         return Path(name_or_path)
-    try:
-        return shipped(kind, name_or_path)
-    except ConfigError:
-        known = ", ".join(shipped_names(kind))
-        rule = f"neither a file nor one of the shipped {kind}: {known}"
-        raise ConfigError([Fault(name_or_path, None, "", name_or_path, rule)]) from None
+    return shipped(kind, name_or_path)
 
 
 def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:
@@ -239,3 +254,9 @@ def _park_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
                 f"park_deg.{name}",
                 f"{angle} is outside the joint's range {joint.min_deg}..{joint.max_deg}",
             )
+
+
+def _part_names(rig: Rig) -> Iterable[tuple[str, str]]:
+    for code in rig.face_parts_mm:
+        if code not in PARTS:
+            yield f"face_parts_mm.{code}", f"unknown face part; parts are {', '.join(PARTS)}"

@@ -15,6 +15,11 @@ def wrap(angle_rad: float) -> float:
     return (angle_rad + pi) % (2.0 * pi) - pi
 
 
+def clip(value: float, most: float) -> float:
+    """Keep a number within +-``most``."""
+    return min(max(value, -most), most)
+
+
 def add(a: Vec3, b: Vec3) -> Vec3:
     """Add two vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
@@ -84,6 +89,20 @@ def along_great_circle(start: Vec3, end: Vec3, fraction: float) -> Vec3:
         return end if fraction >= 0.5 else start
     axis = unit(cross(start, end)) if angle < pi - 1e-6 else (0.0, 0.0, 1.0)
     return turned(start, axis, angle * fraction)
+
+
+def beside(way: Vec3, start: Vec3, further_rad: float, aside_rad: float) -> Vec3:
+    """Move a direction on along the great circle that leads to it, and across.
+
+    way: unit vector that is moved; start: where the great circle comes from
+    further_rad: beyond ``way``; aside_rad: to the left of the path as seen from outside
+    """
+    pole = cross(start, way)
+    if norm(pole) < 1e-12:
+        return way
+    axis = unit(pole)
+    moved = turned(way, axis, further_rad)
+    return turned(moved, cross(moved, axis), -aside_rad)
 
 
 def turned(v: Vec3, axis: Vec3, angle_rad: float) -> Vec3:

@@ -1,16 +1,32 @@
 """The winner of bottom-up and top-down attention (Mitake et al. 3.3.4), and the reason why.
 
 The larger amount of attention wins. Two nearly equal amounts would flicker, so the
-present winner is kept unless another is clearly stronger, and for a shortest time.
+present winner is kept unless another is clearly stronger, and for a shortest time. And
+a winner for ever would be a stare, so amounts are multiplied by the interest that is left
+(gaze.habituation). The most interesting of the bodies that a rule points at keeps the
+rule's whole constant, which the paper's comparison needs: so somebody alone is not left
+for boredom, and several people share the gaze.
 """
 
 from dataclasses import dataclass, field
+from math import inf
+from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gaze.angles import add, scale, sub
 from gaze.bottom_up import BottomUp, Pulls
-from gaze.field_of_view import FieldOfView
+from gaze.field_of_view import FieldOfView, line_of_sight
+from gaze.habituation import Habituation, HabituationParams
 from gaze.idle import Idle
 from gaze.top_down import TopDown, Wanted
-from gaze.types import Bodies, Floats, GazeState, Percept, Target, Vec3
+from gaze.types import Bodies, Floats, GazeState, Percept, Pull, Target, Vec3
+
+_STILL: Vec3 = (0.0, 0.0, 0.0)
+_POINT = ("point", -1)
+_LISTED = 4
+_SPEED_OVER_S = 0.2  # a speed of the head from positions farther apart says nothing
 
 
 @dataclass(frozen=True)
@@ -44,6 +60,26 @@ class AttentionParams:
             "says": "a picture older than this no longer tells what is there",
         },
     )
+    habituation: HabituationParams = field(
+        default_factory=HabituationParams, metadata={"says": "how interest wears off"}
+    )
+
+
+class _Choice(NamedTuple):
+    """Amounts of one decision.
+
+    motion:   of the n bodies, term by term
+    rule, interest, total: (n + 1,), the place that a rule may name coming after the
+        bodies; the rule's constant, the factor of interest, and the amount compared, which
+        is -inf where there is nothing
+    """
+
+    bodies: Bodies
+    motion: Pulls
+    wanted: Wanted | None
+    rule: Floats
+    interest: Floats
+    total: Floats
 
 
 class Attention:
@@ -63,17 +99,22 @@ class Attention:
         self._bottom_up = bottom_up
         self.top_down = top_down
         self._idle = idle
+        self._habituation = Habituation(params.habituation)
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Forget everything seen."""
-        for model in (self._bottom_up, self.top_down, self._idle):
+        for model in (self._bottom_up, self.top_down, self._idle, self._habituation):
             model.reset(t_s)
-        self._seen_s = float("-inf")
+        self._seen_s = -inf
         self._target: Target | None = None
         self._shift = 0
-        self._since_s = float("-inf")
+        self._since_s = -inf
         self._identity: tuple[str, int] | None = None
+        self._place = _STILL
+        self._favoured_id = -1
+        self._behaviour = self.top_down.behaviour
+        self._eye: tuple[Vec3, float] | None = None
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Give the target in force at ``t_s``."""
@@ -81,7 +122,7 @@ class Attention:
         if percept is not None and fresh and percept.captured_s != self._seen_s:
             self._seen_s = percept.captured_s
             self._target = self._decide(percept, state, t_s)
-            if self._target is not None:
+            if self._target is not None and self._target.id >= 0:
                 self._idle.remember(self._target)
         if self._target is not None and fresh:
             return self._settle(self._target, t_s)
@@ -91,79 +132,130 @@ class Attention:
         """Count a shift whenever another thing is looked at."""
         identity = (target.kind, target.id)
         if identity != self._identity:
+            if self._identity is not None:
+                self._habituation.leave(self._place, t_s)
             self._identity = identity
             self._shift += 1
             self._since_s = t_s
+        self._place = target.p_world_m
         return target._replace(shift=self._shift)
 
     def _decide(self, percept: Percept, state: GazeState, t_s: float) -> Target | None:
         """Compare all visible bodies with the rule's choice."""
-        seen = _only(percept, self._field_of_view.visible(percept.bodies, state).tolist())
-        bodies = seen.bodies
-        if len(bodies) == 0:
+        visible = self._field_of_view.visible(percept.bodies, state)
+        made = self._compare(percept.bodies, visible, state, t_s)
+        if made.total.max(initial=-inf) == -inf:
             return None
-        pulls = self._bottom_up.step(bodies, state.p_world_head_m, t_s)
-        wanted = self.top_down.step(seen, state.p_world_head_m)
-        row = self._winner(bodies, pulls.total, wanted, t_s)
-        return _target(bodies, row, pulls, wanted, seen.captured_s)
+        row = self._winner(made, t_s)
+        if made.wanted is not None and row in made.wanted.rows:
+            self._favoured_id = made.bodies.ids[row]
+        return _target(made, row, percept.captured_s)
 
-    def _winner(self, bodies: Bodies, total: Floats, wanted: Wanted | None, t_s: float) -> int:
-        """Give the row of the strongest body, the present one being favoured."""
-        strength = total.tolist()
+    def _compare(
+        self, bodies: Bodies, seen: NDArray[np.bool_], state: GazeState, t_s: float
+    ) -> _Choice:
+        """Give everything that the decision rests on."""
+        n, eye = len(bodies), state.p_world_head_m
+        looks = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
+        motion = self._bottom_up.step(bodies, eye, t_s, self._eye_velocity(eye, t_s), looks, seen)
+        wanted = self.top_down.step(bodies, seen, eye, self._favoured_id)
+        attended = self._identity[1] if self._identity is not None else -1
+        interest, rule = np.ones(n + 1), np.zeros(n + 1)
+        interest[:n] = self._habituation.step(bodies.ids, bodies.p_world_m, eye, attended, t_s)
+        amount = np.append(motion.total, 0.0)
         if wanted is not None:
-            strength[wanted.row] = max(strength[wanted.row], wanted.pull)
-        best = max(range(len(strength)), key=strength.__getitem__)
-        present = self._identity[1] if self._identity is not None else -1
-        if present in bodies.ids:
-            row = bodies.ids.index(present)
-            young = t_s - self._since_s < self._params.shortest_ms / 1e3
-            if young or strength[best] < strength[row] * self._params.stay_factor:
-                return row
-        return best
+            rows = wanted.rows if wanted.point_world_m is None else np.array([n])
+            rule[rows] = wanted.pull
+            amount[rows] = np.maximum(amount[rows], wanted.pull)
+        if wanted is not None and wanted.point_world_m is None:
+            share = self._habituation.for_rule(interest[rows]) * wanted.nearness
+            interest[rows] = share / max(float(share.max()), 1e-9)
+        total = amount * interest
+        total[:n][~seen] = -inf
+        if wanted is None or wanted.point_world_m is None:
+            total[n] = -inf
+        return _Choice(bodies, motion, wanted, rule, interest, total)
+
+    def _eye_velocity(self, p_eye_m: Vec3, t_s: float) -> Vec3:
+        """Give how fast the head has carried the eyes since the decision before, m/s."""
+        before, self._eye = self._eye, (p_eye_m, t_s)
+        if before is None or not 0.0 < t_s - before[1] <= _SPEED_OVER_S:
+            return _STILL
+        return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
+
+    def _winner(self, made: _Choice, t_s: float) -> int:
+        """Give the row of the strongest, the present one being favoured."""
+        best = int(made.total.argmax())
+        # A change of mind does not wait for the end of a fixation.
+        changed = self._behaviour != self.top_down.behaviour
+        self._behaviour = self.top_down.behaviour
+        row = self._present_row(made)
+        if row is None:
+            return best
+        young = t_s - self._since_s < self._params.shortest_ms / 1e3 and not changed
+        stays = young or made.total[best] < made.total[row] * self._params.stay_factor
+        return row if stays else best
+
+    def _present_row(self, made: _Choice) -> int | None:
+        """Give the row of what is looked at now, None where it is no longer there."""
+        if self._identity == _POINT:
+            return len(made.bodies) if made.total[-1] > -inf else None
+        if self._identity is None or self._identity[1] not in made.bodies.ids:
+            return None
+        row = made.bodies.ids.index(self._identity[1])
+        return row if made.total[row] > -inf else None
 
 
-def _only(percept: Percept, mask: list[bool]) -> Percept:
-    """Keep the bodies in the mask."""
-    if all(mask):
-        return percept
-    b = percept.bodies
-    rows = [row for row, keep in enumerate(mask) if keep]
-    kept = Bodies(
-        tuple(b.ids[row] for row in rows),
-        tuple(b.kinds[row] for row in rows),
-        b.p_world_m[rows],
-        b.v_world_m_s[rows],
-        b.w_world_rad_s[rows],
-        b.radius_m[rows],
-    )
-    return Percept(percept.captured_s, kept, percept.faces)
-
-
-def _target(
-    bodies: Bodies, row: int, pulls: Pulls, wanted: Wanted | None, captured_s: float
-) -> Target:
-    """Make the target of a row, with the reason in words."""
-    slide, loom, spin = (float(term[row]) for term in pulls)
-    pull = slide + loom + spin
-    by_rule = wanted is not None and wanted.row == row and wanted.pull >= pull
-    name = f"{bodies.kinds[row]} {bodies.ids[row]}"
+def _target(made: _Choice, row: int, captured_s: float) -> Target:
+    """Make the target of a row, with its reason."""
+    pulls = _strongest(made, row)
+    first, wanted = pulls[0], made.wanted
+    moving = first.slide + first.loom + first.spin + first.onset
+    by_rule = wanted is not None and first.rule > 0.0 and first.rule >= moving
+    name = first.kind if first.id < 0 else f"{first.kind} {first.id}"
     if wanted is not None and by_rule:
-        why = f"{name}: rule {wanted.behaviour} {wanted.pull:.2f} over motion {pull:.2f}"
-        pull = wanted.pull
+        why = f"{name}: rule {wanted.behaviour} {first.rule:.2f}"
     else:
-        why = f"{name}: slide {slide:.2f} + loom {loom:.2f} + spin {spin:.2f}"
+        why = f"{name}: {_terms(first)}"
+    if wanted is not None and wanted.point_world_m is not None and row == len(made.bodies):
+        p, v = wanted.point_world_m, _STILL
+    else:
+        p, v = _vec(made.bodies.p_world_m[row]), _vec(made.bodies.v_world_m_s[row])
+    # How far the head goes follows from the amount itself; boredom moves no head.
+    amount = max(first.rule, moving)
     return Target(
-        _vec(bodies.p_world_m[row]),
-        _vec(bodies.v_world_m_s[row]),
-        captured_s,
-        bodies.kinds[row],
-        bodies.ids[row],
-        pull,
-        by_rule,
-        None,
-        0,
-        why,
+        p, v, captured_s, first.kind, first.id, amount, by_rule, None, 0, why, pulls=pulls
     )
+
+
+def _strongest(made: _Choice, row: int) -> tuple[Pull, ...]:
+    """Give the pulls of a row and of the strongest others, term by term."""
+    total = made.total
+    if len(total) > 64:
+        rows = np.argpartition(-total, _LISTED)[:_LISTED]
+        rows = rows[np.argsort(-total[rows], kind="stable")]
+    else:
+        rows = np.argsort(-total, kind="stable")[:_LISTED]
+    others = [other for other in rows.tolist() if other != row and total[other] > -inf]
+    return tuple(_pull(made, each) for each in (row, *others[: _LISTED - 1]))
+
+
+def _pull(made: _Choice, row: int) -> Pull:
+    """Write down what pulls to one row."""
+    rule, interest = float(made.rule[row]), float(made.interest[row])
+    total = float(made.total[row])
+    if row == len(made.bodies):
+        return Pull(-1, "point", 0.0, 0.0, 0.0, 0.0, rule, interest, total)
+    slide, loom, spin, onset = (float(term[row]) for term in made.motion)
+    name, kind = made.bodies.ids[row], made.bodies.kinds[row]
+    return Pull(name, kind, slide, loom, spin, onset, rule, interest, total)
+
+
+def _terms(pull: Pull) -> str:
+    """Write the terms that count: the largest, and others that are no less than a tenth of it."""
+    terms = {"slide": pull.slide, "loom": pull.loom, "spin": pull.spin, "onset": pull.onset}
+    most = max(terms.values())
+    return " + ".join(f"{name} {a:.2f}" for name, a in terms.items() if a >= 0.1 * most)
 
 
 def _vec(row: Floats) -> Vec3:

@@ -2,22 +2,52 @@
 
 Mitake et al. eq 1 sums three stimuli to which cells of the areas MT and MST respond:
 translation across the line of view (slide), motion along it (loom) and rotation about
-it (spin). Printed with e/|e| on a projection that is only right for |e| = 1, so e is
-normalised here, and taken per body from eye to body, as the retinal image demands.
+it (spin). Two forms of it are here:
+
+literal   As printed: one gaze direction e for all bodies, no distance, metres and radians
+          added as they are. Printed with e/|e| on a projection that is only right for
+          |e| = 1, so e is normalised.
+retinal   What the paper's reason, the image on the retina, demands: e from the eye to each
+          body, speeds relative to the moving eye and divided by the distance, each term
+          measured by the motion that counts as 1.
+
+What has just come into view pulls besides, by a term that decays: the paper's behaviour
+(e), a hand that reaches in from outside the field, is not in eq 1.
+
+All bodies are computed at once; what is remembered of each is a row of an array.
 """
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from math import exp
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gaze.field_of_view import BLOCK, columns
 from gaze.types import Bodies, Floats, Vec3
+
+Ids = NDArray[np.int64]
+
+_BLINK_S = 0.3
+"""A body unseen for no longer than this was missed by the detector and did not leave."""
+
+_NEAREST_M = 0.05
+_STILL: Vec3 = (0.0, 0.0, 0.0)
+_AHEAD: Vec3 = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class BottomUpParams:
-    """Weights of the three terms: the motion that counts as 1."""
+    """Form and weights of eq 1, and the pull of what is new."""
 
+    form: Literal["retinal", "literal"] = field(
+        default="retinal",
+        metadata={
+            "unit": "",
+            "says": "retinal: as the eye sees it; literal: eq 1 as printed, without the weights",
+        },
+    )
     slide_rad_s: float = field(
         default=0.5,
         metadata={
@@ -49,6 +79,32 @@ class BottomUpParams:
         default=0.1,
         metadata={"low": 0.0, "high": 2.0, "unit": "s", "says": "time constant of the low-pass"},
     )
+    onset_pull: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.0,
+            "high": 10.0,
+            "unit": "",
+            "says": "pull of what has just come into view; 0 for none",
+        },
+    )
+    onset_s: float = field(
+        default=0.5,
+        metadata={
+            "low": 0.02,
+            "high": 10.0,
+            "unit": "s",
+            "says": "time constant with which that pull is gone",
+        },
+    )
+
+
+class Terms(NamedTuple):
+    """The terms of eq 1 for each body: (n,) arrays."""
+
+    slide: Floats
+    loom: Floats
+    spin: Floats
 
 
 class Pulls(NamedTuple):
@@ -57,69 +113,189 @@ class Pulls(NamedTuple):
     slide: Floats
     loom: Floats
     spin: Floats
+    onset: Floats
 
     @property
     def total(self) -> Floats:
-        """Give A_i, the sum of the three terms."""
-        return self.slide + self.loom + self.spin
+        """Give A_i, the sum of all terms."""
+        total = self.slide + self.loom
+        total += self.spin
+        total += self.onset
+        return total
 
 
-def slide_loom_spin(v: Floats, w: Floats, e: Floats) -> Pulls:
+def slide_loom_spin(v: Floats, w: Floats, e: Floats) -> Terms:
     """Give the three terms of eq 1 for all bodies at once.
 
     v, w: (n, 3) velocities (m/s) and angular velocities (rad/s)
     e:    (n, 3) or (3,) view directions of any length
     Source: Mitake et al., eq 1, with e normalised.
     """
-    length = _length(e)[..., None]
-    e = e / np.where(length > 0.0, length, 1.0)
-    along = (v * e).sum(axis=-1)
-    across = _length(v - along[:, None] * e)
-    return Pulls(across, np.abs(along), np.abs((w * e).sum(axis=-1)))
+    e = columns(e if e.ndim == 2 else e[None, :])
+    return _eq_1(columns(v), columns(w), e / np.maximum(_length(e), 1e-300))
 
 
-def _length(rows: Floats) -> Floats:
-    """Give the lengths of (..., 3) vectors; a third of the time of numpy's own norm."""
-    lengths: Floats = np.sqrt((rows * rows).sum(axis=-1))
-    return lengths
+def _eq_1(v: Floats, w: Floats, e: Floats) -> Terms:
+    """Give the terms of (3, n) vectors, e being of length 1."""
+    along = (v * e).sum(axis=0)
+    return Terms(_length(v - along * e), np.abs(along), np.abs((w * e).sum(axis=0)))
+
+
+def _length(v: Floats) -> Floats:
+    """Give the lengths of the columns of a (3, n) array."""
+    out: Floats = np.sqrt((v * v).sum(axis=0))
+    return out
+
+
+class _Memory(NamedTuple):
+    """What is known of bodies, in any order: (m,), terms (3, m).
+
+    terms: smoothed slide, loom and spin; entered_s, seen_s: came into view, was last seen
+    """
+
+    ids: Ids
+    terms: Floats
+    entered_s: Floats
+    seen_s: Floats
+
+    def only(self, mask: NDArray[np.bool_]) -> "_Memory":
+        """Keep the bodies in the mask."""
+        return _Memory(self.ids[mask], self.terms[:, mask], self.entered_s[mask], self.seen_s[mask])
+
+
+def _never_seen(ids: Ids) -> _Memory:
+    """Give what is known of bodies that nothing is known of."""
+    n = len(ids)
+    return _Memory(ids, np.zeros((3, n)), np.full(n, -np.inf), np.full(n, -np.inf))
 
 
 class BottomUp:
-    """Retinal form of eq 1 with a low-pass per body."""
+    """Eq 1 with a low-pass per body, and the pull of what has just come into view."""
 
     def __init__(self, params: BottomUpParams) -> None:
-        """Take the weights."""
+        """Take form and weights."""
         self._params = params
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Forget all bodies."""
-        self._smooth: dict[int, tuple[float, float, float]] = {}
+        self._ids: tuple[int, ...] = ()
+        self._memory = self._gone = _never_seen(np.zeros(0, dtype=np.int64))
         self._at_s = t_s
+        self._started_s: float | None = None
 
-    def step(self, bodies: Bodies, p_world_eye_m: Vec3, t_s: float) -> Pulls:
-        """Give the smoothed pulls of all bodies, in their order.
+    def step(
+        self,
+        bodies: Bodies,
+        p_world_eye_m: Vec3,
+        t_s: float,
+        v_world_eye_m_s: Vec3 = _STILL,
+        gaze_world: Vec3 = _AHEAD,
+        seen: NDArray[np.bool_] | None = None,
+    ) -> Pulls:
+        """Give the smoothed pulls of all bodies, in their order; 0 for those not in view.
 
-        Speeds across and along the line of view are divided by the distance, so that
-        they are the rates of the retinal image.
+        Must be called with no bodies, too, or what comes next is not known to be new.
+
+        v_world_eye_m_s: velocity of the eye itself; the literal form does not know it
+        gaze_world: where the eyes look, any length; only the literal form needs it
+        seen: (n,) which bodies are in view; None: all
         """
-        rel = bodies.p_world_m - np.asarray(p_world_eye_m)
-        distance = np.maximum(_length(rel), 0.05)
-        raw = slide_loom_spin(bodies.v_world_m_s, bodies.w_world_rad_s, rel)
-        par = self._params
-        now = np.empty((len(bodies), 3))
-        now[:, 0] = raw.slide / (distance * par.slide_rad_s)
-        now[:, 1] = raw.loom / (distance * par.loom_1_s)
-        now[:, 2] = raw.spin / par.spin_rad_s
-        return self._low_pass(bodies.ids, now, t_s)
+        if seen is None:
+            seen = np.ones(len(bodies), dtype=np.bool_)
+        now = self._terms(bodies, p_world_eye_m, v_world_eye_m_s, gaze_world)
+        self._pause(t_s)
+        if bodies.ids != self._ids:
+            self._remember(bodies.ids, t_s)
+        return self._blend(now, seen, t_s)
 
-    def _low_pass(self, ids: tuple[int, ...], now: Floats, t_s: float) -> Pulls:
+    def _terms(self, bodies: Bodies, p_eye: Vec3, v_eye: Vec3, gaze: Vec3) -> Floats:
+        """Give (3, n) slide, loom and spin as they are now."""
+        now = np.empty((3, len(bodies)))
+        for start in range(0, len(bodies), BLOCK):
+            some = slice(start, start + BLOCK)
+            v, w = bodies.v_world_m_s[some], bodies.w_world_rad_s[some]
+            if self._params.form == "literal":
+                now[0, some], now[1, some], now[2, some] = slide_loom_spin(v, w, np.asarray(gaze))
+            else:
+                rel, v, w = columns(bodies.p_world_m[some]), columns(v), columns(w)
+                rel -= np.array(p_eye)[:, None]
+                v -= np.array(v_eye)[:, None]
+                self._retinal(rel, v, w, now[:, some])
+        return now
+
+    def _retinal(self, rel: Floats, v: Floats, w: Floats, out: Floats) -> None:
+        """Write the (3, n) terms of bodies at ``rel`` from the eye, moving past it with ``v``."""
+        par = self._params
+        length = _length(rel)
+        raw = _eq_1(v, w, rel / np.maximum(length, 1e-300))
+        distance = np.maximum(length, _NEAREST_M)
+        out[0] = raw.slide / (distance * par.slide_rad_s)
+        out[1] = raw.loom / (distance * par.loom_1_s)
+        out[2] = raw.spin / par.spin_rad_s
+
+    def _blend(self, now: Floats, seen: NDArray[np.bool_], t_s: float) -> Pulls:
         """Blend each body's terms with its own past; a new body starts from nothing."""
-        tau = self._params.smoothing_s
-        elapsed = max(0.0, t_s - self._at_s)
-        keep = float(np.exp(-elapsed / tau)) if tau > 0.0 else 0.0
-        past = np.array([self._smooth.get(i, (0.0, 0.0, 0.0)) for i in ids]).reshape(-1, 3)
-        smooth = keep * past + (1.0 - keep) * now
-        self._smooth = dict(zip(ids, map(tuple, smooth.tolist()), strict=True))
+        tau, old = self._params.smoothing_s, self._memory
+        keep = exp(min(0.0, self._at_s - t_s) / tau) if tau > 0.0 else 0.0
+        past, entered_s, seen_s = old.terms, old.entered_s, old.seen_s.copy()
+        new = seen & (t_s - seen_s > _BLINK_S)
+        if new.any():
+            past, entered_s = past.copy(), entered_s.copy()
+            past[:, new], entered_s[new] = 0.0, self._entry_s(t_s)
+        smooth = now  # becomes past + (1 - keep) (now - past), without new arrays
+        smooth -= past
+        smooth *= 1.0 - keep
+        smooth += past
+        onset = self._params.onset_pull * np.exp((entered_s - t_s) / self._params.onset_s)
+        if not seen.all():
+            smooth *= seen
+            onset *= seen
+        np.copyto(seen_s, t_s, where=seen)
+        self._memory = _Memory(old.ids, smooth, entered_s, seen_s)
         self._at_s = t_s
-        return Pulls(smooth[:, 0], smooth[:, 1], smooth[:, 2])
+        return Pulls(smooth[0], smooth[1], smooth[2], onset)
+
+    def _pause(self, t_s: float) -> None:
+        """Begin anew where nothing at all was looked at for long: nobody left meanwhile."""
+        paused_s = t_s - self._at_s
+        if self._started_s is not None and paused_s <= _BLINK_S:
+            return
+        self._started_s = t_s
+        if paused_s > 0.0:
+            self._memory = self._memory._replace(seen_s=self._memory.seen_s + paused_s)
+            self._gone = self._gone._replace(seen_s=self._gone.seen_s + paused_s)
+
+    def _entry_s(self, t_s: float) -> float:
+        """Give the time of entry of what is seen for the first time at ``t_s``.
+
+        What the first moments show was there before: it entered long ago.
+        """
+        started_s = t_s if self._started_s is None else self._started_s
+        return t_s if t_s - started_s > _BLINK_S else -np.inf
+
+    def _remember(self, ids: tuple[int, ...], t_s: float) -> None:
+        """Arrange the memory for other bodies than before, keeping those just missed."""
+        now = _never_seen(np.fromiter(ids, dtype=np.int64, count=len(ids)))
+        old = _joined(self._memory, self._gone)
+        old = old.only(t_s - old.seen_s <= _BLINK_S)
+        order = np.argsort(old.ids, kind="stable")
+        at = np.searchsorted(old.ids, now.ids, sorter=order)
+        known = at < len(order)
+        known[known] = old.ids[order[at[known]]] == now.ids[known]
+        rows = order[at[known]]
+        now.terms[:, known] = old.terms[:, rows]
+        now.entered_s[known], now.seen_s[known] = old.entered_s[rows], old.seen_s[rows]
+        away = np.ones(len(order), dtype=np.bool_)
+        away[rows] = False
+        self._ids, self._memory, self._gone = ids, now, old.only(away)
+
+
+def _joined(a: _Memory, b: _Memory) -> _Memory:
+    """Put two memories of different bodies together."""
+    return _Memory(
+        np.concatenate((a.ids, b.ids)),
+        np.concatenate((a.terms, b.terms), axis=1),
+        np.concatenate((a.entered_s, b.entered_s)),
+        np.concatenate((a.seen_s, b.seen_s)),
+    )

@@ -12,7 +12,8 @@ makes no step.
 from dataclasses import dataclass, field
 from math import degrees, exp, hypot, radians
 
-from gaze.angles import direction, shortened, yaw_pitch
+from gaze.angles import angle_between, direction, shortened, yaw_pitch
+from gaze.quintic import Quintic
 from gaze.types import Angles2, Angles3, Target
 
 
@@ -50,6 +51,40 @@ class HeadParams:
             "high": 10.0,
             "unit": "",
             "says": "attention A2 at which the head moves most",
+        },
+    )
+    goal_by: str = field(
+        default="attention",
+        metadata={
+            "choices": ("attention", "align", "stahl"),
+            "unit": "",
+            "says": "head's share by the amount of attention (eq 7), a fixed alignment, or "
+            "0.77 of what lies beyond 17.9 deg (Stahl 1999)",
+        },
+    )
+    align: float = field(
+        default=0.5,
+        metadata={
+            "low": 0.0,
+            "high": 1.0,
+            "unit": "",
+            "says": "with goal_by align: 0 stops as short as may be, 1 faces the target",
+        },
+    )
+    literal_reach: bool = field(
+        default=False,
+        metadata={
+            "unit": "",
+            "says": "keep trigger and offset whatever the eyes can reach, as printed",
+        },
+    )
+    lead_ms: float = field(
+        default=0.0,
+        metadata={
+            "low": 0.0,
+            "high": 100.0,
+            "unit": "ms",
+            "says": "head before eyes for top-down targets that it turns to",
         },
     )
     start_delay_ms: float = field(
@@ -126,40 +161,6 @@ class HeadParams:
             raise ValueError("pull_most must be above pull_least")
 
 
-class Quintic:
-    """Fifth-order polynomial to a resting goal from any position, speed and acceleration.
-
-    From rest it is eq 8, theta0 + (goal - theta0) (6 s^5 - 15 s^4 + 10 s^3).
-    """
-
-    def __init__(self, start: tuple[float, float, float], goal: float, duration_s: float) -> None:
-        """Take (position, speed, acceleration) at time 0, and where to be at rest when."""
-        p, v, a = start
-        T = duration_s
-        d = goal - p
-        self._goal, self._T = goal, T
-        self._c = (
-            p,
-            v,
-            0.5 * a,
-            (20.0 * d - 12.0 * v * T - 3.0 * a * T * T) / (2.0 * T**3),
-            (-30.0 * d + 16.0 * v * T + 3.0 * a * T * T) / (2.0 * T**4),
-            (12.0 * d - 6.0 * v * T - a * T * T) / (2.0 * T**5),
-        )
-
-    def at(self, t_s: float) -> tuple[float, float, float]:
-        """Give position, speed and acceleration at a time since the start."""
-        if t_s >= self._T:
-            return (self._goal, 0.0, 0.0)
-        c0, c1, c2, c3, c4, c5 = self._c
-        t = max(0.0, t_s)
-        return (
-            c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
-            c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
-            2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
-        )
-
-
 class Head:
     """Decides when, where to and how the head turns."""
 
@@ -172,7 +173,8 @@ class Head:
         reachable = eye_limit_rad - radians(params.eye_margin_deg)
         # A head that stops short by more than the eye can cover never brings the gaze
         # to the target, and a trigger beyond the eye's limit never fires.
-        self.trigger_rad = max(0.0, min(radians(params.largest_offset_deg), reachable))
+        printed = radians(params.largest_offset_deg)
+        self.trigger_rad = printed if params.literal_reach else max(0.0, min(printed, reachable))
         self.reset(0.0, (0.0, 0.0, 0.0))
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
@@ -191,41 +193,60 @@ class Head:
         par = self._params
         z = 2.0 * (pull - par.pull_least) / (par.pull_most - par.pull_least) - 1.0
         full = radians(par.largest_offset_deg) / (1.0 + exp(min(700.0, 7.0 * z)))
-        return min(full, self.trigger_rad)
+        return full if par.literal_reach else min(full, self.trigger_rad)
 
     def goal_rad(self, facing_rad: Angles2, offset_rad: float) -> Angles2:
         """Give the head's yaw and pitch goal: the arc to the target, shortened, in range."""
         yaw, pitch = yaw_pitch(shortened(direction(facing_rad), offset_rad))
+        return self.in_range((yaw, pitch, 0.0))[:2]
+
+    def in_range(self, head_rad: Angles3) -> Angles3:
+        """Keep yaw and pitch within the neck's range."""
         (yaw_low, yaw_high), (pitch_low, pitch_high) = self._neck
-        return (min(max(yaw, yaw_low), yaw_high), min(max(pitch, pitch_low), pitch_high))
+        yaw, pitch, roll = head_rad
+        return (min(max(yaw, yaw_low), yaw_high), min(max(pitch, pitch_low), pitch_high), roll)
+
+    def leads_s(self, target: Target, eccentricity_rad: float) -> float:
+        """Give how long the eyes wait because the head goes first."""
+        first = target.top_down and eccentricity_rad >= self.trigger_rad
+        return self._params.lead_ms / 1e3 if first else 0.0
 
     def step(
         self,
         target: Target,
         facing_rad: Angles2,
+        gaze_rad: Angles2,
         eccentricity_rad: float,
         since_eye_onset_s: float,
         t_s: float,
     ) -> Angles3:
         """Give the head's yaw, pitch and roll for this instant.
 
-        facing_rad: neck angles that would point the face straight at the gaze target
-        eccentricity_rad: angle of the gaze target from the face's front
-        since_eye_onset_s: time since the eyes set off for this target
+        facing_rad: neck angles that would point the face straight at the target's centre
+        gaze_rad: the same for the point itself that is looked at
+        eccentricity_rad: angle of that point from the face's front
+        since_eye_onset_s: time since the eyes set off for it, negative before they do
         """
-        self._decide(target, facing_rad, eccentricity_rad, since_eye_onset_s, t_s)
+        self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         now = [plan.at(t_s - self._planned_s)[0] for plan in self._plans]
         return (now[0], now[1], now[2])
 
     def _decide(
-        self, target: Target, facing: Angles2, eccentricity: float, since_onset: float, t_s: float
+        self,
+        target: Target,
+        facing: Angles2,
+        gaze: Angles2,
+        eccentricity: float,
+        since_onset: float,
+        t_s: float,
     ) -> None:
         """Start, follow, relieve or rest."""
         par = self._params
         if eccentricity <= radians(par.comfort_deg):
             self._aside_since_s = t_s
         moving = t_s < self._ends_s
-        late_enough = target.top_down or since_onset >= par.start_delay_ms / 1e3 - 1e-9
+        delay_ms = -par.lead_ms if target.top_down else par.start_delay_ms
+        late_enough = since_onset >= delay_ms / 1e3 - 1e-9
         if eccentricity >= self.trigger_rad and late_enough:
             self._follows, self._relieves = True, False
         elif t_s - self._aside_since_s >= par.recentre_after_ms / 1e3 and not moving:
@@ -233,10 +254,29 @@ class Head:
         elif not moving:
             self._follows = self._relieves = False
         if self._follows:
-            self._aim(self.goal_rad(facing, self.offset_rad(target.pull)), t_s)
+            self._aim(self._reaching(facing, gaze, self._stops_short(target, facing)), t_s)
         elif self._relieves:
             comfort = min(radians(par.comfort_deg) / 2.0, self.trigger_rad)
-            self._aim(self.goal_rad(facing, comfort), t_s)
+            self._aim(self._reaching(facing, gaze, comfort), t_s)
+
+    def _stops_short(self, target: Target, facing: Angles2) -> float:
+        """Give the angle by which the head stops short of the target."""
+        par = self._params
+        if par.goal_by == "attention":
+            return self.offset_rad(target.pull)
+        if par.goal_by == "align":
+            return (1.0 - par.align) * self.trigger_rad
+        arc = angle_between((1.0, 0.0, 0.0), direction(facing))
+        short = arc - 0.77 * max(0.0, arc - radians(17.9))
+        return min(short, self.trigger_rad)
+
+    def _reaching(self, facing: Angles2, gaze: Angles2, offset_rad: float) -> Angles2:
+        """Give the goal for the centre; for the point itself if its eye could not get there."""
+        goal = self.goal_rad(facing, offset_rad)
+        if facing == gaze or self._params.literal_reach:
+            return goal
+        rest = angle_between(direction(goal), direction(gaze))
+        return goal if rest <= self.trigger_rad else self.goal_rad(gaze, self.trigger_rad)
 
     def _aim(self, goal: Angles2, t_s: float) -> None:
         """Plan anew when the goal has moved enough to matter."""

@@ -1,17 +1,31 @@
-"""Where to look when there is nothing: hold the last place for a moment, then rest.
+"""Where to look when there is nothing: wait, search, then rest and glance around.
 
 A person who steps out of the picture often comes back at once, and a detector blinks;
-so the gaze stays where it was for a while before it returns to straight ahead.
+so the gaze first stays where it was. Then it searches: towards the side the person left
+to, and around the place of the loss. With nobody to be found it rests straight ahead
+and glances around the room at irregular intervals, coming back to rest between glances.
+
+Search points and glances all have kind "search" or "glance" and each has an id of its
+own, -2 - n for the n-th since the reset, counted through both kinds: a shift is counted
+where kind or id changes, so every glance is a shift of gaze. The resting point is "rest"
+with id -1. Directions are seen from a point above the neck base at the resting height.
 """
 
 from dataclasses import dataclass, field
+from math import exp, hypot, log, radians, sqrt
 
-from gaze.types import Target, Vec3
+import numpy as np
+
+from gaze.angles import add, direction, norm, scale, sub, wrap, yaw_pitch
+from gaze.types import Angles2, Target, Vec3
+
+_STILL: Vec3 = (0.0, 0.0, 0.0)
+_SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make no more than 3 to 4 a second
 
 
 @dataclass(frozen=True)
 class IdleParams:
-    """Times and the resting point."""
+    """Times, ranges and the resting point."""
 
     hold_ms: float = field(
         default=1000.0,
@@ -39,36 +53,257 @@ class IdleParams:
         default=0.2,
         metadata={"low": 0.0, "high": 10.0, "unit": "", "says": "pull of the resting point"},
     )
+    coast_ms: float = field(
+        default=200.0,
+        metadata={
+            "low": 0.0,
+            "high": 2000.0,
+            "unit": "ms",
+            "says": "for this long at most a lost target is taken to have moved on",
+        },
+    )
+    search_ms: float = field(
+        default=3000.0,
+        metadata={
+            "low": 0.0,
+            "high": 60000.0,
+            "unit": "ms",
+            "says": "time of searching for a lost target after that; 0 is not at all",
+        },
+    )
+    search_fixation_ms: float = field(
+        default=600.0,
+        metadata={
+            "low": 100.0,
+            "high": 10000.0,
+            "unit": "ms",
+            "says": "mean time with one place of the search",
+        },
+    )
+    search_aside_deg: float = field(
+        default=18.0,
+        metadata={
+            "low": 0.0,
+            "high": 90.0,
+            "unit": "deg",
+            "says": "how far towards the side it left to",
+        },
+    )
+    search_spread_deg: float = field(
+        default=8.0,
+        metadata={
+            "low": 0.0,
+            "high": 45.0,
+            "unit": "deg",
+            "says": "standard deviation of the places of the search, sideways",
+        },
+    )
+    leaving_deg_s: float = field(
+        default=4.0,
+        metadata={
+            "low": 0.1,
+            "high": 100.0,
+            "unit": "deg/s",
+            "says": "slower targets did not leave to any side",
+        },
+    )
+    reach_deg: float = field(
+        default=70.0,
+        metadata={
+            "low": 5.0,
+            "high": 180.0,
+            "unit": "deg",
+            "says": "no farther to the side does it search, unless the target was there",
+        },
+    )
+    rest_ms: float = field(
+        default=3000.0,
+        metadata={
+            "low": 200.0,
+            "high": 600000.0,
+            "unit": "ms",
+            "says": "mean time at rest between glances around",
+        },
+    )
+    glance_ms: float = field(
+        default=1200.0,
+        metadata={"low": 200.0, "high": 60000.0, "unit": "ms", "says": "mean time of a glance"},
+    )
+    spread: float = field(
+        default=0.6,
+        metadata={
+            "low": 0.0,
+            "high": 3.0,
+            "unit": "",
+            "says": "of all these times: standard deviation over mean",
+        },
+    )
+    again_share: float = field(
+        default=0.35,
+        metadata={
+            "low": 0.0,
+            "high": 0.95,
+            "unit": "",
+            "says": "share of glances that another one follows, without rest between",
+        },
+    )
+    glance_least_deg: float = field(
+        default=8.0,
+        metadata={"low": 0.0, "high": 90.0, "unit": "deg", "says": "nearest glance to the side"},
+    )
+    glance_yaw_deg: float = field(
+        default=35.0,
+        metadata={"low": 0.0, "high": 90.0, "unit": "deg", "says": "farthest glance to the side"},
+    )
+    glance_pitch_deg: float = field(
+        default=12.0,
+        metadata={"low": 0.0, "high": 60.0, "unit": "deg", "says": "highest and lowest glance"},
+    )
+
+    def __post_init__(self) -> None:
+        """Check the range of the glances.
+
+        Raises:
+            ValueError: the nearest glance lies beyond the farthest.
+        """
+        if self.glance_least_deg > self.glance_yaw_deg:
+            raise ValueError("glance_least_deg must not be above glance_yaw_deg")
 
 
 class Idle:
     """Chooses the target when attention has none."""
 
-    def __init__(self, params: IdleParams) -> None:
-        """Take the times."""
+    def __init__(self, params: IdleParams, rng: np.random.Generator | None = None) -> None:
+        """Take times, ranges and dice; without dice it only waits and then rests."""
         self._params = params
+        self._rng = rng
+        self._eye: Vec3 = (0.0, 0.0, params.rest_height_m)
+        self._rest: Vec3 = (params.rest_distance_m, 0.0, params.rest_height_m)
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Forget what was looked at."""
         self._last: Target | None = None
-        self._lost_s = t_s
         self._lost = False
+        self._now = self._resting(t_s)
+        self._until_s = self._search_until_s = t_s
+        self._count = 0
+        self._gone: Target | None = None
 
     def remember(self, target: Target) -> None:
         """Note a target that is in sight."""
         self._last, self._lost = target, False
 
     def step(self, t_s: float) -> Target:
-        """Give where to look with nothing in sight: the last place, then the rest."""
+        """Give where to look with nothing in sight: wait, search, rest, glance."""
         if not self._lost:
-            self._lost, self._lost_s = True, t_s
-        if self._last is not None:
-            if t_s - self._lost_s < self._params.hold_ms / 1e3:
-                return self._last._replace(v_world_m_s=(0.0, 0.0, 0.0), why="lost, waiting")
-            self._last = None
-        par = self._params
-        rest: Vec3 = (par.rest_distance_m, 0.0, par.rest_height_m)
-        return Target(
-            rest, (0.0, 0.0, 0.0), t_s, "rest", -1, par.rest_pull, True, None, 0, "nobody in sight"
+            self._lose(t_s)
+        while t_s >= self._until_s:
+            self._next(self._until_s)
+        return self._now
+
+    def _lose(self, t_s: float) -> None:
+        """Begin to wait for what was just in sight, where it has got to by now."""
+        self._lost = True
+        gone, par = self._last, self._params
+        self._gone, self._last = gone, None
+        self._until_s = self._search_until_s = t_s
+        if gone is None:
+            self._rest_now(t_s)
+            return
+        coast_s = min(max(0.0, t_s - gone.at_s), par.coast_ms / 1e3)
+        there = add(gone.p_world_m, scale(gone.v_world_m_s, coast_s))
+        self._now = gone._replace(
+            p_world_m=there,
+            v_world_m_s=_STILL,
+            at_s=t_s,
+            why="lost, waiting",
+            centre_world_m=None,
         )
+        self._gone = gone._replace(p_world_m=there)
+        self._until_s = t_s + par.hold_ms / 1e3
+        self._search_until_s = self._until_s + par.search_ms / 1e3
+
+    def _next(self, t_s: float) -> None:
+        """Go on to the next place at ``t_s``, when the last one's time is over."""
+        if self._rng is None:
+            self._now, self._until_s = self._resting(t_s), float("inf")
+        elif self._gone is not None and t_s < self._search_until_s:
+            self._search(self._gone, t_s, self._rng)
+        elif self._now.kind == "rest" or self._once_more(self._rng):
+            self._glance(t_s, self._rng)
+        else:
+            self._rest_now(t_s)
+
+    def _once_more(self, rng: np.random.Generator) -> bool:
+        """Tell whether another glance follows a glance at once."""
+        return self._now.kind == "glance" and rng.random() < self._params.again_share
+
+    def _rest_now(self, t_s: float) -> None:
+        """Come back to straight ahead for a while."""
+        self._gone = None
+        self._now = self._resting(t_s)
+        self._until_s = float("inf")
+        if self._rng is not None:
+            self._until_s = t_s + self._time_s(self._params.rest_ms, self._rng)
+
+    def _search(self, gone: Target, t_s: float, rng: np.random.Generator) -> None:
+        """Look where the lost target may be: first on its way out, then about there."""
+        par, first = self._params, self._now.kind != "search"
+        rel = sub(gone.p_world_m, self._eye)
+        out = self._way_out(rel, gone.v_world_m_s)
+        share = 1.0 if first else float(rng.uniform(-0.2, 1.2))
+        # Heads stay at about one height: people are looked for sideways.
+        spread = 0.0 if first and out != (0.0, 0.0) else radians(par.search_spread_deg)
+        yaw, pitch = yaw_pitch(rel)
+        to_yaw = yaw + share * out[0] + spread * float(rng.standard_normal())
+        to_pitch = pitch + share * out[1] + 0.3 * spread * float(rng.standard_normal())
+        limit = max(radians(par.reach_deg), abs(yaw))
+        place = (
+            min(limit, max(-limit, to_yaw)),
+            min(radians(45.0), max(-radians(45.0), to_pitch)),
+        )
+        self._look("search", place, norm(rel), t_s, f"looking for {gone.kind} {gone.id}")
+        until_s = t_s + self._time_s(par.search_fixation_ms, rng)
+        self._until_s = min(until_s, max(self._search_until_s, t_s + _SHORTEST_S))
+
+    def _way_out(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:
+        """Give the yaw and pitch from the loss to where it was heading; 0 for what stood."""
+        soon = yaw_pitch(add(rel, scale(v_world_m_s, 0.05)))
+        now = yaw_pitch(rel)
+        yaw, pitch = wrap(soon[0] - now[0]), soon[1] - now[1]
+        size, par = hypot(yaw, pitch), self._params
+        if size / 0.05 < radians(par.leaving_deg_s):
+            return (0.0, 0.0)
+        return (
+            yaw / size * radians(par.search_aside_deg),
+            pitch / size * radians(par.search_aside_deg),
+        )
+
+    def _glance(self, t_s: float, rng: np.random.Generator) -> None:
+        """Look at some place in the room."""
+        par = self._params
+        side = 1.0 if rng.random() < 0.5 else -1.0
+        place = (
+            side * radians(float(rng.uniform(par.glance_least_deg, par.glance_yaw_deg))),
+            radians(float(rng.uniform(-par.glance_pitch_deg, par.glance_pitch_deg))),
+        )
+        self._look("glance", place, par.rest_distance_m, t_s, "glancing around, nobody in sight")
+        self._until_s = t_s + self._time_s(par.glance_ms, rng)
+
+    def _look(self, kind: str, place: Angles2, distance_m: float, t_s: float, why: str) -> None:
+        """Make the target of a search or glance, with an identity of its own."""
+        self._count += 1
+        point = add(self._eye, scale(direction(place), distance_m))
+        pull, name = self._params.rest_pull, -1 - self._count
+        self._now = Target(point, _STILL, t_s, kind, name, pull, True, None, 0, why)
+
+    def _resting(self, t_s: float) -> Target:
+        pull = self._params.rest_pull
+        return Target(self._rest, _STILL, t_s, "rest", -1, pull, True, None, 0, "nobody in sight")
+
+    def _time_s(self, mean_ms: float, rng: np.random.Generator) -> float:
+        """Draw a time with a mean and the common spread, no shorter than people's."""
+        sigma2 = log(1.0 + self._params.spread**2)
+        drawn = mean_ms / 1e3 * exp(sqrt(sigma2) * float(rng.standard_normal()) - 0.5 * sigma2)
+        return max(drawn, _SHORTEST_S)

@@ -1,17 +1,25 @@
-"""Lids: spontaneous and gaze-evoked blinks, and lids that follow the vertical gaze.
+"""Lids: spontaneous and gaze-evoked blinks, winks, sleepiness, lids that follow the gaze.
 
-Closing is about twice as fast as opening (VanderWerf 2003; Kwon 2013). Rates are those
-of Bentivoglio 1997: 17 a minute at rest, 26 in conversation, with log-normal
-intervals. Large gaze shifts bring a blink with them (Evinger 1994: 97 % of those
-beyond 33 deg), once for each shift. Opening 0 is shut, 1 is fully open.
+Rates are those of Bentivoglio 1997: 17 a minute at rest, 26 in conversation, with
+log-normal intervals. Closing is about twice as fast as opening (VanderWerf 2003; Kwon
+2013). Large gaze shifts bring a blink with them (Evinger 1994: 97 % of those beyond
+33 deg), once for each shift. Nakamoto & Tsuruno 3.6 print that rule as a level, eye and
+head more than 20 deg apart, which would blink for ever with the head held aside; here
+it is the event that the text before it describes. Opening 0 is shut, 1 is fully open.
 """
 
 from dataclasses import dataclass, field
-from math import degrees, exp, log, sqrt
+from math import degrees, exp, inf, log, sqrt
+from typing import Literal
 
 import numpy as np
 
 from gaze.saccade import min_jerk
+
+Side = Literal["left", "right"]
+LidMode = Literal["rest", "conversation"]
+
+_DROOP_S = 1.0  # time in which lids sink or rise when the sleepiness changes
 
 
 @dataclass(frozen=True)
@@ -19,12 +27,29 @@ class LidParams:
     """Rates and shapes."""
 
     blinks_per_min: float = field(
-        default=20.0,
+        default=17.0,
         metadata={
             "low": 0.0,
             "high": 60.0,
             "unit": "1/min",
-            "says": "spontaneous blinks; people: 17 at rest, 26 in conversation; 0 is never",
+            "says": "spontaneous blinks at rest; 0 is never",
+        },
+    )
+    conversation_per_min: float = field(
+        default=26.0,
+        metadata={
+            "low": 0.0,
+            "high": 60.0,
+            "unit": "1/min",
+            "says": "spontaneous blinks in conversation; 0 is never",
+        },
+    )
+    interval_law: str = field(
+        default="lognormal",
+        metadata={
+            "choices": ("lognormal", "exponential", "fixed"),
+            "unit": "",
+            "says": "law of the intervals; all three keep the mean, fixed has no spread",
         },
     )
     interval_cv: float = field(
@@ -33,12 +58,39 @@ class LidParams:
             "low": 0.05,
             "high": 3.0,
             "unit": "",
-            "says": "spread of the intervals: standard deviation over mean",
+            "says": "spread of log-normal intervals: standard deviation over mean",
         },
     )
     shortest_interval_ms: float = field(
         default=1000.0,
-        metadata={"low": 400.0, "high": 10000.0, "unit": "ms", "says": "pause after a blink"},
+        metadata={
+            "low": 400.0,
+            "high": 10000.0,
+            "unit": "ms",
+            "says": "pause after a blink before a spontaneous one",
+        },
+    )
+    double_share: float = field(
+        default=0.0,
+        metadata={
+            "low": 0.0,
+            "high": 1.0,
+            "unit": "",
+            "says": "share of blinks with a second one right after them",
+        },
+    )
+    double_gap_ms: float = field(
+        default=100.0,
+        metadata={"low": 0.0, "high": 500.0, "unit": "ms", "says": "pause between those two"},
+    )
+    incomplete_share: float = field(
+        default=0.12,
+        metadata={
+            "low": 0.0,
+            "high": 1.0,
+            "unit": "",
+            "says": "share of blinks that shut the lid by 0.70 to 0.85 only",
+        },
     )
     close_ms: float = field(
         default=75.0,
@@ -52,17 +104,30 @@ class LidParams:
         default=175.0,
         metadata={"low": 50.0, "high": 1500.0, "unit": "ms", "says": "time of opening"},
     )
+    wink_hold_ms: float = field(
+        default=200.0,
+        metadata={"low": 0.0, "high": 3000.0, "unit": "ms", "says": "time shut in a wink"},
+    )
     rest_opening: float = field(
         default=0.75,
         metadata={"low": 0.1, "high": 1.0, "unit": "", "says": "opening with level gaze"},
     )
     follow_per_deg: float = field(
-        default=0.012,
+        default=0.0222,
         metadata={
             "low": 0.0,
             "high": 0.1,
             "unit": "1/deg",
-            "says": "change of the opening with vertical gaze",
+            "says": "change of the opening as the gaze sinks; gain 1 is one over the lid's travel",
+        },
+    )
+    follow_up_share: float = field(
+        default=0.85,
+        metadata={
+            "low": 0.0,
+            "high": 1.5,
+            "unit": "",
+            "says": "the same above level gaze, in parts of the change below it",
         },
     )
     evoked_middle_deg: float = field(
@@ -78,6 +143,53 @@ class LidParams:
         default=0.217,
         metadata={"low": 0.0, "high": 5.0, "unit": "1/deg", "says": "slope of that probability"},
     )
+    evoked_pause_ms: float = field(
+        default=600.0,
+        metadata={
+            "low": 0.0,
+            "high": 10000.0,
+            "unit": "ms",
+            "says": "from the onset of a blink to the next that a gaze shift may bring",
+        },
+    )
+    evoked_literal: bool = field(
+        default=False,
+        metadata={
+            "unit": "",
+            "says": "a blink with every shift beyond evoked_literal_deg instead of the dice",
+        },
+    )
+    evoked_literal_deg: float = field(
+        default=20.0,
+        metadata={
+            "low": 0.0,
+            "high": 180.0,
+            "unit": "deg",
+            "says": "a large saccade of Nakamoto & Tsuruno 3.6",
+        },
+    )
+    sleepy_level: float = field(
+        default=0.0,
+        metadata={"low": 0.0, "high": 1.0, "unit": "", "says": "sleepiness at the start"},
+    )
+    sleepy_droop: float = field(
+        default=0.65,
+        metadata={
+            "low": 0.0,
+            "high": 1.0,
+            "unit": "",
+            "says": "part of the opening that full sleepiness takes away",
+        },
+    )
+    sleepy_slowness: float = field(
+        default=2.0,
+        metadata={
+            "low": 0.0,
+            "high": 5.0,
+            "unit": "",
+            "says": "full sleepiness makes a blink this many times its length longer",
+        },
+    )
 
 
 class Lids:
@@ -87,13 +199,54 @@ class Lids:
         """Take rates, shapes and dice."""
         self._params = params
         self._rng = rng
+        self._mode: LidMode = "rest"
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
-        """Open the lids and draw the first blink."""
+        """Open the lids and draw the first blink; the mode stays."""
         self.blinks = 0
-        self._onset_s = float("-inf")
+        self._t_s = t_s
+        self._onset_s = -inf
+        self._depth = self._slow = 1.0
+        self._redraw = False
+        self._winks_s: dict[Side, float] = {"left": -inf, "right": -inf}
+        level = self._params.sleepy_level
+        self._droop_from, self._droop_to, self._droop_since_s = level, level, t_s
         self._next_s = t_s + self._interval_s()
+
+    def mode(self, name: LidMode) -> None:
+        """Blink as often as people do at "rest" or in "conversation", from the next step on.
+
+        Raises:
+            ValueError: there is no such mode.
+        """
+        if name not in ("rest", "conversation"):
+            raise ValueError(f"no lid mode {name!r}; modes: rest, conversation")
+        # The interval under way was drawn for the other rate, perhaps for "never".
+        self._redraw = self._redraw or name != self._mode
+        self._mode = name
+
+    def wink(self, side: Side, t_s: float) -> None:
+        """Shut and open one lid, from ``t_s`` or the last step on; a wink under way goes on.
+
+        Raises:
+            ValueError: there is no such side.
+        """
+        if side not in self._winks_s:
+            raise ValueError(f"no lid {side!r}; sides: left, right")
+        if not self._under_way(self._winks_s[side], self._t_s):
+            self._winks_s[side] = max(t_s, self._t_s)
+
+    def sleepy(self, level: float) -> None:
+        """Let the lids sink and the blinks grow long: 0 awake .. 1 hardly awake.
+
+        Raises:
+            ValueError: level is not within 0..1.
+        """
+        if not 0.0 <= level <= 1.0:
+            raise ValueError(f"sleepy level {level} is not within 0..1")
+        self._droop_from = self._sleepiness(self._t_s)
+        self._droop_to, self._droop_since_s = level, self._t_s
 
     def step(
         self, t_s: float, eye_pitch_rad: float, shift_rad: float | None
@@ -102,20 +255,25 @@ class Lids:
 
         shift_rad: size of a gaze shift that begins in this very tick, else None
         """
+        self._t_s = t_s
+        if self._redraw:
+            self._redraw, self._next_s = False, t_s + self._interval_s()
         if self._due(t_s, shift_rad):
-            self._onset_s = t_s
-            self.blinks += 1
-            self._next_s = t_s + self._length_s() + self._interval_s()
-        closure = self.closure(t_s - self._onset_s)
-        par = self._params
-        follow = par.rest_opening + par.follow_per_deg * degrees(eye_pitch_rad)
-        opening = min(1.0, max(0.0, follow)) * (1.0 - closure)
-        return opening, opening, closure > 0.0
+            self._blink(t_s)
+        blink = self._depth * self.closure((t_s - self._onset_s) / self._slow)
+        left, right = (max(blink, self._winked(t_s - at_s)) for at_s in self._winks_s.values())
+        opening = self._level_opening(degrees(eye_pitch_rad))
+        opening *= 1.0 - self._params.sleepy_droop * self._sleepiness(t_s)
+        return opening * (1.0 - left), opening * (1.0 - right), blink > 0.0
 
-    def closure(self, since_onset_s: float) -> float:
-        """Give how far a blink has shut the lid, 0..1, a time after its onset."""
+    def closure(self, since_onset_s: float, hold_s: float | None = None) -> float:
+        """Give how far a full blink has shut the lid, 0..1, a time after its onset.
+
+        hold_s: time shut, of a blink where not given
+        """
         par = self._params
-        close, hold, opening = par.close_ms / 1e3, par.hold_ms / 1e3, par.open_ms / 1e3
+        close, opening = par.close_ms / 1e3, par.open_ms / 1e3
+        hold = par.hold_ms / 1e3 if hold_s is None else hold_s
         if since_onset_s <= 0.0 or since_onset_s >= close + hold + opening:
             return 0.0
         if since_onset_s < close:
@@ -127,28 +285,76 @@ class Lids:
         s = (since_onset_s - close - hold) / opening
         return 1.0 - min_jerk(1.0 - (1.0 - s) ** 1.4)
 
+    def _level_opening(self, eye_pitch_deg: float) -> float:
+        """Give the opening that goes with a vertical gaze (Becker & Fuchs 1988)."""
+        par = self._params
+        share = par.follow_up_share if eye_pitch_deg > 0.0 else 1.0
+        opening = par.rest_opening + par.follow_per_deg * share * eye_pitch_deg
+        return min(1.0, max(0.0, opening))
+
     def _due(self, t_s: float, shift_rad: float | None) -> bool:
         """Tell whether a blink begins now; the dice of a shift are thrown once."""
-        if shift_rad is not None:
-            par = self._params
-            beyond = degrees(shift_rad) - par.evoked_middle_deg
-            chance = 1.0 / (1.0 + exp(-par.evoked_steepness_1_deg * beyond))
-            if self._rng.random() < chance and t_s - self._onset_s > 0.6:
-                return True
+        evoked = shift_rad is not None and self._evokes(degrees(abs(shift_rad)))
+        if any(self._under_way(at_s, t_s) for at_s in self._winks_s.values()):
+            # Both lids would shut, and the wink be lost in it.
+            self._next_s = max(self._next_s, t_s + self._params.shortest_interval_ms / 1e3)
+            return False
+        since_s = t_s - self._onset_s
+        if evoked and since_s >= max(self._params.evoked_pause_ms / 1e3, self._length_s()):
+            return True
         return t_s >= self._next_s
 
-    def _length_s(self) -> float:
+    def _evokes(self, shift_deg: float) -> bool:
+        """Tell whether a gaze shift brings a blink with it."""
         par = self._params
-        return (par.close_ms + par.hold_ms + par.open_ms) / 1e3
+        if par.evoked_literal:
+            return shift_deg > par.evoked_literal_deg
+        beyond = shift_deg - par.evoked_middle_deg
+        chance = 1.0 / (1.0 + exp(-par.evoked_steepness_1_deg * beyond))
+        return float(self._rng.random()) < chance
+
+    def _blink(self, t_s: float) -> None:
+        """Begin a blink, draw how deep it is and when the next one comes."""
+        par = self._params
+        self.blinks += 1
+        self._onset_s = t_s
+        self._slow = 1.0 + par.sleepy_slowness * self._sleepiness(t_s)
+        shallow = self._rng.random() < par.incomplete_share
+        self._depth = float(self._rng.uniform(0.70, 0.85)) if shallow else 1.0
+        double = self._rng.random() < par.double_share
+        pause_s = par.double_gap_ms / 1e3 if double else self._interval_s()
+        self._next_s = t_s + self._length_s() + pause_s
+
+    def _winked(self, since_onset_s: float) -> float:
+        return self.closure(since_onset_s, self._params.wink_hold_ms / 1e3)
+
+    def _under_way(self, wink_s: float, t_s: float) -> bool:
+        """Tell whether the wink that began at ``wink_s`` is not over."""
+        par = self._params
+        return wink_s <= t_s < wink_s + (par.close_ms + par.wink_hold_ms + par.open_ms) / 1e3
+
+    def _sleepiness(self, t_s: float) -> float:
+        way = min_jerk((t_s - self._droop_since_s) / _DROOP_S)
+        return self._droop_from + way * (self._droop_to - self._droop_from)
+
+    def _length_s(self) -> float:
+        """Give the length of the blink under way, of an awake one before the first."""
+        par = self._params
+        return self._slow * (par.close_ms + par.hold_ms + par.open_ms) / 1e3
 
     def _interval_s(self) -> float:
-        """Draw the pause until the next spontaneous blink."""
+        """Draw the pause from the end of a blink until the next spontaneous one."""
         par = self._params
-        if par.blinks_per_min == 0.0:
-            return float("inf")
+        per_min = par.blinks_per_min if self._mode == "rest" else par.conversation_per_min
+        if per_min == 0.0:
+            return inf
         shortest = par.shortest_interval_ms / 1e3
-        between = 60.0 / par.blinks_per_min - self._length_s()
+        between = 60.0 / per_min - self._length_s()
         mean = max(between - shortest, 0.05)
+        if par.interval_law == "fixed":
+            return shortest + mean
+        if par.interval_law == "exponential":
+            return shortest + mean * float(self._rng.standard_exponential())
         # A log-normal part on top of the shortest pause, with mean and spread such that
         # the whole pause has those asked for.
         sigma2 = log(1.0 + (par.interval_cv * between / mean) ** 2)

@@ -6,15 +6,19 @@ exactly (the vestibulo-ocular reflex), and vergence comes from each eye's own ge
 """
 
 from dataclasses import dataclass, field
-from math import radians
-from typing import NamedTuple
+from math import exp
+from typing import NamedTuple, Protocol
 
-from gaze.angles import add, along_great_circle, angle_between, norm, rotate, scale, sub, unit
+import numpy as np
+
+from gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
 from gaze.field_of_view import line_of_sight
+from gaze.flight import Flight, scattered
 from gaze.head import Head
 from gaze.lids import Lids
 from gaze.pursuit import Pursuit
 from gaze.saccade import Saccade
+from gaze.shift import ShiftParams, ShiftRule
 from gaze.types import (
     Angles2,
     Angles3,
@@ -27,38 +31,14 @@ from gaze.types import (
     Vec3,
 )
 
+_MOVING_M_S = 0.05
+"""A target slower than this is fixated, not pursued."""
+
 
 @dataclass(frozen=True)
-class OculomotorParams:
-    """When to jump, and how to bridge delays."""
+class OculomotorParams(ShiftParams):
+    """When to jump, how to bridge delays, and how exactly to land."""
 
-    saccade_deg: float = field(
-        default=2.0,
-        metadata={
-            "low": 0.1,
-            "high": 30.0,
-            "unit": "deg",
-            "says": "error that is closed by a saccade instead of smooth following",
-        },
-    )
-    smallest_shift_deg: float = field(
-        default=0.3,
-        metadata={
-            "low": 0.0,
-            "high": 10.0,
-            "unit": "deg",
-            "says": "a new target nearer than this needs no saccade",
-        },
-    )
-    refractory_ms: float = field(
-        default=150.0,
-        metadata={
-            "low": 0.0,
-            "high": 2000.0,
-            "unit": "ms",
-            "says": "pause before an error alone may bring the next saccade",
-        },
-    )
     extrapolate_ms: float = field(
         default=200.0,
         metadata={
@@ -66,6 +46,15 @@ class OculomotorParams:
             "high": 2000.0,
             "unit": "ms",
             "says": "longest time for which a target is moved on by its own velocity",
+        },
+    )
+    fade_ms: float = field(
+        default=300.0,
+        metadata={
+            "low": 1.0,
+            "high": 5000.0,
+            "unit": "ms",
+            "says": "decay of that velocity when there is no news for longer",
         },
     )
     eye_lag_ms: float = field(
@@ -86,16 +75,44 @@ class OculomotorParams:
             "says": "no nearer point is converged on (0.2 m is 17.6 deg of vergence)",
         },
     )
+    landing_along: float = field(
+        default=0.0,
+        metadata={
+            "low": 0.0,
+            "high": 0.2,
+            "unit": "",
+            "says": "scatter of the landing along the way, share of the amplitude; people .03-.05",
+        },
+    )
+    landing_across: float = field(
+        default=0.0,
+        metadata={
+            "low": 0.0,
+            "high": 0.2,
+            "unit": "",
+            "says": "scatter of the landing across the way, share of the amplitude; people .02",
+        },
+    )
 
 
-class _Flight(NamedTuple):
-    """A saccade under way: from and to points in the world, amplitude, onset."""
+class Sway(Protocol):
+    """What moves the head beside the gaze: breathing."""
 
-    start: Vec3
-    end: Vec3
-    amplitude_rad: float
-    onset_s: float
-    ends_s: float
+    def reset(self, t_s: float) -> None:
+        """Begin anew."""
+        ...
+
+    def step(self, t_s: float) -> Angles3:
+        """Give (yaw, pitch, roll) to add to the head's angles."""
+        ...
+
+
+class _Seen(NamedTuple):
+    """The target as it is now: the point, its velocity, and where the head is to face."""
+
+    point: Vec3
+    velocity: Vec3
+    centre: Vec3
 
 
 class Oculomotor:
@@ -110,8 +127,19 @@ class Oculomotor:
         pursuit: Pursuit,
         head: Head,
         lids: Lids,
+        breathing: Sway | None = None,
+        rng: np.random.Generator | None = None,
     ) -> None:
-        """Take the models and, for left and right eye, ((yaw low, high), (pitch low, high))."""
+        """Take the models and, for left and right eye, ((yaw low, high), (pitch low, high)).
+
+        rng: dice of the landing scatter
+
+        Raises:
+            ValueError: the landing is to scatter and there are no dice.
+        """
+        self._scatter = (params.landing_along, params.landing_across)
+        if any(self._scatter) and rng is None:
+            raise ValueError("landing_along and landing_across need dice: give rng")
         self._params = params
         self._geometry = geometry
         self._eye_limits = eye_limits
@@ -119,16 +147,20 @@ class Oculomotor:
         self._pursuit = pursuit
         self._head = head
         self._lids = lids
+        self._breathing = breathing
+        self._rng = rng
+        self._rule = ShiftRule(params, any(self._scatter))
         self._started = False
 
     def reset(self, t_s: float, state: GazeState) -> None:
         """Begin where head and eyes are."""
         self._head.reset(t_s, state.head_rad)
         self._lids.reset(t_s)
+        if self._breathing is not None:
+            self._breathing.reset(t_s)
+        self._rule.reset(t_s)
         self._gaze = _meeting_point(state)
-        self._flight: _Flight | None = None
-        self._onset_s = self._landed_s = t_s
-        self._shift: int | None = None
+        self._flight: Flight | None = None
         self.saccades = self.fixations = 0
         self._started = True
 
@@ -141,21 +173,20 @@ class Oculomotor:
         if not self._started:
             self.reset(t_s, state)
         R_world_head, p_head = self._foreseen_head(state)
-        ahead_s = min(max(0.0, t_s - target.at_s), self._params.extrapolate_ms / 1e3)
-        point = self._clear(add(target.p_world_m, scale(target.v_world_m_s, ahead_s)), p_head)
-        shift_rad = self._maybe_jump(target, point, p_head, t_s)
-        self._move_gaze(point, target.v_world_m_s, p_head, t_s, dt_s)
-        head = self._head.step(
-            target,
-            self._geometry.facing(point),
-            angle_between(rotate(R_world_head, (1.0, 0.0, 0.0)), sub(point, p_head)),
-            t_s - self._onset_s,
-            t_s,
-        )
+        seen = self._now(target, p_head, t_s)
+        facing = self._geometry.facing(seen.point)
+        ahead = rotate(R_world_head, (1.0, 0.0, 0.0))
+        aside_rad = angle_between(ahead, sub(seen.point, p_head))
+        free_s = self._flight.ends_s if self._flight else t_s
+        self._rule.tell(target.shift, self._head.leads_s(target, aside_rad), free_s, t_s)
+        shift_rad = self._maybe_jump(seen, p_head, t_s)
+        self._move_gaze(seen, p_head, t_s, dt_s)
+        centre = facing if seen.centre is seen.point else self._geometry.facing(seen.centre)
+        head = self._head.step(target, centre, facing, aside_rad, t_s - self._rule.onset_s, t_s)
         left, right = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
         left, right = _clip(left, self._eye_limits[0]), _clip(right, self._eye_limits[1])
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
-        return self._command(head, left, right, lids, target)
+        return self._command(self._swayed(head, t_s), left, right, lids, seen)
 
     def _command(
         self,
@@ -163,9 +194,9 @@ class Oculomotor:
         left: Angles2,
         right: Angles2,
         lids: tuple[float, float, bool],
-        target: Target,
+        seen: _Seen,
     ) -> GazeCommand:
-        moving = norm(target.v_world_m_s) > 0.05
+        moving = norm(seen.velocity) > _MOVING_M_S
         phase: Phase = "saccade" if self._flight else "pursue" if moving else "fixate"
         return GazeCommand(
             head,
@@ -180,6 +211,13 @@ class Oculomotor:
             self._lids.blinks,
         )
 
+    def _swayed(self, head: Angles3, t_s: float) -> Angles3:
+        """Add the breath to the head's angles, within the neck's range."""
+        if self._breathing is None:
+            return head
+        yaw, pitch, roll = self._breathing.step(t_s)
+        return self._head.in_range((head[0] + yaw, head[1] + pitch, head[2] + roll))
+
     def _foreseen_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
         """Give the head's pose at the time when an eye command of now takes effect."""
         lag = self._params.eye_lag_ms / 1e3
@@ -188,6 +226,22 @@ class Oculomotor:
             (yaw + rates[0] * lag, pitch + rates[1] * lag, roll + rates[2] * lag)
         )
 
+    def _now(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
+        """Move the target on by its own velocity, which fades when there is no news."""
+        par = self._params
+        age = max(0.0, t_s - target.at_s)
+        known, fade = par.extrapolate_ms / 1e3, par.fade_ms / 1e3
+        velocity = target.v_world_m_s
+        moved = scale(velocity, min(age, known))
+        if age > known:
+            left = exp(-(age - known) / fade)
+            moved = add(moved, scale(velocity, fade * (1.0 - left)))
+            velocity = scale(velocity, left)
+        point = self._clear(add(target.p_world_m, moved), p_head)
+        if target.centre_world_m is None:
+            return _Seen(point, velocity, point)
+        return _Seen(point, velocity, self._clear(add(target.centre_world_m, moved), p_head))
+
     def _clear(self, point: Vec3, p_head: Vec3) -> Vec3:
         """Keep a point far enough away to converge on."""
         rel = sub(point, p_head)
@@ -195,49 +249,35 @@ class Oculomotor:
             return point
         return add(p_head, scale(unit(rel), self._params.nearest_m))
 
-    def _maybe_jump(self, target: Target, point: Vec3, p_head: Vec3, t_s: float) -> float | None:
-        """Start a saccade when a new target or a large error asks for one; give its size."""
+    def _maybe_jump(self, seen: _Seen, p_head: Vec3, t_s: float) -> float | None:
+        """Start a saccade when one is due; give its size."""
         if self._flight is not None:
             return None
-        error = angle_between(sub(self._gaze, p_head), sub(point, p_head))
-        par = self._params
-        new = target.shift != self._shift
-        if new:
-            self._shift = target.shift
-            self._onset_s = t_s
-        rested = t_s - self._landed_s >= par.refractory_ms / 1e3
-        large = error > radians(par.saccade_deg) and rested
-        if not large and not (new and error > radians(par.smallest_shift_deg)):
+        slip = self._pursuit.slip(self._gaze, seen.point, seen.velocity, p_head)
+        if not self._rule.due(slip, t_s):
             return None
-        duration = self._saccade.duration_s(error)
-        end = add(point, scale(target.v_world_m_s, duration))
+        error = angle_between(sub(self._gaze, p_head), sub(seen.point, p_head))
+        end = add(seen.point, scale(seen.velocity, self._saccade.duration_s(error)))
         end = self._clear(end, p_head)
-        amplitude = angle_between(sub(self._gaze, p_head), sub(end, p_head))
-        self._flight = _Flight(
-            self._gaze, end, amplitude, t_s, t_s + self._saccade.duration_s(amplitude)
-        )
-        self._onset_s = t_s
+        if self._rng is not None and any(self._scatter):
+            end = scattered(end, self._gaze, p_head, *self._scatter, self._rng)
+        self._flight = Flight(self._saccade, self._gaze, end, p_head, t_s)
         self.saccades += 1
         return error
 
-    def _move_gaze(self, point: Vec3, v_point: Vec3, p_head: Vec3, t_s: float, dt_s: float) -> None:
+    def _move_gaze(self, seen: _Seen, p_head: Vec3, t_s: float, dt_s: float) -> None:
         """Move the gaze point along the saccade, or after the target."""
-        flight = self._flight
-        if flight is None:
-            self._gaze = self._pursuit.step(self._gaze, point, v_point, p_head, dt_s)
-            return
-        done = self._saccade.displacement_rad(flight.amplitude_rad, t_s - flight.onset_s)
-        share = done / flight.amplitude_rad if flight.amplitude_rad > 0.0 else 1.0
-        # Both ends are seen from where the head is now, so the head's own motion
-        # during the saccade bends nothing; vergence goes with the same profile.
-        a, b = sub(flight.start, p_head), sub(flight.end, p_head)
-        nearness = (1.0 - share) / norm(a) + share / norm(b)
-        way = along_great_circle(unit(a), unit(b), share)
-        self._gaze = add(p_head, scale(way, 1.0 / nearness))
-        if t_s >= flight.ends_s - 1e-9:
-            self._flight = None
-            self._landed_s = t_s
-            self.fixations += 1
+        if self._flight is not None:
+            self._gaze = self._flight.at(p_head, t_s)
+            if self._flight.landed(t_s):
+                self._flight = None
+                self._rule.land(t_s)
+                self.fixations += 1
+        elif not self._rule.waits:
+            closing = not self._rule.corrects
+            self._gaze = self._pursuit.step(
+                self._gaze, seen.point, seen.velocity, p_head, dt_s, closing
+            )
 
 
 def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:

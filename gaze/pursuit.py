@@ -1,27 +1,46 @@
-"""Smooth following of a moving target between saccades.
+"""Smooth following of a moving target between saccades, in gaze space.
 
-The gaze takes over the target's own motion and closes what error remains: the
-direction (version) at the rate Kc and up to the speed that human pursuit reaches, the
-nearness (vergence) at the slower rate Kd. Larger errors of direction are saccades.
+The two controls of the binocular controller (gaze.binocular), conjugate and vergence,
+for a target whose picture was placed in space when it was taken: its place is known
+without the eyes' own motion (efference copy), the delay is the measured one, and the
+target's own speed stands for the smoothed derivative. So a jump of the place never
+enters the speed, an eye that sees nothing goes with the other one, and a head that
+turns or moves changes nothing, near targets included.
+
+The direction takes over the share Gp of the target's angular speed, up to the speed that
+human pursuit reaches, and closes the error at the rate Kc; the nearness closes its own
+at Kd, or at the slower Kdiv where it recedes. Larger errors of direction are saccades.
 """
 
 from dataclasses import dataclass, field
 from math import exp, radians
+from typing import NamedTuple
 
 from gaze.angles import add, norm, scale, sub, unit
 from gaze.types import Vec3
 
 _FARTHEST_1_M = 0.01
 """Nearness below which the lines of sight are as good as parallel (100 m)."""
+_NEAREST_1_M = 20.0
+"""Nearness of a point at the eyes themselves (0.05 m); nothing nearer has a direction."""
 
 
 @dataclass(frozen=True)
 class PursuitParams:
-    """Gain and speed limit of the following."""
+    """Gains and limits of the following."""
 
     gain_1_s: float = field(
         default=8.0,
         metadata={"low": 0.0, "high": 50.0, "unit": "1/s", "says": "rate Kc closing the error"},
+    )
+    velocity_gain: float = field(
+        default=0.95,
+        metadata={
+            "low": 0.0,
+            "high": 1.0,
+            "unit": "",
+            "says": "share Gp of the target's speed taken over at once; people .95",
+        },
     )
     vergence_gain_1_s: float = field(
         default=4.0,
@@ -30,6 +49,15 @@ class PursuitParams:
             "high": 50.0,
             "unit": "1/s",
             "says": "rate Kd closing the error in depth",
+        },
+    )
+    divergence_gain_1_s: float = field(
+        default=3.0,
+        metadata={
+            "low": 0.0,
+            "high": 50.0,
+            "unit": "1/s",
+            "says": "rate Kdiv closing it where the target is farther than the gaze",
         },
     )
     max_speed_deg_s: float = field(
@@ -41,37 +69,98 @@ class PursuitParams:
             "says": "fastest smooth following; human pursuit saturates near 63 deg/s",
         },
     )
+    reject_deg_s: float = field(
+        default=100.0,
+        metadata={
+            "low": 1.0,
+            "high": 1000.0,
+            "unit": "deg/s",
+            "says": "a target said to be faster than this has jumped, and is not followed",
+        },
+    )
+    max_error_deg: float = field(
+        default=5.0,
+        metadata={
+            "low": 0.1,
+            "high": 90.0,
+            "unit": "deg",
+            "says": "largest error that smooth following closes at its rate",
+        },
+    )
+
+
+class Slip(NamedTuple):
+    """How the target moves past the gaze, as seen from the eyes.
+
+    error_rad: from the gaze to the target, as a vector across the line of sight
+    slip_rad_s: speed of the target less that of the following, closing aside
+    """
+
+    error_rad: Vec3
+    slip_rad_s: Vec3
 
 
 class Pursuit:
     """Moves a gaze point after a target point."""
 
     def __init__(self, params: PursuitParams) -> None:
-        """Take gains and speed limit."""
+        """Take gains and limits."""
         self._params = params
         self._max_rad_s = radians(params.max_speed_deg_s)
+        self._reject_rad_s = radians(params.reject_deg_s)
+        self._max_error_rad = radians(params.max_error_deg)
 
-    def step(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3, dt_s: float) -> Vec3:
+    def slip(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3) -> Slip:
+        """Give error and retinal slip; all points in the world, metres."""
+        way, _ = _seen(gaze, eye)
+        there, near = _seen(target, eye)
+        across = _across(there, scale(v_target, near))
+        return Slip(sub(there, way), sub(across, self._taken(across)))
+
+    def step(
+        self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3, dt_s: float, closing: bool = True
+    ) -> Vec3:
         """Give the gaze point ``dt_s`` later; all points in the world, metres.
 
         target, v_target: where the target is now and its velocity
         eye: centre between the eyes, from which directions and nearness are seen
+        closing: whether the error of direction is closed; False leaves it to a saccade
         """
+        if dt_s <= 0.0:
+            return gaze
+        par = self._params
         now, near_now = _seen(target, eye)
         before, near_before = _seen(sub(target, scale(v_target, dt_s)), eye)
         way, near = _seen(gaze, eye)
-        close = 1.0 - exp(-self._params.gain_1_s * dt_s)
-        move = add(sub(now, before), scale(sub(before, way), close))
-        length, longest = norm(move), self._max_rad_s * dt_s
-        if length > longest:
-            move = scale(move, longest / length)
-        close = 1.0 - exp(-self._params.vergence_gain_1_s * dt_s)
-        near += near_now - near_before + (near_before - near) * close
-        return add(eye, scale(unit(add(way, move)), 1.0 / max(near, _FARTHEST_1_M)))
+        move = scale(self._taken(scale(sub(now, before), 1.0 / dt_s)), dt_s)
+        if closing:
+            error = _shorter(sub(before, way), self._max_error_rad)
+            move = add(move, scale(error, 1.0 - exp(-par.gain_1_s * dt_s)))
+        rate = par.vergence_gain_1_s if near_before > near else par.divergence_gain_1_s
+        near += near_now - near_before + (near_before - near) * (1.0 - exp(-rate * dt_s))
+        near = min(max(near, _FARTHEST_1_M), _NEAREST_1_M)
+        return add(eye, scale(unit(add(way, move)), 1.0 / near))
+
+    def _taken(self, speed_rad_s: Vec3) -> Vec3:
+        """Give the angular velocity that is taken over from a target's."""
+        if norm(speed_rad_s) > self._reject_rad_s:
+            return (0.0, 0.0, 0.0)
+        return scale(_shorter(speed_rad_s, self._max_rad_s), self._params.velocity_gain)
 
 
 def _seen(point: Vec3, eye: Vec3) -> tuple[Vec3, float]:
     """Give the direction of a point and its nearness, one over its distance."""
     rel = sub(point, eye)
-    distance = max(norm(rel), 1e-6)
-    return scale(rel, 1.0 / distance), 1.0 / distance
+    return unit(rel), 1.0 / max(norm(rel), 1.0 / _NEAREST_1_M)
+
+
+def _across(way: Vec3, v: Vec3) -> Vec3:
+    """Give the part of a vector that is perpendicular to a direction."""
+    along = way[0] * v[0] + way[1] * v[1] + way[2] * v[2]
+    return sub(v, scale(way, along))
+
+
+def _shorter(v: Vec3, longest: float) -> Vec3:
+    """Keep a vector no longer than ``longest``."""
+    length = norm(v)
+    return scale(v, longest / length) if length > longest else v

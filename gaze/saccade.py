@@ -1,17 +1,36 @@
-"""Saccade profile: minimum jerk with a cap on the speed (Mitake et al., eqs 2-6).
+"""How an eye jumps: the angle covered as a function of the time since onset.
 
-Closed forms of the time since onset: a late tick lands on the curve instead of
-stretching it. Radians and seconds inside; parameters in degrees and milliseconds.
+Three profiles with one interface. ``min_jerk`` is eqs 2-6 of Mitake et al., minimum
+jerk with a cap on the speed. ``main_sequence`` has the duration and the early peak of
+human saccades. ``literal_frame`` is the rule of Nakamoto & Tsuruno 3.3, 0.8 of the way
+in each frame. All are closed forms of the time: a late tick lands on the curve instead
+of stretching it. Radians and seconds inside; parameters in degrees and milliseconds.
 """
 
 from dataclasses import dataclass, field
-from math import radians
+from math import degrees, exp, log, radians
+from typing import Protocol
+
+MIN_JERK_PEAK = 1.875
+"""Peak over mean speed of a minimum-jerk movement."""
+_NARROWEST = 1.1
+"""Least peak over mean speed of the main-sequence profile: some time goes to its flanks."""
+_LITERAL_REST_RAD = radians(0.05)
+"""What the 0.8-per-frame rule may leave when its saccade counts as landed."""
 
 
 @dataclass(frozen=True)
 class SaccadeParams:
-    """Speed cap L and shortest duration T."""
+    """Profile, speed cap L, shortest duration T, and the constants of the other profiles."""
 
+    profile: str = field(
+        default="min_jerk",
+        metadata={
+            "choices": ("min_jerk", "main_sequence", "literal_frame"),
+            "unit": "",
+            "says": "how an eye jumps: eqs 2-6, as people do, or 0.8 of the way each frame",
+        },
+    )
     max_speed_deg_s: float = field(
         default=500.0,
         metadata={
@@ -23,8 +42,83 @@ class SaccadeParams:
     )
     shortest_ms: float = field(
         default=50.0,
-        metadata={"low": 10.0, "high": 1000.0, "unit": "ms", "says": "shortest saccade T"},
+        metadata={
+            "low": 10.0,
+            "high": 1000.0,
+            "unit": "ms",
+            "says": "shortest saccade T of the profile min_jerk",
+        },
     )
+    human_base_ms: float = field(
+        default=21.0,
+        metadata={
+            "low": 1.0,
+            "high": 200.0,
+            "unit": "ms",
+            "says": "duration of a human saccade of no size",
+        },
+    )
+    human_per_deg_ms: float = field(
+        default=2.2,
+        metadata={
+            "low": 0.1,
+            "high": 20.0,
+            "unit": "ms/deg",
+            "says": "how much longer a human saccade is for each degree",
+        },
+    )
+    human_peak_over_mean: float = field(
+        default=1.65,
+        metadata={
+            "low": 1.2,
+            "high": 1.875,
+            "unit": "",
+            "says": "peak over mean speed of a human saccade below the cap",
+        },
+    )
+    device_floor_ms: float = field(
+        default=20.0,
+        metadata={
+            "low": 1.0,
+            "high": 500.0,
+            "unit": "ms",
+            "says": "shortest saccade the device can make with the profile main_sequence",
+        },
+    )
+    frame_share: float = field(
+        default=0.8,
+        metadata={
+            "low": 0.05,
+            "high": 0.99,
+            "unit": "",
+            "says": "share of the remaining way per frame of the profile literal_frame",
+        },
+    )
+    frame_ms: float = field(
+        default=11.1,
+        metadata={
+            "low": 1.0,
+            "high": 200.0,
+            "unit": "ms",
+            "says": "length of such a frame; the authors' display showed 90 a second",
+        },
+    )
+
+
+class Profile(Protocol):
+    """What each kind of saccade knows of itself; sizes and angles in radians."""
+
+    def duration_s(self, amplitude_rad: float) -> float:
+        """Give the time from onset to landing."""
+        ...
+
+    def peak_speed_rad_s(self, amplitude_rad: float) -> float:
+        """Give the highest speed."""
+        ...
+
+    def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
+        """Give the angle covered ``t_s`` after onset."""
+        ...
 
 
 def min_jerk(s: float) -> float:
@@ -36,15 +130,15 @@ def min_jerk(s: float) -> float:
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 
-class Saccade:
-    """Displacement of the eye along the great circle as a function of time."""
+class MinJerk:
+    """Minimum jerk with a cap on the speed (Mitake et al., eqs 2-6)."""
 
-    def __init__(self, params: SaccadeParams) -> None:
+    def __init__(self, max_speed_rad_s: float, shortest_s: float) -> None:
         """Take L and T."""
-        self._L = radians(params.max_speed_deg_s)
-        self._T = params.shortest_ms / 1000.0
+        self._L = max_speed_rad_s
+        self._T = shortest_s
         # Eq 3, A' = L / f'(0.5 T), where the paper misprints T' for f': f'(0.5 T) = 1.875 / T.
-        self.largest_uncapped_rad = self._L * self._T / 1.875
+        self.largest_uncapped_rad = self._L * self._T / MIN_JERK_PEAK
 
     def duration_s(self, amplitude_rad: float) -> float:
         """Give the time from onset to landing."""
@@ -52,7 +146,7 @@ class Saccade:
 
     def peak_speed_rad_s(self, amplitude_rad: float) -> float:
         """Give the highest speed, never above L."""
-        return min(1.875 * amplitude_rad / self._T, self._L)
+        return min(MIN_JERK_PEAK * amplitude_rad / self._T, self._L)
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
         """Give the angle covered ``t_s`` after onset (eqs 5 and 6)."""
@@ -70,3 +164,118 @@ class Saccade:
     def _cruise_s(self, amplitude_rad: float) -> float:
         """Give the time at full speed, (A - A') / L; eq 4's t_f is 0.5 T later."""
         return max(0.0, (amplitude_rad - self.largest_uncapped_rad) / self._L)
+
+
+class MainSequence:
+    """Duration and skew of human saccades, the speed capped.
+
+    The speed rises like the first half of a minimum-jerk movement, stays at its peak
+    for a while, and falls like the second half. Rise and fall share their time .45 to
+    .55 up to 10 deg and .25 to .75 from 50 deg on (Collewijn 1988); the time at the
+    peak follows from the ratio of peak to mean speed, which the cap lowers.
+    """
+
+    def __init__(self, params: SaccadeParams) -> None:
+        """Take the constants."""
+        self._L = radians(params.max_speed_deg_s)
+        self._params = params
+
+    def duration_s(self, amplitude_rad: float) -> float:
+        """Give the time from onset to landing: max(floor, 21 ms + 2.2 ms a degree)."""
+        par = self._params
+        human = par.human_base_ms + par.human_per_deg_ms * degrees(amplitude_rad)
+        # A low cap needs more time than people do.
+        capped = _NARROWEST * amplitude_rad / self._L
+        return max(par.device_floor_ms / 1e3, human / 1e3, capped)
+
+    def peak_speed_rad_s(self, amplitude_rad: float) -> float:
+        """Give the highest speed, never above L."""
+        mean = amplitude_rad / self.duration_s(amplitude_rad)
+        return min(self._params.human_peak_over_mean * mean, self._L)
+
+    def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
+        """Give the angle covered ``t_s`` after onset."""
+        D = self.duration_s(amplitude_rad)
+        if t_s <= 0.0 or amplitude_rad <= 0.0:
+            return 0.0
+        if t_s >= D:
+            return amplitude_rad
+        V = self.peak_speed_rad_s(amplitude_rad)
+        # A = V (flanks / 1.875 + cruise), flanks + cruise = D.
+        flanks = (V * D - amplitude_rad) / (V * (1.0 - 1.0 / MIN_JERK_PEAK))
+        rise = flanks * self._skew(amplitude_rad)
+        cruise_ends = rise + D - flanks
+        if t_s < rise:
+            return _flank(V, rise, t_s)
+        if t_s < cruise_ends:
+            return _flank(V, rise, rise) + V * (t_s - rise)
+        return amplitude_rad - _flank(V, flanks - rise, D - t_s)
+
+    def _skew(self, amplitude_rad: float) -> float:
+        """Give the share of the rise in the time of rise and fall."""
+        over = (degrees(amplitude_rad) - 10.0) / 40.0
+        return 0.45 - 0.20 * min(1.0, max(0.0, over))
+
+
+def _flank(peak_rad_s: float, length_s: float, t_s: float) -> float:
+    """Give the angle covered ``t_s`` into half a minimum-jerk movement of that peak speed."""
+    whole = 2.0 * length_s
+    return peak_rad_s * whole / MIN_JERK_PEAK * min_jerk(t_s / whole) if whole > 0.0 else 0.0
+
+
+class LiteralFrame:
+    """0.8 of the remaining way in each frame (Nakamoto & Tsuruno 3.3), at any tick rate.
+
+    Done at 1 - 0.2^(t / frame), which is the rule at whole frames. It has no cap.
+    """
+
+    def __init__(self, share: float, frame_s: float) -> None:
+        """Take the share of the way and the length of a frame."""
+        self._rate_1_s = -log(1.0 - share) / frame_s
+        self._frame_s = frame_s
+
+    def duration_s(self, amplitude_rad: float) -> float:
+        """Give the time until 0.05 deg remain, one frame at least."""
+        ratio = max(1.0, amplitude_rad / _LITERAL_REST_RAD)
+        return max(self._frame_s, log(ratio) / self._rate_1_s)
+
+    def peak_speed_rad_s(self, amplitude_rad: float) -> float:
+        """Give the highest speed, which is the first."""
+        return amplitude_rad * self._rate_1_s
+
+    def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
+        """Give the angle covered ``t_s`` after onset."""
+        if t_s <= 0.0:
+            return 0.0
+        if t_s >= self.duration_s(amplitude_rad):
+            return amplitude_rad
+        return amplitude_rad * (1.0 - exp(-self._rate_1_s * t_s))
+
+
+class Saccade:
+    """Displacement of the eye along the great circle as a function of time."""
+
+    def __init__(self, params: SaccadeParams) -> None:
+        """Take the profile and its constants."""
+        self._profile = _profile(params)
+
+    def duration_s(self, amplitude_rad: float) -> float:
+        """Give the time from onset to landing."""
+        return self._profile.duration_s(amplitude_rad)
+
+    def peak_speed_rad_s(self, amplitude_rad: float) -> float:
+        """Give the highest speed."""
+        return self._profile.peak_speed_rad_s(amplitude_rad)
+
+    def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
+        """Give the angle covered ``t_s`` after onset."""
+        return self._profile.displacement_rad(amplitude_rad, t_s)
+
+
+def _profile(params: SaccadeParams) -> Profile:
+    """Make the profile that the parameters name."""
+    if params.profile == "main_sequence":
+        return MainSequence(params)
+    if params.profile == "literal_frame":
+        return LiteralFrame(params.frame_share, params.frame_ms / 1e3)
+    return MinJerk(radians(params.max_speed_deg_s), params.shortest_ms / 1e3)

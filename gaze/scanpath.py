@@ -1,19 +1,29 @@
-"""Where on a face to look: a measured Markov walk over eight parts (Nakamoto & Tsuruno 3.2).
+"""Where on a face to look: a measured walk over eight parts, or one of three simpler ways.
 
-Draw the next part, move there, hold it for its dwell time, draw again. A part drawn
-again is a refixation: the gaze stays for another dwell. The printed matrix has one
-decimal, so its rows sum to 0.8-1.1 and are normalised; rows are "from", columns "to".
-Dwell times have standard deviations above their means, so the paper's "mean +- SD"
-reaches negative times; a log-normal law with the same mean and SD is drawn instead.
+The measured walk is that of Nakamoto & Tsuruno 3.2. Its printed matrix has one decimal, so
+the rows sum to 0.8-1.1 and are normalised; rows are "from", columns "to". Only the point of
+a face target is replaced here; the head is told to turn to the face's centre and not to each
+part (3.5).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import exp, log, sqrt
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target
+from gaze.scanpath_dwell import LAWS, Draw, dwell_law
+from gaze.scanpath_models import (
+    FaceLooks,
+    FaceTracking,
+    MarkovWalk,
+    RandomAngles,
+    SimpleCycle,
+)
+from gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
+
+_OTHER_SIDE = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}
+# A measured and rounded row may miss 1 by this and still count as a row that sums to 1.
+_ROUNDING = 0.005
 
 
 @dataclass(frozen=True)
@@ -55,14 +65,63 @@ class Walk:
         if len(self.dwell_mean_s) != n or len(self.dwell_sd_s) != n:
             raise ValueError(f"dwell_mean_s and dwell_sd_s must hold {n} numbers each")
 
+    @property
+    def row_sums(self) -> tuple[float, ...]:
+        """Give the sum of every row as it stands, before it is normalised."""
+        return tuple(sum(row) for row in self.matrix)
+
+
+def row_sums_note(walk: Walk) -> str | None:
+    """Say in one line which rows do not sum to 1 and are normalised; None where all do."""
+    sums = zip(walk.order, walk.row_sums, strict=True)
+    off = [f"{part} {total:.3g}" for part, total in sums if abs(total - 1.0) > _ROUNDING]
+    if not off:
+        return None
+    return f"the walk's rows do not all sum to 1 ({', '.join(off)}); they are normalised"
+
 
 @dataclass(frozen=True)
 class ScanpathParams:
-    """How the walk is taken by this robot."""
+    """Which way this robot looks at a face, and how it takes the walk."""
 
+    model: str = field(
+        default="markov",
+        metadata={
+            "choices": ("markov", "simple", "face_tracking", "random"),
+            "unit": "",
+            "says": "measured walk, or one of the three it is compared with",
+        },
+    )
     walk: str = field(
         default="nakamoto_tsuruno",
         metadata={"unit": "", "says": "name of a shipped walk or path of a YAML file"},
+    )
+    start: str = field(
+        default="as_walk",
+        metadata={
+            "choices": ("as_walk", *PARTS),
+            "unit": "",
+            "says": "part at which a face is entered, named as in the walk",
+        },
+    )
+    viewers_left: bool = field(
+        default=False,
+        metadata={
+            "unit": "",
+            "says": "left and right in walk and round are the viewer's, not the owner's",
+        },
+    )
+    diagonal: str = field(
+        default="refixation",
+        metadata={
+            "choices": ("refixation", "whole_visit"),
+            "unit": "",
+            "says": "a part drawn again: another dwell, or part of the visit whose dwell it is",
+        },
+    )
+    dwell_law: str = field(
+        default="lognormal",
+        metadata={"choices": LAWS, "unit": "", "says": "law of the dwell times"},
     )
     shortest_dwell_ms: float = field(
         default=120.0,
@@ -82,41 +141,90 @@ class ScanpathParams:
             "says": "dwell times are divided by it: 2 wanders twice as fast",
         },
     )
+    simple_order: tuple[str, ...] = field(
+        default=("N", "RE", "LE"),
+        metadata={"choices": PARTS, "unit": "", "says": "round of the simple model"},
+    )
+    simple_dwell_ms: tuple[float, ...] = field(
+        default=(459.42, 408.21, 408.21),
+        metadata={
+            "low": 1.0,
+            "high": 60000.0,
+            "unit": "ms",
+            "says": "time on each part of the simple model's round",
+        },
+    )
+    random_angle_deg: float = field(
+        default=20.0,
+        metadata={
+            "low": 0.0,
+            "high": 60.0,
+            "unit": "deg",
+            "says": "largest yaw and pitch of the random model about the direction to the face",
+        },
+    )
+    random_longest_ms: float = field(
+        default=3000.0,
+        metadata={
+            "low": 10.0,
+            "high": 60000.0,
+            "unit": "ms",
+            "says": "longest interval between jumps of the random model",
+        },
+    )
+
+    def __post_init__(self) -> None:
+        """Check the simple model's round.
+
+        Raises:
+            ValueError: it is empty, or its parts and times differ in number.
+        """
+        if not self.simple_order or len(self.simple_order) != len(self.simple_dwell_ms):
+            raise ValueError(
+                "simple_order and simple_dwell_ms must hold as many items, one or more"
+            )
 
 
-def normalised(matrix: Sequence[Sequence[float]]) -> Floats:
-    """Give the matrix with every row summing to 1."""
+def normalised(matrix: ArrayLike) -> Floats:
+    """Give an (n, n) matrix with every row summing to 1."""
     rows = np.asarray(matrix, dtype=float)
     out: Floats = rows / rows.sum(axis=1, keepdims=True)
     return out
 
 
+def without_refixations(matrix: ArrayLike) -> Floats:
+    """Give the chain of visits: the same walk with its self-transitions merged.
+
+    matrix: (n, n); a part that is never left for another keeps its row
+    """
+    rows = np.asarray(matrix, dtype=float)
+    away = rows * (1.0 - np.eye(len(rows)))
+    return normalised(np.where(away.sum(axis=1, keepdims=True) > 0.0, away, rows))
+
+
 class Scanpath:
-    """The walk, driven by the time and by whether the gaze has arrived."""
+    """Replaces a face target by the point of the face that is due."""
 
     def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
-        """Take the measured walk and the dice."""
-        self._params = params
-        self._rng = rng
-        self._order = walk.order
-        self._cumulative: list[list[float]] = np.cumsum(normalised(walk.matrix), axis=1).tolist()
-        self._log_normal = [
-            _log_normal(mean, sd)
-            for mean, sd in zip(walk.dwell_mean_s, walk.dwell_sd_s, strict=True)
-        ]
-        self._start = walk.order.index(walk.start)
-        self._column = [PARTS.index(code) for code in walk.order]
+        """Take the model that ``params`` names, the measured walk and the dice."""
+        self.looks = _looks(params, walk, rng)
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
-        """Forget the face; the next one is entered at the start part."""
+        """Forget the face; the next one is entered anew."""
         self._face: Face | None = None
-        self._part = self._start
-        self._until_s: float | None = None
         self._shift = 0
+        self.looks.enter()
 
-    def wander(self, target: Target, percept: Percept | None, t_s: float, settled: bool) -> Target:
-        """Replace a face target by the part of it that is due; pass anything else on.
+    def wander(
+        self,
+        target: Target,
+        percept: Percept | None,
+        t_s: float,
+        settled: bool,
+        p_world_head_m: Vec3 = (0.0, 0.0, 0.2),
+    ) -> Target:
+        """Replace a face target by the point of it that is due; pass anything else on.
 
         settled: whether the gaze has arrived at the last target given
         """
@@ -126,60 +234,63 @@ class Scanpath:
         face = self._find(target.id, percept)
         if face is None:
             return target._replace(shift=target.shift + self._shift)
-        self._walk(t_s, settled)
-        code = self._order[self._part]
-        point = face.parts_world_m[self._column[self._part]]
+        look = self.looks.step(face, p_world_head_m, t_s, settled)
+        self._shift += look.moved
+        what = PART_NAMES[look.part] if look.part is not None else "random angles about"
         return target._replace(
-            p_world_m=point,
-            part=code,
+            p_world_m=look.p_world_m,
+            part=look.part,
             shift=target.shift + self._shift,
-            why=f"{PART_NAMES[code]} of {target.why}",
+            why=f"{what} of {target.why}" if look.part is not None else f"{what} {target.why}",
+            centre_world_m=face.p_world_m,
         )
-
-    def next_part(self, part: int) -> int:
-        """Draw the part that follows ``part`` (indices in the walk's order)."""
-        dice = self._rng.random()
-        row = self._cumulative[part]
-        for following, edge in enumerate(row):
-            if dice < edge:
-                return following
-        return row.index(row[-1])  # rounding left the sum a hair below 1
-
-    def dwell_s(self, part: int) -> float:
-        """Draw a dwell time for a part (index in the walk's order)."""
-        mu, sigma = self._log_normal[part]
-        drawn = exp(mu + sigma * self._rng.standard_normal()) / self._params.tempo
-        return max(drawn, self._params.shortest_dwell_ms / 1000.0)
 
     def _find(self, face_id: int, percept: Percept | None) -> Face | None:
         """Give the target's face, the last known one while it is out of sight."""
         if self._face is None or self._face.id != face_id:
             self._face = None
-            self._part = self._start
-            self._until_s = None
         if percept is not None:
             for face in percept.faces:
                 if face.id == face_id:
+                    if self._face is None:
+                        self.looks.enter()
                     self._face = face
         return self._face
 
-    def _walk(self, t_s: float, settled: bool) -> None:
-        """Start the dwell on arrival; after it draw until another part comes."""
-        if self._until_s is None:
-            if settled:
-                self._until_s = t_s + self.dwell_s(self._part)
-            return
-        while t_s >= self._until_s:
-            following = self.next_part(self._part)
-            if following != self._part:
-                self._part = following
-                self._until_s = None
-                self._shift += 1
-                return
-            self._until_s += self.dwell_s(self._part)
+
+def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> FaceLooks:
+    """Make the model by its name."""
+    match params.model:
+        case "simple":
+            dwells_s = [ms / 1e3 / params.tempo for ms in params.simple_dwell_ms]
+            return SimpleCycle(_owners(params, params.simple_order), dwells_s)
+        case "face_tracking":
+            return FaceTracking()
+        case "random":
+            longest_s = params.random_longest_ms / 1e3 / params.tempo
+            return RandomAngles(params.random_angle_deg, longest_s, rng)
+    return markov_walk(params, walk, rng)
 
 
-def _log_normal(mean: float, sd: float) -> tuple[float, float]:
-    """Give mu and sigma of the log-normal law with a mean and standard deviation."""
-    sigma2 = log(1.0 + (sd / mean) ** 2)
-    return log(mean) - 0.5 * sigma2, sqrt(sigma2)
+def markov_walk(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> MarkovWalk:
+    """Make the walk in the reading of its diagonal, sides and start that is asked for."""
+    merged = params.diagonal == "whole_visit"
+    matrix = without_refixations(walk.matrix) if merged else normalised(walk.matrix)
+    statistics = zip(walk.dwell_mean_s, walk.dwell_sd_s, strict=True)
+    dwells = [_dwell(params, mean, sd) for mean, sd in statistics]
+    start = walk.start if params.start == "as_walk" else params.start
+    return MarkovWalk(_owners(params, walk.order), matrix, dwells, walk.order.index(start), rng)
+
+
+def _owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:
+    """Name the parts by the owner's left and right."""
+    if not params.viewers_left:
+        return parts
+    return tuple(_OTHER_SIDE.get(part, part) for part in parts)
+
+
+def _dwell(params: ScanpathParams, mean_s: float, sd_s: float) -> Draw:
+    """Give a part's dwell law at this robot's tempo and above its floor."""
+    law = dwell_law(params.dwell_law, mean_s, sd_s)
+    tempo, floor_s = params.tempo, params.shortest_dwell_ms / 1e3
+    return lambda rng: max(law(rng) / tempo, floor_s)

@@ -2,14 +2,22 @@
 
 The paper's rules are attack -> attack target, guard -> guard target, wait -> the
 opponent's face, each with a constant amount of attention whose value it does not give.
+Here a rule may point at a kind of body, at one body by its id, or at a place. Where
+several bodies are of the wanted kind, each is wanted, the nearer the more.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import compress
 from typing import NamedTuple
 
-from gaze.angles import norm, sub
-from gaze.types import Percept, Vec3
+import numpy as np
+from numpy.typing import NDArray
+
+from gaze.types import Bodies, Floats, Vec3
+
+_BY_ID = "id:"
+_POINT = "point"
 
 
 @dataclass(frozen=True)
@@ -17,7 +25,11 @@ class Rule:
     """One behaviour's rule."""
 
     look_at: str = field(
-        metadata={"unit": "", "says": 'kind of body to look at, e.g. "face" or "hand"'}
+        metadata={
+            "unit": "",
+            "says": 'kind of body to look at, e.g. "face" or "hand"; "id:7" for the body '
+            'with that id; "point" for the place point_world_m',
+        }
     )
     pull: float = field(
         metadata={
@@ -27,6 +39,31 @@ class Rule:
             "says": "its constant amount of attention (A_attack, A_guard, A_face)",
         }
     )
+    point_world_m: tuple[float, float, float] | None = field(
+        default=None,
+        metadata={
+            "low": -100.0,
+            "high": 100.0,
+            "unit": "m",
+            "says": "place to look at: ahead, left and above of the neck base",
+        },
+    )
+
+    def __post_init__(self) -> None:
+        """Check that it says one thing.
+
+        Raises:
+            ValueError: an id that is no number; a point without a place, or a place without one.
+        """
+        if self.look_at.startswith(_BY_ID) and not self.look_at[len(_BY_ID) :].isdecimal():
+            raise ValueError(f'look_at {self.look_at!r} names no id; write e.g. "id:7"')
+        if (self.look_at == _POINT) != (self.point_world_m is not None):
+            raise ValueError("look_at: point and point_world_m go together; give both or neither")
+
+    @property
+    def body_id(self) -> int | None:
+        """Give the id of the one body it names, None where it names none."""
+        return int(self.look_at[len(_BY_ID) :]) if self.look_at.startswith(_BY_ID) else None
 
 
 def _shipped_rules() -> dict[str, Rule]:
@@ -54,7 +91,16 @@ class TopDownParams:
             "low": 1.0,
             "high": 10.0,
             "unit": "",
-            "says": "how many times nearer another person must be to take over",
+            "says": "the one looked at last counts as this many times nearer than the others",
+        },
+    )
+    nearness: float = field(
+        default=0.5,
+        metadata={
+            "low": 0.0,
+            "high": 4.0,
+            "unit": "",
+            "says": "how much less the farther of several pull: the power of the distance",
         },
     )
 
@@ -70,9 +116,17 @@ class TopDownParams:
 
 
 class Wanted(NamedTuple):
-    """What the rule in force points at: row of the body, its pull, the rule's name."""
+    """What the rule in force points at.
 
-    row: int
+    rows:     (k,) rows of the bodies wanted; none for a place
+    nearness: (k,) factor of each, 1 for the nearest
+    point_world_m: the place wanted, None for bodies
+    pull, behaviour: the rule's constant and name
+    """
+
+    rows: NDArray[np.intp]
+    nearness: Floats
+    point_world_m: Vec3 | None
     pull: float
     behaviour: str
 
@@ -85,10 +139,16 @@ class TopDown:
         self._params = params
         self.reset(0.0)
 
+    @property
+    def behaviours(self) -> tuple[str, ...]:
+        """Give the behaviours that have a rule, in the order of the rules."""
+        return tuple(self._params.rules)
+
     def reset(self, t_s: float) -> None:
         """Return to the behaviour of the start."""
         self.behaviour = self._params.behaviour
-        self._last_id = -1
+        self._named: tuple[str, tuple[str, ...]] = ("", ())
+        self._rows_named = np.zeros(0, dtype=np.intp)
 
     def behave(self, behaviour: str) -> None:
         """Set the behaviour in force.
@@ -101,26 +161,51 @@ class TopDown:
             raise ValueError(f"no rule for behaviour {behaviour!r}; rules: {known}")
         self.behaviour = behaviour
 
-    def step(self, percept: Percept, p_world_eye_m: Vec3) -> Wanted | None:
-        """Give the body that the rule points at, or None where there is none.
+    def step(
+        self,
+        bodies: Bodies,
+        seen: NDArray[np.bool_],
+        p_world_eye_m: Vec3,
+        favoured_id: int = -1,
+    ) -> Wanted | None:
+        """Give what the rule points at among the bodies in view, None where nothing.
 
-        Of several bodies of the wanted kind the nearest is taken, which is the largest
-        in the picture, but the one looked at before is kept until another is clearly
-        nearer.
+        seen: (n,) which bodies are in view
+        favoured_id: the body that was looked at last for a rule's sake; it counts as
+            somewhat nearer than it is, so that equals do not flicker; -1 for none
         """
         rule = self._params.rules[self.behaviour]
-        bodies = percept.bodies
-        best_row, best_distance = -1, float("inf")
-        for row, kind in enumerate(bodies.kinds):
-            if kind != rule.look_at:
-                continue
-            x, y, z = bodies.p_world_m[row].tolist()
-            distance = norm(sub((x, y, z), p_world_eye_m))
-            if bodies.ids[row] == self._last_id:
-                distance /= self._params.stay_with_person
-            if distance < best_distance:
-                best_row, best_distance = row, distance
-        if best_row < 0:
+        rows = self._rows(bodies, rule)
+        rows = rows[seen[rows]]
+        if len(rows) == 0 and rule.point_world_m is None:
             return None
-        self._last_id = bodies.ids[best_row]
-        return Wanted(best_row, rule.pull, self.behaviour)
+        near = self._nearness(bodies, rows, p_world_eye_m, favoured_id)
+        return Wanted(rows, near, rule.point_world_m, rule.pull, self.behaviour)
+
+    def _nearness(
+        self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3, favoured_id: int
+    ) -> Floats:
+        """Give the factor of each wanted row: (nearest distance / its distance)^nearness."""
+        if len(rows) <= 1:
+            return np.ones(len(rows))
+        rel = bodies.p_world_m[rows] - np.asarray(p_eye)
+        distance = np.maximum(np.sqrt((rel * rel).sum(axis=1)), 1e-3)
+        if favoured_id in bodies.ids:
+            distance[rows == bodies.ids.index(favoured_id)] /= self._params.stay_with_person
+        factor: Floats = (distance.min() / distance) ** self._params.nearness
+        return factor
+
+    def _rows(self, bodies: Bodies, rule: Rule) -> NDArray[np.intp]:
+        """Give the rows of the bodies that a rule names."""
+        if rule.point_world_m is not None:
+            return np.zeros(0, dtype=np.intp)
+        if rule.body_id is not None:
+            rows = [bodies.ids.index(rule.body_id)] if rule.body_id in bodies.ids else []
+            return np.array(rows, dtype=np.intp)
+        # The same kinds in the same order come again and again; comparing tuples of the
+        # same strings is many times faster than looking through them.
+        if (rule.look_at, bodies.kinds) != self._named:
+            same = [kind == rule.look_at for kind in bodies.kinds]
+            self._named = rule.look_at, bodies.kinds
+            self._rows_named = np.array(list(compress(range(len(same)), same)), dtype=np.intp)
+        return self._rows_named

@@ -2,14 +2,14 @@
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from math import radians
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from config.schema import Rig, load_profile, load_walk
+from config.schema import Rig, load_walk
 from drivers.camera_thread import CameraThread
 from drivers.dynamixel import DynamixelBus
 from drivers.dynamixel_port import BlockingPort, BusPort
@@ -19,15 +19,17 @@ from drivers.types import Camera
 from drivers.video_file import VideoFile
 from drivers.webcam import Webcam
 from gaze.attention import Attention
+from gaze.aversion import Aversion
 from gaze.bottom_up import BottomUp
+from gaze.breathing import Breathing
 from gaze.field_of_view import FieldOfView
 from gaze.head import Head
 from gaze.idle import Idle
 from gaze.lids import Lids
 from gaze.oculomotor import Oculomotor
 from gaze.pursuit import Pursuit
-from gaze.saccade import Saccade
-from gaze.scanpath import Scanpath
+from gaze.saccade import Saccade, SaccadeParams
+from gaze.scanpath import Scanpath, ScanpathParams, row_sums_note
 from gaze.top_down import TopDown
 from gaze.types import Angles2, Mat3, Vec3
 from robot.body import Body, JointParams
@@ -42,9 +44,12 @@ from robot.types import JOINTS, JointAngles
 from sim_mock.film_camera import FilmCamera
 from sim_mock.ports import InProcessPort
 from sim_mock.pty_bus import PtyBus
+from sim_mock.scene import Scene
 from sim_mock.scene_camera import SceneCamera, SceneCameraParams
+from sim_mock.scenes import scenes
 from sim_mock.servo_chain import ServoChain, build_chain
-from sim_mock.visitor import scenes
+
+P = TypeVar("P", ScanpathParams, SaccadeParams)
 
 # Emulated joints start a little crooked, as a head that somebody has moved by hand does.
 _CROOKED_DEG = {
@@ -68,7 +73,8 @@ class Choice:
     scene: str | None = None
     video: Path | None = None
     camera: int | None = None
-    profile: str | None = None
+    scanpath: str | None = None
+    saccade: str | None = None
     film_delay_s: float = 0.05
 
 
@@ -86,6 +92,7 @@ class Assembly(NamedTuple):
     mount: CameraMount
     poses: PoseHistory
     horizontal_field_deg: float
+    scene: Scene | None
     sent_digest: Callable[[], str | None]
     close: Callable[[], None]
     notes: tuple[str, ...]
@@ -107,16 +114,16 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
         config.load.ConfigError: the profile or walk that the rig names is at fault.
         drivers.errors.SetupError: a film or model file cannot be used.
     """
-    if choice.scene is not None and choice.scene not in scenes():
-        known = ", ".join(sorted(scenes()))
-        raise SetupError(f"--scene {choice.scene}: unknown; scenes: {known}")
-    scanpath_dice, lid_dice, camera_dice = (
-        np.random.default_rng(child) for child in np.random.SeedSequence(choice.seed).spawn(3)
-    )
+    scene = _scene(rig, choice.scene) if choice.scene is not None else None
+    dice = [np.random.default_rng(child) for child in np.random.SeedSequence(choice.seed).spawn(6)]
+    scanpath_dice, lid_dice, camera_dice, idle_dice, aversion_dice, landing_dice = dice
     clock: Clock = SimulatedClock() if choice.fast else RealClock()
     kinematics = _kinematics(rig)
     poses = PoseHistory(kinematics)
     camera_params, notes = _camera_params(rig, choice, kinematics)
+    walk = load_walk(rig.gaze.scanpath.walk)
+    note = row_sums_note(walk)
+    notes = (*notes, note) if note is not None else notes
     mount = CameraMount(camera_params)
     wires = _wires(rig, choice, clock)
     try:
@@ -124,16 +131,21 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
             wires.port, [rig.joints[name].setup() for name in JOINTS], rig.bus.dynamixel
         )
         body = Body(bus, rig.joints)
+        lids = Lids(rig.gaze.lids, lid_dice)
         where = _true_head(wires.chain, body, kinematics, poses)
         robot = Robot(
             body,
             kinematics,
-            _camera(rig, choice, clock, mount, where, camera_dice),
-            Perception(mount, camera_params.horizontal_field_deg, Tracker(rig.tracks)),
+            _camera(rig, choice, scene, clock, mount, where, camera_dice),
+            Perception(
+                mount, camera_params.horizontal_field_deg, Tracker(rig.tracks), _own_parts(rig)
+            ),
             poses,
-            _attention(rig),
-            Scanpath(rig.gaze.scanpath, load_walk(rig.gaze.scanpath.walk), scanpath_dice),
-            _oculomotor(rig, choice.profile or rig.profile, kinematics, lid_dice),
+            _attention(rig, idle_dice),
+            Scanpath(_scanpath_params(rig, choice), walk, scanpath_dice),
+            Aversion(rig.gaze.aversion, aversion_dice),
+            _oculomotor(rig, choice, kinematics, lids, landing_dice),
+            lids,
             Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS)),
         )
     except BaseException:
@@ -148,10 +160,31 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
         mount,
         poses,
         camera_params.horizontal_field_deg,
+        scene,
         wires.digest,
         wires.close,
         notes,
     )
+
+
+def _scene(rig: Rig, name: str) -> Scene:
+    """Find a scene, and see that the rig has a rule for all that it makes the robot do."""
+    known = scenes()
+    if name not in known:
+        raise SetupError(f"--scene {name}: unknown; scenes: {', '.join(sorted(known))}")
+    scene = known[name]
+    missing = [b for b in scene.behaviours if b not in rig.gaze.top_down.rules]
+    if missing:
+        raise SetupError(
+            f"--scene {name}: the rig has no rule for {', '.join(missing)}; "
+            "add it under gaze.top_down.rules"
+        )
+    return scene
+
+
+def _own_parts(rig: Rig) -> dict[str, Vec3]:
+    """Give the rig's own places of face parts in metres."""
+    return {code: (x / 1e3, y / 1e3, z / 1e3) for code, (x, y, z) in rig.face_parts_mm.items()}
 
 
 def _kinematics(rig: Rig) -> Kinematics:
@@ -215,17 +248,47 @@ def _true_head(
     return now
 
 
+def _scanpath_params(rig: Rig, choice: Choice) -> ScanpathParams:
+    """Take the rig's scanpath, or another model by name."""
+    params = rig.gaze.scanpath
+    if choice.scanpath is None:
+        return params
+    return chosen(params, "model", choice.scanpath, "--scanpath")
+
+
+def _saccade_params(rig: Rig, choice: Choice) -> SaccadeParams:
+    """Take the rig's saccades, or another profile by name."""
+    params = rig.gaze.saccade
+    if choice.saccade is None:
+        return params
+    return chosen(params, "profile", choice.saccade, "--saccade")
+
+
+def chosen(params: P, key: str, value: str, option: str) -> P:
+    """Replace one key that has choices, as an option of the command line asks.
+
+    Raises:
+        drivers.errors.SetupError: the value is none of the choices.
+    """
+    (declared,) = (f for f in fields(params) if f.name == key)
+    choices = declared.metadata["choices"]
+    if value not in choices:
+        raise SetupError(f"{option} {value}: unknown; there is {', '.join(choices)}")
+    return replace(params, **{key: value})  # type: ignore[arg-type]
+
+
 def _camera(
     rig: Rig,
     choice: Choice,
+    scene: Scene | None,
     clock: Clock,
     mount: CameraMount,
     where: Callable[[float], tuple[Mat3, Vec3]],
     rng: np.random.Generator,
 ) -> Camera:
-    if choice.scene is not None:
+    if scene is not None:
         params = SceneCameraParams(horizontal_field_deg=rig.camera.horizontal_field_deg)
-        return SceneCamera(params, scenes()[choice.scene], mount, where, rng)
+        return SceneCamera(params, scene, mount, where, rng)
     detector = face_detector(rig.detector)
     if choice.video is not None:
         film = VideoFile(choice.video)
@@ -235,32 +298,35 @@ def _camera(
     return CameraThread(Webcam(choice.camera or 0), detector, clock.now_s)
 
 
-def _attention(rig: Rig) -> Attention:
+def _attention(rig: Rig, idle_dice: np.random.Generator) -> Attention:
     gaze = rig.gaze
     return Attention(
         gaze.attention,
         FieldOfView(gaze.field_of_view),
         BottomUp(gaze.bottom_up),
         TopDown(gaze.top_down),
-        Idle(gaze.idle),
+        Idle(gaze.idle, idle_dice),
     )
 
 
 def _oculomotor(
-    rig: Rig, profile_name: str, kinematics: Kinematics, rng: np.random.Generator
+    rig: Rig,
+    choice: Choice,
+    kinematics: Kinematics,
+    lids: Lids,
+    landing_dice: np.random.Generator,
 ) -> Oculomotor:
     """Compose the models with the narrower of the rig's and the profile's ranges."""
-    profile = load_profile(profile_name)
-    gaze, joints = rig.gaze, rig.joints
+    gaze, joints, ranges = rig.gaze, rig.joints, rig.ranges
     eyes = tuple(
         (
-            _range(joints, f"{side}_eye_pan", profile.eye_yaw_deg),
-            _range(joints, f"{side}_eye_tilt", profile.eye_pitch_deg),
+            _range(joints, f"{side}_eye_pan", ranges.eye_yaw_deg),
+            _range(joints, f"{side}_eye_tilt", ranges.eye_pitch_deg),
         )
         for side in ("left", "right")
     )
     neck = (
-        _range(joints, "neck_yaw", profile.neck_yaw_deg),
+        _range(joints, "neck_yaw", ranges.neck_yaw_deg),
         _range(joints, "neck_pitch", 180.0),
     )
     smallest = min(abs(end) for eye in eyes for span in eye for end in span)
@@ -268,10 +334,12 @@ def _oculomotor(
         gaze.oculomotor,
         kinematics,
         (eyes[0], eyes[1]),
-        Saccade(gaze.saccade),
+        Saccade(_saccade_params(rig, choice)),
         Pursuit(gaze.pursuit),
         Head(gaze.head, smallest, neck),
-        Lids(gaze.lids, rng),
+        lids,
+        Breathing(gaze.breathing),
+        landing_dice,
     )
 
 

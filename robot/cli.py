@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from config.load import ConfigError
+from config.load import ConfigError, load
 from config.schema import Rig, load_rig
 from drivers.errors import DriverError, SetupError
 
@@ -47,10 +47,32 @@ def run(
         bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock, --seconds).")
     ] = False,
     profile: Annotated[
-        str | None, typer.Option(help="Ranges of eyes and head: robot, mitake, nakamoto.")
+        str | None, typer.Option(help="Style of gaze: robot, or literal mitake, nakamoto.")
+    ] = None,
+    character: Annotated[
+        str | None,
+        typer.Option(help="A character laid over the rig: shy, bold, sleepy, strong_boxer ..."),
+    ] = None,
+    behaviour: Annotated[
+        str | None, typer.Option(help="Behaviour in force at the start, one of the rig's rules.")
+    ] = None,
+    conversation: Annotated[
+        str | None, typer.Option(help="Looking away as in: talk, listen, think; none (default).")
+    ] = None,
+    scanpath: Annotated[
+        str | None, typer.Option(help="Face scanpath: markov, simple, face_tracking, random.")
+    ] = None,
+    saccade: Annotated[
+        str | None, typer.Option(help="Saccades: min_jerk, main_sequence, literal_frame.")
     ] = None,
     page: Annotated[str, typer.Option(help="Where the live page is served.")] = "127.0.0.1:8080",
     no_page: Annotated[bool, typer.Option(help="Without the live page.")] = False,
+    heatmap: Annotated[
+        Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
+    ] = None,
+    heatmap_face: Annotated[
+        Path | None, typer.Option(help="Picture of a face to lay the heat map over.")
+    ] = None,
     summary: Annotated[
         str | None, typer.Option(help="Write figures as JSON to this file; - prints them.")
     ] = None,
@@ -71,16 +93,43 @@ def run(
             video=video,
             camera=camera,
             oak=oak,
-            profile=profile,
+            scanpath=scanpath,
+            saccade=saccade,
+            asked=tuple(
+                (menu, choice)
+                for menu, choice in (("behaviour", behaviour), ("conversation", conversation))
+                if choice is not None
+            ),
+            heatmap=heatmap,
+            heatmap_face=heatmap_face,
             page=None if no_page or fast else address,
             status_line=not fast and sys.stderr.isatty(),
         )
-        made = assemble(load_rig(rig), wanted.choice())
+        made = assemble(load_rig(rig, character, profile), wanted.choice())
         with _signals() as stopped:
             figures = session.run(made, wanted, stopped, _say, _status)
         _write_summary(figures, summary)
     if str(figures["stopped_by"]).startswith("fault"):
         raise typer.Exit(_FAULT)
+
+
+@app.command("fit-scanpath")
+def fit_scanpath(
+    recording: Annotated[Path, typer.Argument(help="CSV of gaze samples or labelled fixations.")],
+    parts: Annotated[
+        Path | None, typer.Option(help="YAML of part rectangles, needed for samples.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="YAML to write.")] = Path("walk.yaml"),
+    smoothing: Annotated[str, typer.Option(help="laplace, bootstrap or none.")] = "laplace",
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
+) -> None:
+    """Fit a walk over the face to an eye-tracker recording, as YAML that run takes."""
+    with _clear_errors():
+        from robot import fit_scanpath as fitting
+        from robot.fixations import PartBoxes
+
+        boxes = load(parts, PartBoxes) if parts is not None else None
+        _say(fitting.fit(recording, boxes, out, smoothing, seed))
 
 
 @app.command()

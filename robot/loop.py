@@ -1,5 +1,7 @@
 """The tick, and the loop that keeps its time."""
 
+import gc
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, radians
@@ -8,6 +10,8 @@ from typing import NamedTuple
 from drivers.errors import DriverError, ServoFault
 from drivers.types import Camera, Detections
 from gaze.attention import Attention
+from gaze.aversion import MODES, Aversion
+from gaze.lids import Lids
 from gaze.oculomotor import Oculomotor
 from gaze.scanpath import Scanpath
 from gaze.types import GazeCommand, GazeState, Percept, Target
@@ -73,7 +77,9 @@ class Robot:
         poses: PoseHistory,
         attention: Attention,
         scanpath: Scanpath,
+        aversion: Aversion,
         oculomotor: Oculomotor,
+        lids: Lids,
         guard: Guard,
     ) -> None:
         """Take the parts, real or simulated."""
@@ -84,9 +90,35 @@ class Robot:
         self._kinematics = kinematics
         self._poses = poses
         self._scanpath = scanpath
+        self._aversion = aversion
         self._oculomotor = oculomotor
+        self._lids = lids
         self._guard = guard
         self._settled = True
+        self._asked: deque[tuple[str, str]] = deque()
+
+    def ask(self, menu: str, choice: str) -> None:
+        """Ask for a behaviour or a mode of conversation; it is in force from the next tick on.
+
+        May be called from any thread.
+
+        Raises:
+            ValueError: there is no such menu or choice; the message lists what there is.
+        """
+        menus = self.menus()
+        if menu not in menus:
+            raise ValueError(f"nothing called {menu!r} to choose; there is {', '.join(menus)}")
+        if choice not in menus[menu]:
+            raise ValueError(f"no {menu} {choice!r}; there is {', '.join(menus[menu])}")
+        self._asked.append((menu, choice))
+
+    def menus(self) -> dict[str, tuple[str, ...]]:
+        """Give what ``ask`` takes: menu -> choices, the present one first."""
+        top_down = self.attention.top_down
+        return {
+            "behaviour": _first(top_down.behaviour, top_down.behaviours),
+            "conversation": _first(self._aversion.mode, MODES),
+        }
 
     def start(self, clock: Clock) -> None:
         """Open camera and bus, switch torque on where the joints are, begin from there.
@@ -107,6 +139,7 @@ class Robot:
         self._poses.remember(t_s, pose.head_rad)
         self.attention.reset(t_s)
         self._scanpath.reset(t_s)
+        self._aversion.reset(t_s)
         self._oculomotor.reset(t_s, pose)
 
     def tick(self, t_s: float, dt_s: float) -> Tick:
@@ -115,13 +148,15 @@ class Robot:
         Raises:
             drivers.errors.DriverError: bus or camera are gone, or a servo has failed.
         """
+        self._obey(t_s)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
         self._poses.remember(t_s, pose.head_rad)
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
         target = self.attention.choose(percept, pose, t_s)
-        target = self._scanpath.wander(target, percept, t_s, self._settled)
+        target = self._scanpath.wander(target, percept, t_s, self._settled, pose.p_world_head_m)
+        target = self._aversion.step(target, pose.p_world_head_m, t_s)
         gaze = self._oculomotor.step(target, pose, t_s, dt_s)
         self._settled = gaze.phase != "saccade"
         wish = self._kinematics.inverse(gaze)
@@ -153,10 +188,26 @@ class Robot:
         finally:
             self.camera.close()
 
+    def _obey(self, t_s: float) -> None:
+        """Put in force what was asked for."""
+        while self._asked:
+            menu, choice = self._asked.popleft()
+            if menu == "behaviour":
+                self.attention.top_down.behave(choice)
+            else:
+                mode = next(mode for mode in MODES if mode == choice)
+                self._aversion.converse(mode, t_s)
+                self._lids.mode("rest" if mode == "none" else "conversation")
+
     def _look_for_faults(self) -> None:
         faults = self.body.bus.faults()
         if faults:
             raise ServoFault("; ".join(faults))
+
+
+def _first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Put the present choice before the others."""
+    return (present, *(name for name in names if name != present))
 
 
 def run(
@@ -171,6 +222,10 @@ def run(
     A tick that takes too long costs the slots it overran: they are counted and
     skipped, never caught up in a burst.
     """
+    # A full pass of the garbage collector over all that start-up made takes 20 ms, four
+    # slots; what is there now stays, so later passes need not look at it.
+    gc.collect()
+    gc.freeze()
     period = 1.0 / params.rate_hz
     start_s = clock.now_s()
     last_s = start_s

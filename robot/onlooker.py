@@ -35,14 +35,21 @@ class Onlooker:
         page: Page | None,
         say: Callable[[str], None] | None,
         health: Callable[[], BusHealth],
+        behaviour: Callable[[], str],
+        ask: Callable[[str, str], None],
         mount: CameraMount,
         poses: PoseHistory,
         horizontal_field_deg: float,
     ) -> None:
-        """Take the page, and where to write the status line (None: nowhere)."""
+        """Take the page, and where to write the status line (None: nowhere).
+
+        health, behaviour: give what is shown; ask: takes the choices made on the page
+        """
         self._page = page
         self._say = say
         self._health = health
+        self._behaviour = behaviour
+        self._ask = ask
         self._mount = mount
         self._poses = poses
         self._field_rad = radians(horizontal_field_deg)
@@ -75,11 +82,18 @@ class Onlooker:
             round_number += 1
             rate.note(tick.t_s, self._ticks)
             if self._page is not None:
-                self._page.show(snapshot(tick, rate.hz, _health_words(self._health())))
+                words = _health_words(self._health())
+                self._page.show(snapshot(tick, rate.hz, words, self._behaviour()))
+                self._pass_on(self._page)
             if round_number % round(_PICTURE_S / _SNAPSHOT_S) == 0:
                 picture_number = self._show_picture(tick, picture_number)
             if self._say is not None and round_number % round(_LINE_S / _SNAPSHOT_S) == 0:
                 self._say(self._line(tick, rate.hz))
+
+    def _pass_on(self, page: Page) -> None:
+        """Hand the choices made on the page to the robot."""
+        while (asked := page.asked()) is not None:
+            self._ask(*asked)
 
     def _show_picture(self, tick: Tick, shown: int) -> int:
         """Send the camera picture unless it was sent already; give its number."""
@@ -129,7 +143,7 @@ class _Rate:
             self._from = (t_s, ticks)
 
 
-def snapshot(tick: Tick, rate_hz: float, health: str) -> Snapshot:
+def snapshot(tick: Tick, rate_hz: float, health: str, behaviour: str) -> Snapshot:
     """Give what the page is shown of a tick."""
     pose, percept, target = tick.pose, tick.percept, tick.target
     faces = percept.faces if percept is not None else ()
@@ -162,6 +176,8 @@ def snapshot(tick: Tick, rate_hz: float, health: str) -> Snapshot:
         ),
         rate_hz=rate_hz,
         health=health,
+        behaviour=behaviour,
+        pulls=target.pulls,
     )
 
 

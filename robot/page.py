@@ -7,12 +7,14 @@ page ends when this side of the socket closes, so it never outlives the program,
 that ends.
 """
 
+import json
 import os
 import pickle
 import socket
 import subprocess
 import sys
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import fields
 from math import nan
 from operator import attrgetter
@@ -21,7 +23,7 @@ from pathlib import Path
 from robot.types import SeenBody, SeenFace, Snapshot
 
 # The first byte of a message says what follows it.
-SNAPSHOT, PICTURE, URL, NOTICE = b"s", b"p", b"u", b"n"
+SNAPSHOT, PICTURE, URL, NOTICE, CHOICES, ASK = b"s", b"p", b"u", b"n", b"c", b"a"
 MESSAGE_BYTES = 200_000
 """No message is longer: a socket's default send buffer in Linux holds 212,992 bytes."""
 
@@ -76,6 +78,7 @@ class Page:
         self._errors_fd = -1
         self._url: str | None = None
         self._notices: deque[str] = deque()
+        self._asked: deque[tuple[str, str]] = deque()
         self._shown_s = nan
         self.dropped = 0
         self.pictures_dropped = 0
@@ -116,6 +119,15 @@ class Page:
         if not self._send(PICTURE + jpeg):
             self.pictures_dropped += 1
 
+    def offer(self, choices: Mapping[str, tuple[str, ...]]) -> None:
+        """Put menus on the page: name of the menu -> what can be chosen, the present first."""
+        self._send(CHOICES + json.dumps(choices).encode())
+
+    def asked(self) -> tuple[str, str] | None:
+        """Give the next choice a spectator has made, as (menu, choice), each one once."""
+        self._listen()
+        return self._asked.popleft() if self._asked else None
+
     def _send(self, message: bytes) -> bool:
         page = self._socket
         if page is None or len(message) > MESSAGE_BYTES:
@@ -150,6 +162,9 @@ class Page:
                 self._url = message[1:].decode()
             elif message[:1] == NOTICE:
                 self._notices.append(message[1:].decode())
+            elif message[:1] == ASK:
+                menu, choice = json.loads(message[1:])
+                self._asked.append((menu, choice))
 
     def _lose(self) -> None:
         words = self._last_words()

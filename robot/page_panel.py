@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from viser import uplot
 
-from gaze.types import Floats
+from gaze.types import Floats, Pull
 from robot.types import JOINTS, Snapshot
 
 TRACE_S = 10.0
@@ -126,15 +126,34 @@ def status(snapshot: Snapshot) -> str:
     pills = (
         _pill(snapshot.phase, _PHASES.get(snapshot.phase, _GREY))
         + _pill(f"guard: {snapshot.level}", _LEVELS[snapshot.level])
+        + (_pill(snapshot.behaviour, _GREY) if snapshot.behaviour else "")
         + f"<span style='float:right'>{snapshot.rate_hz:.0f} Hz</span>"
     )
     return _frame(
         f"<div style='font-size:17px;font-weight:600'>{escape(snapshot.target_name)}</div>"
         f"<div style='opacity:.8;min-height:1.5em'>{escape(snapshot.why)}</div>"
         f"<div style='margin:6px 0'>{pills}</div>"
+        f"{_pulls(snapshot.pulls)}"
         f"{_reasons(snapshot.reasons)}"
         f"<div style='opacity:.8'>{escape(snapshot.health)}</div>"
     )
+
+
+def _pulls(pulls: tuple[Pull, ...]) -> str:
+    """List what pulls the gaze, term by term, the strongest first."""
+    if not pulls:
+        return ""
+    rows = "".join(
+        f"<tr><td>{escape(p.kind)} {p.id}</td>"
+        + "".join(f"<td style='text-align:right'>{value:.2f}</td>" for value in p[2:])
+        + "</tr>"
+        for p in pulls
+    )
+    names = "".join(
+        f"<th style='font-weight:400;text-align:right'>{escape(n)}</th>" for n in Pull._fields[2:]
+    )
+    style = "font-size:10.5px;width:100%;opacity:.85;line-height:1.3"
+    return f"<table style='{style}'><tr><th></th>{names}</tr>{rows}</table>"
 
 
 def _reasons(reasons: tuple[str, ...]) -> str:

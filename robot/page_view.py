@@ -5,19 +5,22 @@ ends when the other side of the socket closes. Nothing is fetched from anywhere:
 page's script comes from the viser package and all shapes are made here.
 """
 
+import contextlib
 import errno
+import json
 import os
 import select
 import signal
 import socket
 import sys
 import threading
+from collections.abc import Callable, Mapping, Sequence
 from math import atan
 from typing import NamedTuple
 
 import viser
 
-from robot.page import MESSAGE_BYTES, NOTICE, PICTURE, SNAPSHOT, URL, unpack
+from robot.page import ASK, CHOICES, MESSAGE_BYTES, NOTICE, PICTURE, SNAPSHOT, URL, unpack
 from robot.page_head import FLOOR_M, HeadView
 from robot.page_panel import PanelView
 from robot.page_people import PeopleView
@@ -42,17 +45,21 @@ VIEWS = {
 
 
 class News(NamedTuple):
-    """What was waiting on the socket: all snapshots, the last picture, whether it has closed."""
+    """What was waiting on the socket: all snapshots, the last picture, whether it has closed.
+
+    choices: menus to put on the page, None where none came
+    """
 
     snapshots: tuple[Snapshot, ...]
     jpeg: bytes | None
     ended: bool
+    choices: Mapping[str, Sequence[str]] | None = None
 
 
 def drain(feed: socket.socket) -> News:
     """Take everything that waits, without waiting for more."""
     snapshots: list[Snapshot] = []
-    jpeg, ended = None, False
+    jpeg, choices, ended = None, None, False
     while not ended:
         try:
             message = feed.recv(MESSAGE_BYTES, socket.MSG_DONTWAIT)
@@ -65,7 +72,9 @@ def drain(feed: socket.socket) -> News:
             snapshots.append(unpack(message))
         elif message[:1] == PICTURE:
             jpeg = message[1:]
-    return News(tuple(snapshots), jpeg, ended)
+        elif message[:1] == CHOICES:
+            choices = json.loads(message[1:])
+    return News(tuple(snapshots), jpeg, ended, choices)
 
 
 def free_port(host: str, port: int) -> int:
@@ -92,9 +101,10 @@ def free_port(host: str, port: int) -> int:
 class View:
     """Scene and panel of one server."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
-        """Build the empty room."""
+    def __init__(self, server: viser.ViserServer, ask: Callable[[str, str], None]) -> None:
+        """Build the empty room; ``ask`` is told of every choice a spectator makes."""
         self._server = server
+        self._ask = ask
         server.initial_camera.position, server.initial_camera.look_at = VIEWS["both"]
         server.on_client_connect(_greet)
         _furnish(server)
@@ -115,8 +125,17 @@ class View:
                 camera = event.client.camera
                 camera.position, camera.look_at = VIEWS[event.target.value]
 
+    def _add_menu(self, name: str, choices: Sequence[str]) -> None:
+        menu = self._server.gui.add_dropdown(name, tuple(choices), order=8)
+
+        @menu.on_update
+        def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
+            self._ask(name, event.target.value)
+
     def show(self, news: News) -> None:
         """Draw the newest of what came; without a spectator it is kept until one comes."""
+        for name, choices in (news.choices or {}).items():
+            self._add_menu(name, choices)
         self._panel.note(news.snapshots)
         if news.snapshots:
             self._newest = news.snapshots[-1]
@@ -213,6 +232,12 @@ def watch(feed: socket.socket, view: View, parent: int) -> None:
             view.silent()
 
 
+def tell(feed: socket.socket, menu: str, choice: str) -> None:
+    """Hand a choice to the rig; a rig that is gone ends the page by itself."""
+    with contextlib.suppress(OSError):
+        feed.send(ASK + json.dumps((menu, choice)).encode())
+
+
 def main(arguments: list[str]) -> int:
     """Run the page; give the process's exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -228,7 +253,7 @@ def main(arguments: list[str]) -> int:
         return 1
     if words is not None:
         feed.send(NOTICE + words.encode())
-    view = View(server)
+    view = View(server, lambda menu, choice: tell(feed, menu, choice))
     feed.send(URL + url.encode())
     watch(feed, view, int(parent))
     server.stop()

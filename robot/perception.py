@@ -10,8 +10,8 @@ import numpy as np
 
 from drivers.types import Detections
 from gaze.angles import add, compose, rotate, scale, sub, unit
-from gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
-from robot.face_pose import PARTS_FACE_M, Intrinsics, face_pose, intrinsics_of_view
+from gaze.types import Bodies, Face, Mat3, Percept, Vec3
+from robot.face_pose import Intrinsics, face_pose, intrinsics_of_view
 from robot.frames import CameraMount, PoseHistory
 from robot.tracks import Sighting, Track, Tracker
 
@@ -46,7 +46,7 @@ class Perception:
         self._percept = Percept(
             t_s,
             _bodies(tracks, p),
-            tuple(_face(track) for track in tracks if track.sighting.kind == "face"),
+            tuple(self._face(track) for track in tracks if track.sighting.kind == "face"),
         )
         return self._percept
 
@@ -71,8 +71,33 @@ class Perception:
             )
         for blob in found.blobs:
             place = add(p, rotate(R_world_camera, blob.p_camera_m))
-            sightings.append(Sighting(blob.kind, place, None, blob.radius_m, blob.spin_rad_s, 1.0))
+            sightings.append(
+                Sighting(
+                    blob.kind,
+                    place,
+                    None,
+                    blob.radius_m,
+                    blob.spin_rad_s,
+                    1.0,
+                    depth_measured=True,
+                )
+            )
         return sightings
+
+    def _face(self, track: Track) -> Face:
+        """Give a tracked face with its eight parts."""
+        R = track.R_world_face
+        assert R is not None  # faces are tracked with their pose
+        p = track.p_world_m
+        parts = ((x, y, z if own else z * track.face_length) for (x, y, z), own in self._parts)
+        return Face(
+            track.id,
+            p,
+            track.v_world_m_s,
+            R,
+            tuple(add(p, rotate(R, part)) for part in parts),
+            track.sighting.confidence,
+        )
 
     def _lens(self, width_px: int, height_px: int) -> Intrinsics:
         """Give the intrinsics for a size of picture, made anew when the size changes."""
@@ -94,19 +119,4 @@ def _bodies(tracks: tuple[Track, ...], p_camera: Vec3) -> Bodies:
         np.array([track.v_world_m_s for track in tracks]).reshape(-1, 3),
         np.array(spins).reshape(-1, 3),
         np.array([track.sighting.radius_m for track in tracks]),
-    )
-
-
-def _face(track: Track) -> Face:
-    R = track.R_world_face
-    assert R is not None  # faces are tracked with their pose
-    p = track.p_world_m
-    parts = ((x, y, z * track.face_length) for x, y, z in (PARTS_FACE_M[code] for code in PARTS))
-    return Face(
-        track.id,
-        p,
-        track.v_world_m_s,
-        R,
-        tuple(add(p, rotate(R, part)) for part in parts),
-        track.sighting.confidence,
     )

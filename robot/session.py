@@ -4,13 +4,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from drivers.errors import DriverError, SetupError
 from robot.assemble import Assembly, Choice
+from robot.behaviours import Behaviours
 from robot.clock import RealClock
-from robot.loop import LoopCount, Tick
+from robot.face_gaze import FaceGaze
+from robot.heatmap import heatmap
+from robot.loop import LoopCount, Robot, Tick
 from robot.loop import run as run_loop
 from robot.onlooker import Onlooker
 from robot.page import Page
+from robot.planner import Planner
 from robot.summary import Summary
 
 _NO_OAK = (
@@ -31,7 +37,11 @@ class Wanted:
     video: Path | None = None
     camera: int | None = None
     oak: bool = False
-    profile: str | None = None
+    scanpath: str | None = None
+    saccade: str | None = None
+    asked: tuple[tuple[str, str], ...] = ()
+    heatmap: Path | None = None
+    heatmap_face: Path | None = None
     page: tuple[str, int] | None = None
     status_line: bool = False
 
@@ -67,7 +77,8 @@ class Wanted:
             scene=scene,
             video=self.video,
             camera=self.camera,
-            profile=self.profile,
+            scanpath=self.scanpath,
+            saccade=self.saccade,
         )
 
 
@@ -104,15 +115,27 @@ def _run(
         page,
         status if wanted.status_line else None,
         robot.body.bus.health,
+        lambda: robot.attention.top_down.behaviour,
+        robot.ask,
         made.mount,
         made.poses,
         made.horizontal_field_deg,
     )
     summary = Summary()
+    scene = made.scene
+    planner = Planner(scene.behaviour, robot.ask) if scene is not None else None
+    score = Behaviours(scene.events(), scene.round_s) if scene is not None else None
+    face_gaze = FaceGaze() if wanted.heatmap is not None else None
+    _ask_all(robot, wanted)
 
     def watch(tick: Tick) -> None:
         summary.note(tick)
         onlooker.note(tick)
+        if planner is not None and score is not None:
+            planner.note(tick.t_s)
+            score.note(tick)
+        if face_gaze is not None:
+            face_gaze.note(tick)
 
     def stop(seconds: float) -> str | None:
         over = wanted.seconds is not None and seconds >= wanted.seconds - 1e-9
@@ -126,6 +149,7 @@ def _run(
     try:
         if page is not None:
             page.open()
+            page.offer(robot.menus())
         if not wanted.fast:
             onlooker.start()
         count = run_loop(robot, made.clock, made.loop, stop, watch)
@@ -136,7 +160,29 @@ def _run(
             onlooker.stop()
         if page is not None:
             page.close()
-    return _figures(made, summary, count, wall_s)
+    if face_gaze is not None and wanted.heatmap is not None:
+        _draw_heatmap(face_gaze, wanted.heatmap, wanted.heatmap_face, say)
+    return _figures(made, summary, score, count, wall_s)
+
+
+def _ask_all(robot: Robot, wanted: Wanted) -> None:
+    """Ask for what the command line wants in force at the start."""
+    try:
+        for menu, choice in wanted.asked:
+            robot.ask(menu, choice)
+    except ValueError as error:
+        raise SetupError(str(error)) from error
+
+
+def _draw_heatmap(
+    face_gaze: FaceGaze, out: Path, picture: Path | None, say: Callable[[str], None]
+) -> None:
+    """Write the heat map, or say why there is none."""
+    if not face_gaze.points_face_m:
+        say(f"no heat map in {out}: no face was looked at")
+        return
+    heatmap(np.array(face_gaze.points_face_m), np.array(face_gaze.seconds), out, picture)
+    say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
 
 
 def _leave(made: Assembly, count: LoopCount, say: Callable[[str], None]) -> None:
@@ -157,7 +203,11 @@ def _leave(made: Assembly, count: LoopCount, say: Callable[[str], None]) -> None
 
 
 def _figures(
-    made: Assembly, summary: Summary, count: LoopCount, wall_s: float
+    made: Assembly,
+    summary: Summary,
+    score: Behaviours | None,
+    count: LoopCount,
+    wall_s: float,
 ) -> dict[str, object]:
     """Join the figures of the ticks, the loop, the pictures and the bus."""
     robot = made.robot
@@ -171,6 +221,8 @@ def _figures(
     if digest is not None:
         bus["tx_sha256"] = digest
     ticks = summary.figures()
+    if score is not None and (behaviours := score.figures()):
+        ticks["behaviours"] = behaviours
     return {
         "seconds": ticks.pop("seconds"),
         "wall_seconds": round(wall_s, 3),

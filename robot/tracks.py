@@ -1,7 +1,8 @@
 """Who is who from picture to picture: nearest-place association and steady-gain filters.
 
-World frame, metres. The distance of a face is known far worse than its direction, so
-each innovation is split along and across the line of view, with gains of their own.
+World frame, metres. The distance of a face comes from its size and is known far worse
+than its direction, so each innovation is split along and across the line of view, with
+gains of their own; what was measured by depth needs no such care.
 """
 
 from dataclasses import dataclass, field
@@ -22,7 +23,8 @@ class TrackParams:
             "low": 0.02,
             "high": 5.0,
             "unit": "m",
-            "says": "farthest from its expected place that something is taken for the same",
+            "says": "farthest from its expected place that something is taken for the same, at "
+            "up to 1 m; beyond, it grows with the distance as the errors do",
         },
     )
     across_gain: float = field(
@@ -91,6 +93,7 @@ class Sighting:
 
     R_world_face: axes of a face, None of anything else
     face_length: of a face, in lengths of the canonical one
+    depth_measured: whether the distance is as good as the direction
     """
 
     kind: str
@@ -100,6 +103,7 @@ class Sighting:
     spin_rad_s: float
     confidence: float
     face_length: float = 1.0
+    depth_measured: bool = False
 
 
 @dataclass(slots=True)
@@ -143,8 +147,9 @@ class Tracker:
         taken_tracks: set[int] = set()
         taken: set[int] = set()
         for distance, i, j in pairs:
-            if distance > par.gate_m:
-                break
+            far = norm(sub(sightings[j].p_world_m, p_world_camera_m))
+            if distance > par.gate_m * max(1.0, far):
+                continue
             if i not in taken_tracks and j not in taken:
                 taken_tracks.add(i)
                 taken.add(j)
@@ -185,12 +190,15 @@ class Tracker:
         view = unit(sub(expected, p_camera))
         along = scale(view, dot(innovation, view))
         across = sub(innovation, along)
+        measured = sighting.depth_measured
+        along_gain = par.across_gain if measured else par.along_gain
+        along_velocity_gain = par.across_velocity_gain if measured else par.along_velocity_gain
         track.p_world_m = add(
-            expected, add(scale(along, par.along_gain), scale(across, par.across_gain))
+            expected, add(scale(along, along_gain), scale(across, par.across_gain))
         )
         if dt_s > 0.0:
             change = add(
-                scale(along, par.along_velocity_gain / dt_s),
+                scale(along, along_velocity_gain / dt_s),
                 scale(across, par.across_velocity_gain / dt_s),
             )
             track.v_world_m_s = add(track.v_world_m_s, change)

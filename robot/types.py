@@ -6,7 +6,7 @@ Radians, metres, seconds; joints in the order of JOINTS.
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from gaze.types import Mat3, Vec3
+from gaze.types import Mat3, Pull, Vec3
 
 JOINTS = (
     "left_eye_pan",
@@ -83,6 +83,7 @@ class Snapshot:
     lids: left and right opening 0..1, measured
     target_name: e.g. "face 3: left eye"; why: why it won
     rate_hz: control rate of the last second; health: bus figures in words
+    behaviour: the behaviour in force; pulls: what pulls the gaze, strongest first
     """
 
     t_s: float
@@ -103,3 +104,5 @@ class Snapshot:
     bodies: tuple[SeenBody, ...]
     rate_hz: float
     health: str
+    behaviour: str = ""
+    pulls: tuple[Pull, ...] = ()

@@ -1,8 +1,8 @@
 """A camera that looks into a simulated scene from where the emulated head is.
 
-It gives what a detector would find, not pixels: landmarks with noise, raised hands with
-a place in depth; late by its latency, at its own rate, inside its own field, and now and
-then nothing. Not modelled: motion blur, light, occlusion, false detections.
+It gives what a detector would find, not pixels: landmarks with noise, hands and things
+with a place in depth; late by its latency, at its own rate, inside its own field, and
+now and then nothing. Not modelled: motion blur, light, occlusion, false detections.
 """
 
 from collections import deque
@@ -17,10 +17,11 @@ from gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, un
 from gaze.types import Mat3, Vec3
 from robot.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
 from robot.frames import CameraMount
-from sim_mock.visitor import Person, Scene
+from sim_mock.scene import Person, Scene, Thing
 
 _FARTHEST_FACE_M = 4.0
 _HAND_RADIUS_M = 0.07
+_FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
 _FACE_BOX_M = 0.17
 
 
@@ -91,14 +92,18 @@ class SceneCamera:
         """Take one picture from where the camera is."""
         assert self._start_s is not None
         R, p = self._mount.pose(*self._head_pose(t_s))
-        faces, blobs = [], []
-        for index, person in enumerate(self._scene.people(t_s - self._start_s)):
+        faces: list[DetectedFace] = []
+        blobs: list[MovingBlob] = []
+        scene_s = t_s - self._start_s
+        for index, person in enumerate(self._scene.people(scene_s)):
             face = self._face(person, R, p)
             if face is not None:
                 faces.append(face)
-            blob = self._hand(person.hand, index, R, p)
-            if blob is not None:
-                blobs.append(blob)
+            if person.hand is not None:
+                hand = Thing(index, "hand", person.hand, _HAND_RADIUS_M)
+                blobs.extend(self._blob(hand, R, p))
+        for thing in self._scene.things(scene_s):
+            blobs.extend(self._blob(thing._replace(id=_FIRST_THING_ID + thing.id), R, p))
         faces.sort(key=lambda face: -face.box_px[2])
         par = self._params
         return Detections(
@@ -131,19 +136,17 @@ class SceneCamera:
             return None
         return DetectedFace(box, px + noise, 0.98)
 
-    def _hand(self, hand: Vec3 | None, index: int, R: Mat3, p: Vec3) -> MovingBlob | None:
-        """Place a raised hand by depth."""
-        if hand is None:
-            return None
+    def _blob(self, thing: Thing, R: Mat3, p: Vec3) -> tuple[MovingBlob, ...]:
+        """Place a hand or thing by depth; nothing where it is behind or outside the picture."""
         noise = self._rng.normal(0.0, self._params.depth_noise_mm / 1e3)
-        point = rotate_back(R, sub(hand, p))
+        point = rotate_back(R, sub(thing.p_world_m, p))
         if point[2] < 0.1:
-            return None
+            return ()
         x, y = project(np.array([point]), self._lens)[0].tolist()
         if not self._inside(x, y, 0.0):
-            return None
+            return ()
         place = scale(point, 1.0 + noise / norm(point))
-        return MovingBlob(index, "hand", place, _HAND_RADIUS_M)
+        return (MovingBlob(thing.id, thing.kind, place, thing.radius_m),)
 
     def _inside(self, x: float, y: float, margin: float) -> bool:
         par = self._params

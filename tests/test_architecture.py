@@ -25,7 +25,7 @@ OWNERS = {
     "pydantic_core": ("config.",),
     "typer": ("robot.cli",),
     "viser": ("robot.page_",),
-    "cv2": ("drivers.", "robot.face_pose", "robot.page_", "sim_mock."),
+    "cv2": ("drivers.", "robot.face_pose", "robot.heatmap", "robot.page_", "sim_mock."),
 }
 
 

@@ -342,13 +342,14 @@ def test_a_fault_names_the_layer_its_value_comes_from(tmp_path: Path) -> None:
     ]
 
 
-def test_what_is_missing_is_missed_in_the_uppermost_mapping(tmp_path: Path) -> None:
+def test_what_is_missing_is_missed_in_the_lowest_mapping(tmp_path: Path) -> None:
     base = write(tmp_path, "name: x\njoints:\n  pan:\n    low_deg: 1\n", "base.yaml")
     top = write(tmp_path, "\njoints:\n  pan: {high_deg: 2}\n", "top.yaml")
     with pytest.raises(ConfigError) as caught:
         load(top, Rig, defaults=[base])
     (fault,) = caught.value.faults
-    assert (Path(fault.file).name, fault.line, fault.key) == ("top.yaml", 3, "joints.pan.id")
+    # A layer of differences need not be whole; the file it is laid over must be.
+    assert (Path(fault.file).name, fault.line, fault.key) == ("base.yaml", 4, "joints.pan.id")
 
 
 def test_unreadable_layers_are_all_named(tmp_path: Path) -> None:

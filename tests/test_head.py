@@ -5,7 +5,9 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from gaze.head import Head, HeadParams, Quintic
+from gaze.head import Head, HeadParams
+from gaze.quintic import Quintic
+from gaze.types import Target
 
 NECK = ((-2.0, 2.0), (-1.0, 1.0))
 
@@ -76,8 +78,6 @@ def test_attention_bounds_must_be_in_order() -> None:
 
 
 def test_an_eye_held_aside_is_relieved_slowly() -> None:
-    from gaze.types import Target
-
     model = Head(HeadParams(), radians(35.0), NECK)
     model.reset(0.0, (0.0, 0.0, 0.0))
     target = Target((1.0, 0.4, 0.0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
@@ -85,9 +85,71 @@ def test_an_eye_held_aside_is_relieved_slowly() -> None:
     trace = []
     for k in range(800):
         t = k * 0.005
-        now = model.step(target, (yaw, 0.0), abs(yaw - (trace[-1] if trace else 0.0)), 1.0, t)
+        aside = abs(yaw - (trace[-1] if trace else 0.0))
+        now = model.step(target, (yaw, 0.0), (yaw, 0.0), aside, 1.0, t)
         trace.append(now[0])
     moved = np.degrees(np.array(trace))
     assert np.abs(moved[:150]).max() == 0.0
     assert moved[-1] == pytest.approx(21.0 - 4.0, abs=0.5)
     assert np.abs(np.diff(moved)).max() / 0.005 <= 30.0 + 1e-6
+
+
+def aimed(params: HeadParams, centre: float, point: float, top_down: bool = False) -> float:
+    """Give where the head (eye range 20 deg) ends for a far centre and a point, in degrees."""
+    model = Head(params, radians(20.0), NECK)
+    target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 0.5, top_down, None, 1, "")
+    facing, gaze, yaw = (radians(centre), 0.0), (radians(point), 0.0), 0.0
+    for k in range(800):
+        yaw = model.step(target, facing, gaze, abs(gaze[0] - yaw), 1.0, k * 0.005)[0]
+    return degrees(yaw)
+
+
+def test_head_turns_to_the_centre_but_never_so_that_the_point_is_out_of_reach() -> None:
+    still = HeadParams(pull_least=0.0, recentre_after_ms=60_000.0)
+    assert aimed(still, 40.0, 41.0) == pytest.approx(40.0 - 15.0, abs=0.1)
+    assert aimed(still, 40.0, 50.0) == pytest.approx(50.0 - 18.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("align", "short"), [(0.0, 18.0), (0.5, 9.0), (1.0, 0.0)])
+def test_alignment_is_one_less_the_share_of_the_offset(align: float, short: float) -> None:
+    params = HeadParams(goal_by="align", align=align, recentre_after_ms=60_000.0)
+    assert aimed(params, 50.0, 50.0) == pytest.approx(50.0 - short, abs=0.1)
+
+
+@pytest.mark.parametrize(("target", "head_deg"), [(30.0, 12.0), (40.0, 22.0), (60.0, 42.0)])
+def test_stahl_share_is_lifted_where_the_eyes_cannot_reach(target: float, head_deg: float) -> None:
+    params = HeadParams(goal_by="stahl", recentre_after_ms=60_000.0)
+    assert aimed(params, target, target) == pytest.approx(head_deg, abs=0.1)
+
+
+def test_stahl_share_of_a_wide_eye_range() -> None:
+    model = Head(HeadParams(goal_by="stahl", recentre_after_ms=60_000.0), radians(55.0), NECK)
+    target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
+    facing = (radians(40.0), 0.0)
+    for k in range(800):
+        yaw = model.step(target, facing, facing, radians(40.0), 1.0, k * 0.005)[0]
+    assert degrees(yaw) == pytest.approx(0.77 * (40.0 - 17.9), abs=0.1)
+
+
+def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
+    params = HeadParams(pull_least=0.5, pull_most=1.0, literal_reach=True)
+    model = Head(params, radians(20.0), NECK)
+    assert degrees(model.trigger_rad) == pytest.approx(30.0)
+    assert degrees(model.offset_rad(0.5)) == pytest.approx(29.97, abs=0.01)
+    # 60 - 30.03 - 20: the 9.97 deg that no eye of 20 deg covers.
+    assert 60.0 - goal_deg(model, 60.0, 0.5)[0] - 20.0 == pytest.approx(9.97, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("size", "peak"), [(20.0, 65.0), (30.0, 84.0), (40.0, 103.0), (60.0, 140.0)]
+)
+def test_larger_head_movements_are_faster(size: float, peak: float) -> None:
+    model = Head(HeadParams(), radians(5.0), NECK)
+    model.reset(0.0, (0.0, 0.0, 0.0))
+    target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 2.0, True, None, 1, "")
+    facing = (radians(size), 0.0)
+    trace = [
+        degrees(model.step(target, facing, facing, radians(size), 1.0, k * 0.005)[0])
+        for k in range(400)
+    ]
+    assert np.diff(trace).max() / 0.005 == pytest.approx(peak, abs=1.5)

@@ -13,7 +13,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gaze.angles import add, angle_between, direction, rotate, scale, sub, unit
+from gaze.angles import (
+    add,
+    angle_between,
+    cross,
+    direction,
+    dot,
+    rotate,
+    scale,
+    sub,
+    unit,
+    yaw_pitch,
+)
+from gaze.breathing import Breathing, BreathingParams
 from gaze.field_of_view import line_of_sight
 from gaze.head import Head, HeadParams
 from gaze.lids import LidParams, Lids
@@ -28,6 +40,9 @@ DT = 0.005
 CENTRED = GeometryParams(0.0, 0.0, 0.0)
 DESK = GeometryParams(60.0, 40.0, 50.0)
 NO_RELIEF = HeadParams(recentre_after_ms=60_000.0)
+AT_ONCE = OculomotorParams(eye_lag_ms=DT * 1e3)
+SACCADE = SaccadeParams()
+HUMAN = SaccadeParams(profile="main_sequence")
 
 
 class Trace(NamedTuple):
@@ -49,18 +64,24 @@ class Rig:
         geometry: GeometryParams = CENTRED,
         head: HeadParams = NO_RELIEF,
         neck_deg: float = 90.0,
+        params: OculomotorParams = AT_ONCE,
+        saccade: SaccadeParams = SACCADE,
+        breathing: Breathing | None = None,
+        dice: int | None = None,
     ) -> None:
         self.kinematics = Kinematics(geometry, (-0.4, -0.4), (0.4, 0.4))
         span = (-radians(eye_deg), radians(eye_deg))
         neck = (-radians(neck_deg), radians(neck_deg))
         self.oculomotor = Oculomotor(
-            OculomotorParams(eye_lag_ms=DT * 1e3),
+            params,
             self.kinematics,
             ((span, span), (span, span)),
-            Saccade(SaccadeParams()),
+            Saccade(saccade),
             Pursuit(PursuitParams()),
             Head(head, radians(eye_deg), (neck, neck)),
             Lids(LidParams(), np.random.default_rng(0)),
+            breathing,
+            None if dice is None else np.random.default_rng(dice),
         )
         self.joints = JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ())
 
@@ -68,16 +89,19 @@ class Rig:
         rows, commands = [], []
         for k in range(round(seconds / DT)):
             t = k * DT
-            state = self.kinematics.forward(self.joints)
-            command = self.oculomotor.step(where(t), state, t, DT)
-            now = self.kinematics.inverse(command)
-            rates = tuple((a - b) / DT for a, b in zip(now, self.joints.position_rad, strict=True))
-            self.joints = JointState(now, rates, (t,) * 9, ())
-            rows.append(self._row(t, where(t)))
-            commands.append(command)
+            commands.append(self.tick(where(t), t, DT))
+            rows.append(self.row(t, where(t)))
         return Trace(*np.array(rows).T, commands)
 
-    def _row(self, t: float, target: Target) -> tuple[float, ...]:
+    def tick(self, target: Target, t: float, dt: float) -> GazeCommand:
+        state = self.kinematics.forward(self.joints)
+        command = self.oculomotor.step(target, state, t, dt)
+        now = self.kinematics.inverse(command)
+        rates = tuple((a - b) / dt for a, b in zip(now, self.joints.position_rad, strict=True))
+        self.joints = JointState(now, rates, (t,) * 9, ())
+        return command
+
+    def row(self, t: float, target: Target) -> tuple[float, ...]:
         state = self.kinematics.forward(self.joints)
         gaze = unit(add(line_of_sight(state, True), line_of_sight(state, False)))
         point = add(target.p_world_m, scale(target.v_world_m_s, t - target.at_s))
@@ -124,6 +148,202 @@ def test_e15_head_start_rule(size: float, top_down: bool) -> None:
 def test_e16_every_target_is_reached_with_a_small_eye_range(size: float) -> None:
     trace = Rig(eye_deg=20.0).run(still(size, pull=0.2), 3.0)
     assert trace.error[-1] <= 0.5
+
+
+@pytest.mark.parametrize("profile", [SACCADE, HUMAN])
+def test_e8_oblique_saccade_keeps_to_the_great_circle(profile: SaccadeParams) -> None:
+    trace = Rig(saccade=profile).run(still(20.0, pitch_deg=12.0), 0.4)
+    ways = [unit(c.gaze_point_world_m) for c in trace.commands]
+    pole = unit(cross((1.0, 0.0, 0.0), ways[-1]))
+    assert max(abs(degrees(dot(way, pole))) for way in ways) < 0.2
+    angles = np.array([yaw_pitch(way) for way in ways]).T
+    moves = [np.flatnonzero(np.abs(np.diff(a)) > 1e-6) for a in angles]
+    assert abs(moves[0][0] - moves[1][0]) <= 1
+    assert abs(moves[0][-1] - moves[1][-1]) <= 1
+
+
+def test_latency_delays_the_saccade_and_the_gaze_waits_where_it_is() -> None:
+    late = OculomotorParams(eye_lag_ms=5.0, latency_ms=200.0)
+    trace = Rig(params=late).run(lambda t: still(1.5)(t - 0.4), 1.0)
+    assert np.abs(trace.eye[trace.t < 0.7 - 1e-9]).max() < 1e-6
+    assert trace.t[np.argmax(np.abs(trace.eye) > 1e-6)] == pytest.approx(0.705, abs=DT + 1e-9)
+    assert trace.commands[-1].saccades == 1
+    assert trace.error[-1] < 0.01
+
+
+@pytest.mark.parametrize("top_down", [False, True])
+def test_the_head_goes_first_only_where_it_is_wanted(top_down: bool) -> None:
+    head = HeadParams(recentre_after_ms=60_000.0, lead_ms=100.0)
+    trace = Rig(head=head).run(still(45.0, top_down=top_down), 1.0)
+    eyes = np.argmax([c.phase == "saccade" for c in trace.commands])
+    turns = np.argmax(np.abs(trace.head) > 1e-9)
+    lead = 0.1 if top_down else -0.02
+    assert (eyes - turns) * DT == pytest.approx(lead, abs=DT + 1e-9)
+    if top_down:
+        # Until they go, the eyes hold the old place against the turning head.
+        held = np.abs(trace.eye + trace.head)[:eyes]
+        assert held.max() < 0.05 and np.abs(trace.head[eyes - 1]) > 0.5
+
+
+def test_scattered_landings_are_corrected_by_small_saccades() -> None:
+    noisy = OculomotorParams(eye_lag_ms=5.0, landing_along=0.05, landing_across=0.02)
+    after, misses = [], []
+    for seed in range(12):
+        trace = Rig(params=noisy, dice=seed).run(still(28.0), 0.8)
+        phases = [c.phase == "saccade" for c in trace.commands]
+        landed = len(phases) - 1 - phases[::-1].index(True)
+        first = phases.index(True)
+        ends = first + phases[first:].index(False)
+        misses.append(trace.error[ends + 1])
+        count = trace.commands[-1].saccades
+        assert count == (2 if misses[-1] > 1.0 else 1)
+        if count == 2:
+            start = ends + phases[ends:].index(True)
+            after.append((start - ends) * DT)
+        assert trace.error[-1] < 0.1 and landed < len(phases) - 1
+    assert 0.4 < np.mean(misses) < 2.2
+    assert after and min(after) >= 0.15 and max(after) <= 0.25
+
+
+def test_scatter_without_dice_is_refused() -> None:
+    with pytest.raises(ValueError, match="need dice"):
+        Rig(params=OculomotorParams(landing_along=0.04))
+
+
+def test_breathing_moves_the_head_and_not_the_gaze() -> None:
+    rig = Rig(geometry=DESK, breathing=Breathing(BreathingParams(pitch_deg=1.0, roll_deg=0.5)))
+    target = Target((1.0, 0.1, 0.2), (0, 0, 0), 0.0, "thing", 1, 0.2, False, None, 1, "")
+    trace = rig.run(lambda t: target, 12.0)
+    pitch = np.degrees([c.head_rad[1] for c in trace.commands])
+    assert np.ptp(pitch[-800:]) == pytest.approx(2.0, abs=0.1)
+    assert trace.error[100:].max() < 0.05
+    assert trace.commands[-1].saccades == 1
+
+
+def test_the_head_faces_the_centre_while_the_gaze_wanders_over_parts() -> None:
+    rig = Rig(head=HeadParams(recentre_after_ms=60_000.0))
+    centre = scale(direction((radians(45.0), 0.0)), 1.0)
+
+    def where(t: float) -> Target:
+        part = int(t / 0.4)
+        point = scale(direction((radians(45.0 + 3.0 * (part % 3 - 1)), 0.0)), 1.0)
+        return Target(
+            point, (0, 0, 0), t, "face", 1, 0.6, True, "N", part, "", centre_world_m=centre
+        )
+
+    trace = rig.run(where, 4.0)
+    assert np.ptp(trace.head[400:]) < 1e-6
+    assert trace.error[350] < 0.05 and trace.commands[-1].saccades == 10
+
+
+def test_e58_a_lost_target_is_followed_for_a_moment_and_then_no_more() -> None:
+    rig = Rig(params=OculomotorParams(eye_lag_ms=5.0, extrapolate_ms=100.0))
+    v = radians(20.0)
+
+    def where(t: float) -> Target:
+        at = min(t, 1.0)
+        return Target((1.0, v * (at - 0.5), 0), (0, v, 0), at, "face", 1, 0.2, False, None, 1, "")
+
+    trace = rig.run(where, 3.0)
+    speeds = np.diff(trace.eye) / DT
+    assert speeds[round(1.05 / DT)] == pytest.approx(20.0, rel=0.1)
+    assert speeds[round(1.3 / DT)] == pytest.approx(9.6, abs=2.0)
+    assert abs(speeds[-1]) < 0.1
+    assert trace.commands[-1].saccades == 1
+
+
+def test_a_target_faster_than_pursuit_is_caught_up_with_by_saccades() -> None:
+    v = radians(90.0)
+
+    def where(t: float) -> Target:
+        yaw = v * t - 0.6
+        point = (float(np.cos(yaw)), float(np.sin(yaw)), 0.0)
+        return Target(
+            point, (-v * point[1], v * point[0], 0), t, "hand", 1, 0.2, False, None, 1, ""
+        )
+
+    trace = Rig().run(where, 0.8)
+    assert trace.commands[-1].saccades >= 3
+    assert np.median(trace.error[40:]) < 4.0
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    eye=st.floats(15, 55),
+    profile=st.sampled_from((SACCADE, HUMAN)),
+    geometry=st.sampled_from((CENTRED, DESK)),
+)
+def test_no_eye_beyond_its_limit_nothing_infinite_and_no_gaze_above_the_cap(
+    seed: int, eye: float, profile: SaccadeParams, geometry: GeometryParams
+) -> None:
+    """For any path of targets, any motion of the head, obeying or not, and any timing."""
+    rng = np.random.default_rng(seed)
+    rig = Rig(
+        eye,
+        geometry,
+        HeadParams(lead_ms=float(rng.choice((0.0, 80.0)))),
+        params=OculomotorParams(eye_lag_ms=0.0, latency_ms=float(rng.choice((0.0, 120.0)))),
+        saccade=profile,
+    )
+    t, shift, before = 0.0, 0, None
+    target = _any_target(rng, 0.0, 0)
+    pushed = np.zeros(3)
+    for _ in range(250):
+        dt = float(rng.choice((0.0, 0.001, 0.005, 0.005, 0.005, 0.020, 0.2)))
+        t += dt
+        if rng.random() < 0.08:
+            shift += int(rng.integers(0, 2))
+            target = _any_target(rng, t - float(rng.uniform(0.0, 0.3)), shift)
+        if rng.random() < 0.1:
+            pushed = rng.normal(0.0, (0.8, 0.4, 0.2))
+        head = np.array(rig.joints.position_rad[6:]) + (pushed * dt if dt < 0.1 else 0.0)
+        joints = JointState((*rig.joints.position_rad[:6], *head), (0.0,) * 9, (t,) * 9, ())
+        state = rig.kinematics.forward(joints)
+        command = rig.oculomotor.step(target, state, t, dt)
+        now = rig.kinematics.inverse(command)
+        assert np.isfinite(now).all() and np.isfinite(command.gaze_point_world_m).all()
+        eyes = (*command.eye_left_rad, *command.eye_right_rad)
+        assert max(abs(a) for a in eyes) <= radians(eye) + 1e-12
+        way = sub(command.gaze_point_world_m, state.p_world_head_m)
+        # A head that shifts its eyes sideways adds what the shifted view asks for.
+        if before is not None and geometry is CENTRED:
+            assert angle_between(way, before) <= radians(500.0) * dt + 1e-9
+        before = way
+        rig.joints = joints._replace(position_rad=now) if rng.random() < 0.8 else joints
+
+
+def _any_target(rng: np.random.Generator, at_s: float, shift: int) -> Target:
+    yaw, pitch = rng.uniform((-3.2, -1.6), (3.2, 1.6))
+    distance = float(10 ** rng.uniform(-2, 1.5))
+    point = scale(direction((float(yaw), float(pitch))), distance)
+    x, y, z = rng.normal(0.0, 10 ** rng.uniform(-2, 1.5), 3)
+    centre = add(point, (0.0, 0.1, -0.05)) if rng.random() < 0.5 else None
+    return Target(
+        point, (float(x), float(y), float(z)), at_s, "face", 1, float(rng.uniform(0, 2)),
+        bool(rng.integers(0, 2)), None, shift, "", centre,
+    )  # fmt: skip
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    eye=st.floats(15, 55),
+    yaw=st.floats(-80, 80),
+    pitch=st.floats(-30, 30),
+    pull=st.floats(0, 3),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_e16_any_eye_range_and_timing_reaches_the_target(
+    eye: float, yaw: float, pitch: float, pull: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    rig = Rig(eye_deg=eye, geometry=DESK)
+    where, t = still(yaw, pull, bool(seed % 2), pitch), 0.0
+    for _ in range(600):
+        dt = float(rng.choice((0.002, 0.005, 0.005, 0.010, 0.030)))
+        t += dt
+        rig.tick(where(t), t, dt)
+    assert rig.row(t, where(t))[3] <= 0.5
 
 
 def test_e19_no_eye_beyond_its_limit_and_no_head_beyond_its_range() -> None:

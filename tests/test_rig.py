@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from config.load import ConfigError, shipped, shipped_names
-from config.schema import Rig, load_profile, load_rig, load_walk
+from config.schema import Rig, load_rig, load_walk
 from robot.types import JOINTS
 
 DESK = shipped("rigs", "desk")
@@ -59,12 +59,15 @@ def test_the_desk_rig_spells_out_every_default(tmp_path: Path) -> None:
     assert whole.gaze == cut_rig.gaze == Rig.__dataclass_fields__["gaze"].default_factory()
 
 
-def test_shipped_profiles_and_walks_load() -> None:
-    for name in shipped_names("profiles"):
-        load_profile(name)
-    assert load_profile("mitake").eye_yaw_deg == 55.0
-    assert load_profile("mitake").eye_pitch_deg == 45.0
-    assert load_profile("nakamoto").eye_yaw_deg == 20.0
+def test_shipped_profiles_characters_and_walks_load() -> None:
+    ranges = {name: load_rig("desk", profile=name).ranges for name in shipped_names("profiles")}
+    assert (ranges["mitake"].eye_yaw_deg, ranges["mitake"].eye_pitch_deg) == (55.0, 45.0)
+    assert ranges["nakamoto"].eye_yaw_deg == 20.0
+    assert load_rig("desk").ranges == ranges["robot"]
+    assert load_rig("desk", profile="nakamoto").gaze.saccade.profile == "literal_frame"
+    assert load_rig("desk", profile="mitake").gaze.bottom_up.form == "literal"
+    for name in shipped_names("characters"):
+        assert load_rig("desk", character=name).gaze != load_rig("desk").gaze
     for name in shipped_names("scanpaths"):
         load_walk(name)
 

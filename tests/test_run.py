@@ -53,7 +53,8 @@ def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
 
 def test_the_head_looks_at_the_visitor(visitor: dict[str, Any]) -> None:
     share = visitor["target_share"]
-    assert share["face"] > 0.6 and share["hand"] > 0.02 and share["rest"] > 0.05
+    nobody = sum(share.get(kind, 0.0) for kind in ("rest", "search", "glance"))
+    assert share["face"] > 0.6 and share["hand"] > 0.02 and nobody > 0.02
     assert len(visitor["part_share"]) == 8
     assert visitor["gaze_error_deg"]["median"] < 0.3
     assert visitor["gaze_error_deg"]["p95"] < 2.0

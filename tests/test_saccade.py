@@ -5,7 +5,7 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from gaze.saccade import Saccade, SaccadeParams, min_jerk
+from gaze.saccade import MinJerk, Saccade, SaccadeParams, min_jerk
 
 SACCADE = Saccade(SaccadeParams())
 
@@ -15,7 +15,7 @@ def at(amplitude_deg: float, *times_ms: float) -> list[float]:
 
 
 def test_e1_largest_amplitude_below_the_cap() -> None:
-    assert degrees(SACCADE.largest_uncapped_rad) == pytest.approx(13.333, abs=0.001)
+    assert degrees(MinJerk(8.7266, 0.05).largest_uncapped_rad) == pytest.approx(13.333, abs=0.001)
 
 
 def test_e2_small_saccade() -> None:
@@ -65,3 +65,72 @@ def test_uneven_ticks_land_on_the_same_curve() -> None:
 
 def test_min_jerk_is_held_at_its_ends() -> None:
     assert [min_jerk(s) for s in (-1.0, 0.0, 0.5, 1.0, 2.0)] == [0.0, 0.0, 0.5, 1.0, 1.0]
+
+
+HUMAN = Saccade(SaccadeParams(profile="main_sequence"))
+FRAMES = Saccade(SaccadeParams(profile="literal_frame"))
+
+
+@pytest.mark.parametrize("saccade", [SACCADE, HUMAN])
+@pytest.mark.parametrize("size", [12.0, 15.0, 20.0, 30.0, 40.0])
+def test_e9_duration_within_the_human_band(saccade: Saccade, size: float) -> None:
+    duration = saccade.duration_s(radians(size)) * 1e3
+    assert 0.75 * (21.0 + 2.2 * size) <= duration <= 1.25 * (25.0 + 2.4 * size)
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0, 5.0, 8.0, 10.0])
+def test_human_profile_keeps_the_band_for_small_ones_too(size: float) -> None:
+    duration = HUMAN.duration_s(radians(size)) * 1e3
+    assert duration == pytest.approx(21.0 + 2.2 * size)
+    assert degrees(HUMAN.peak_speed_rad_s(radians(size))) == pytest.approx(
+        1.65 * size / duration * 1e3
+    )
+
+
+@pytest.mark.parametrize("cap", [100.0, 300.0, 500.0])
+@pytest.mark.parametrize("size", [0.1, 1.0, 5.0, 10.0, 20.0, 50.0, 90.0])
+def test_human_profile_is_smooth_capped_and_ends_on_its_amplitude(cap: float, size: float) -> None:
+    saccade = Saccade(SaccadeParams(profile="main_sequence", max_speed_deg_s=cap))
+    duration = saccade.duration_s(radians(size))
+    times = np.linspace(-0.1 * duration, 1.1 * duration, 6001)
+    angles = np.degrees([saccade.displacement_rad(radians(size), t) for t in times])
+    speeds = np.diff(angles) / np.diff(times)
+    assert angles[0] == 0.0
+    assert angles[-1] == pytest.approx(size, abs=1e-9)
+    assert speeds.min() >= -1e-6
+    peak = degrees(saccade.peak_speed_rad_s(radians(size)))
+    assert speeds.max() == pytest.approx(peak, rel=0.002)
+    assert peak <= cap * (1.0 + 1e-9)
+    # No step of the speed anywhere: the steepest flank takes 2 % of the time or more.
+    assert np.abs(np.diff(speeds)).max() < 0.03 * peak
+
+
+def test_human_peak_comes_earlier_in_large_saccades() -> None:
+    def peak_at(size: float) -> float:
+        times = np.linspace(0.0, HUMAN.duration_s(radians(size)), 4001)
+        angles = np.array([HUMAN.displacement_rad(radians(size), t) for t in times])
+        speeds = np.diff(angles)
+        return float(np.mean(np.nonzero(speeds > speeds.max() * 0.9999)[0])) / 4000
+
+    small, large = peak_at(8.0), peak_at(60.0)
+    assert small == pytest.approx(0.45, abs=0.02)
+    assert large < 0.40
+
+
+def test_literal_frames_leave_a_fifth_at_each_and_do_not_know_the_tick() -> None:
+    frame = SaccadeParams().frame_ms / 1e3
+    for frames in (1, 2, 3):
+        done = FRAMES.displacement_rad(radians(10.0), frames * frame)
+        assert degrees(done) == pytest.approx(10.0 * (1.0 - 0.2**frames))
+    # 20.7, 10.4, 6.9 ms: time constants at 30, 60 and 90 pictures a second.
+    for rate, constant in ((30.0, 20.7), (60.0, 10.4), (90.0, 6.9)):
+        saccade = Saccade(SaccadeParams(profile="literal_frame", frame_ms=1e3 / rate))
+        assert saccade.displacement_rad(1.0, constant / 1e3) == pytest.approx(0.632, abs=0.002)
+    assert degrees(FRAMES.peak_speed_rad_s(radians(10.0))) == pytest.approx(1450.0, rel=0.01)
+
+
+def test_literal_saccade_lands_when_a_twentieth_of_a_degree_remains() -> None:
+    lasts = FRAMES.duration_s(radians(10.0))
+    assert degrees(FRAMES.displacement_rad(radians(10.0), lasts - 1e-9)) == pytest.approx(9.95)
+    assert FRAMES.displacement_rad(radians(10.0), lasts) == radians(10.0)
+    assert FRAMES.duration_s(radians(0.01)) == pytest.approx(SaccadeParams().frame_ms / 1e3)

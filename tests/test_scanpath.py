@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from config.load import load, shipped
-from gaze.scanpath import Scanpath, ScanpathParams, Walk, normalised
+from gaze.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalised
+from gaze.scanpath_models import MarkovWalk
 from gaze.types import PARTS, Bodies, Face, Percept, Target
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
@@ -18,7 +19,7 @@ def walker(seed: int = 1, params: ScanpathParams = NO_FLOOR) -> Scanpath:
 
 
 def drawn(count: int) -> np.ndarray:
-    walk, parts = walker(), [0]
+    walk, parts = markov_walk(NO_FLOOR, WALK, np.random.default_rng(1)), [0]
     for _ in range(count):
         parts.append(walk.next_part(parts[-1]))
     return np.array(parts)
@@ -74,7 +75,7 @@ def test_e37_face_time_share() -> None:
 
 
 def test_e40_dwell_times() -> None:
-    walk = walker(3)
+    walk = markov_walk(NO_FLOOR, WALK, np.random.default_rng(3))
     for part in range(8):
         times = np.array([walk.dwell_s(part) for _ in range(200_000)])
         assert times.min() > 0.0
@@ -83,10 +84,13 @@ def test_e40_dwell_times() -> None:
 
 
 def test_floor_and_tempo() -> None:
-    floored = walker(4, ScanpathParams(shortest_dwell_ms=120.0))
+    def walk(seed: int, params: ScanpathParams) -> MarkovWalk:
+        return markov_walk(params, WALK, np.random.default_rng(seed))
+
+    floored = walk(4, ScanpathParams(shortest_dwell_ms=120.0))
     assert min(floored.dwell_s(2) for _ in range(2000)) == 0.12
-    slow = walker(5, ScanpathParams(shortest_dwell_ms=0.0, tempo=0.5))
-    quick = walker(5, NO_FLOOR)
+    slow = walk(5, ScanpathParams(shortest_dwell_ms=0.0, tempo=0.5))
+    quick = walk(5, NO_FLOOR)
     assert slow.dwell_s(1) == pytest.approx(2.0 * quick.dwell_s(1))
 
 

@@ -1,0 +1,285 @@
+"""Looking away from a face now and then, as people do while they talk, listen and think.
+
+A gaze that never leaves a face is a stare. So it goes to and fro between MUTUAL, on the
+face, and AWAY, beside it. How long each lasts, how far away the gaze goes and which way
+is what Lee, Badler & Badler 2002 (Eyes Alive) measured in talking and listening people;
+while thinking the gaze goes mostly up, for longer (Andrist et al. 2014).
+"""
+
+from dataclasses import dataclass, field
+from math import cos, exp, log, radians, sin, sqrt
+from typing import Literal
+
+import numpy as np
+
+from gaze.angles import add, cross, norm, scale, sub, unit
+from gaze.types import Target, Vec3
+
+AversionMode = Literal["none", "talk", "listen", "think"]
+MODES: tuple[AversionMode, ...] = ("none", "talk", "listen", "think")
+
+# Share of gaze shifts, percent, to 0, 45, ... 315 deg; 0 is right, 90 up (Eyes Alive).
+DIRECTIONS_PERCENT = (15.54, 6.46, 17.69, 7.44, 16.80, 7.89, 20.38, 7.79)
+_UP = 2
+
+# A = -6.9 ln(P / 15.7) deg, P uniform in 0..15 % (Eyes Alive).
+_SCALE_DEG, _P_TOP, _P_MOST = 6.9, 15.7, 15.0
+
+
+def _time(mean_s: float, says: str) -> float:
+    """Declare a time in seconds."""
+    meta = {"low": 0.1, "high": 60.0, "unit": "s", "says": says}
+    value: float = field(default=mean_s, metadata=meta)
+    return value
+
+
+@dataclass(frozen=True)
+class AversionParams:
+    """Times on the face and away from it, and how far away."""
+
+    talk_mutual_s: float = _time(3.13, "talking: mean time on the face")
+    talk_mutual_sd_s: float = _time(3.16, "its standard deviation")
+    talk_away_s: float = _time(0.93, "talking: mean time away")
+    talk_away_sd_s: float = _time(0.80, "its standard deviation")
+    listen_mutual_s: float = _time(7.92, "listening: mean time on the face")
+    listen_mutual_sd_s: float = _time(1.57, "its standard deviation")
+    listen_away_s: float = _time(0.43, "listening: mean time away")
+    listen_away_sd_s: float = _time(0.24, "its standard deviation")
+    think_mutual_s: float = _time(1.50, "thinking: mean time on the face")
+    think_mutual_sd_s: float = _time(0.80, "its standard deviation")
+    think_away_s: float = _time(3.54, "thinking: mean time away")
+    think_away_sd_s: float = _time(1.26, "its standard deviation")
+    longest_mutual_s: float = field(
+        default=14.5,
+        metadata={
+            "low": 0.5,
+            "high": 14.9,
+            "unit": "s",
+            "says": "no look at a face is longer; beyond 15 s it is a stare",
+        },
+    )
+    shortest_s: float = field(
+        default=0.2,
+        metadata={
+            "low": 0.05,
+            "high": 2.0,
+            "unit": "s",
+            "says": "no time on or away is shorter: eyes and servos must get there first",
+        },
+    )
+    least_deg: float = field(
+        default=5.0,
+        metadata={
+            "low": 0.0,
+            "high": 20.0,
+            "unit": "deg",
+            "says": "no nearer beside the face: half the gazes of the published law would still "
+            "be on it; 0 is that law",
+        },
+    )
+    talk_most_deg: float = field(
+        default=27.5,
+        metadata={
+            "low": 1.0,
+            "high": 60.0,
+            "unit": "deg",
+            "says": "farthest away while talking or thinking",
+        },
+    )
+    listen_most_deg: float = field(
+        default=22.7,
+        metadata={"low": 1.0, "high": 60.0, "unit": "deg", "says": "farthest while listening"},
+    )
+    think_up_share: float = field(
+        default=0.8,
+        metadata={
+            "low": 0.0,
+            "high": 1.0,
+            "unit": "",
+            "says": "share of the looks away while thinking that go up; the others go anywhere",
+        },
+    )
+
+    def __post_init__(self) -> None:
+        """Check the order of the limits.
+
+        Raises:
+            ValueError: the nearest look away lies beyond a farthest one.
+        """
+        if self.least_deg > min(self.talk_most_deg, self.listen_most_deg):
+            raise ValueError("least_deg must not be above talk_most_deg or listen_most_deg")
+
+
+class Aversion:
+    """Semi-Markov MUTUAL <-> AWAY on faces; everything else passes through."""
+
+    def __init__(self, params: AversionParams, rng: np.random.Generator) -> None:
+        """Take times, angles and dice; nothing happens before ``converse``."""
+        par = self._params = params
+        self._rng = rng
+        self._times: dict[AversionMode, tuple[float, float, float, float]] = {
+            "talk": (
+                par.talk_mutual_s,
+                par.talk_mutual_sd_s,
+                par.talk_away_s,
+                par.talk_away_sd_s,
+            ),
+            "listen": (
+                par.listen_mutual_s,
+                par.listen_mutual_sd_s,
+                par.listen_away_s,
+                par.listen_away_sd_s,
+            ),
+            "think": (
+                par.think_mutual_s,
+                par.think_mutual_sd_s,
+                par.think_away_s,
+                par.think_away_sd_s,
+            ),
+        }
+        self._mode: AversionMode = "none"
+        self.reset(0.0)
+
+    def reset(self, t_s: float) -> None:
+        """Forget whom it looked at; the mode stays."""
+        self._face: int | None = None
+        self._until_s = t_s
+        self._away: Vec3 | None = None
+        self._away_shift = 0
+        self._shifts = 0
+
+    @property
+    def mode(self) -> AversionMode:
+        """Say what the conversation is doing."""
+        return self._mode
+
+    def converse(self, mode: AversionMode, t_s: float) -> None:
+        """Say what the robot does from now on: talk, listen, think or none of these.
+
+        A change brings the gaze back to the face for a new look; thinking looks away at
+        once, since that is when people do.
+
+        Raises:
+            ValueError: there is no such mode.
+        """
+        if mode not in MODES:
+            raise ValueError(f"no conversation mode {mode!r}; modes: {', '.join(MODES)}")
+        if mode == self._mode:
+            return
+        self._mode = mode
+        self._return()
+        if self._face is not None and mode != "none":
+            self._until_s = t_s if mode == "think" else t_s + self._mutual_s()
+
+    def step(self, target: Target, p_world_head_m: Vec3, t_s: float) -> Target:
+        """Give the target itself, or a place beside the face while looking away.
+
+        A place beside a face has kind "away", the id of the face, the face's centre as
+        centre (the head stays with the person) and a shift number of its own; the
+        number rises on leaving and on returning. In mode "none" targets pass unchanged,
+        but for the shifts that earlier looks away have added to the count.
+        """
+        self._attend(target, t_s)
+        if self._face is not None and self._mode != "none" and t_s >= self._until_s:
+            self._turn(target, p_world_head_m, t_s)
+        if self._away is not None:
+            return self._beside(target, self._away, t_s)
+        if self._shifts == 0:
+            return target
+        return target._replace(shift=target.shift + self._shifts)
+
+    def _attend(self, target: Target, t_s: float) -> None:
+        """Begin anew with another face; come back when there is none."""
+        face = target.id if target.kind == "face" else None
+        if face == self._face:
+            return
+        self._face = face
+        self._return()
+        if face is not None and self._mode != "none":
+            self._until_s = t_s + self._mutual_s()
+
+    def _turn(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
+        """Leave the face, or return to it, when the time is over."""
+        if self._away is not None:
+            self._return()
+            self._until_s = t_s + self._mutual_s()
+            return
+        self._away = self._place(_centre(target), p_world_head_m)
+        self._shifts += 1
+        self._away_shift = target.shift + self._shifts
+        self._until_s = t_s + self._away_s()
+
+    def _return(self) -> None:
+        if self._away is not None:
+            self._away = None
+            self._shifts += 1
+
+    def _beside(self, target: Target, away: Vec3, t_s: float) -> Target:
+        """Make the target of a look away."""
+        return target._replace(
+            p_world_m=away,
+            v_world_m_s=(0.0, 0.0, 0.0),
+            at_s=t_s,
+            kind="away",
+            top_down=True,
+            part=None,
+            shift=self._away_shift,
+            why=f"looking away from face {target.id} ({self._mode})",
+            centre_world_m=_centre(target),
+        )
+
+    def _place(self, face: Vec3, p_world_head_m: Vec3) -> Vec3:
+        """Draw a point beside the face, at its distance."""
+        rel = sub(face, p_world_head_m)
+        ahead = unit(rel)
+        right = unit(cross(ahead, (0.0, 0.0, 1.0)))
+        up = cross(right, ahead)
+        angle, way = radians(self._angle_deg()), radians(self._way_deg())
+        aside = add(scale(right, cos(way)), scale(up, sin(way)))
+        looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
+        return add(p_world_head_m, scale(looking, norm(rel)))
+
+    def _angle_deg(self) -> float:
+        """Draw how far away."""
+        par = self._params
+        most = par.listen_most_deg if self._mode == "listen" else par.talk_most_deg
+        # The law's P, of those only that go at least as far as asked for; never 0.
+        p_most = min(_P_MOST, _P_TOP * exp(-par.least_deg / _SCALE_DEG))
+        p = (1.0 - float(self._rng.random())) * p_most
+        return min(most, -_SCALE_DEG * log(p / _P_TOP))
+
+    def _way_deg(self) -> float:
+        """Draw which way, 0 right and 90 up: a sector of the table and a way within it."""
+        if self._mode == "think" and self._rng.random() < self._params.think_up_share:
+            sector = _UP
+        else:
+            sector = self._sector()
+        return 45.0 * sector + float(self._rng.uniform(-22.5, 22.5))
+
+    def _sector(self) -> int:
+        dice = float(self._rng.random()) * sum(DIRECTIONS_PERCENT)
+        for sector, share in enumerate(DIRECTIONS_PERCENT):
+            dice -= share
+            if dice < 0.0:
+                return sector
+        return len(DIRECTIONS_PERCENT) - 1  # rounding
+
+    def _mutual_s(self) -> float:
+        """Draw a time on the face."""
+        mean, sd, _, _ = self._times[self._mode]
+        return min(self._params.longest_mutual_s, self._time_s(mean, sd))
+
+    def _away_s(self) -> float:
+        """Draw a time away from it."""
+        _, _, mean, sd = self._times[self._mode]
+        return self._time_s(mean, sd)
+
+    def _time_s(self, mean_s: float, sd_s: float) -> float:
+        """Draw from the log-normal law with a mean and standard deviation."""
+        sigma2 = log(1.0 + (sd_s / mean_s) ** 2)
+        drawn = mean_s * exp(sqrt(sigma2) * float(self._rng.standard_normal()) - 0.5 * sigma2)
+        return max(drawn, self._params.shortest_s)
+
+
+def _centre(target: Target) -> Vec3:
+    return target.p_world_m if target.centre_world_m is None else target.centre_world_m

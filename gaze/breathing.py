@@ -1,0 +1,65 @@
+"""Breathing: a slow sway of the neck that says somebody is in there.
+
+Pitch of 0.5 to 1.5 deg at 0.2 to 0.3 Hz; heads that breathe slowly while idle are
+judged more alive. The sway is added to what the head model wishes, and as the eyes
+take whatever the head does not, they compensate it and the gaze stays where it is.
+"""
+
+from dataclasses import dataclass, field
+from math import cos, pi, radians, sin
+
+from gaze.saccade import min_jerk
+from gaze.types import Angles3
+
+_STILL: Angles3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class BreathingParams:
+    """Depth and pace."""
+
+    pitch_deg: float = field(
+        default=0.6,
+        metadata={
+            "low": 0.0,
+            "high": 5.0,
+            "unit": "deg",
+            "says": "how far the head nods up and down with the breath; 0 is not at all",
+        },
+    )
+    roll_deg: float = field(
+        default=0.0,
+        metadata={
+            "low": 0.0,
+            "high": 5.0,
+            "unit": "deg",
+            "says": "how far it rolls to each side, a quarter of a breath later",
+        },
+    )
+    rate_hz: float = field(
+        default=0.25,
+        metadata={"low": 0.02, "high": 1.0, "unit": "Hz", "says": "breaths in a second"},
+    )
+
+
+class Breathing:
+    """Sway of the neck as a closed form of the time."""
+
+    def __init__(self, params: BreathingParams) -> None:
+        """Take depth and pace."""
+        self._pitch_rad = radians(params.pitch_deg)
+        self._roll_rad = radians(params.roll_deg)
+        self._rate_hz = params.rate_hz
+        self.reset(0.0)
+
+    def reset(self, t_s: float) -> None:
+        """Begin to breathe: the sway grows from nothing within the first breath."""
+        self._start_s = t_s
+
+    def step(self, t_s: float) -> Angles3:
+        """Give the (yaw, pitch, roll) to add to the head's; yaw is always 0."""
+        breaths = (t_s - self._start_s) * self._rate_hz
+        if breaths <= 0.0 or (self._pitch_rad == 0.0 and self._roll_rad == 0.0):
+            return _STILL
+        depth, turn = min_jerk(breaths), 2.0 * pi * breaths
+        return (0.0, depth * self._pitch_rad * sin(turn), -depth * self._roll_rad * cos(turn))

@@ -1,0 +1,177 @@
+"""Interest that wears off: habituation to what is looked at, and inhibition of return.
+
+Habituation, as in Pan et al. 2020 ("Realistic and interactive robot gaze"): the interest h
+in what is attended falls, the interest in everything else recovers, and what is compared
+is h times the pull. Without it a gaze stares. It belongs to an identity and outlives its
+absence: somebody who comes back at once is not new.
+
+Inhibition of return: for a moment the gaze avoids the place it has just left, as in
+Ruesch et al. 2008 (a Gaussian about that place that decays).
+"""
+
+from dataclasses import dataclass, field
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+
+from gaze.types import Floats, Vec3
+
+
+@dataclass(frozen=True)
+class HabituationParams:
+    """Rates of interest, and the place that is avoided."""
+
+    fall_1_s: float = field(
+        default=0.2,
+        metadata={
+            "low": 0.0,
+            "high": 10.0,
+            "unit": "1/s",
+            "says": "how fast interest in what is looked at falls from 1; 0 for never",
+        },
+    )
+    rise_1_s: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.01,
+            "high": 10.0,
+            "unit": "1/s",
+            "says": "how fast it recovers in what is not looked at",
+        },
+    )
+    rule_floor: float = field(
+        default=0.6,
+        metadata={
+            "low": 0.0,
+            "high": 1.0,
+            "unit": "",
+            "says": "interest kept in what a rule points at; lower: the gaze changes sooner "
+            "between several people",
+        },
+    )
+    return_strength: float = field(
+        default=0.5,
+        metadata={
+            "low": 0.0,
+            "high": 1.0,
+            "unit": "",
+            "says": "how strongly the place just left is avoided; 0 for not at all",
+        },
+    )
+    return_sigma_deg: float = field(
+        default=4.0,
+        metadata={
+            "low": 0.1,
+            "high": 45.0,
+            "unit": "deg",
+            "says": "standard deviation of that place",
+        },
+    )
+    return_s: float = field(
+        default=1.5,
+        metadata={
+            "low": 0.05,
+            "high": 60.0,
+            "unit": "s",
+            "says": "time constant with which that is over",
+        },
+    )
+
+
+class _Left(NamedTuple):
+    """A place the gaze has left, and when."""
+
+    p_world_m: Vec3
+    at_s: float
+
+
+class Habituation:
+    """Keeps the interest in every identity and the places left."""
+
+    def __init__(self, params: HabituationParams) -> None:
+        """Take the rates."""
+        self._params = params
+        self.reset(0.0)
+
+    def reset(self, t_s: float) -> None:
+        """Find everything interesting again."""
+        # Only those below full interest are kept: the ones attended in the last 1/rise_1_s
+        # seconds, a handful however many bodies there are.
+        self._interest: dict[int, float] = {}
+        self._left: list[_Left] = []
+        self._at_s = t_s
+
+    def leave(self, p_world_m: Vec3, t_s: float) -> None:
+        """Note that the gaze has left a place."""
+        if self._params.return_strength > 0.0:
+            self._left.append(_Left(p_world_m, t_s))
+
+    def step(
+        self,
+        ids: tuple[int, ...],
+        p_world_m: Floats,
+        p_world_eye_m: Vec3,
+        attended_id: int,
+        t_s: float,
+    ) -> Floats:
+        """Give (n,) the interest 0..1 in each body.
+
+        ids, p_world_m: the bodies in view and their centres, (n, 3)
+        attended_id: what has been looked at since the step before; -1 for nothing
+        """
+        self._habituate(attended_id, max(0.0, t_s - self._at_s))
+        self._at_s = t_s
+        interest = np.ones(len(ids))
+        for id, left in self._interest.items():
+            if id in ids:
+                interest[ids.index(id)] = left
+        self._left = [one for one in self._left if t_s - one.at_s < 4.0 * self._params.return_s]
+        if self._left:
+            self._avoid(interest, ids, p_world_m, p_world_eye_m, attended_id, t_s)
+        return interest
+
+    def for_rule(self, interest: Floats) -> Floats:
+        """Give the interest in bodies that a rule points at: it does not go below the floor."""
+        floor = self._params.rule_floor
+        out: Floats = floor + (1.0 - floor) * interest
+        return out
+
+    def _habituate(self, attended_id: int, dt_s: float) -> None:
+        """Let interest fall in what is attended and rise in the rest."""
+        risen = self._params.rise_1_s * dt_s
+        attended = self._interest.pop(attended_id, 1.0)
+        self._interest = {
+            id: left + risen for id, left in self._interest.items() if left + risen < 1.0
+        }
+        attended = max(0.0, attended - self._params.fall_1_s * dt_s)
+        if attended_id >= 0 and attended < 1.0:
+            self._interest[attended_id] = attended
+
+    def _avoid(
+        self,
+        interest: Floats,
+        ids: tuple[int, ...],
+        p_world_m: Floats,
+        p_eye: Vec3,
+        attended_id: int,
+        t_s: float,
+    ) -> None:
+        """Lower the interest in bodies near the places left; what is attended is exempt."""
+        par = self._params
+        places = np.array([one.p_world_m for one in self._left]) - np.asarray(p_eye)
+        ages = t_s - np.array([one.at_s for one in self._left])
+        cosines = _directions(p_world_m - np.asarray(p_eye)) @ _directions(places).T
+        angles = np.arccos(np.clip(cosines, -1.0, 1.0))
+        sigmas = angles / radians(par.return_sigma_deg)
+        near = np.exp(-0.5 * sigmas * sigmas - ages / par.return_s)
+        factor = (1.0 - par.return_strength * near).prod(axis=1)
+        if attended_id in ids:
+            factor[ids.index(attended_id)] = 1.0
+        interest *= factor
+
+
+def _directions(rel_m: Floats) -> Floats:
+    """Give the directions of (n, 3) vectors."""
+    out: Floats = rel_m / np.maximum(np.sqrt((rel_m * rel_m).sum(axis=1, keepdims=True)), 1e-9)
+    return out

@@ -1,0 +1,253 @@
+"""Fixations on a face -> the walk that would have made them: transitions and dwell times.
+
+Nakamoto & Tsuruno (3.2.2, 3.2.3) count how often a look at one part is followed by a look at
+another, and take mean and SD of the dwell times. So does this, with three choices for cells
+that a recording of finite length fills badly, and with a confidence interval for each number.
+Intervals are percentiles over resampled recordings (Efron's bootstrap).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from gaze.types import PART_NAMES, PARTS, Floats
+
+SMOOTHINGS = ("none", "laplace", "bootstrap")
+
+# Fixations may overlap by this much: times are often written with three digits.
+_OVERLAP_S = 0.005
+
+
+class Fixation(NamedTuple):
+    """One look: its part, None where it lay outside all parts, its start and duration."""
+
+    part: str | None
+    start_s: float
+    duration_s: float
+
+
+class Interval(NamedTuple):
+    """A number with the ends of its confidence interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class FitParams:
+    """How a walk is fitted."""
+
+    smoothing: str = field(
+        default="laplace",
+        metadata={
+            "choices": SMOOTHINGS,
+            "unit": "",
+            "says": "plain shares, shares after adding pseudo_count, or mean over resamples",
+        },
+    )
+    pseudo_count: float = field(
+        default=0.5,
+        metadata={
+            "low": 0.001,
+            "high": 10.0,
+            "unit": "",
+            "says": "added to every count by laplace smoothing",
+        },
+    )
+    confidence: float = field(
+        default=0.95,
+        metadata={"low": 0.5, "high": 0.999, "unit": "", "says": "level of the intervals"},
+    )
+    resamples: int = field(
+        default=1000,
+        metadata={"low": 100, "high": 100000, "unit": "", "says": "resampled recordings"},
+    )
+    fewest: int = field(
+        default=50,
+        metadata={
+            "low": 2,
+            "high": 100000,
+            "unit": "",
+            "says": "fixations on the face below which nothing is fitted",
+        },
+    )
+    longest_gap_s: float = field(
+        default=0.5,
+        metadata={
+            "low": 0.01,
+            "high": 60.0,
+            "unit": "s",
+            "says": "fixations further apart are no transition: what lay between is unknown",
+        },
+    )
+    fewest_dwells: int = field(
+        default=5,
+        metadata={
+            "low": 2,
+            "high": 1000,
+            "unit": "",
+            "says": "a part with fewer fixations gets mean and SD of all parts together",
+        },
+    )
+
+
+@dataclass(frozen=True)
+class WalkFit:
+    """A fitted walk; rows and columns in the order of PARTS, rows from, columns to.
+
+    counts:  transitions seen; matrix: their probabilities with intervals
+    visits:  fixations per part; outside: fixations on no part
+    dwell_mean_s, dwell_sd_s: per part, with intervals
+    pooled:  parts too rarely looked at, whose dwell is that of all parts together
+    start:   part of the first fixation on the face
+    """
+
+    counts: tuple[tuple[int, ...], ...]
+    matrix: tuple[tuple[Interval, ...], ...]
+    visits: tuple[int, ...]
+    outside: int
+    dwell_mean_s: tuple[Interval, ...]
+    dwell_sd_s: tuple[Interval, ...]
+    pooled: tuple[str, ...]
+    start: str
+
+
+def fit_walk(fixations: Sequence[Fixation], params: FitParams, rng: np.random.Generator) -> WalkFit:
+    """Fit the walk to fixations in the order of time.
+
+    Raises:
+        ValueError: the fixations cannot be trusted; the message says why.
+    """
+    _refuse_untrustworthy(fixations, params)
+    counts = _transitions(fixations, params.longest_gap_s)
+    matrix = _matrix(counts, params, rng)
+    seconds = {
+        part: np.array([f.duration_s for f in fixations if f.part == part]) for part in PARTS
+    }
+    everywhere = np.concatenate(list(seconds.values()))
+    pooled = tuple(part for part in PARTS if len(seconds[part]) < params.fewest_dwells)
+    dwells = [
+        _dwell(everywhere if part in pooled else seconds[part], params, rng) for part in PARTS
+    ]
+    return WalkFit(
+        tuple(tuple(row) for row in counts.astype(int).tolist()),
+        matrix,
+        tuple(len(seconds[part]) for part in PARTS),
+        sum(f.part is None for f in fixations),
+        tuple(mean for mean, _ in dwells),
+        tuple(sd for _, sd in dwells),
+        pooled,
+        next(f.part for f in fixations if f.part is not None),
+    )
+
+
+def _refuse_untrustworthy(fixations: Sequence[Fixation], params: FitParams) -> None:
+    """Raise ValueError for what cannot be a recording of looks at a face."""
+    end_s, start_s = float("-inf"), float("-inf")
+    for number, look in enumerate(fixations, 1):
+        if look.part is not None and look.part not in PARTS:
+            raise ValueError(f"fixation {number}: no part {look.part!r}; {', '.join(PARTS)}")
+        if not isfinite(look.start_s) or not isfinite(look.duration_s) or look.duration_s <= 0.0:
+            raise ValueError(f"fixation {number}: start and duration must be finite, duration > 0")
+        if look.start_s <= start_s:
+            raise ValueError(f"fixation {number} does not begin after the one before: sort by time")
+        if look.start_s < end_s - _OVERLAP_S:
+            raise ValueError(
+                f"fixation {number} begins before the one before ends: check the units"
+            )
+        start_s, end_s = look.start_s, look.start_s + look.duration_s
+    inside = sum(look.part is not None for look in fixations)
+    if fixations and inside == 0:
+        raise ValueError(f"all {len(fixations)} fixations lie outside the parts of the face")
+    if inside < params.fewest:
+        raise ValueError(
+            f"{inside} fixations on the face are too few, {params.fewest} are needed:"
+            " record for longer"
+        )
+
+
+def _transitions(fixations: Sequence[Fixation], longest_gap_s: float) -> Floats:
+    """Count who follows whom, (8, 8), rows from; a look outside or a long gap breaks the chain."""
+    counts = np.zeros((len(PARTS), len(PARTS)))
+    for before, after in zip(fixations, fixations[1:], strict=False):
+        gap_s = after.start_s - before.start_s - before.duration_s
+        if before.part is not None and after.part is not None and gap_s <= longest_gap_s:
+            counts[PARTS.index(before.part), PARTS.index(after.part)] += 1.0
+    return counts
+
+
+def _matrix(
+    counts: Floats, params: FitParams, rng: np.random.Generator
+) -> tuple[tuple[Interval, ...], ...]:
+    """Estimate the transition probabilities and their intervals."""
+    added = params.pseudo_count if params.smoothing == "laplace" else 0.0
+    if added == 0.0:
+        _refuse_dead_ends(counts)
+    total = counts.sum()
+    if total == 0.0:
+        raise ValueError("no two fixations on the face follow each other: nothing to count")
+    drawn = rng.multinomial(int(total), counts.ravel() / total, size=params.resamples)
+    resampled = _shares(np.asarray(drawn.reshape(-1, *counts.shape) + added, dtype=np.float64))
+    value = _shares(counts + added)
+    if params.smoothing == "bootstrap":
+        value = _shares(np.asarray(np.nanmean(resampled, axis=0), dtype=np.float64))
+    outer = 0.5 * (1.0 - params.confidence)
+    low, high = np.nanquantile(resampled, (outer, 1.0 - outer), axis=0)
+    low, high = _never_and_always(counts, low, high, params.confidence)
+    return tuple(
+        tuple(Interval(*cell) for cell in zip(*row, strict=True))
+        for row in zip(value.tolist(), low.tolist(), high.tolist(), strict=True)
+    )
+
+
+def _shares(counts: Floats) -> Floats:
+    """Divide rows by their sums; a row without counts becomes NaN."""
+    sums = counts.sum(axis=-1, keepdims=True)
+    shares: Floats = np.divide(counts, sums, out=np.full(counts.shape, np.nan), where=sums > 0.0)
+    return shares
+
+
+def _refuse_dead_ends(counts: Floats) -> None:
+    """Refuse parts that the walk would never leave, or would not know how to."""
+    away = counts.sum(axis=1) - np.diag(counts)
+    stuck = [PART_NAMES[part] for part, n in zip(PARTS, away, strict=True) if n == 0.0]
+    if stuck:
+        raise ValueError(
+            f"no transition leads away from {', '.join(stuck)}:"
+            " record for longer or take laplace smoothing"
+        )
+
+
+def _never_and_always(
+    counts: Floats, low: Floats, high: Floats, confidence: float
+) -> tuple[Floats, Floats]:
+    """Widen intervals of cells that resampling cannot move: seen never, or every time.
+
+    Of something not seen in n trials, p <= 1 - (1 - confidence)^(1/n) is sure to that level
+    (the "rule of three" for 95 %).
+    """
+    n = counts.sum(axis=1, keepdims=True)
+    surprise = np.where(n > 0.0, (1.0 - confidence) ** (1.0 / np.maximum(n, 1.0)), 0.0)
+    high = np.where(counts == 0.0, np.maximum(high, 1.0 - surprise), high)
+    low = np.where(counts == n, np.minimum(low, surprise), low)
+    return low, high
+
+
+def _dwell(
+    seconds: Floats, params: FitParams, rng: np.random.Generator
+) -> tuple[Interval, Interval]:
+    """Give mean and SD of dwell times with their intervals."""
+    n = len(seconds)
+    drawn = [seconds[rng.integers(0, n, n)] for _ in range(params.resamples)]
+    outer = 0.5 * (1.0 - params.confidence)
+    ends = (outer, 1.0 - outer)
+    mean_ends = np.quantile([d.mean() for d in drawn], ends).tolist()
+    sd_ends = np.quantile([d.std(ddof=1) for d in drawn], ends).tolist()
+    return (
+        Interval(float(seconds.mean()), *mean_ends),
+        Interval(float(seconds.std(ddof=1)), *sd_ends),
+    )

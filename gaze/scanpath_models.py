@@ -1,0 +1,181 @@
+"""Four ways to look at a face: the measured walk and the three it is compared with.
+
+MarkovWalk     the measured walk over eight parts (Nakamoto & Tsuruno 3.2)
+SimpleCycle    face centre, right eye, left eye, again (4.4.2)
+FaceTracking   the face centre, always (4.4.3)
+RandomAngles   eyes to random angles at random intervals (4.4.4)
+
+All know time as an argument, throw dice only where given, and are driven alike: ``enter``
+when another face is looked at, then ``step`` every tick.
+"""
+
+from collections.abc import Sequence
+from math import radians
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from gaze.angles import add, direction, norm, rotate, rotation, scale, sub, yaw_pitch
+from gaze.scanpath_dwell import Draw
+from gaze.types import PARTS, Angles2, Face, Floats, Vec3
+
+
+class Look(NamedTuple):
+    """What is looked at on a face: the point, its part where it is one, whether it is new."""
+
+    p_world_m: Vec3
+    part: str | None
+    moved: bool
+
+
+class FaceLooks(Protocol):
+    """A way to look at a face."""
+
+    def enter(self) -> None:
+        """Begin anew: another face is looked at."""
+        ...
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+        """Give what to look at; ``settled``: the gaze has arrived at the last look."""
+        ...
+
+
+class MarkovWalk:
+    """Draw the next part, move there, hold it for its dwell time, draw again.
+
+    A part that is drawn again is a refixation: the gaze stays for another dwell.
+    """
+
+    def __init__(
+        self,
+        parts: Sequence[str],
+        matrix: Floats,
+        dwells: Sequence[Draw],
+        start: int,
+        rng: np.random.Generator,
+    ) -> None:
+        """Take parts, (n, n) probabilities (rows from, columns to), dwell laws and the dice."""
+        self._parts = tuple(parts)
+        self._columns = tuple(PARTS.index(part) for part in parts)
+        self._cumulative: list[list[float]] = np.cumsum(matrix, axis=1).tolist()
+        self._dwells = tuple(dwells)
+        self._start = start
+        self._rng = rng
+        self.enter()
+
+    def enter(self) -> None:
+        """Go to the start part."""
+        self._part = self._start
+        self._until_s: float | None = None
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+        """Start the dwell on arrival; after it draw until another part comes."""
+        before = self._part
+        if self._until_s is not None:
+            self._walk(self._until_s, t_s)
+        elif settled:
+            self._until_s = t_s + self.dwell_s(self._part)
+        point = face.parts_world_m[self._columns[self._part]]
+        return Look(point, self._parts[self._part], self._part != before)
+
+    def next_part(self, part: int) -> int:
+        """Draw the part that follows ``part`` (both count from 0 in the order given)."""
+        dice = self._rng.random()
+        row = self._cumulative[part]
+        for following, edge in enumerate(row):
+            if dice < edge:
+                return following
+        return row.index(row[-1])  # rounding left the sum a hair below 1
+
+    def dwell_s(self, part: int) -> float:
+        """Draw a dwell time of a part."""
+        return self._dwells[part](self._rng)
+
+    def _walk(self, until_s: float, t_s: float) -> None:
+        while t_s >= until_s:
+            following = self.next_part(self._part)
+            if following != self._part:
+                self._part = following
+                self._until_s = None
+                return
+            until_s += self.dwell_s(self._part)
+        self._until_s = until_s
+
+
+class SimpleCycle:
+    """A fixed round of parts, each held for its own time after arrival."""
+
+    def __init__(self, parts: Sequence[str], dwell_s: Sequence[float]) -> None:
+        """Take the parts in their order and the time on each."""
+        self._parts = tuple(parts)
+        self._columns = tuple(PARTS.index(part) for part in parts)
+        self._dwell_s = tuple(dwell_s)
+        self.enter()
+
+    def enter(self) -> None:
+        """Go to the first part."""
+        self._at = 0
+        self._until_s: float | None = None
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+        """Start the time on arrival, go on when it is over."""
+        moved = False
+        if self._until_s is None:
+            if settled:
+                self._until_s = t_s + self._dwell_s[self._at]
+        elif t_s >= self._until_s:
+            self._at = (self._at + 1) % len(self._parts)
+            self._until_s = None
+            moved = True
+        return Look(face.parts_world_m[self._columns[self._at]], self._parts[self._at], moved)
+
+
+class FaceTracking:
+    """The face centre, always; the paper takes the tip of the nose for it (4.4.2)."""
+
+    def enter(self) -> None:
+        """Do nothing: there is nothing to remember."""
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+        """Give the centre."""
+        return Look(face.p_world_m, "N", False)
+
+
+class RandomAngles:
+    """Eyes to random angles at random intervals, whatever the face shows.
+
+    Angles are even within +-angle_deg in yaw and in pitch, and turn about the direction
+    from the head to the face, which is where the head turns to. Intervals run from jump to
+    jump; the paper prints them as 0-3.0 ms, shorter than one of its frames: seconds are meant.
+    """
+
+    def __init__(self, angle_deg: float, longest_s: float, rng: np.random.Generator) -> None:
+        """Take the largest angle, the longest interval, and the dice."""
+        self._angle_rad = radians(angle_deg)
+        self._longest_s = longest_s
+        self._rng = rng
+        self.enter()
+
+    def enter(self) -> None:
+        """Draw the first angles at once."""
+        self._offset_rad: Angles2 = self._angles()
+        self._until_s: float | None = None
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+        """Jump when the interval is over."""
+        if self._until_s is None:
+            self._until_s = t_s + self._interval_s()
+        moved = t_s >= self._until_s
+        while t_s >= self._until_s:
+            self._offset_rad = self._angles()
+            self._until_s += self._interval_s()
+        to_face = sub(face.p_world_m, p_world_head_m)
+        way = rotate(rotation((*yaw_pitch(to_face), 0.0)), direction(self._offset_rad))
+        return Look(add(p_world_head_m, scale(way, norm(to_face))), None, moved)
+
+    def _angles(self) -> Angles2:
+        yaw, pitch = self._rng.uniform(-self._angle_rad, self._angle_rad, 2).tolist()
+        return yaw, pitch
+
+    def _interval_s(self) -> float:
+        return self._longest_s * (1.0 - self._rng.random())  # never 0

@@ -1,0 +1,181 @@
+"""When the gaze jumps and when it follows: one rule.
+
+A new object or part of it (the target's event flag) brings a saccade after the latency.
+Without that, an error beyond ``saccade_deg`` does, unless the eye is about to cross the
+target by itself: with the error PE and the retinal slip RV the crossing is T = -PE / RV
+away, and between 40 and 180 ms it is left to smooth following (de Brouwer et al. 2002).
+Where landings scatter, what one leaves beyond ``correct_deg`` is corrected by another
+saccade 150 to 250 ms later; an exact landing errs only where the target was misjudged,
+and that is closed smoothly. No error brings a saccade sooner after the last than the
+refractory time, and none starts while another is in flight.
+"""
+
+from dataclasses import dataclass, field
+from math import inf, radians
+
+from gaze.angles import dot, norm
+from gaze.pursuit import Slip
+
+
+@dataclass(frozen=True)
+class ShiftParams:
+    """Thresholds and times of that rule."""
+
+    saccade_deg: float = field(
+        default=2.0,
+        metadata={
+            "low": 0.1,
+            "high": 30.0,
+            "unit": "deg",
+            "says": "error that is closed by a saccade instead of smooth following",
+        },
+    )
+    smallest_shift_deg: float = field(
+        default=0.3,
+        metadata={
+            "low": 0.0,
+            "high": 10.0,
+            "unit": "deg",
+            "says": "a new target nearer than this needs no saccade",
+        },
+    )
+    refractory_ms: float = field(
+        default=150.0,
+        metadata={
+            "low": 0.0,
+            "high": 2000.0,
+            "unit": "ms",
+            "says": "pause before an error alone may bring the next saccade",
+        },
+    )
+    latency_ms: float = field(
+        default=0.0,
+        metadata={
+            "low": 0.0,
+            "high": 1000.0,
+            "unit": "ms",
+            "says": "from a new target to the saccade; people 200",
+        },
+    )
+    crossing_least_ms: float = field(
+        default=40.0,
+        metadata={
+            "low": 0.0,
+            "high": 1000.0,
+            "unit": "ms",
+            "says": "an eye that crosses the target later than this ...",
+        },
+    )
+    crossing_most_ms: float = field(
+        default=180.0,
+        metadata={
+            "low": 0.0,
+            "high": 1000.0,
+            "unit": "ms",
+            "says": "... and sooner than this needs no saccade",
+        },
+    )
+    correct_deg: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.1,
+            "high": 30.0,
+            "unit": "deg",
+            "says": "error after a scattered landing that is corrected by a small saccade",
+        },
+    )
+    correct_after_ms: float = field(
+        default=200.0,
+        metadata={
+            "low": 0.0,
+            "high": 1000.0,
+            "unit": "ms",
+            "says": "from landing to that correction; people 150 to 250",
+        },
+    )
+
+
+class ShiftRule:
+    """Remembers the events and says when a saccade is due."""
+
+    def __init__(self, params: ShiftParams, scatters: bool) -> None:
+        """Take thresholds and times, and whether landings scatter and are corrected."""
+        self._scatters = scatters
+        self._smallest_rad = radians(params.smallest_shift_deg)
+        self._saccade_rad = radians(params.saccade_deg)
+        self._correct_rad = radians(params.correct_deg)
+        self._latency_s = params.latency_ms / 1e3
+        self._refractory_s = params.refractory_ms / 1e3
+        self._correct_s = params.correct_after_ms / 1e3
+        self._smooth_s = (params.crossing_least_ms / 1e3, params.crossing_most_ms / 1e3)
+        self.reset(0.0)
+
+    def reset(self, t_s: float) -> None:
+        """Begin with no event and well rested."""
+        self._shift: int | None = None
+        self._due_s: float | None = None
+        self._landed_s = -inf
+        self._erred: bool | None = False
+        self.onset_s = t_s
+
+    def tell(self, shift: int, wait_s: float, free_s: float, t_s: float) -> None:
+        """Take note of the target's event count.
+
+        wait_s: what the eyes wait beyond the latency, because the head goes first
+        free_s: when a saccade in flight lands, else any time up to now
+        """
+        if shift == self._shift:
+            return
+        self._shift = shift
+        self._erred = False
+        if self._due_s is None:
+            # The latency counts from the first event that is not answered yet; a later
+            # one changes where the saccade goes.
+            self._due_s = self.onset_s = max(free_s, t_s + self._latency_s + wait_s)
+
+    def land(self, t_s: float) -> None:
+        """Take note of the end of a saccade."""
+        self._landed_s = t_s
+        self._erred = None if self._scatters else False
+
+    def due(self, slip: Slip, t_s: float) -> bool:
+        """Tell whether a saccade starts now; to be asked only between saccades."""
+        error = norm(slip.error_rad)
+        if self._erred is None:
+            self._erred = error > self._correct_rad
+        if self._due_s is not None:
+            if t_s < self._due_s - 1e-9:
+                return False
+            self._due_s = None
+            if error > self._smallest_rad:
+                return self._go(t_s)
+        rested_s = t_s - self._landed_s
+        if self._erred:
+            if error <= self._correct_rad:
+                self._erred = False
+            elif rested_s >= self._correct_s - 1e-9:
+                return self._go(t_s)
+        if error <= self._saccade_rad or rested_s < self._refractory_s:
+            return False
+        return self._go(t_s) if not self._crosses(slip, error) else False
+
+    @property
+    def waits(self) -> bool:
+        """Tell whether a new target has come and its saccade is still to start."""
+        return self._due_s is not None
+
+    @property
+    def corrects(self) -> bool:
+        """Tell whether what the last saccade left waits for a correction."""
+        return bool(self._erred)
+
+    def _go(self, t_s: float) -> bool:
+        self.onset_s = t_s
+        self._erred = False
+        return True
+
+    def _crosses(self, slip: Slip, error_rad: float) -> bool:
+        """Tell whether the target meets the line of sight soon by its own motion."""
+        closing = -dot(slip.error_rad, slip.slip_rad_s) / error_rad
+        least, most = self._smooth_s
+        return closing > 0.0 and least < error_rad / closing < most

@@ -1,0 +1,236 @@
+"""Looking away from faces; numbered checks are listed in docs/checks.md."""
+
+from itertools import pairwise
+from math import atan2, degrees
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from gaze.angles import angle_between, sub, unit
+from gaze.aversion import DIRECTIONS_PERCENT, Aversion, AversionMode, AversionParams
+from gaze.types import Target, Vec3
+
+DT = 0.02
+HEAD: Vec3 = (0.05, 0.0, 0.2)
+FACE: Vec3 = (1.2, 0.1, 0.35)
+EYE: Vec3 = (1.2, 0.13, 0.38)
+
+
+def face(shift: int = 1, name: int = 4) -> Target:
+    return Target(
+        EYE, (0.0, 0.1, 0.0), 0.0, "face", name, 0.5, False, "LE", shift, "left eye of face 4", FACE
+    )
+
+
+def aversion(seed: int = 0, **params: float) -> Aversion:
+    return Aversion(AversionParams(**params), np.random.default_rng(seed))
+
+
+class Stay(NamedTuple):
+    """One stay on the face or away from it: its kind, length and place."""
+
+    kind: str
+    seconds: float
+    place: Vec3
+
+
+def stays(model: Aversion, seconds: float, dt: float = DT) -> list[Stay]:
+    """Run on one face and give the complete stays."""
+    found, since = [], 0.0
+    last = model.step(face(), HEAD, 0.0)
+    for k in range(1, round(seconds / dt)):
+        now = model.step(face(), HEAD, k * dt)
+        if now.kind != last.kind:
+            found.append(Stay(last.kind, k * dt - since, last.p_world_m))
+            since = k * dt
+        last = now
+    return found
+
+
+@pytest.mark.parametrize(
+    ("mode", "bout", "bout_band", "share", "share_band"),
+    [("talk", 3.1, 0.8, 0.77, 0.08), ("listen", 7.9, 1.5, 0.95, 0.04)],
+)
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_e54_mutual_gaze(
+    mode: AversionMode, bout: float, bout_band: float, share: float, share_band: float, seed: int
+) -> None:
+    model = aversion(seed)
+    model.converse(mode, 0.0)
+    found = stays(model, 600.0, 0.005)
+    mutual = [s.seconds for s in found if s.kind == "face"]
+    away = [s.seconds for s in found if s.kind == "away"]
+    assert np.mean(mutual) == pytest.approx(bout, abs=bout_band)
+    assert sum(mutual) / (sum(mutual) + sum(away)) == pytest.approx(share, abs=share_band)
+    assert max(mutual) <= 15.0
+
+
+def test_long_times_keep_the_measured_spread() -> None:
+    model = aversion(5)
+    model.converse("talk", 0.0)
+    away = [s.seconds for s in stays(model, 20_000.0, 0.05) if s.kind == "away"]
+    assert np.mean(away) == pytest.approx(0.93, rel=0.05)
+    assert np.std(away) == pytest.approx(0.80, rel=0.15)
+    assert min(away) >= 0.2 - 1e-9
+
+
+def test_without_a_conversation_targets_pass_untouched() -> None:
+    model, target = aversion(), face()
+    for k in range(5000):
+        assert model.step(target, HEAD, k * DT) is target
+
+
+def test_only_faces_are_looked_away_from() -> None:
+    model = aversion()
+    model.converse("talk", 0.0)
+    hand = face()._replace(kind="hand")
+    assert all(model.step(hand, HEAD, k * DT) is hand for k in range(3000))
+
+
+def angles_and_ways(model: Aversion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Give how far away the stays are and which way, 0 right and 90 up, degrees."""
+    to_face = unit(sub(FACE, HEAD))
+    found = [s.place for s in stays(model, seconds) if s.kind == "away"]
+    far = [degrees(angle_between(to_face, sub(p, HEAD))) for p in found]
+    ways = []
+    for p in found:
+        way = sub(unit(sub(p, HEAD)), to_face)
+        ways.append(degrees(atan2(way[2], -way[1])) % 360.0)
+    return np.array(far), np.array(ways)
+
+
+def test_how_far_away_follows_the_published_law() -> None:
+    model = aversion(7, least_deg=0.0)
+    model.converse("talk", 0.0)
+    far, _ = angles_and_ways(model, 12_000.0)
+    assert far.mean() == pytest.approx(7.2, abs=0.5)
+    assert np.median(far) == pytest.approx(5.1, abs=0.5)
+    assert np.quantile(far, 0.9) == pytest.approx(16.3, abs=1.2)
+    assert far.max() == pytest.approx(27.5, abs=0.01)
+
+
+@pytest.mark.parametrize(("mode", "most"), [("talk", 27.5), ("listen", 22.7), ("think", 27.5)])
+def test_away_is_beside_the_face_and_within_the_cap(mode: AversionMode, most: float) -> None:
+    model = aversion(8)
+    model.converse(mode, 0.0)
+    far, _ = angles_and_ways(model, 4000.0)
+    assert far.min() >= 5.0 - 1e-6 and far.max() <= most + 1e-6
+    assert far.mean() > 9.0
+
+
+def test_directions_are_those_of_the_table() -> None:
+    model = aversion(9)
+    model.converse("talk", 0.0)
+    _, ways = angles_and_ways(model, 16_000.0)
+    counts = np.bincount(((ways + 22.5) // 45.0).astype(int) % 8, minlength=8)
+    expected = np.array(DIRECTIONS_PERCENT) / 100.0
+    assert np.abs(counts / counts.sum() - expected).max() < 0.025
+
+
+@pytest.mark.parametrize("before", ["none", "talk", "listen"])
+def test_thinking_looks_away_at_once(before: AversionMode) -> None:
+    model = aversion(10)
+    model.converse(before, 0.0)
+    assert model.step(face(), HEAD, 0.0).kind == "face"
+    model.converse("think", 0.01)
+    assert model.step(face(), HEAD, 0.02).kind == "away"
+
+
+def test_thinking_looks_mostly_up_and_for_longer() -> None:
+    model = aversion(10)
+    model.converse("think", 0.0)
+    found = [s for s in stays(model, 3000.0) if s.kind == "away"]
+    assert np.mean([s.seconds for s in found]) == pytest.approx(3.54, abs=0.3)
+    assert np.std([s.seconds for s in found]) == pytest.approx(1.26, abs=0.25)
+    assert np.mean([s.place[2] > FACE[2] for s in found]) > 0.75
+
+
+def test_a_place_away_keeps_the_head_with_the_person() -> None:
+    model = aversion(11)
+    model.converse("think", 0.0)
+    model.step(face(), HEAD, 0.0)
+    seen = [model.step(face(), HEAD, k * DT) for k in range(500)]
+    away = next(t for t in seen if t.kind == "away")
+    assert (away.id, away.part, away.top_down, away.centre_world_m) == (4, None, True, FACE)
+    assert away.v_world_m_s == (0.0, 0.0, 0.0)
+    assert away.why == "looking away from face 4 (think)"
+    distance = [float(np.linalg.norm(sub(p, HEAD))) for p in (away.p_world_m, FACE)]
+    assert distance[0] == pytest.approx(distance[1])
+
+
+def test_every_leave_and_return_is_one_new_shift_and_the_count_never_falls() -> None:
+    model = aversion(12)
+    model.converse("talk", 0.0)
+    # The part beneath changes every 0.4 s, also while the gaze is away.
+    seen = [model.step(face(k // 20), HEAD, k * DT) for k in range(5000)]
+    turns = 0
+    for before, now in pairwise(seen):
+        assert now.shift >= before.shift
+        if now.kind != before.kind:
+            turns += 1
+            assert now.shift > before.shift
+        elif now.kind == "away":
+            assert now == before._replace(at_s=now.at_s)
+    assert turns > 20
+    model.converse("none", 100.0)
+    after = model.step(face(250), HEAD, 100.02)
+    assert after.kind == "face" and after.shift > seen[-1].shift - 1
+    assert after == face(250)._replace(shift=after.shift)
+
+
+def test_another_face_is_looked_at_before_it_is_looked_away_from() -> None:
+    model = aversion(13)
+    model.converse("think", 0.0)
+    t = 0.0
+    while model.step(face(), HEAD, t).kind == "face":
+        t += DT
+    other = model.step(face(2, name=5), HEAD, t + DT)
+    assert (other.kind, other.id) == ("face", 5)
+    assert model.step(face(2, name=5), HEAD, t + 2 * DT).kind == "face"
+
+
+def test_a_change_of_the_conversation_returns_to_the_face() -> None:
+    model = aversion(14)
+    model.converse("think", 0.0)
+    t = 0.0
+    while model.step(face(), HEAD, t).kind == "face":
+        t += DT
+    model.converse("listen", t)
+    assert model.mode == "listen"
+    assert {model.step(face(), HEAD, t + k * DT).kind for k in range(50)} == {"face"}
+    model.converse("listen", t + 1.0)  # the same again changes nothing
+    with pytest.raises(ValueError, match="modes: none, talk, listen, think"):
+        model.converse("sing", t)  # type: ignore[arg-type]
+
+
+def test_a_face_straight_above_has_places_beside_it() -> None:
+    model = aversion(15)
+    model.converse("think", 0.0)
+    above = face()._replace(p_world_m=(0.05, 0.0, 1.2), centre_world_m=None)
+    away = next(t for k in range(1000) if (t := model.step(above, HEAD, k * DT)).kind == "away")
+    angle = angle_between((0.0, 0.0, 1.0), sub(away.p_world_m, HEAD))
+    assert 5.0 - 1e-6 <= degrees(angle) <= 27.5 + 1e-6
+
+
+def test_limits_that_contradict_are_refused() -> None:
+    with pytest.raises(ValueError, match="least_deg"):
+        AversionParams(least_deg=20.0, listen_most_deg=10.0)
+
+
+def test_same_dice_same_looks() -> None:
+    def run(seed: int) -> list[Stay]:
+        model = aversion(seed)
+        model.converse("talk", 0.0)
+        return stays(model, 60.0)
+
+    assert run(1) == run(1) != run(2)
+
+
+def test_reset_forgets_and_keeps_the_mode() -> None:
+    model = aversion(16)
+    model.converse("talk", 0.0)
+    stays(model, 30.0)
+    model.reset(40.0)
+    assert model.mode == "talk"
+    assert model.step(face(), HEAD, 40.0) == face()

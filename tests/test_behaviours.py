@@ -1,0 +1,266 @@
+"""The score of a scene's events; and the papers' scenes through the whole robot."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import degrees, pi, sin
+from typing import Any
+
+import numpy as np
+import pytest
+
+from config.schema import load_rig
+from gaze.types import Target, Vec3
+from robot.assemble import Assembly, Choice, assemble
+from robot.behaviours import Behaviours
+from robot.loop import Tick, run
+from sim_mock.scene import Event, Person, Scene, Thing, there_and_back
+from sim_mock.scene_camera import SceneCamera, SceneCameraParams
+from sim_mock.scenes import scenes
+
+FACE: Vec3 = (1.0, 0.0, 0.2)
+HAND: Vec3 = (0.7, 0.2, 0.1)
+
+
+def tick(t_s: float, kind: str, place: Vec3) -> Tick:
+    """Make a tick of which only time and target matter."""
+    unread: Any = None
+    target = Target(place, (0.0, 0.0, 0.0), t_s, kind, 1, 0.5, False, None, 0, "")
+    return Tick(t_s, unread, unread, None, None, target, unread, (), unread)
+
+
+def scored(
+    events: tuple[Event, ...],
+    looks: Callable[[float], tuple[str, Vec3]],
+    seconds: float = 10.0,
+    first_s: float = 5.0,
+) -> dict[str, dict[str, float | int | None]]:
+    score = Behaviours(events, 10.0)
+    for slot in range(round(seconds * 200) + 1):
+        score.note(tick(first_s + slot * 0.005, *looks(slot * 0.005)))
+    return score.figures()
+
+
+WAVE = Event("wave", "look", "hand", 2.0, 3.0, HAND, 0.3)
+RETURN = Event("return", "return", "face", 5.0, 6.3, FACE, 0.6)
+
+
+def test_latency_is_from_the_start_of_the_event_to_the_first_look() -> None:
+    found = scored((WAVE,), lambda t: ("hand", HAND) if 2.3 <= t < 2.8 else ("face", FACE))
+    assert found["wave"]["seen"] == found["wave"]["of"] == 1
+    assert found["wave"]["latency_s"] == pytest.approx(0.3, abs=0.006)
+    assert found["wave"]["share"] == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("kind", "place", "look_s"),
+    [("hand", HAND, 3.01), ("face", HAND, 2.3), ("hand", FACE, 2.3)],
+    ids=["too late", "another kind", "another hand elsewhere"],
+)
+def test_what_is_no_answer_is_not_counted_as_seen(kind: str, place: Vec3, look_s: float) -> None:
+    found = scored((WAVE,), lambda t: (kind, place) if t >= look_s else ("idle", FACE))
+    assert found["wave"] == {"seen": 0, "of": 1, "latency_s": None, "share": 0.0}
+
+
+def test_an_event_counts_when_it_is_over() -> None:
+    def looks(_: float) -> tuple[str, Vec3]:
+        return "hand", HAND
+
+    assert scored((WAVE,), looks, seconds=2.9)["wave"]["of"] == 0
+    assert scored((WAVE,), looks, seconds=3.1)["wave"]["of"] == 1
+
+
+def test_rounds_follow_each_other() -> None:
+    everything = Event("face", "look", "face", 0.0, 10.0, FACE, 0.6)
+    found = scored((WAVE, everything), lambda t: ("hand", HAND) if t > 11 else ("face", FACE), 35.0)
+    assert (found["wave"]["seen"], found["wave"]["of"]) == (3, 4)
+    assert (found["face"]["seen"], found["face"]["of"]) == (2, 3)
+
+
+def test_the_median_is_that_of_the_events_seen() -> None:
+    def looks(t: float) -> tuple[str, Vec3]:
+        number, phase_s = divmod(t, 10.0)
+        delay_s = (0.1, 0.5, 0.2, 9.0)[int(number)]
+        return ("hand", HAND) if phase_s > 2.0 + delay_s else ("face", FACE)
+
+    found = scored((WAVE,), looks, 39.9)["wave"]
+    assert (found["seen"], found["of"]) == (3, 4)
+    assert found["latency_s"] == pytest.approx(0.2, abs=0.006)
+
+
+def test_return_measures_the_time_away() -> None:
+    found = scored((RETURN,), lambda t: ("hand", HAND) if 5.2 <= t < 5.9 else ("face", FACE))
+    assert found["return"]["seen"] == 1
+    assert found["return"]["latency_s"] == pytest.approx(0.7, abs=0.011)
+    lost = scored((RETURN,), lambda t: ("hand", HAND) if t >= 5.2 else ("face", FACE))
+    assert lost["return"]["seen"] == 0
+    undisturbed = scored((RETURN,), lambda _: ("face", FACE))["return"]
+    assert undisturbed == {"seen": 1, "of": 1, "latency_s": None, "share": 1.0}
+
+
+class Lived:
+    """A scene as a robot lived through it: its ticks, and the scene's time of each."""
+
+    def __init__(self, made: Assembly, scene: Scene, seconds: float) -> None:
+        self.score = Behaviours(scene.events(), scene.round_s)
+        self.scene_s: list[float] = []
+        self.ticks: list[Tick] = []
+        self._scene, self._top_down = scene, made.robot.attention.top_down
+        made.robot.start(made.clock)
+        count = run(
+            made.robot,
+            made.clock,
+            made.loop,
+            lambda s: "seconds" if s > seconds else None,
+            self._watch,
+        )
+        assert count.stopped_by == "seconds"
+
+    def _watch(self, new: Tick) -> None:
+        self.ticks.append(new)
+        self.scene_s.append(new.t_s - self.ticks[0].t_s)
+        wanted = self._scene.behaviour(self.scene_s[-1])
+        if wanted is not None and wanted != self._top_down.behaviour:
+            self._top_down.behave(wanted)
+        self.score.note(new)
+
+    def within(self, start_s: float, end_s: float) -> list[Tick]:
+        pairs = zip(self.scene_s, self.ticks, strict=True)
+        return [each for t_s, each in pairs if start_s <= t_s < end_s]
+
+
+def made_for(scene: str, seed: int = 0) -> Assembly:
+    return assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=seed, scene=scene))
+
+
+@pytest.fixture(scope="module", params=[0, 7])
+def boxing(request: pytest.FixtureRequest) -> Lived:
+    scene = scenes()["boxing"]
+    return Lived(made_for("boxing", request.param), scene, scene.round_s + 0.05)
+
+
+def latency(figure: dict[str, float | int | None]) -> float:
+    assert figure["seen"] == figure["of"] and figure["of"]
+    assert isinstance(figure["latency_s"], float)
+    return figure["latency_s"]
+
+
+def test_e46_a_the_fist_of_a_punch_is_looked_at(boxing: Lived) -> None:
+    figure = boxing.score.figures()["punch"]
+    assert figure["of"] == 4
+    assert latency(figure) <= 0.4
+    for event in boxing._scene.events():
+        if event.name == "punch":
+            during = boxing.within(event.start_s, event.end_s)
+            first = next(each for each in during if each.target.kind == "hand")
+            assert not first.target.top_down  # its motion drew the gaze, not the guard's rule
+
+
+def test_e46_a_without_the_pull_of_motion_no_fist_is_looked_at() -> None:
+    rig = load_rig("desk")
+    dull = replace(rig.gaze.bottom_up, slide_rad_s=20.0, loom_1_s=20.0)
+    rig = replace(rig, gaze=replace(rig.gaze, bottom_up=dull))
+    made = assemble(rig, Choice(mock=True, fast=True, seed=0, scene="boxing"))
+    lived = Lived(made, scenes()["boxing"], 7.0)
+    figures = lived.score.figures()
+    assert (figures["punch"]["seen"], figures["punch"]["of"]) == (0, 2)
+    assert (figures["attack"]["seen"], figures["attack"]["of"]) == (1, 1)
+
+
+def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing: Lived) -> None:
+    figure = boxing.score.figures()["attack"]
+    assert figure["of"] == 3
+    assert latency(figure) < 0.6
+    for event in boxing._scene.events():
+        if event.name == "attack":
+            early = boxing.within(event.start_s - 1.0, event.start_s - 0.2)
+            assert "attack_target" not in {each.target.kind for each in early}
+            last = boxing.within(event.end_s - 0.1, event.end_s)
+            assert {each.target.kind for each in last} == {"attack_target"}
+
+
+def test_e46_c_the_face_otherwise(boxing: Lived) -> None:
+    figures = boxing.score.figures()
+    share = figures["face"]["share"]
+    assert share is not None and share >= 0.6
+    assert latency(figures["face"]) <= 0.5
+
+
+def test_e46_d_the_waved_hand_is_looked_at(boxing: Lived) -> None:
+    figure = boxing.score.figures()["wave"]
+    assert figure["of"] == 2
+    assert latency(figure) <= 0.4
+
+
+def test_e46_the_face_is_kept_while_the_opponent_steps_left_and_right(boxing: Lived) -> None:
+    figure = boxing.score.figures()["step"]
+    assert figure["of"] == 3 and figure["seen"] == 3
+    assert figure["share"] is not None and figure["share"] >= 0.6
+
+
+def test_a_hand_that_reaches_in_is_noticed_and_the_head_turns_to_it(boxing: Lived) -> None:
+    assert latency(boxing.score.figures()["reach"]) <= 0.5
+    for event in boxing._scene.events():
+        if event.name == "reach":
+            side = 1.0 if event.place_world_m[1] > 0.0 else -1.0
+            before, *_, last = boxing.within(event.start_s, event.end_s)
+            assert side * degrees(last.pose.head_rad[0] - before.pose.head_rad[0]) > 10.0
+
+
+def test_a_feint_draws_the_gaze_for_less_than_a_second(boxing: Lived) -> None:
+    assert latency(boxing.score.figures()["return"]) <= 1.0
+
+
+class Distracted:
+    """A still person, and a hand beside that moves for 0.3 s now and then."""
+
+    name = "distracted"
+    round_s = 20.0
+    behaviours = ("wait",)
+    starts_s = (3.0, 6.0, 9.0, 12.0, 15.0)
+
+    def __init__(self, way_m: Vec3) -> None:
+        self._way_m = way_m
+
+    def people(self, t_s: float) -> tuple[Person, ...]:
+        return (Person((1.0, 0.01 * sin(t_s), 0.22), (pi, 0.0), None),)
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        moved = sum(there_and_back(t_s - start_s, 0.15, 0.0, 0.15) for start_s in self.starts_s)
+        x, y, z = (a + moved * b for a, b in zip((0.8, 0.2, 0.05), self._way_m, strict=True))
+        return (Thing(0, "hand", (x, y, z), 0.06),)
+
+    def behaviour(self, t_s: float) -> str | None:
+        return "wait"
+
+    def events(self) -> tuple[Event, ...]:
+        return tuple(
+            Event("return", "return", "face", s, s + 1.5, (1.0, 0.0, 0.22), 0.5)
+            for s in self.starts_s
+        )
+
+
+@pytest.mark.parametrize("way_m", [(0.0, 0.2, 0.0), (0.0, 0.0, 0.15)], ids=["aside", "up"])
+def test_e48_back_on_the_face_within_a_second_of_a_distraction(way_m: Vec3) -> None:
+    made = made_for("boxing")
+    scene = Distracted(way_m)
+    made.robot.camera = SceneCamera(
+        SceneCameraParams(), scene, made.mount, made.poses.head_pose, np.random.default_rng(0)
+    )
+    lived = Lived(made, scene, 17.0)
+    figure = lived.score.figures()["return"]
+    assert (figure["seen"], figure["of"]) == (5, 5)
+    assert isinstance(figure["latency_s"], float)  # it was drawn away
+    assert 0.1 < figure["latency_s"] <= 1.0
+    for start_s in scene.starts_s:
+        away = [each for each in lived.within(start_s, start_s + 1.5) if each.target.kind != "face"]
+        assert len(away) * 0.005 <= 1.0
+
+
+def test_face_to_face_keeps_the_face_through_all_heights() -> None:
+    scene = scenes()["face-to-face"]
+    lived = Lived(made_for("face-to-face"), scene, scene.round_s + 0.05)
+    figure = lived.score.figures()["face"]
+    assert figure["seen"] == figure["of"] == 1
+    assert figure["share"] is not None and figure["share"] > 0.9
+    pitch = [degrees(each.pose.head_rad[1]) for each in lived.ticks]
+    assert max(pitch) > 8.0 and min(pitch) < -3.0

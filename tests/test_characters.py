@@ -1,0 +1,112 @@
+"""Characters and rule sets as shipped: they load, they differ, and they mean what they say."""
+
+from dataclasses import replace
+from math import pi, sin
+
+import numpy as np
+import pytest
+
+from config.load import load, read_yaml, shipped, shipped_names
+from config.schema import GazeConfig, load_rig
+from gaze.angles import rotation
+from gaze.attention import Attention
+from gaze.bottom_up import BottomUp
+from gaze.field_of_view import FieldOfView
+from gaze.idle import Idle
+from gaze.top_down import Rule, TopDown, TopDownParams
+from gaze.types import Bodies, GazeState, Percept
+
+CHARACTERS = ("bold", "shy", "sleepy", "strong_boxer", "weak_boxer")
+AHEAD = GazeState(
+    (0, 0, 0), (0, 0, 0), (0, 0), (0, 0), rotation((0.0, 0.0, 0.0)),
+    (0, 0, 0), (0, 0.03, 0), (0, -0.03, 0), 1.0, 1.0,
+)  # fmt: skip
+
+
+def hands_about_a_face(t_s: float) -> Percept:
+    """Show a face that sways a little, and two hands that move for a while now and then."""
+    w = 2 * pi * np.array([0.15, 0.9, 1.3])
+    # Bursts of all sizes: from hardly a motion to a wild wave, never in step.
+    size = np.array([0.01, 0.12 * max(0.0, sin(0.31 * t_s)) ** 2, 0.2 * sin(0.17 * t_s) ** 4])
+    p = np.array([[1.0, 0.0, 0.0], [0.8, 0.3, -0.2], [0.85, -0.3, -0.2]])
+    v = np.zeros((3, 3))
+    p[:, 1] += size * np.sin(w * t_s)
+    v[:, 1] = size * w * np.cos(w * t_s)
+    ids, kinds = (1, 2, 3), ("face", "hand", "hand")
+    return Percept(t_s, Bodies(ids, kinds, p, v, np.zeros((3, 3)), np.full(3, 0.08)))
+
+
+def face_share(gaze: GazeConfig, seconds: float = 60.0) -> float:
+    model = Attention(
+        gaze.attention,
+        FieldOfView(gaze.field_of_view),
+        BottomUp(gaze.bottom_up),
+        TopDown(gaze.top_down),
+        Idle(gaze.idle),
+    )
+    times = [k / 30 for k in range(round(30 * seconds))]
+    kinds = [model.choose(hands_about_a_face(t), AHEAD, t).kind for t in times]
+    return kinds.count("face") / len(kinds)
+
+
+def with_face_pull(gaze: GazeConfig, pull: float) -> GazeConfig:
+    rules = {**gaze.top_down.rules, "wait": Rule("face", pull)}
+    return replace(gaze, top_down=replace(gaze.top_down, rules=rules))
+
+
+def test_a_larger_pull_of_the_face_means_more_time_on_it() -> None:
+    gaze = load_rig("desk").gaze
+    found = [face_share(with_face_pull(gaze, pull)) for pull in (0.1, 0.3, 0.6, 1.2, 2.4)]
+    assert all(more > less + 0.02 for less, more in zip(found, found[1:], strict=False)), found
+    assert found[0] < 0.4 and found[-1] > 0.8
+
+
+@pytest.mark.parametrize("name", CHARACTERS)
+def test_a_character_lies_over_the_desk_rig_and_changes_all_it_names(name: str) -> None:
+    plain, other = load_rig("desk"), load_rig("desk", name)
+    assert other.gaze != plain.gaze
+    assert replace(other, gaze=plain.gaze) == plain  # manners only, never wires or limits
+
+    def differ(given: object, before: object, after: object, key: str) -> int:
+        if not isinstance(given, dict):
+            assert before != after, f"{key} says nothing new"
+            return 1
+        count = 0
+        for name, value in given.items():
+            inside = (
+                (before[name], after[name])
+                if isinstance(before, dict) and isinstance(after, dict)
+                else (getattr(before, name), getattr(after, name))
+            )
+            count += differ(value, *inside, f"{key}.{name}")
+        return count
+
+    assert differ(read_yaml(shipped("characters", name)).data, plain, other, name) >= 4
+
+
+def test_all_characters_are_known_here() -> None:
+    assert shipped_names("characters") == CHARACTERS
+
+
+def test_the_strong_boxer_keeps_the_face_and_the_weak_one_loses_it() -> None:
+    weak, plain, strong = (
+        face_share(load_rig("desk", name).gaze) for name in ("weak_boxer", None, "strong_boxer")
+    )
+    assert weak < plain - 0.05 and strong > plain + 0.05
+
+
+def test_the_bold_look_at_a_face_more_than_the_shy() -> None:
+    shy, bold = (face_share(load_rig("desk", name).gaze) for name in ("shy", "bold"))
+    assert shy < bold - 0.1
+
+
+def test_shipped_rule_sets_load() -> None:
+    sets = {name: load(shipped("rules", name), TopDownParams) for name in shipped_names("rules")}
+    assert set(sets) == {"boxing", "conversation"}
+    boxing, talk = sets["boxing"], sets["conversation"]
+    assert boxing.rules == TopDownParams().rules and boxing.behaviour == "wait"
+    assert set(talk.rules) >= {"wait", "listen", "talk", "think"}
+    assert talk.rules["listen"].pull > talk.rules["talk"].pull > talk.rules["think"].pull
+    assert talk.rules["recall"].point_world_m == (1.2, 0.35, 0.75)
+    for rules in sets.values():
+        TopDown(rules).behave(rules.behaviour)

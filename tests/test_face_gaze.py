@@ -1,0 +1,45 @@
+"""Gaze points on the plane of a face, and the stand-in for an action planner."""
+
+from math import cos, radians, sin
+
+import pytest
+
+from gaze.angles import rotation, sub, unit
+from robot.face_gaze import on_face
+from robot.planner import Planner
+
+NOSE = (1.0, 0.2, 0.25)
+TOWARDS = rotation((radians(180.0), 0.0, 0.0))
+
+
+@pytest.mark.parametrize("point", [(0.0, 0.0), (0.03, 0.035), (-0.05, -0.08)])
+def test_a_line_of_sight_meets_the_face_where_it_is_aimed(point: tuple[float, float]) -> None:
+    y, z = point
+    # The owner's left is the viewer's right: the face looks back along -x.
+    place = (NOSE[0], NOSE[1] - y, NOSE[2] + z)
+    eye = (0.0, 0.0, 0.2)
+    assert on_face(eye, unit(sub(place, eye)), NOSE, TOWARDS) == pytest.approx(point, abs=1e-12)
+
+
+def test_a_turned_face_is_met_on_its_own_plane() -> None:
+    turned = rotation((radians(150.0), 0.0, 0.0))
+    left = (-sin(radians(150.0)), cos(radians(150.0)), 0.0)
+    place = (NOSE[0] + 0.03 * left[0], NOSE[1] + 0.03 * left[1], NOSE[2])
+    eye = (0.0, 0.0, 0.2)
+    met = on_face(eye, unit(sub(place, eye)), NOSE, turned)
+    assert met == pytest.approx((0.03, 0.0), abs=1e-12)
+
+
+def test_lines_along_the_plane_or_from_behind_meet_nothing() -> None:
+    assert on_face((0.0, 0.0, 0.2), (0.0, 1.0, 0.0), NOSE, TOWARDS) is None
+    assert on_face((2.0, 0.2, 0.25), (-1.0, 0.0, 0.0), NOSE, TOWARDS) is None
+
+
+def test_the_planner_asks_once_for_each_change() -> None:
+    asked: list[tuple[str, str]] = []
+    plan = Planner(
+        lambda t: None if t < 1 else "guard" if t < 2 else "wait", lambda *a: asked.append(a)
+    )
+    for k in range(40):
+        plan.note(100.0 + 0.1 * k)
+    assert asked == [("behaviour", "guard"), ("behaviour", "wait")]

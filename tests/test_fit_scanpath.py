@@ -1,0 +1,255 @@
+"""The fit-scanpath command: recordings on disk -> a YAML that run takes, or one line why not."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.load import ConfigError, load, shipped
+from drivers.errors import SetupError
+from gaze.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalised, row_sums_note
+from gaze.types import PARTS
+from robot.fit_scanpath import fit
+from robot.fixations import FixationParams, PartBoxes, fixations_of
+from robot.gaze_recording import Samples, read_recording
+
+WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
+
+# A face of about 400 by 560 px in a picture of 800 by 800; y runs down.
+BOXES_YAML = """\
+UP: [300, 120, 500, 220]
+RE: [240, 250, 370, 330]
+LE: [430, 250, 560, 330]
+N: [360, 335, 440, 450]
+M: [320, 480, 480, 560]
+DN: [330, 590, 470, 670]
+FR: [190, 340, 300, 560]
+FL: [500, 340, 610, 560]
+"""
+NAN = float("nan")
+
+
+@pytest.fixture
+def boxes(tmp_path: Path) -> PartBoxes:
+    path = tmp_path / "parts.yaml"
+    path.write_text(BOXES_YAML, encoding="utf-8")
+    return load(path, PartBoxes)
+
+
+def walked(count: int, seed: int, dwell_s: float | None = None) -> Iterator[tuple[str, float]]:
+    """Parts and dwell times of the known walk."""
+    params = ScanpathParams(dwell_law="gamma", shortest_dwell_ms=0.0)
+    walk = markov_walk(params, WALK, np.random.default_rng(seed))
+    part = 5
+    for _ in range(count):
+        yield PARTS[part], walk.dwell_s(part) if dwell_s is None else dwell_s
+        part = walk.next_part(part)
+
+
+def samples(boxes: PartBoxes, looks: Iterator[tuple[str, float]], seed: int) -> Samples:
+    """An eye-tracker's view: 250 Hz, noise of 1.5 px, flights of 32 ms, some lost samples.
+
+    Each look goes to another place of its part, so that a refixation can be seen.
+    """
+    rng, step_s = np.random.default_rng(seed), 0.004
+    places: list[np.ndarray] = []
+    at, before = np.array([0.0, 0.0]), ""
+    left = True
+    for part, dwell_s in looks:
+        x0, y0, x1, y1 = boxes.boxes[part]
+        left = not left if part == before else left
+        share = np.array([0.2 if left else 0.8, rng.uniform(0.3, 0.7)])
+        goal = np.array([x0, y0]) + share * np.array([x1 - x0, y1 - y0])
+        flight = np.linspace(0.0, 1.0, 9)[1:-1, None]
+        places += [at + flight * (goal - at), np.repeat(goal[None], round(dwell_s / step_s), 0)]
+        at, before = goal, part
+    p = np.concatenate(places)
+    p += rng.normal(0.0, 1.5, p.shape)
+    p[rng.random(len(p)) < 0.01] = NAN
+    return Samples(np.arange(len(p)) * step_s, p[:, 0], p[:, 1], "")
+
+
+def written(path: Path, header: str, rows: Iterator[str]) -> Path:
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def as_csv(path: Path, s: Samples) -> Path:
+    rows = zip(s.time_s, s.x, s.y, strict=True)
+    return written(path, "time,x,y", (f"{t:.4f},{x:.2f},{y:.2f}" for t, x, y in rows))
+
+
+def labelled_csv(path: Path, count: int, seed: int = 1) -> Path:
+    def rows() -> Iterator[str]:
+        t_s = 0.0
+        for part, dwell_s in walked(count, seed):
+            yield f"{t_s:.6f},{max(dwell_s, 1e-6):.6f},{part}"
+            t_s += dwell_s + 0.03
+
+    return written(path, "start,duration,part", rows())
+
+
+def test_labelled_fixations_of_a_known_walk_give_it_back(tmp_path: Path) -> None:
+    out = tmp_path / "mine.yaml"
+    report = fit(labelled_csv(tmp_path / "looks.csv", 8000), None, out)
+    walk = load(out, Walk)
+    wanted, found = normalised(WALK.matrix), normalised(walk.matrix)
+    assert "8000 fixations on the face, 0 elsewhere, 7999 transitions" in report
+    shares = {"DN": 0.0607, "FL": 0.0842, "LE": 0.0931, "M": 0.0999,
+              "N": 0.2217, "FR": 0.0946, "RE": 0.2550, "UP": 0.0907}  # fmt: skip
+    for i, part in enumerate(PARTS):
+        n = 8000 * shares[part] * 0.9
+        limit = 4.0 * np.sqrt(wanted[i] * (1.0 - wanted[i]) / n) + 4.0 / n
+        assert (np.abs(found[i] - wanted[i]) <= limit).all(), part
+        sd = WALK.dwell_sd_s[i]
+        assert walk.dwell_mean_s[i] == pytest.approx(
+            WALK.dwell_mean_s[i], abs=4.0 * sd / np.sqrt(n)
+        )
+        assert walk.dwell_sd_s[i] == pytest.approx(sd, rel=0.25)
+    assert row_sums_note(walk) is None
+    Scanpath(ScanpathParams(), walk, np.random.default_rng(1))
+
+
+def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) -> None:
+    # Looks of a fifth of a second: shorter ones than 60 ms no detector can be asked for.
+    recording = as_csv(tmp_path / "gaze.csv", samples(boxes, walked(1500, 2, 0.2), 3))
+    out = tmp_path / "mine.yaml"
+    report = fit(recording, boxes, out, "none")
+    walk = load(out, Walk)
+    wanted, found = normalised(WALK.matrix), normalised(walk.matrix)
+    for i, share in enumerate((0.0607, 0.0842, 0.0931, 0.0999, 0.2217, 0.0946, 0.2550, 0.0907)):
+        n = 1500 * share * 0.85
+        assert np.abs(found[i] - wanted[i]).max() < 4.0 * np.sqrt(0.25 / n), PARTS[i]
+        assert walk.dwell_mean_s[i] == pytest.approx(0.2, abs=0.015), PARTS[i]
+    assert "at 250 Hz" in report and "% lost; column time is in s" in report
+    text = out.read_text(encoding="utf-8")
+    assert "#   gaze.csv" in text and "95 %" in text and "# from RE" in text
+
+
+def test_fixations_are_found_where_and_when_they_are(boxes: PartBoxes) -> None:
+    looks = list(walked(400, 5, 0.2))
+    found = fixations_of(samples(boxes, iter(looks), 6), boxes, FixationParams())
+    assert [f.part for f in found] == [part for part, _ in looks]
+    # Each look lasts 7 samples of flight and 50 at rest.
+    starts = 0.004 * (7 + 57 * np.arange(400))
+    # Within the flight: to a near place it is slow enough to belong to the look.
+    assert np.abs([f.start_s for f in found] - starts).max() < 0.028
+    assert np.mean([f.duration_s for f in found]) == pytest.approx(0.2, abs=0.012)
+
+
+def test_a_short_loss_is_bridged_and_a_long_one_ends_a_fixation(boxes: PartBoxes) -> None:
+    x, y = np.full(500, 400.0), np.full(500, 400.0)
+    x[100:110] = NAN  # 40 ms
+    x[300:400] = NAN  # 400 ms: a blink
+    found = fixations_of(Samples(np.arange(500) * 0.004, x, y, ""), boxes, FixationParams())
+    assert [f.part for f in found] == ["N", "N"]
+    assert found[0].duration_s == pytest.approx(1.2, abs=0.01)
+    assert found[1].start_s == pytest.approx(1.6)
+
+
+def test_fixations_with_places_are_labelled_by_the_boxes(tmp_path: Path, boxes: PartBoxes) -> None:
+    rows = (f"{300 * k},250,{(400, 300)[k % 2]},{(400, 300)[k % 2]}" for k in range(80))
+    recording = written(tmp_path / "looks.csv", "onset,duration,X,Y", rows)
+    report = fit(recording, boxes, tmp_path / "mine.yaml")
+    assert "80 fixations on the face" in report and "times are in ms" in report
+    assert load(tmp_path / "mine.yaml", Walk).dwell_mean_s == (0.25,) * 8
+    with pytest.raises(SetupError, match="without a part column need the rectangles"):
+        fit(recording, None, tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize("header", ["time_ms;X;Y;pupil", "Timestamp\tgaze_x\tgaze_y\tpupil"])
+def test_headers_separators_and_units_are_understood(tmp_path: Path, header: str) -> None:
+    cut = ";" if ";" in header else "\t"
+    rows = (cut.join((str(4 * k), "1.5", "nan" if k == 3 else "2", "7")) for k in range(10))
+    read = read_recording(written(tmp_path / "gaze.csv", header, rows))
+    assert isinstance(read, Samples)
+    assert read.time_s == pytest.approx(0.004 * np.arange(10))
+    assert np.isnan(read.y).tolist() == np.isnan(read.x).tolist() == [k == 3 for k in range(10)]
+    assert "is in ms" in read.note
+
+
+def test_same_seed_same_bytes(tmp_path: Path) -> None:
+    recording = labelled_csv(tmp_path / "looks.csv", 300)
+    for name in ("a", "b"):
+        fit(recording, None, tmp_path / name, "bootstrap", seed=7)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+SAMPLE_ROWS = [f"{0.004 * k:.3f},400,400" for k in range(200)]
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", r"bad\.csv: is empty"),
+        ("time,x,y\n", r"bad\.csv: no line after the column names"),
+        ("0.0,400,400\n0.004,400,400\n", r"bad\.csv:1: no column time; found: 0\.0, 400, 400"),
+        ("\ntime,x\n0,1\n", r"bad\.csv:2: no column y; found: time, x; wanted: time, x, y"),
+        ("start,duration\n0,1\n", r"bad\.csv:1: no column part"),
+        ("time,x,y\n0,1,2\n0.1,1\n", r"bad\.csv:3: 2 cells under 3 column names"),
+        ("time,x,y\n0,1,2\n0.1,left,2\n", r"bad\.csv:3: column x: 'left' is not a number"),
+        ("time,x,y\n0,1,2\n0.1,inf,2\n", r"bad\.csv:3: column x: 'inf' is not a finite"),
+        ("time,x,y\n0,1,2\n,1,2\n", r"bad\.csv:3: column time: '' is not a number"),
+        ("time,x,y\n0,1,2\n0.2,1,2\n0.1,1,2\n", r"bad\.csv:4: column time: 0\.1 does not come"),
+        ("time,x,y\n0,nan,nan\n0.1,,\n", r"the eye is lost in all 2 samples"),
+        ("time,x,y\n0,1,2\n4000,1,2\n8000,1,2\n", "steps of 4000 are neither seconds nor"),
+        ("time,x,y\n0,1,2\n", "fewer than three samples"),
+        ("start,duration,part\n0,1,N\n1,0,N\n", r"bad\.csv:3: column duration: 0 is not above 0"),
+        ("start,duration,part\n0,1,ear\n", r"bad\.csv:2: column part: no part 'ear'; known: DN"),
+        ("start,duration,part\n0,.2,N\n1,.2,right eye\n", "2 fixations on the face are too few"),
+        ("\n".join(["time,x,y", *SAMPLE_ROWS]), "1 fixations on the face are too few"),
+        ("\n".join(["time,x,y", *(r.replace(",400", ",5") for r in SAMPLE_ROWS)]),
+         "all 1 fixations lie outside"),
+    ],
+)  # fmt: skip
+def test_files_that_cannot_be_trusted_are_refused(
+    tmp_path: Path, boxes: PartBoxes, text: str, why: str
+) -> None:
+    recording, out = tmp_path / "bad.csv", tmp_path / "mine.yaml"
+    recording.write_text(text, encoding="utf-8")
+    with pytest.raises(SetupError, match=why) as caught:
+        fit(recording, boxes, out)
+    assert "\n" not in str(caught.value) and "bad.csv" in str(caught.value)
+    assert not out.exists()
+
+
+def test_what_else_can_be_wrong_is_said(tmp_path: Path, boxes: PartBoxes) -> None:
+    looks = labelled_csv(tmp_path / "looks.csv", 300)
+    with pytest.raises(SetupError, match="no smoothing 'some'; there are none, laplace"):
+        fit(looks, None, tmp_path / "out.yaml", "some")
+    with pytest.raises(SetupError, match="is the recording itself"):
+        fit(looks, None, looks)
+    with pytest.raises(SetupError, match="No such file"):
+        fit(tmp_path / "absent.csv", None, tmp_path / "out.yaml")
+    with pytest.raises(SetupError, match="No such file or directory; give another file"):
+        fit(looks, None, tmp_path / "nowhere" / "out.yaml")
+    (tmp_path / "gaze.csv").write_text("time,x,y\n0,1,2\n0.1,1,2\n", encoding="utf-8")
+    with pytest.raises(SetupError, match=r"need the rectangles of the face's parts \(--parts\)"):
+        fit(tmp_path / "gaze.csv", None, tmp_path / "out.yaml")
+    (tmp_path / "latin.csv").write_bytes(b"time,x,y\n\xff")
+    with pytest.raises(SetupError, match="not UTF-8 text"):
+        fit(tmp_path / "latin.csv", boxes, tmp_path / "out.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("N: [0, 0, 10, 10]\n", "at least two parts"),
+        ("N: [0, 0, 10, 10]\nM: [10, 0, 0, 10]\n", "M: .*needs x0 < x1"),
+        ("N: [0, 0, 10]\nM: [0, 0, 9, 9]\n", "N: has length 3, wanted 4"),
+        ("nose: [0, 0, 10, 10]\n", "unknown key 'nose'"),
+    ],
+)
+def test_part_rectangles_are_checked(tmp_path: Path, text: str, why: str) -> None:
+    path = tmp_path / "parts.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=why):
+        load(path, PartBoxes)
+
+
+def test_the_smaller_of_two_overlapping_parts_is_meant() -> None:
+    boxes = PartBoxes(FR=(0.0, 0.0, 100.0, 100.0), RE=(20.0, 20.0, 60.0, 40.0))
+    assert boxes.part_at(30.0, 30.0) == "RE"
+    assert boxes.part_at(30.0, 70.0) == "FR"
+    assert boxes.part_at(130.0, 70.0) is None

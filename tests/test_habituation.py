@@ -1,0 +1,148 @@
+"""Interest that wears off, the place just left, and several people who share the gaze."""
+
+from itertools import groupby
+from math import radians
+
+import numpy as np
+import pytest
+
+from gaze.angles import rotation
+from gaze.attention import Attention, AttentionParams
+from gaze.bottom_up import BottomUp, BottomUpParams
+from gaze.field_of_view import FieldOfView, FieldOfViewParams
+from gaze.habituation import Habituation, HabituationParams
+from gaze.idle import Idle, IdleParams
+from gaze.top_down import TopDown, TopDownParams
+from gaze.types import Bodies, GazeState, Percept, Target, Vec3
+
+AHEAD = GazeState(
+    (0, 0, 0), (0, 0, 0), (0, 0), (0, 0), rotation((0.0, 0.0, 0.0)),
+    (0, 0, 0), (0, 0.03, 0), (0, -0.03, 0), 1.0, 1.0,
+)  # fmt: skip
+EYE: Vec3 = (0.0, 0.0, 0.0)
+
+
+def bodies(kinds: str, *places: Vec3, speed: float = 0.0) -> Bodies:
+    n = len(places)
+    v = np.zeros((n, 3))
+    v[:, 1] = speed
+    return Bodies(
+        tuple(range(1, n + 1)), tuple(kinds.split()), np.array(places, float).reshape(n, 3), v,
+        np.zeros((n, 3)), np.full(n, 0.1),
+    )  # fmt: skip
+
+
+def watch(seen: Bodies, seconds: float, **params: float) -> list[Target]:
+    """Let attention look at a scene that stays as it is, 30 pictures a second."""
+    model = Attention(
+        AttentionParams(habituation=HabituationParams(**params)),
+        FieldOfView(FieldOfViewParams()),
+        BottomUp(BottomUpParams(smoothing_s=0.0)),
+        TopDown(TopDownParams()),
+        Idle(IdleParams()),
+    )
+    times = [k / 30 for k in range(round(30 * seconds))]
+    return [model.choose(Percept(t, seen), AHEAD, t) for t in times]
+
+
+def shares(targets: list[Target]) -> dict[int, float]:
+    ids = [target.id for target in targets]
+    return {name: ids.count(name) / len(ids) for name in set(ids)}
+
+
+def stays_s(targets: list[Target]) -> list[float]:
+    """Give how long each look lasted, without the last one, which the end cuts short."""
+    return [len(list(same)) / 30 for _, same in groupby(t.id for t in targets)][:-1]
+
+
+def interest(model: Habituation, seen: Bodies, attended: int, t_s: float) -> list[float]:
+    return model.step(seen.ids, seen.p_world_m, EYE, attended, t_s).tolist()
+
+
+def test_interest_falls_while_attended_and_recovers_otherwise() -> None:
+    model = Habituation(HabituationParams(fall_1_s=0.2, rise_1_s=1.0))
+    seen = bodies("face face", (1, 0.5, 0), (1, -0.5, 0))
+    assert interest(model, seen, -1, 0.0) == [1.0, 1.0]
+    assert interest(model, seen, 1, 2.0) == pytest.approx([0.6, 1.0])
+    assert interest(model, seen, 1, 30.0) == [0.0, 1.0]
+    assert interest(model, seen, 2, 30.5) == pytest.approx([0.5, 0.9])
+    assert interest(model, seen, -1, 31.5) == [1.0, 1.0]
+
+
+def test_interest_outlives_an_absence() -> None:
+    model = Habituation(HabituationParams())
+    seen, nobody = bodies("face", (1, 0, 0)), bodies("")
+    interest(model, seen, -1, 0.0)
+    interest(model, seen, 1, 5.0)
+    interest(model, nobody, -1, 5.4)
+    assert interest(model, seen, -1, 5.5) == pytest.approx([0.5])
+    model.reset(6.0)
+    assert interest(model, seen, -1, 6.0) == [1.0]
+
+
+def test_a_rule_keeps_its_floor_of_interest() -> None:
+    model = Habituation(HabituationParams(rule_floor=0.6))
+    assert model.for_rule(np.array([0.0, 0.5, 1.0])).tolist() == pytest.approx([0.6, 0.8, 1.0])
+
+
+@pytest.mark.parametrize(("aside_deg", "age_s"), [(0.0, 0.0), (4.0, 0.0), (4.0, 1.5), (20.0, 0.0)])
+def test_the_place_left_is_avoided_by_a_gaussian_that_decays(
+    aside_deg: float, age_s: float
+) -> None:
+    model = Habituation(HabituationParams(return_strength=0.8, return_sigma_deg=4.0, return_s=1.5))
+    a = radians(aside_deg)
+    seen = bodies("hand", (2 * np.cos(a), 2 * np.sin(a), 0))
+    interest(model, seen, -1, 10.0)
+    model.leave((1.0, 0.0, 0.0), 10.0)
+    expected = 1.0 - 0.8 * np.exp(-0.5 * (aside_deg / 4.0) ** 2 - age_s / 1.5)
+    assert interest(model, seen, -1, 10.0 + age_s) == pytest.approx([expected])
+    assert interest(model, seen, -1, 17.0) == [1.0]
+
+
+def test_what_is_attended_is_not_avoided_and_strength_0_avoids_nothing() -> None:
+    seen = bodies("hand", (1, 0, 0))
+    for strength, attended in ((1.0, 1), (0.0, -1)):
+        model = Habituation(HabituationParams(fall_1_s=0.0, return_strength=strength))
+        model.leave((1.0, 0.0, 0.0), 0.0)
+        assert interest(model, seen, attended, 0.1) == [1.0]
+
+
+def test_a_single_still_face_is_never_left() -> None:
+    targets = watch(bodies("face", (1, 0, 0)), 120.0)
+    assert {(t.id, t.kind, t.pull, t.shift) for t in targets} == {(1, "face", 0.5, 1)}
+
+
+def test_a_still_thing_beside_a_face_does_not_profit_from_boredom() -> None:
+    assert shares(watch(bodies("face thing", (1, 0, 0), (0.7, 0.3, 0)), 60.0)) == {1: 1.0}
+
+
+def test_two_faces_share_the_gaze_without_flicker() -> None:
+    targets = watch(bodies("face face", (1, 0.3, 0), (1, -0.3, 0)), 120.0)
+    share, stays = shares(targets), stays_s(targets)
+    assert min(share.values()) > 0.4 and set(share) == {1, 2}
+    assert len(stays) > 20 and min(stays) > 1.0 and max(stays) < 6.0
+    assert {t.pull for t in targets} == {0.5}  # the rule's constant, whoever is looked at
+
+
+def test_without_habituation_two_faces_do_not_share() -> None:
+    share = shares(watch(bodies("face face", (1, 0.3, 0), (1, -0.3, 0)), 30.0, fall_1_s=0.0))
+    assert share == {1: 1.0}
+
+
+def test_the_nearer_of_two_people_gets_more_of_the_gaze_and_the_other_some() -> None:
+    share = shares(watch(bodies("face face", (1.5, 0.4, 0), (1, -0.3, 0)), 120.0))
+    assert 0.05 < share[1] < 0.4 and share[2] > 0.6
+
+
+def test_nobody_of_three_is_left_out() -> None:
+    three = bodies("face face face", (1, 0.4, 0), (1.1, 0, 0), (1, -0.4, 0))
+    targets = watch(three, 120.0)
+    assert min(shares(targets).values()) > 0.25 and min(stays_s(targets)) > 1.0
+    assert 2 not in shares(watch(three, 120.0, return_strength=0.0))  # what the default is for
+
+
+def test_the_gaze_leaves_a_hand_that_waves_on_and_on_but_not_before_the_face_is_stronger() -> None:
+    targets = watch(bodies("face hand", (1, 0, 0), (0.9, 0.4, 0), speed=0.6), 60.0)
+    share, stays = shares(targets), stays_s(targets)
+    assert share[1] > 0.1 and share[2] > 0.3
+    assert min(stays) >= 0.3 - 1e-9

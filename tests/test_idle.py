@@ -1,0 +1,177 @@
+"""What the gaze does with nobody in sight."""
+
+from itertools import pairwise
+from math import degrees
+
+import numpy as np
+import pytest
+
+from gaze.angles import sub, yaw_pitch
+from gaze.idle import Idle, IdleParams
+from gaze.types import Target, Vec3
+
+DT = 0.01
+EYE: Vec3 = (0.0, 0.0, 0.2)
+
+
+def seen(p: Vec3 = (1.0, 0.2, 0.2), v: Vec3 = (0.0, 0.0, 0.0), at_s: float = 0.0) -> Target:
+    return Target(p, v, at_s, "face", 3, 0.5, True, None, 7, "face 3")
+
+
+def idle(seed: int | None = 0, **params: float) -> Idle:
+    return Idle(IdleParams(**params), None if seed is None else np.random.default_rng(seed))
+
+
+def run(model: Idle, start_s: float, end_s: float) -> list[Target]:
+    return [model.step(start_s + k * DT) for k in range(round((end_s - start_s) / DT))]
+
+
+def yaw_deg(target: Target) -> float:
+    return degrees(yaw_pitch(sub(target.p_world_m, EYE))[0])
+
+
+def looks(targets: list[Target]) -> list[tuple[Target, float]]:
+    """Give each look once, with its length; the last, cut short, is left out."""
+    found: list[tuple[Target, float]] = []
+    count = 1
+    for before, now in pairwise(targets):
+        if (now.kind, now.id) == (before.kind, before.id):
+            count += 1
+            continue
+        found.append((before, count * DT))
+        count = 1
+    return found
+
+
+def test_without_dice_it_waits_and_then_rests_for_good() -> None:
+    model = idle(None)
+    model.remember(seen())
+    targets = run(model, 1.0, 120.0)
+    assert {t.kind for t in targets[:99]} == {"face"}
+    assert {(t.kind, t.id) for t in targets[101:]} == {("rest", -1)}
+    assert targets[-1].p_world_m == (1.5, 0.0, 0.2)
+
+
+def test_waiting_keeps_the_identity_and_the_place_it_had_got_to() -> None:
+    model = idle()
+    model.remember(seen(v=(0.0, 0.3, 0.0), at_s=0.95))
+    held = model.step(1.0)
+    assert (held.kind, held.id, held.why) == ("face", 3, "lost, waiting")
+    assert held.p_world_m == pytest.approx((1.0, 0.215, 0.2))
+    assert held.v_world_m_s == (0.0, 0.0, 0.0)
+    model.remember(seen(v=(0.0, 0.3, 0.0), at_s=0.0))
+    assert model.step(9.0).p_world_m == pytest.approx((1.0, 0.26, 0.2))
+
+
+def test_e48_a_face_that_is_lost_for_a_moment_is_not_left() -> None:
+    model, off = idle(), 0
+    for k in range(3000):
+        t = k * DT
+        if t % 3.0 < 0.3:  # lost for 0.3 s, again and again
+            off += model.step(t).kind != "face" if t >= 3.0 else 0
+        else:
+            model.remember(seen(at_s=t))
+    assert off * DT / 9 <= 1.0 and off == 0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_search_goes_first_to_the_side_the_target_left_to(side: float) -> None:
+    for seed in range(20):
+        model = idle(seed)
+        model.remember(seen((1.0, side * 0.3, 0.2), (0.0, side * 0.8, 0.0), 0.0))
+        lost = yaw_deg(model.step(0.0))
+        search = [t for t in run(model, 0.0, 4.0) if t.kind == "search"]
+        assert side * (yaw_deg(search[0]) - lost) == pytest.approx(18.0, abs=0.5)
+        assert search[0].why == "looking for face 3"
+
+
+def test_search_stays_about_the_place_of_the_loss() -> None:
+    offsets = []
+    for seed in range(100):
+        model = idle(seed)
+        model.remember(seen())
+        lost = yaw_deg(seen())
+        found = looks(run(model, 0.0, 8.0))
+        search = [t for t, _ in found if t.kind == "search"]
+        assert 2 <= len(search) <= 12
+        offsets += [yaw_deg(t) - lost for t in search]
+    assert abs(np.mean(offsets)) < 2.0
+    assert 6.0 < np.std(offsets) < 10.0
+
+
+def test_search_takes_its_time_and_then_the_gaze_rests() -> None:
+    model = idle(4)
+    model.remember(seen())
+    kinds = [t.kind for t in run(model, 0.0, 6.0)]
+    assert kinds[50] == "face" and kinds[150] == "search" and kinds[380] == "search"
+    assert kinds.index("rest") == pytest.approx(400, abs=26)
+    assert "glance" not in kinds[: kinds.index("rest")]
+    never = idle(4, search_ms=0.0)
+    never.remember(seen())
+    assert "search" not in {t.kind for t in run(never, 0.0, 6.0)}
+
+
+@pytest.mark.parametrize(("place", "most"), [((0.5, 0.9, 0.2), 70.0), ((0.1, 0.9, 0.2), 83.7)])
+def test_search_goes_no_farther_than_its_reach_or_the_loss(place: Vec3, most: float) -> None:
+    yaws = []
+    for seed in range(30):
+        model = idle(seed)
+        model.remember(seen(place, (-0.5, 0.2, 0.0)))
+        yaws += [yaw_deg(t) for t in run(model, 0.0, 4.0) if t.kind == "search"]
+    assert max(yaws) == pytest.approx(most, abs=0.1)
+
+
+def test_glances_are_human_in_length_place_and_number() -> None:
+    found = looks(run(idle(6), 0.0, 1800.0))
+    glances = [(t, s) for t, s in found if t.kind == "glance"]
+    rests = [s for t, s in found if t.kind == "rest"]
+    assert {t.kind for t, _ in found} == {"glance", "rest"}
+    assert np.mean([s for _, s in glances]) == pytest.approx(1.2, rel=0.1)
+    assert np.mean(rests) == pytest.approx(3.0, rel=0.1)
+    assert min(s for _, s in found) >= 0.25 - DT
+    yaws = np.array([yaw_deg(t) for t, _ in glances])
+    assert np.abs(yaws).min() >= 8.0 - 1e-6 and np.abs(yaws).max() <= 35.0 + 1e-6
+    assert abs((yaws > 0.0).mean() - 0.5) < 0.08
+    in_row = sum(a[0].kind == b[0].kind == "glance" for a, b in pairwise(found))
+    assert in_row / len(glances) == pytest.approx(0.35, abs=0.08)
+
+
+def test_each_glance_is_a_look_of_its_own() -> None:
+    model = idle(7)
+    model.remember(seen())
+    targets = run(model, 0.0, 60.0)
+    model.remember(seen(at_s=60.0))
+    targets += run(model, 60.1, 120.0)
+    ids = [t.id for t, _ in looks(targets) if t.kind in ("search", "glance")]
+    assert len(ids) > 20
+    assert ids == list(range(-2, -2 - len(ids), -1))
+    assert {t.id for t in targets if t.kind == "rest"} == {-1}
+
+
+def test_a_target_that_comes_back_is_waited_for_anew() -> None:
+    model = idle(8)
+    model.remember(seen())
+    assert model.step(0.0).kind == "face" and model.step(1.5).kind == "search"
+    model.remember(seen((1.0, -0.4, 0.3), at_s=1.6))
+    again = model.step(1.7)
+    assert (again.kind, again.p_world_m) == ("face", (1.0, -0.4, 0.3))
+    model.reset(2.0)
+    assert model.step(2.0).kind == "rest"
+
+
+def test_a_late_step_lands_in_the_same_place() -> None:
+    early, late = idle(9), idle(9)
+    for model in (early, late):
+        model.remember(seen())
+        model.step(0.0)
+    run(early, 0.0, 30.0)
+    assert early.step(30.0) == late.step(30.0)
+
+
+def test_same_dice_same_looks() -> None:
+    assert run(idle(1), 0.0, 60.0) == run(idle(1), 0.0, 60.0) != run(idle(2), 0.0, 60.0)
+
+
+def test_glances_that_contradict_are_refused() -> None:
+    with pytest.raises(ValueError, match="glance_least_deg"):
+        IdleParams(glance_least_deg=40.0, glance_yaw_deg=20.0)

@@ -1,0 +1,111 @@
+"""Following in gaze space: a point in the world after another, seen from one eye centre."""
+
+from math import atan2, degrees, exp, radians
+
+import numpy as np
+import pytest
+
+from gaze.angles import angle_between, direction, norm, scale
+from gaze.pursuit import Pursuit, PursuitParams
+from gaze.types import Vec3
+
+DT = 0.005
+EYE = (0.0, 0.0, 0.0)
+STILL = (0.0, 0.0, 0.0)
+
+
+def point(yaw_deg: float, distance: float = 1.0) -> Vec3:
+    return scale(direction((radians(yaw_deg), 0.0)), distance)
+
+
+def circling(yaw_deg: float, speed_deg_s: float) -> tuple[Vec3, Vec3]:
+    """Give a point on a circle of 1 m and its velocity."""
+    place = point(yaw_deg)
+    return place, scale((-place[1], place[0], 0.0), radians(speed_deg_s))
+
+
+def yaw(p: Vec3) -> float:
+    return degrees(atan2(p[1], p[0]))
+
+
+def follow(speed_deg_s: float, seconds: float, dt: float = DT) -> tuple[float, float]:
+    """Give the speed and the lag behind a circling target at the end, in degrees."""
+    pursuit, gaze, before = Pursuit(PursuitParams()), point(0.0), 0.0
+    for k in range(1, round(seconds / dt) + 1):
+        before = yaw(gaze)
+        gaze = pursuit.step(gaze, *circling(speed_deg_s * k * dt, speed_deg_s), EYE, dt)
+    return (yaw(gaze) - before) / dt, speed_deg_s * seconds - yaw(gaze)
+
+
+@pytest.mark.parametrize("speed", [10.0, 20.0, 30.0, 50.0])
+@pytest.mark.parametrize("dt", [0.010, 0.005, 0.002])
+def test_ramp_is_followed_at_its_speed_with_the_lag_of_the_gains(speed: float, dt: float) -> None:
+    now, lag = follow(speed, 2.0, dt)
+    assert now == pytest.approx(speed, rel=0.02)
+    # (1 - Gp) / Kc, and one period in which the rest is closed.
+    assert lag == pytest.approx(speed * 0.05 / 8.0, abs=0.05 * speed * dt + 0.01)
+
+
+def test_error_of_direction_closes_at_its_rate_and_no_faster_than_five_degrees_do() -> None:
+    pursuit, gaze = Pursuit(PursuitParams()), point(-1.0)
+    for _ in range(25):
+        gaze = pursuit.step(gaze, point(0.0), STILL, EYE, DT)
+    assert yaw(gaze) == pytest.approx(-exp(-8.0 * 0.125), abs=0.01)
+    far = pursuit.step(point(-30.0), point(0.0), STILL, EYE, DT)
+    assert (yaw(far) + 30.0) / DT <= 40.0
+
+
+def test_error_may_be_left_to_a_saccade() -> None:
+    pursuit = Pursuit(PursuitParams())
+    assert yaw(pursuit.step(point(-1.0), point(0.0), STILL, EYE, DT, closing=False)) == -1.0
+
+
+def test_a_jump_of_the_place_does_not_enter_the_speed() -> None:
+    pursuit = Pursuit(PursuitParams())
+    gaze = pursuit.step(point(0.0), point(1.0), STILL, EYE, DT)
+    assert yaw(gaze) / DT == pytest.approx(8.0, rel=0.03)
+
+
+@pytest.mark.parametrize(("speed", "taken"), [(50.0, 47.5), (80.0, 57.0), (120.0, 0.0)])
+def test_speed_taken_over(speed: float, taken: float) -> None:
+    pursuit = Pursuit(PursuitParams(gain_1_s=0.0))
+    gaze = pursuit.step(point(0.0), *circling(speed * DT, speed), EYE, DT)
+    assert yaw(gaze) / DT == pytest.approx(taken, rel=0.01)
+    seen = pursuit.slip(point(0.0), *circling(0.0, speed), EYE)
+    assert degrees(norm(seen.slip_rad_s)) == pytest.approx(speed - taken, rel=0.01)
+
+
+@pytest.mark.parametrize(("start", "end", "rate"), [(2.0, 0.5, 4.0), (0.5, 2.0, 3.0)])
+def test_depth_closes_by_nearness_and_more_slowly_outwards(
+    start: float, end: float, rate: float
+) -> None:
+    pursuit, gaze = Pursuit(PursuitParams()), point(0.0, start)
+    for _ in range(40):
+        gaze = pursuit.step(gaze, point(0.0, end), STILL, EYE, DT)
+    left = (1.0 / norm(gaze) - 1.0 / end) / (1.0 / start - 1.0 / end)
+    assert left == pytest.approx(exp(-rate * 0.2), abs=0.005)
+    assert abs(yaw(gaze)) < 1e-9
+
+
+def test_e26_direction_and_depth_do_not_disturb_each_other() -> None:
+    def end(yaw_deg: float, distance: float) -> Vec3:
+        gaze = point(0.0)
+        for _ in range(30):
+            gaze = Pursuit(PursuitParams()).step(gaze, point(yaw_deg, distance), STILL, EYE, DT)
+        return gaze
+
+    together, turned, nearer = end(1.5, 0.5), end(1.5, 1.0), end(0.0, 0.5)
+    assert degrees(angle_between(together, turned)) < 0.01
+    assert norm(together) == pytest.approx(norm(nearer), rel=1e-6)
+
+
+def test_a_still_target_is_held_whatever_the_eye_centre_does() -> None:
+    pursuit, gaze = Pursuit(PursuitParams()), point(20.0, 0.5)
+    for k in range(200):
+        eye = (0.0, 0.05 * float(np.sin(0.1 * k)), 0.0)
+        gaze = pursuit.step(gaze, point(20.0, 0.5), STILL, eye, DT)
+        assert gaze == pytest.approx(point(20.0, 0.5), abs=1e-9)
+
+
+def test_no_time_no_motion() -> None:
+    assert Pursuit(PursuitParams()).step(point(3.0), point(0.0), STILL, EYE, 0.0) == point(3.0)

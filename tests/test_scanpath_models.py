@@ -1,0 +1,220 @@
+"""The simple model, face tracking, random angles, and the readings of the measured walk."""
+
+from dataclasses import replace
+from math import degrees
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from config.load import load, shipped
+from gaze.angles import add, angle_between, norm, rotation, scale, sub, yaw_pitch
+from gaze.angles import rotate_back as seen_from
+from gaze.scanpath import (
+    Scanpath,
+    ScanpathParams,
+    Walk,
+    markov_walk,
+    normalised,
+    row_sums_note,
+    without_refixations,
+)
+from gaze.types import PARTS, Face, Percept, Target, Vec3
+
+WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
+HEAD: Vec3 = (0.02, -0.01, 0.25)
+FACING = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def face_at(p: Vec3, v: Vec3 = (0.0, 0.0, 0.0), number: int = 3) -> Face:
+    parts = tuple(add(p, (0.0, 0.01 * i, 0.0)) for i in range(8))
+    nose = PARTS.index("N")
+    return Face(number, p, v, FACING, (*parts[:nose], p, *parts[nose + 1 :]), 0.9)
+
+
+def target_of(face: Face, at_s: float = 0.0) -> Target:
+    at = face.p_world_m, face.v_world_m_s, at_s
+    return Target(*at, "face", face.id, 0.5, True, None, 1, "face 3")
+
+
+FACE = face_at((1.0, 0.3, 0.4))
+PERCEPT = Percept(0.0, faces=(FACE,))
+TARGET = target_of(FACE)
+
+
+def looks_of(params: ScanpathParams, seconds: float, dt: float, seed: int = 1) -> list[Target]:
+    path = Scanpath(params, WALK, np.random.default_rng(seed))
+    steps = range(round(seconds / dt))
+    return [path.wander(TARGET, PERCEPT, k * dt, True, HEAD) for k in steps]
+
+
+def visits(looks: list[Target], dt: float) -> list[tuple[str | None, float]]:
+    """Parts with their times, the last and unfinished one left out."""
+    ends = [k for k in range(1, len(looks)) if looks[k].shift != looks[k - 1].shift]
+    starts = [0, *ends]
+    return [(looks[a].part, (b - a) * dt) for a, b in zip(starts, ends, strict=False)]
+
+
+def test_e41_simple_model() -> None:
+    dt = 0.001
+    looks = looks_of(ScanpathParams(model="simple"), 60.0, dt)
+    seen = visits(looks, dt)
+    assert [part for part, _ in seen[:6]] == ["N", "RE", "LE"] * 2
+    wanted = {"N": 0.45942, "RE": 0.40821, "LE": 0.40821}
+    for part, time_s in seen:
+        # A tick passes before the gaze is said to have arrived, up to one before the end shows.
+        assert 0.0 <= time_s - wanted[str(part)] <= 2.0 * dt + 1e-9
+    assert len(seen) / 60.0 == pytest.approx(2.35, abs=0.02)
+    assert {look.centre_world_m for look in looks} == {FACE.p_world_m}
+
+
+def test_e41_simple_model_waits_for_arrival_and_takes_another_order() -> None:
+    params = ScanpathParams(
+        model="simple", simple_order=("LE", "M"), simple_dwell_ms=(100.0, 200.0), tempo=0.5
+    )
+    path = Scanpath(params, WALK, np.random.default_rng(1))
+    for k in range(100):
+        assert path.wander(TARGET, PERCEPT, k * 0.1, settled=False).part == "LE"
+    assert path.wander(TARGET, PERCEPT, 10.0, settled=True).part == "LE"
+    assert path.wander(TARGET, PERCEPT, 10.19, settled=True).part == "LE"
+    assert path.wander(TARGET, PERCEPT, 10.21, settled=True).part == "M"
+    with pytest.raises(ValueError, match="as many items"):
+        ScanpathParams(simple_order=("N",))
+
+
+def test_e42_random_baseline() -> None:
+    dt = 0.005
+    looks = looks_of(ScanpathParams(model="random"), 300.0, dt, seed=6)
+    starts = [0] + [k for k in range(1, len(looks)) if looks[k].shift != looks[k - 1].shift]
+    intervals = np.diff(starts) * dt
+    assert intervals.min() >= 0.0 and intervals.max() <= 3.0 + dt
+    assert intervals.mean() == pytest.approx(1.5, abs=0.1)
+    assert stats.kstest(intervals, stats.uniform(0.0, 3.0).cdf).pvalue > 0.01
+    # Eye angles in a head that is turned to the face's centre, as it always is.
+    R_world_head = rotation((*yaw_pitch(sub(FACE.p_world_m, HEAD)), 0.0))
+    points = [sub(looks[k].p_world_m, HEAD) for k in starts]
+    angles = np.degrees([yaw_pitch(seen_from(R_world_head, point)) for point in points])
+    for axis in (0, 1):
+        assert stats.kstest(angles[:, axis], stats.uniform(-20.0, 40.0).cdf).pvalue > 0.01
+    assert abs(np.corrcoef(angles.T)[0, 1]) < 0.2
+    assert {look.centre_world_m for look in looks} == {FACE.p_world_m}
+    assert {look.part for look in looks} == {None}
+    far = norm(sub(FACE.p_world_m, HEAD))
+    assert all(norm(point) == pytest.approx(far) for point in points)
+
+
+def test_e42_random_gaze_keeps_its_angles_between_jumps_while_the_face_moves() -> None:
+    path = Scanpath(ScanpathParams(model="random"), WALK, np.random.default_rng(2))
+    seen: dict[int, list[tuple[float, float]]] = {}
+    for k in range(2000):
+        face = face_at((1.0, 0.4 * np.sin(0.01 * k), 0.3))
+        look = path.wander(target_of(face), Percept(0.01 * k, faces=(face,)), 0.01 * k, True, HEAD)
+        R_world_head = rotation((*yaw_pitch(sub(face.p_world_m, HEAD)), 0.0))
+        in_head = yaw_pitch(seen_from(R_world_head, sub(look.p_world_m, HEAD)))
+        seen.setdefault(look.shift, []).append(in_head)
+        assert look.centre_world_m == face.p_world_m
+    assert len(seen) > 8
+    for angles in seen.values():
+        assert np.ptp(angles, axis=0).max() < 1e-9
+
+
+def test_e43_face_tracking_stays_at_the_centre_of_a_moving_face() -> None:
+    path = Scanpath(ScanpathParams(model="face_tracking"), WALK, np.random.default_rng(1))
+    start, v = (1.0, -0.6, 0.3), (0.0, 0.3, 0.02)
+    worst, shifts = 0.0, set()
+    for k in range(800):
+        t_s = 0.005 * k
+        captured_s = (t_s // 0.033) * 0.033 - 0.05  # 30 pictures a second, each 50 ms old
+        face = face_at(add(start, scale(v, captured_s)), v)
+        look = path.wander(target_of(face, captured_s), Percept(captured_s, faces=(face,)), t_s,
+                           True, HEAD)  # fmt: skip
+        aimed = add(look.p_world_m, scale(look.v_world_m_s, t_s - look.at_s))
+        true = add(start, scale(v, t_s))
+        worst = max(worst, degrees(angle_between(sub(aimed, HEAD), sub(true, HEAD))))
+        shifts.add((look.shift, look.part))
+    assert worst < 0.5
+    assert shifts == {(1, "N")}
+
+
+@pytest.mark.parametrize("model", ["markov", "simple", "face_tracking", "random"])
+def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(model: str) -> None:
+    path = Scanpath(ScanpathParams(model=model), WALK, np.random.default_rng(1))
+    hand = TARGET._replace(kind="hand", id=9, why="hand 9")
+    assert path.wander(hand, PERCEPT, 0.0, True, HEAD) == hand
+    look = path.wander(TARGET, PERCEPT, 0.1, True, HEAD)
+    assert look.centre_world_m == FACE.p_world_m
+    assert "face 3" in look.why
+    unseen = TARGET._replace(id=4)
+    assert path.wander(unseen, PERCEPT, 0.2, True, HEAD) == unseen
+
+
+@pytest.mark.parametrize("model", ["markov", "simple", "face_tracking", "random"])
+def test_every_model_repeats_itself_with_the_same_dice(model: str) -> None:
+    params = ScanpathParams(model=model)
+    assert looks_of(params, 10.0, 0.02, seed=5) == looks_of(params, 10.0, 0.02, seed=5)
+
+
+# ---- readings of the measured walk ----------------------------------------------------
+
+
+def test_viewers_left_swaps_the_sides() -> None:
+    owners = looks_of(ScanpathParams(), 60.0, 0.01, seed=3)
+    viewers = looks_of(ScanpathParams(viewers_left=True), 60.0, 0.01, seed=3)
+    other = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}
+    for mine, theirs in zip(owners, viewers, strict=True):
+        assert theirs.part == other.get(str(mine.part), mine.part)
+        assert theirs.p_world_m == FACE.parts_world_m[PARTS.index(str(theirs.part))]
+    assert viewers[0].part == "FL"
+    simple = looks_of(ScanpathParams(model="simple", viewers_left=True), 3.0, 0.01)
+    assert [part for part, _ in visits(simple, 0.01)] == ["N", "LE", "RE", "N", "LE", "RE"]
+
+
+def test_the_start_part_can_be_chosen() -> None:
+    assert looks_of(ScanpathParams(), 0.05, 0.01)[0].part == "FR"
+    assert looks_of(ScanpathParams(start="M"), 0.05, 0.01)[0].part == "M"
+
+
+def test_whole_visit_merges_refixations() -> None:
+    merged = without_refixations(WALK.matrix)
+    assert np.diag(merged).max() == 0.0
+    assert merged.sum(axis=1) == pytest.approx(np.ones(8))
+    # Proportions between the other parts stay: from N, M to RE as .1 to .3.
+    n, m, re = (WALK.order.index(part) for part in ("N", "M", "RE"))
+    assert merged[n, re] == pytest.approx(3.0 * merged[n, m])
+
+
+def test_whole_visit_shares_of_steps_and_rate() -> None:
+    # Stationary shares of the merged chain, and 5.66 shifts a second without travel or floor.
+    params = ScanpathParams(diagonal="whole_visit", shortest_dwell_ms=0.0)
+    walk = markov_walk(params, WALK, np.random.default_rng(8))
+    parts = [0]
+    for _ in range(100_000):
+        parts.append(walk.next_part(parts[-1]))
+    assert (np.diff(parts) != 0).all()
+    share = np.bincount(parts, minlength=8) / len(parts)
+    wanted = (0.0727, 0.0648, 0.0912, 0.1119, 0.1896, 0.1019, 0.2748, 0.0931)
+    assert share == pytest.approx(wanted, abs=0.008)
+    looks = looks_of(params, 600.0, 0.002)
+    shifts = sum(a.shift != b.shift for a, b in zip(looks, looks[1:], strict=False)) / 600.0
+    assert shifts == pytest.approx(5.66, abs=0.3)
+
+
+def test_refixations_give_a_human_rate_of_gaze_shifts() -> None:
+    looks = looks_of(ScanpathParams(shortest_dwell_ms=0.0), 900.0, 0.003)
+    shifts = sum(a.shift != b.shift for a, b in zip(looks, looks[1:], strict=False)) / 900.0
+    assert shifts == pytest.approx(3.68, abs=0.2)
+
+
+def test_a_part_that_is_never_left_keeps_its_row() -> None:
+    rows = (*WALK.matrix[:7], (0.0,) * 7 + (1.0,))
+    assert without_refixations(rows)[7].tolist() == [0.0] * 7 + [1.0]
+
+
+def test_row_sums_are_reported_as_printed() -> None:
+    assert WALK.row_sums == pytest.approx((0.9, 0.8, 1.1, 1.1, 0.9, 1.0, 1.0, 0.9))
+    assert row_sums_note(WALK) == (
+        "the walk's rows do not all sum to 1 (DN 0.9, FL 0.8, LE 1.1, M 1.1, N 0.9, UP 0.9); "
+        "they are normalised"
+    )
+    whole = replace(WALK, matrix=tuple(map(tuple, normalised(WALK.matrix).round(4).tolist())))
+    assert row_sums_note(whole) is None

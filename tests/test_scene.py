@@ -1,0 +1,203 @@
+"""The scenes: closed forms that move as people can, and the events they ask about."""
+
+from math import atan2, degrees, dist, hypot
+
+import numpy as np
+import pytest
+
+from sim_mock.boxing import HALF_FIELD_RAD, HEAD_M, Boxing
+from sim_mock.face_to_face import FaceToFace
+from sim_mock.scene import Event, Key, Scene, Thing, between, there_and_back
+from sim_mock.scenes import scenes
+
+NAMES = ("boxing", "face-to-face", "visitor")
+DT_S = 0.01
+
+
+def times(scene: Scene, dt_s: float = DT_S) -> list[float]:
+    """Give the instants of one round and a little of the next."""
+    return np.arange(0.0, scene.round_s + 0.5, dt_s).tolist()
+
+
+def named(name: str) -> list[Event]:
+    return [event for event in Boxing().events() if event.name == name]
+
+
+def thing(t_s: float, kind: str, id_: int | None = None) -> Thing | None:
+    for each in Boxing().things(t_s):
+        if each.kind == kind and id_ in (None, each.id):
+            return each
+    return None
+
+
+def test_all_scenes_are_there_under_their_names() -> None:
+    found = scenes()
+    assert tuple(sorted(found)) == NAMES
+    assert all(scene.name == name for name, scene in found.items())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_looking_twice_or_backwards_shows_the_same(name: str) -> None:
+    scene, again = scenes()[name], scenes()[name]
+    forward = [(scene.people(t), scene.things(t), scene.behaviour(t)) for t in times(scene, 0.5)]
+    backward = [
+        (again.people(t), again.things(t), again.behaviour(t)) for t in times(scene, 0.5)[::-1]
+    ]
+    assert forward == backward[::-1]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nobody_jumps_and_no_thing_is_faster_than_a_fist(name: str) -> None:
+    scene = scenes()[name]
+    before_people, before = scene.people(0.0), {t.id: t for t in scene.things(0.0)}
+    for t_s in times(scene)[1:]:
+        people, things = scene.people(t_s), {t.id: t for t in scene.things(t_s)}
+        for old, new in zip(before_people, people, strict=True):
+            assert dist(old.p_world_face_m, new.p_world_face_m) / DT_S < 2.7, t_s  # walking
+            turn = abs(new.face_yaw_pitch_rad[0] - old.face_yaw_pitch_rad[0])
+            assert degrees(min(turn, abs(turn - 2 * np.pi))) / DT_S < 250.0, t_s
+        for id_ in before.keys() & things.keys():
+            assert dist(before[id_].p_world_m, things[id_].p_world_m) / DT_S < 5.0, t_s
+            assert before[id_].kind == things[id_].kind
+        before_people, before = people, things
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_events_lie_inside_the_round_and_in_order(name: str) -> None:
+    scene = scenes()[name]
+    events = scene.events()
+    assert all(0.0 <= event.start_s < event.end_s <= scene.round_s for event in events)
+    starts = [event.start_s for event in events]
+    assert starts == sorted(starts)
+
+
+@pytest.mark.parametrize("kind", ["hand", "attack_target", "face"])
+def test_what_an_event_asks_for_is_where_it_says(kind: str) -> None:
+    scene = Boxing()
+    for event in (event for event in scene.events() if event.kind == kind):
+        for t_s in np.linspace(event.start_s, event.end_s - 0.01, 20).tolist():
+            places = [each.p_world_m for each in scene.things(t_s) if each.kind == kind]
+            if kind == "face":
+                places = [scene.people(t_s)[0].p_world_face_m]
+            assert min(dist(place, event.place_world_m) for place in places) < event.within_m
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_planner_names_every_behaviour_it_uses(name: str) -> None:
+    scene = scenes()[name]
+    used = {scene.behaviour(t) for t in times(scene)} - {None}
+    assert used == set(scene.behaviours)
+
+
+def test_the_round_of_boxing_holds_several_of_each() -> None:
+    for name, least in [("punch", 3), ("attack", 3), ("wave", 2), ("reach", 2), ("step", 2)]:
+        assert len(named(name)) >= least, name
+    assert len(named("return")) >= 2 and len(named("face")) >= 8
+    busy = sum(e.end_s - e.start_s for e in Boxing().events() if e.name != "face")
+    quiet = sum(e.end_s - e.start_s for e in named("face"))
+    assert busy + quiet <= Boxing.round_s + 1e-9 and quiet > 0.4 * Boxing.round_s
+
+
+def test_a_punch_comes_within_reach_of_the_face_in_a_quarter_of_a_second() -> None:
+    for event in named("punch"):
+        ways = []
+        for t_s in np.arange(event.start_s, event.end_s, 0.005).tolist():
+            ways.append([dist(each.p_world_m, HEAD_M) for each in Boxing().things(t_s)[:2]])
+        nearest = np.array(ways).min(axis=1)
+        assert nearest.min() == pytest.approx(0.35, abs=0.02)
+        assert nearest.argmin() * 0.005 == pytest.approx(0.25, abs=0.03)
+        assert nearest[0] > 0.75 and nearest[-1] > 0.75
+
+
+def test_the_robot_guards_a_reaction_time_after_the_punch_began() -> None:
+    scene = Boxing()
+    for event in named("punch"):
+        assert scene.behaviour(event.start_s + 0.29) == "wait"
+        assert scene.behaviour(event.start_s + 0.31) == "guard"
+        target = thing(event.start_s + 0.3, "guard_target")
+        fists = [t.p_world_m for t in scene.things(event.start_s + 0.3) if t.kind == "hand"]
+        assert target is not None
+        assert target.p_world_m == min(fists, key=lambda place: dist(place, HEAD_M))
+        assert scene.behaviour(event.end_s + 0.05) == "wait"
+
+
+def test_the_planner_attacks_for_0_6_s_with_a_target_on_the_opponent() -> None:
+    scene = Boxing()
+    sides = set()
+    for event in named("attack"):
+        assert scene.behaviour(event.start_s - 0.01) == "wait"
+        assert scene.behaviour(event.start_s) == scene.behaviour(event.end_s - 0.01) == "attack"
+        assert scene.behaviour(event.end_s + 0.01) == "wait"
+        assert event.end_s - event.start_s == pytest.approx(0.6)
+        target = thing(event.start_s, "attack_target")
+        face = scene.people(event.start_s)[0].p_world_face_m
+        assert target is not None and 0.05 < dist(target.p_world_m, face) < 0.4
+        sides.add(target.p_world_m[2] < face[2] - 0.1)
+    assert sides == {True, False}  # at the chest and at the face's side
+    assert thing(0.0, "attack_target") is None
+
+
+def test_a_hand_reaches_in_from_outside_the_field_and_the_event_begins_as_it_enters() -> None:
+    sides = set()
+    for event in named("reach"):
+        entered = thing(event.start_s, "hand", 2)
+        outside = thing(event.start_s - 0.05, "hand", 2)
+        inside = thing(event.start_s + 1.0, "hand", 2)
+        assert entered is not None and outside is not None and inside is not None
+        angles = [
+            abs(atan2(hand.p_world_m[1] - HEAD_M[1], hand.p_world_m[0] - HEAD_M[0]))
+            for hand in (outside, entered, inside)
+        ]
+        assert angles[0] > HALF_FIELD_RAD > angles[2]
+        assert angles[1] == pytest.approx(HALF_FIELD_RAD, abs=0.01)
+        sides.add(entered.p_world_m[1] > 0.0)
+        opponent = Boxing().people(event.start_s)[0].p_world_face_m
+        assert abs(opponent[1]) < 0.02  # so that the robot looks straight ahead
+    assert sides == {True, False}
+
+
+def test_the_opponent_steps_left_and_right() -> None:
+    y = [Boxing().people(t)[0].p_world_face_m[1] for t in times(Boxing())]
+    assert max(y) > 0.2 and min(y) < -0.2
+
+
+def test_face_to_face_walks_about_at_the_heights_of_sitting_standing_and_a_child() -> None:
+    scene = FaceToFace()
+    faces = np.array([scene.people(t)[0].p_world_face_m for t in times(scene)])
+    distances = np.linalg.norm(faces - HEAD_M, axis=1)
+    assert distances.min() > 0.6 and distances.max() < 1.5
+    assert distances.max() - distances.min() > 0.4
+    heights = faces[:, 2]
+    for low, high in ((-0.05, 0.02), (0.2, 0.25), (0.58, 0.65)):
+        assert DT_S * np.count_nonzero((heights > low) & (heights < high)) > 8.0
+    assert faces[:, 1].max() > 0.4 and faces[:, 1].min() < -0.4
+
+
+def test_face_to_face_mostly_faces_the_robot() -> None:
+    scene = FaceToFace()
+    off = []
+    for t_s in times(scene):
+        (x, y, z), (yaw, pitch) = scene.people(t_s)[0][:2]
+        to_head = (HEAD_M[0] - x, HEAD_M[1] - y, HEAD_M[2] - z)
+        side = yaw - atan2(to_head[1], to_head[0])
+        up = pitch - atan2(to_head[2], hypot(to_head[0], to_head[1]))
+        off.append(degrees(hypot((side + np.pi) % (2 * np.pi) - np.pi, up)))
+    share = float(np.mean(np.array(off) < 5.0))
+    assert 0.7 < share < 0.95
+    assert max(off) < 25.0
+
+
+def test_there_and_back_rises_holds_and_falls_without_a_step() -> None:
+    values = [there_and_back(t, 0.2, 0.1, 0.3) for t in np.arange(-0.1, 0.8, 0.001).tolist()]
+    assert values[0] == values[-1] == 0.0
+    assert there_and_back(0.1, 0.2, 0.1, 0.3) == pytest.approx(0.5)
+    assert there_and_back(0.25, 0.2, 0.1, 0.3) == 1.0
+    assert there_and_back(0.45, 0.2, 0.1, 0.3) == pytest.approx(0.5)
+    assert np.abs(np.diff(values)).max() < 1.875 / 0.2 * 0.001 * 1.01
+    assert there_and_back(0.15, 0.15, 0.0, 0.15) == pytest.approx(1.0)
+
+
+def test_between_keys_stays_at_the_last_one() -> None:
+    keys = (Key(0.0, (1.0, 0.0, 0.0)), Key(1.0, (1.0, 1.0, 0.0), (10.0, 0.0)))
+    assert between(keys, 0.5)[0] == (1.0, 0.5, 0.0)
+    assert between(keys, 9.0)[0] == (1.0, 1.0, 0.0)

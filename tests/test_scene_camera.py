@@ -1,0 +1,98 @@
+"""The camera on a scene: things come late, noisy, with their identity, inside the field."""
+
+import numpy as np
+import pytest
+
+from drivers.types import Detections
+from gaze.types import Vec3
+from robot.frames import CameraMount, CameraParams
+from sim_mock.scene import Event, Person, Thing
+from sim_mock.scene_camera import SceneCamera, SceneCameraParams
+
+LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class Still:
+    """A scene that shows what it is given, and some of it only later."""
+
+    name = "still"
+    round_s = 10.0
+    behaviours = ()
+
+    def __init__(self, things: tuple[Thing, ...], later: tuple[Thing, ...] = ()) -> None:
+        self._things, self._later = things, later
+
+    def people(self, t_s: float) -> tuple[Person, ...]:
+        return (Person((1.0, 0.0, 0.0), (np.pi, 0.0), (0.8, 0.2, 0.0)),)
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        return self._things if t_s < 0.5 else self._later + self._things
+
+    def behaviour(self, t_s: float) -> str | None:
+        return None
+
+    def events(self) -> tuple[Event, ...]:
+        return ()
+
+
+def camera(scene: Still, **params: float) -> SceneCamera:
+    still = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
+    made = SceneCamera(SceneCameraParams(**params), scene, still, where, np.random.default_rng(0))
+    made.open()
+    return made
+
+
+def where(_: float) -> tuple[tuple[Vec3, Vec3, Vec3], Vec3]:
+    return LEVEL, (0.0, 0.0, 0.0)
+
+
+def seen_at(made: SceneCamera, t_s: float) -> Detections:
+    for now_s in np.arange(0.0, t_s + 1e-9, 0.005).tolist():
+        found = made.latest(now_s)
+    assert found is not None
+    return found
+
+
+def test_things_and_hands_are_blobs_of_their_kind_at_their_place() -> None:
+    ball = Thing(7, "attack_target", (0.9, -0.1, 0.1), 0.05)
+    found = seen_at(camera(Still((ball,)), depth_noise_mm=0.0), 0.2)
+    hand, target = found.blobs
+    assert hand.kind == "hand" and hand.p_camera_m == pytest.approx((-0.2, 0.0, 0.8))
+    assert target.kind == "attack_target" and target.radius_m == 0.05
+    # Camera: x right, y down, z forward.
+    assert target.p_camera_m == pytest.approx((0.1, -0.1, 0.9))
+
+
+def test_a_thing_keeps_its_number_when_another_comes_before_it() -> None:
+    ball = Thing(1, "thing", (0.9, -0.1, 0.1), 0.05)
+    other = Thing(0, "thing", (0.9, 0.1, 0.1), 0.05)
+    made = camera(Still((ball,), later=(other,)))
+    early = seen_at(made, 0.2).blobs
+    late = seen_at(made, 1.0).blobs
+    assert [len(early), len(late)] == [2, 3]
+    assert early[-1].id == late[-1].id
+    assert len({blob.id for blob in late}) == 3
+
+
+def test_a_thing_is_seen_late_and_only_inside_the_field() -> None:
+    aside = Thing(0, "hand", (0.5, 0.5, 0.0), 0.05)
+    behind = Thing(1, "hand", (-0.5, 0.0, 0.0), 0.05)
+    appears = Thing(2, "thing", (0.9, 0.0, 0.0), 0.05)
+    made = camera(Still((aside, behind), later=(appears,)))
+    assert all(blob.kind == "hand" for blob in seen_at(made, 0.55).blobs)
+    assert len(seen_at(camera(Still((aside, behind))), 0.55).blobs) == 1  # the person's own hand
+    shown = seen_at(camera(Still((), later=(appears,)), latency_ms=60.0), 0.63)
+    assert "thing" in {blob.kind for blob in shown.blobs}
+
+
+def test_depth_is_noisy_along_the_line_of_view_alone() -> None:
+    ball = Thing(0, "thing", (1.0, 0.2, 0.0), 0.05)
+    made = camera(Still((ball,)), depth_noise_mm=5.0)
+    places = []
+    for now_s in np.arange(0.0, 0.45 / 30.0 * 400, 1.0 / 30.0).tolist():
+        found = made.latest(now_s)
+        if found is not None:
+            places.append(found.blobs[-1].p_camera_m)
+    p = np.array(places)
+    assert 0.003 < np.linalg.norm(p, axis=1).std() < 0.007
+    assert (p[:, 0] / p[:, 2]).std() < 1e-9
