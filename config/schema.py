@@ -189,6 +189,15 @@ def load_rig(name_or_path: str, character: str | None = None, profile: str | Non
     return load(layers[-1], Rig, defaults=layers[:-1], checks=rules)
 
 
+def load_rules(name_or_path: str) -> TopDownParams:
+    """Read a rule set, behaviour -> what to look at, by shipped name or by path.
+
+    Raises:
+        config.load.ConfigError: with every fault.
+    """
+    return load(_find("rules", name_or_path), TopDownParams)
+
+
 def load_walk(name_or_path: str) -> Walk:
     """Read a scanpath walk by shipped name or by path.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from config.schema import Rig, load_walk
+from config.schema import Rig, load_rules, load_walk
 from drivers.camera_thread import CameraThread
 from drivers.dynamixel import DynamixelBus
 from drivers.dynamixel_port import BlockingPort, BusPort
@@ -75,6 +75,7 @@ class Choice:
     camera: int | None = None
     scanpath: str | None = None
     saccade: str | None = None
+    rules: str | None = None
     film_delay_s: float = 0.05
 
 
@@ -114,6 +115,9 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
         config.load.ConfigError: the profile or walk that the rig names is at fault.
         drivers.errors.SetupError: a film or model file cannot be used.
     """
+    if choice.rules is not None:
+        gaze = replace(rig.gaze, top_down=load_rules(choice.rules))
+        rig = replace(rig, gaze=gaze)
     scene = _scene(rig, choice.scene) if choice.scene is not None else None
     dice = [np.random.default_rng(child) for child in np.random.SeedSequence(choice.seed).spawn(6)]
     scanpath_dice, lid_dice, camera_dice, idle_dice, aversion_dice, landing_dice = dice

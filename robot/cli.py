@@ -53,6 +53,9 @@ def run(
         str | None,
         typer.Option(help="A character laid over the rig: shy, bold, sleepy, strong_boxer ..."),
     ] = None,
+    rules: Annotated[
+        str | None, typer.Option(help="Rule set instead of the rig's: boxing, conversation.")
+    ] = None,
     behaviour: Annotated[
         str | None, typer.Option(help="Behaviour in force at the start, one of the rig's rules.")
     ] = None,
@@ -95,6 +98,7 @@ def run(
             oak=oak,
             scanpath=scanpath,
             saccade=saccade,
+            rules=rules,
             asked=tuple(
                 (menu, choice)
                 for menu, choice in (("behaviour", behaviour), ("conversation", conversation))

@@ -57,6 +57,15 @@ class LoopParams:
     )
 
 
+LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
+    "awake": lambda lids, t_s: lids.sleepy(0.0),
+    "sleepy": lambda lids, t_s: lids.sleepy(0.7),
+    "wink left": lambda lids, t_s: lids.wink("left", t_s),
+    "wink right": lambda lids, t_s: lids.wink("right", t_s),
+}
+"""What can be asked of the lids."""
+
+
 class LoopCount(NamedTuple):
     """How the loop kept its time."""
 
@@ -98,7 +107,7 @@ class Robot:
         self._asked: deque[tuple[str, str]] = deque()
 
     def ask(self, menu: str, choice: str) -> None:
-        """Ask for a behaviour or a mode of conversation; it is in force from the next tick on.
+        """Ask for a behaviour, a mode of conversation or a wink, from the next tick on.
 
         May be called from any thread.
 
@@ -118,6 +127,7 @@ class Robot:
         return {
             "behaviour": _first(top_down.behaviour, top_down.behaviours),
             "conversation": _first(self._aversion.mode, MODES),
+            "lids": tuple(LID_COMMANDS),
         }
 
     def start(self, clock: Clock) -> None:
@@ -194,10 +204,12 @@ class Robot:
             menu, choice = self._asked.popleft()
             if menu == "behaviour":
                 self.attention.top_down.behave(choice)
-            else:
+            elif menu == "conversation":
                 mode = next(mode for mode in MODES if mode == choice)
                 self._aversion.converse(mode, t_s)
                 self._lids.mode("rest" if mode == "none" else "conversation")
+            else:
+                LID_COMMANDS[choice](self._lids, t_s)
 
     def _look_for_faults(self) -> None:
         faults = self.body.bus.faults()

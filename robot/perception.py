@@ -4,14 +4,15 @@ A face's landmarks give its metric pose in the camera frame; the camera is place
 it was when the picture was taken, not where it is now.
 """
 
+from collections.abc import Mapping
 from math import radians
 
 import numpy as np
 
 from drivers.types import Detections
 from gaze.angles import add, compose, rotate, scale, sub, unit
-from gaze.types import Bodies, Face, Mat3, Percept, Vec3
-from robot.face_pose import Intrinsics, face_pose, intrinsics_of_view
+from gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
+from robot.face_pose import PARTS_FACE_M, Intrinsics, face_pose, intrinsics_of_view
 from robot.frames import CameraMount, PoseHistory
 from robot.tracks import Sighting, Track, Tracker
 
@@ -21,8 +22,21 @@ _FACE_RADIUS_M = 0.1
 class Perception:
     """Sees: one percept for each new picture."""
 
-    def __init__(self, mount: CameraMount, horizontal_field_deg: float, tracker: Tracker) -> None:
-        """Take where the camera sits, its field of view and the tracker."""
+    def __init__(
+        self,
+        mount: CameraMount,
+        horizontal_field_deg: float,
+        tracker: Tracker,
+        parts_face_m: Mapping[str, Vec3] | None = None,
+    ) -> None:
+        """Take where the camera sits, its field of view and the tracker.
+
+        parts_face_m: a person's own places of some parts in the face's frame, instead of
+            the canonical ones (Nakamoto & Tsuruno 3.7)
+        """
+        own = parts_face_m or {}
+        # A measured part is where it was measured; a canonical one is stretched with the face.
+        self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
         self._mount = mount
         self._field_rad = radians(horizontal_field_deg)
         self._size_px = (0, 0)

@@ -39,6 +39,7 @@ class Wanted:
     oak: bool = False
     scanpath: str | None = None
     saccade: str | None = None
+    rules: str | None = None
     asked: tuple[tuple[str, str], ...] = ()
     heatmap: Path | None = None
     heatmap_face: Path | None = None
@@ -79,6 +80,7 @@ class Wanted:
             camera=self.camera,
             scanpath=self.scanpath,
             saccade=self.saccade,
+            rules=self.rules,
         )
 
 

@@ -349,7 +349,7 @@ def test_what_is_missing_is_missed_in_the_lowest_mapping(tmp_path: Path) -> None
         load(top, Rig, defaults=[base])
     (fault,) = caught.value.faults
     # A layer of differences need not be whole; the file it is laid over must be.
-    assert (Path(fault.file).name, fault.line, fault.key) == ("base.yaml", 4, "joints.pan.id")
+    assert (Path(fault.file).name, fault.line, fault.key) == ("base.yaml", 3, "joints.pan.id")
 
 
 def test_unreadable_layers_are_all_named(tmp_path: Path) -> None:

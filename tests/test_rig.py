@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from config.load import ConfigError, shipped, shipped_names
-from config.schema import Rig, load_rig, load_walk
+from config.schema import Rig, load_rig, load_rules, load_walk
 from robot.types import JOINTS
 
 DESK = shipped("rigs", "desk")
@@ -68,6 +68,8 @@ def test_shipped_profiles_characters_and_walks_load() -> None:
     assert load_rig("desk", profile="mitake").gaze.bottom_up.form == "literal"
     for name in shipped_names("characters"):
         assert load_rig("desk", character=name).gaze != load_rig("desk").gaze
+    for name in shipped_names("rules"):
+        assert "wait" in load_rules(name).rules
     for name in shipped_names("scanpaths"):
         load_walk(name)
 
