@@ -4,6 +4,7 @@ Every curve is what the models give at this moment; human data are marked as suc
 their sources.
 """
 
+from collections.abc import Callable
 from math import degrees, radians
 from pathlib import Path
 
@@ -14,6 +15,12 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen before
 
 from config.schema import load_walk  # noqa: E402
+from gaze.binocular import (  # noqa: E402
+    AT_REST,
+    BinocularController,
+    BinocularParams,
+    HeadMotion,
+)
 from gaze.head import Head, HeadParams  # noqa: E402
 from gaze.lids import LidParams, Lids  # noqa: E402
 from gaze.saccade import Saccade, SaccadeParams  # noqa: E402
@@ -22,13 +29,14 @@ from gaze.types import PART_NAMES  # noqa: E402
 
 HERE = Path(__file__).parent / "figures"
 INK, HUMAN = "#1f5fa8", "#c0722e"
+TICK_S = 0.005
 
 
 def main() -> None:
     """Draw all figures into docs/figures."""
     HERE.mkdir(exist_ok=True)
     plt.rcParams.update({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3})
-    for draw in (main_sequence, head_goal, blink, scanpath):
+    for draw in (main_sequence, head_goal, pursuit, vergence, reflex, blink, scanpath):
         draw()
         print(f"docs/figures/{draw.__name__}.png")
 
@@ -78,6 +86,83 @@ def head_goal() -> None:
     )
     axes.legend(fontsize=7)
     saved("head_goal", figure)
+
+
+def followed(
+    left: Callable[[float], float | None],
+    right: Callable[[float], float | None],
+    seconds: float,
+    head: Callable[[float], HeadMotion] = lambda t: AT_REST,
+) -> np.ndarray:
+    """Let the binocular controller follow (degrees); give rows of time, version, vergence."""
+    controller = BinocularController(BinocularParams())
+    controller.reset(0.0)
+    rows = []
+    for k in range(round(seconds / TICK_S)):
+        seen = [None if a is None else radians(a) for a in (left(k * TICK_S), right(k * TICK_S))]
+        controller.step(seen[0], seen[1], head(k * TICK_S), TICK_S)
+        rows.append(((k + 1) * TICK_S, controller.version_rad, controller.vergence_rad))
+    table = np.array(rows)
+    table[:, 1:] = np.degrees(table[:, 1:])
+    return table
+
+
+def pursuit() -> None:
+    """Following a ramp and a sine that are seen 0.1 s late."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.4))
+    for speed in (10.0, 20.0, 30.0):
+        t, version, _ = followed(lambda t, v=speed: v * t, lambda t, v=speed: v * t, 0.8).T
+        left.plot(t, np.gradient(version, t), label=f"{speed:.0f} deg/s")
+    left.axvline(0.1, color=HUMAN, ls="--", label="human latency, 100 ms (Robinson 1986)")
+    left.set(xlabel="s", ylabel="eye speed, deg/s", title="ramps")
+    for hz, style in ((0.2, "-"), (0.5, "--")):
+        t, version, _ = followed(
+            lambda t, f=hz: 5 * np.sin(2 * np.pi * f * t),
+            lambda t, f=hz: 5 * np.sin(2 * np.pi * f * t),
+            5.0,
+        ).T
+        right.plot(t, version, INK, ls=style, label=f"eye, {hz} Hz")
+        right.plot(t, 5 * np.sin(2 * np.pi * hz * t), HUMAN, ls=style, lw=0.8, label="target")
+    right.set(xlabel="s", ylabel="deg", title="sines")
+    for axes in (left, right):
+        axes.legend(fontsize=7)
+    saved("pursuit", figure)
+
+
+def vergence() -> None:
+    """Steps in depth: converging and diverging by 4 deg."""
+    figure, axes = plt.subplots(figsize=(4.8, 3.2))
+    for start, step in ((2.0, 4.0), (8.0, -4.0)):
+        controller = BinocularController(BinocularParams())
+        controller.reset(0.0, 0.0, radians(start))
+        half = radians(start + step) / 2
+        values = []
+        for _ in range(400):
+            controller.step(-half, half, AT_REST, TICK_S)
+            values.append(degrees(controller.vergence_rad))
+        times = TICK_S * np.arange(1, 401)
+        axes.plot(times, values, label=f"{start:.0f} to {start + step:.0f} deg")
+    axes.set(xlabel="s", ylabel="vergence, deg", title="vergence: slower apart than together")
+    axes.legend(fontsize=7)
+    saved("vergence", figure)
+
+
+def reflex() -> None:
+    """The eye against a head that swings in the dark."""
+
+    def head(t: float) -> HeadMotion:
+        w = 2 * np.pi * 0.5
+        return HeadMotion(radians(10 * np.sin(w * t)), radians(10 * w * np.cos(w * t)))
+
+    t, version, _ = followed(lambda t: None, lambda t: None, 4.0, head).T
+    swing = 10 * np.sin(np.pi * t)
+    figure, axes = plt.subplots(figsize=(4.8, 3.2))
+    axes.plot(t, swing, HUMAN, label="head, 0.5 Hz")
+    axes.plot(t, version, INK, label="eye in the head")
+    axes.plot(t, swing + version, "k", lw=0.8, label="gaze")
+    axes.set(xlabel="s", ylabel="deg", title="vestibulo-ocular reflex in the dark")
+    axes.legend(fontsize=7)
+    saved("reflex", figure)
 
 
 def blink() -> None:

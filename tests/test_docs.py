@@ -50,7 +50,7 @@ def test_tests_and_functions_named_exist(paper: Path) -> None:
         if name != "test_e17_":
             assert name in known, f"{paper.name}: {name}"
     for name in set(re.findall(r"`([A-Z]\w+\.\w+)`", text)):
-        assert name in known or name.split(".")[0] not in known, f"{paper.name}: {name}"
+        assert name in known, f"{paper.name}: {name}"
 
 
 def test_every_numbered_check_listed_is_a_test() -> None:
