@@ -12,7 +12,7 @@ run: $(VENV)/.installed
 	$(BIN)/gazerig run --mock
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto
 
 check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
