@@ -44,7 +44,7 @@ def run(
     seconds: Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all dice.")] = 0,
     fast: Annotated[
-        bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock, --seconds).")
+        bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock).")
     ] = False,
     profile: Annotated[
         str | None, typer.Option(help="Style of gaze: robot, or literal mitake, nakamoto.")

@@ -69,8 +69,8 @@ class Wanted:
             raise SetupError("--fast needs --mock: real servos cannot be hurried")
         if self.fast and self.camera is not None:
             raise SetupError("--fast cannot be used with --camera: a webcam has real time")
-        if self.fast and self.seconds is None:
-            raise SetupError("--fast needs --seconds S: it would never end")
+        if self.fast and self.seconds is None and scene is None:
+            raise SetupError("--fast needs --seconds S with a film: it would never end")
         return Choice(
             mock=self.mock,
             fast=self.fast,
@@ -139,8 +139,12 @@ def _run(
         if face_gaze is not None:
             face_gaze.note(tick)
 
+    longest_s = wanted.seconds
+    if longest_s is None and wanted.fast and scene is not None:
+        longest_s = scene.round_s + 1.0  # one whole round, and how it ends
+
     def stop(seconds: float) -> str | None:
-        over = wanted.seconds is not None and seconds >= wanted.seconds - 1e-9
+        over = longest_s is not None and seconds >= longest_s - 1e-9
         return stopped() or ("seconds" if over else None)
 
     began_s = wall.now_s()

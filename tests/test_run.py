@@ -73,6 +73,23 @@ def test_e59_same_seed_same_bytes_in_another_process(visitor: dict[str, Any]) ->
     assert other["bus"]["tx_sha256"] != again["bus"]["tx_sha256"]
 
 
+def test_boxing_shows_the_papers_five_behaviours_with_their_latencies() -> None:
+    run = figures("--scene", "boxing")
+    seen = run["behaviours"]
+    for name in ("punch", "attack", "face", "wave", "reach"):
+        assert seen[name]["seen"] == seen[name]["of"] > 0, name
+    assert seen["punch"]["latency_s"] <= 0.4 and seen["wave"]["latency_s"] <= 0.4
+    assert run["seconds"] == pytest.approx(45.0, abs=0.1)
+
+
+def test_a_heat_map_of_a_face_is_a_picture(tmp_path: Path) -> None:
+    out = tmp_path / "heat.png"
+    run = figures("--scene", "face-to-face", "--seconds", "10", "--heatmap", str(out))
+    picture = cv2.imread(str(out))
+    assert run["target_share"]["face"] > 0.9
+    assert picture is not None and picture.shape[0] > 400 and picture.std() > 10.0
+
+
 def photo(path: Path) -> Path:
     data = pytest.importorskip("skimage.data", reason="scikit-image ships the photo")
     cv2.imwrite(str(path), np.ascontiguousarray(data.astronaut()[:, :, ::-1]))
@@ -149,7 +166,7 @@ def test_losing_the_bus_is_a_fault_with_its_cause() -> None:
         (("--mock", "--scene", "circus"), "circus"),
         (("--mock", "--oak"), "not supported yet"),
         (("--mock", "--scene", "visitor", "--video", "x.avi"), "exclude each other"),
-        (("--mock", "--fast"), "--seconds"),
+        (("--mock", "--fast", "--video", "x.avi"), "--seconds"),
         (("--fast", "--scene", "visitor", "--seconds", "1"), "--mock"),
         ((), "nothing to look at"),
         (("--mock", "--page", "8080"), "HOST:PORT"),
