@@ -23,7 +23,8 @@ class Summary:
         self._target_s: defaultdict[str, float] = defaultdict(float)
         self._part_s: defaultdict[str, float] = defaultdict(float)
         self._limited: Counter[str] = Counter()
-        self._errors_deg: list[float] = []
+        # Counted by thousandths of a degree: a list would grow for as long as the rig runs.
+        self._errors_mdeg: Counter[int] = Counter()
         self._first_s: float | None = None
         self._last: Tick | None = None
         self._gaze: Vec3 | None = None
@@ -40,7 +41,7 @@ class Summary:
         if tick.target.part is not None:
             self._part_s[tick.target.part] += dt_s
         if self._fixates(tick, dt_s):
-            self._errors_deg.append(degrees(gaze_error_rad(tick)))
+            self._errors_mdeg[round(1000.0 * degrees(gaze_error_rad(tick)))] += 1
         for reason in tick.verdict.reasons:
             self._limited[reason.partition(": ")[2]] += 1
 
@@ -54,8 +55,6 @@ class Summary:
     def figures(self) -> dict[str, object]:
         """Give what the ticks themselves tell; the caller adds bus, loop and pictures."""
         last = self._last
-        errors = np.array(self._errors_deg) if self._errors_deg else np.array([np.nan])
-        median, p95 = np.percentile(errors, [50.0, 95.0]).tolist()
         return {
             "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,
             "fixations": last.gaze.fixations if last else 0,
@@ -64,8 +63,8 @@ class Summary:
             "target_share": _shares(self._target_s),
             "part_share": _shares(self._part_s),
             "gaze_error_deg": {
-                "median": round(median, 4) if self._errors_deg else None,
-                "p95": round(p95, 4) if self._errors_deg else None,
+                "median": _percentile_deg(self._errors_mdeg, 50.0),
+                "p95": _percentile_deg(self._errors_mdeg, 95.0),
             },
             "limited": dict(sorted(self._limited.items())),
         }
@@ -83,6 +82,15 @@ def gaze_error_rad(tick: Tick) -> float:
     left = angle_between(line_of_sight(pose, True), sub(point, pose.p_world_eye_left_m))
     right = angle_between(line_of_sight(pose, False), sub(point, pose.p_world_eye_right_m))
     return 0.5 * (left + right)
+
+
+def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
+    """Give a percentile of counted thousandths of a degree, None of nothing."""
+    if not counts_mdeg:
+        return None
+    values = sorted(counts_mdeg)
+    reached = np.cumsum([counts_mdeg[value] for value in values])
+    return values[int(np.searchsorted(reached, percent / 100.0 * reached[-1]))] / 1000.0
 
 
 def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
