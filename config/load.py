@@ -358,10 +358,7 @@ def _steps(key: str) -> tuple[str, ...]:
 
 
 def _merged(low: Entry, high: Entry) -> Entry:
-    """Lay one entry over another: mappings key by key, all else whole.
-
-    A mapping keeps the place it has in the lowest file, where a missing key belongs.
-    """
+    """Lay one entry over another; a mapping keeps its place in the lowest file."""
     if not (isinstance(low.value, dict) and isinstance(high.value, dict)):
         return high
     below = low.value

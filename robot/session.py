@@ -125,23 +125,21 @@ def _run(
     )
     summary = Summary()
     scene = made.scene
-    planner = Planner(scene.behaviour, robot.ask) if scene is not None else None
     score = Behaviours(scene.events(), scene.round_s) if scene is not None else None
     face_gaze = FaceGaze() if wanted.heatmap is not None else None
+    watchers = [summary.note, onlooker.note]
+    if scene is not None and score is not None:
+        planner = Planner(scene.behaviour, robot.ask)
+        watchers += [lambda tick: planner.note(tick.t_s), score.note]
+    if face_gaze is not None:
+        watchers.append(face_gaze.note)
     _ask_all(robot, wanted)
 
     def watch(tick: Tick) -> None:
-        summary.note(tick)
-        onlooker.note(tick)
-        if planner is not None and score is not None:
-            planner.note(tick.t_s)
-            score.note(tick)
-        if face_gaze is not None:
-            face_gaze.note(tick)
+        for note in watchers:
+            note(tick)
 
-    longest_s = wanted.seconds
-    if longest_s is None and wanted.fast and scene is not None:
-        longest_s = scene.round_s + 1.0  # one whole round, and how it ends
+    longest_s = _longest_s(made, wanted)
 
     def stop(seconds: float) -> str | None:
         over = longest_s is not None and seconds >= longest_s - 1e-9
@@ -169,6 +167,13 @@ def _run(
     if face_gaze is not None and wanted.heatmap is not None:
         _draw_heatmap(face_gaze, wanted.heatmap, wanted.heatmap_face, say)
     return _figures(made, summary, score, count, wall_s)
+
+
+def _longest_s(made: Assembly, wanted: Wanted) -> float | None:
+    """Give how long to run: as asked, or one whole round of a scene in simulated time."""
+    if wanted.seconds is None and wanted.fast and made.scene is not None:
+        return made.scene.round_s + 1.0  # and how the round ends
+    return wanted.seconds
 
 
 def _ask_all(robot: Robot, wanted: Wanted) -> None:
