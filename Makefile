@@ -4,6 +4,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+OTHER_SDK := dynamixel-sdk==3.8.4
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: run test check bench figures clean
@@ -22,6 +23,8 @@ check: $(VENV)/.installed-dev
 bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_run.py
 	$(BIN)/python tests/bench/bench_gaze.py
+	$(BIN)/python tests/bench/bench_bus.py
+	$(BIN)/python tests/bench/bench_emulator.py
 
 figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/make_figures.py
@@ -44,9 +47,16 @@ define install
 	@touch $@
 endef
 
+# A second version of the servo maker's SDK, beside the environment: it judges the emulated bus.
+define other_sdk
+	{ uv pip install -q --python $(BIN)/python --no-deps --target $(VENV)/other-sdk $(OTHER_SDK) 2>/dev/null \
+	  || $(BIN)/python -m pip install -q --no-deps --upgrade --target $(VENV)/other-sdk $(OTHER_SDK); }
+endef
+
 $(VENV)/.installed: pyproject.toml
 	$(call install,.)
 
 $(VENV)/.installed-dev: pyproject.toml
 	$(call install,.[dev])
+	@$(call other_sdk)
 	@touch $(VENV)/.installed

@@ -9,8 +9,9 @@ from drivers.dynamixel_group import STARTS, Answer, FastGroup, Group, PlainGroup
 from drivers.dynamixel_line import Line
 from drivers.dynamixel_packets import ALERT, ERROR_NUMBER, SyncWrite
 from drivers.dynamixel_port import BusPort
+from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_roll import Roll
-from drivers.dynamixel_setup import Registers, find, prepare
+from drivers.dynamixel_setup import find, prepare
 from drivers.dynamixel_table import (
     FAST_READ_SINCE,
     MODELS,
@@ -189,6 +190,10 @@ class DynamixelBus:
     def faults(self) -> tuple[str, ...]:
         """Name every latched servo fault found so far, e.g. "servo 7: overload"."""
         return tuple(f"servo {i}: {fault}" for i, fault in sorted(self._care.faults.items()))
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call."""
+        return ()
 
     def release(self) -> None:
         """Torque off on every servo; never raises for a servo that does not answer.

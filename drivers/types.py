@@ -25,6 +25,16 @@ class ServoReading(NamedTuple):
     current_ma: present current, signed (0 where the model has none)
     at_s: host time at which the answer arrived
     alert: the servo reports a latched hardware error
+
+    What follows may be some cycles old, as it is read in turn:
+
+    torque: the torque is on
+    fault: latched hardware errors in words, "overload and input voltage"; "" where none
+    load: share of the stall torque that it gives, signed, -1..1
+    temperature_c, voltage_v: None before the first reading
+    rearmed: True in the first reading after the torque came on anew with the present
+        position as goal (a restarted servo, a port that was unplugged): whoever plans
+        goals begins there
     """
 
     position_steps: int
@@ -32,6 +42,12 @@ class ServoReading(NamedTuple):
     current_ma: float
     at_s: float
     alert: bool
+    torque: bool = True
+    fault: str = ""
+    load: float = 0.0
+    temperature_c: float | None = None
+    voltage_v: float | None = None
+    rearmed: bool = False
 
 
 class BusHealth(NamedTuple):
@@ -48,6 +64,10 @@ class ServoSetup(NamedTuple):
     model: name as in the control table, e.g. "xl330-m077"
     min_steps, max_steps: no goal outside is ever sent
     max_speed_steps_s: armed in the servo's own profile
+    name: what people call it, e.g. "neck_yaw", for messages; "" where it has no name
+    firmware_min: oldest firmware that will do
+    gains: registers Position P, I and D Gain (84, 82, 80), None where they stay as they are
+    max_current_ma: Current Limit (38), None where it stays as it is
     """
 
     id: int
@@ -55,6 +75,10 @@ class ServoSetup(NamedTuple):
     min_steps: int
     max_steps: int
     max_speed_steps_s: float
+    name: str = ""
+    firmware_min: int = 0
+    gains: tuple[int, int, int] | None = None
+    max_current_ma: float | None = None
 
 
 class ServoBus(Protocol):
@@ -72,8 +96,11 @@ class ServoBus(Protocol):
     def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
         """Read all servos in one exchange; None where no fresh answer came.
 
+        While the port is gone every value is None and the port is tried again now and then;
+        when it is back the servos hold where they are, marked ``rearmed``.
+
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            drivers.errors.BusLost: nobody has answered for longer than the bus's patience.
         """
         ...
 
@@ -90,6 +117,10 @@ class ServoBus(Protocol):
 
     def faults(self) -> tuple[str, ...]:
         """Name every latched servo fault found so far, e.g. "servo 7: overload"."""
+        ...
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call, e.g. "servo 3 restarted: set up anew"."""
         ...
 
     def release(self) -> None:

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import ceil, floor, pi, radians
+from math import ceil, floor, inf, pi, radians
 
+from drivers.dynamixel_table import MODELS
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from robot.safety import JointLimit
 from robot.types import JOINTS, JointAngles, JointState
@@ -55,6 +56,28 @@ class JointParams:
         default=2048,
         metadata={"low": 0, "high": 4095, "unit": "steps", "says": "servo position at 0 deg"},
     )
+    gains: tuple[int, int, int] | None = field(
+        default=None,
+        metadata={
+            "low": 0,
+            "high": 16383,
+            "unit": "",
+            "says": "the servo's Position P, I and D Gain; null: left as they are",
+        },
+    )
+    max_current_ma: float | None = field(
+        default=None,
+        metadata={
+            "low": 1.0,
+            "high": 5000.0,
+            "unit": "mA",
+            "says": "the servo's Current Limit, so its strength; null: left as it is",
+        },
+    )
+    firmware_min: int = field(
+        default=0,
+        metadata={"low": 0, "high": 255, "unit": "", "says": "oldest servo firmware that will do"},
+    )
 
     def __post_init__(self) -> None:
         """Check that the limits fit each other and the servo's one turn.
@@ -82,19 +105,36 @@ class JointParams:
         return (steps - self.zero_step) / (self.sign * self.ratio * _STEPS_PER_RAD)
 
     def limit(self) -> JointLimit:
-        """Give the limits in radians."""
+        """Give the limits in radians, and those of the servo's own protection."""
+        model = MODELS.get(self.model)
+        own = (
+            (float(model.temperature_limit), 0.1 * model.min_voltage, 0.1 * model.max_voltage)
+            if model is not None
+            else ()
+        )
         return JointLimit(
             radians(self.min_deg),
             radians(self.max_deg),
             radians(self.max_speed_deg_s),
             radians(self.max_accel_deg_s2),
+            *own,
         )
 
-    def setup(self) -> ServoSetup:
+    def setup(self, name: str = "") -> ServoSetup:
         """Give what the bus must know: the range rounded inwards, the speed at the servo."""
         ends = sorted((self.steps(radians(self.min_deg)), self.steps(radians(self.max_deg))))
         speed = radians(self.max_speed_deg_s) * self.ratio * _STEPS_PER_RAD
-        return ServoSetup(self.id, self.model, ceil(ends[0]), floor(ends[1]), speed)
+        return ServoSetup(
+            self.id,
+            self.model,
+            ceil(ends[0]),
+            floor(ends[1]),
+            speed,
+            name,
+            self.firmware_min,
+            self.gains,
+            self.max_current_ma,
+        )
 
 
 class Body:
@@ -108,7 +148,8 @@ class Body:
             1.0 / (joint.sign * joint.ratio * _STEPS_PER_RAD) for joint in self._joints
         )
         self._zero = tuple(joint.zero_step for joint in self._joints)
-        self._last: list[ServoReading | None] = [None] * len(JOINTS)
+        # Before the first answer: the centre, of an age that says so.
+        self._last = [ServoReading(zero, 0.0, 0.0, -inf, False) for zero in self._zero]
 
     def start(self) -> JointAngles:
         """Open the bus and switch torque on where the joints are; give the goals in force.
@@ -132,18 +173,20 @@ class Body:
                 missing = (*missing, JOINTS[i])
             else:
                 self._last[i] = reading
-        position, velocity, measured = [], [], []
-        for zero, scale, last in zip(self._zero, self._scale, self._last, strict=True):
-            if last is None:
-                # Never answered since the start: the age says so, the value is a centre.
-                position.append(0.0)
-                velocity.append(0.0)
-                measured.append(float("-inf"))
-            else:
-                position.append((last.position_steps - zero) * scale)
-                velocity.append(last.velocity_steps_s * scale)
-                measured.append(last.at_s)
-        return JointState(tuple(position), tuple(velocity), tuple(measured), missing)
+        columns = zip(*self._last, strict=True)
+        steps, speeds, _, at_s, _, torque, fault, load, warm, volts, _ = columns
+        return JointState(
+            tuple([(s - z) * k for s, z, k in zip(steps, self._zero, self._scale, strict=True)]),
+            tuple([v * k for v, k in zip(speeds, self._scale, strict=True)]),
+            at_s,
+            missing,
+            torque,
+            fault,
+            load,
+            warm,
+            volts,
+            tuple([reading is not None and reading.rearmed for reading in readings]),
+        )
 
     def write(self, command_rad: JointAngles) -> None:
         """Send one goal to every servo."""

@@ -1,20 +1,16 @@
 """The command ``gazerig``: what people type, and what they read on the terminal."""
 
-import contextlib
 import json
-import shutil
-import signal
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import FrameType
 from typing import Annotated
 
 import typer
 
-from config.load import ConfigError, load
+from config.load import load
 from config.schema import Rig, load_rig
-from drivers.errors import DriverError, SetupError
+from drivers.errors import SetupError
+from robot.cli_terminal import FAULT, RigArgument, clear_errors, say, signals, status
 
 app = typer.Typer(
     add_completion=False,
@@ -22,13 +18,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Makes an animatronic head look at people the way people look at each other.",
 )
-
-_BAD_INPUT = 2
-_FAULT = 1
-
-RigArgument = Annotated[
-    str, typer.Argument(metavar="RIG", help="A rig's YAML file, or the name of a shipped rig.")
-]
 
 
 @app.command()
@@ -81,7 +70,7 @@ def run(
     ] = None,
 ) -> None:
     """Run the head: gazerig run --mock, then open the page it names."""
-    with _clear_errors():
+    with clear_errors():
         # Vision and emulator are heavy; `check` and `--help` do without them.
         from robot import session
         from robot.assemble import assemble
@@ -110,11 +99,11 @@ def run(
             status_line=not fast and sys.stderr.isatty(),
         )
         made = assemble(load_rig(rig, character, profile), wanted.choice())
-        with _signals() as stopped:
-            figures = session.run(made, wanted, stopped, _say, _status)
+        with signals() as stopped:
+            figures = session.run(made, wanted, stopped, say, status)
         _write_summary(figures, summary)
     if str(figures["stopped_by"]).startswith("fault"):
-        raise typer.Exit(_FAULT)
+        raise typer.Exit(FAULT)
 
 
 @app.command("fit-scanpath")
@@ -128,22 +117,20 @@ def fit_scanpath(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
 ) -> None:
     """Fit a walk over the face to an eye-tracker recording, as YAML that run takes."""
-    with _clear_errors():
+    with clear_errors():
         from robot import fit_scanpath as fitting
         from robot.fixations import PartBoxes
 
         boxes = load(parts, PartBoxes) if parts is not None else None
-        _say(fitting.fit(recording, boxes, out, smoothing, seed))
+        say(fitting.fit(recording, boxes, out, smoothing, seed))
 
 
 @app.command()
 def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and nothing else: all faults at once, no servo is touched."""
-    with _clear_errors():
+    with clear_errors():
         found: Rig = load_rig(rig)
-        _say(
-            f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
-        )
+        say(f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}")
 
 
 @app.command()
@@ -157,47 +144,13 @@ def schema(
     if out is None:
         print(text, end="")
     else:
-        with _clear_errors():
+        with clear_errors():
             out.write_text(text, encoding="utf-8")
 
 
 def main() -> None:
     """Run the command line."""
     app()
-
-
-@contextlib.contextmanager
-def _clear_errors() -> Iterator[None]:
-    """Turn what a person can mend into its message and exit code 2."""
-    try:
-        yield
-    except (ConfigError, SetupError) as error:
-        print(error, file=sys.stderr)
-        raise typer.Exit(_BAD_INPUT) from None
-    except DriverError as error:
-        print(error, file=sys.stderr)
-        raise typer.Exit(_FAULT) from None
-    except OSError as error:
-        print(f"{error.filename or 'file'}: {error.strerror or error}", file=sys.stderr)
-        raise typer.Exit(_BAD_INPUT) from None
-
-
-@contextlib.contextmanager
-def _signals() -> Iterator[Callable[[], str | None]]:
-    """Give whether Ctrl-C or SIGTERM came, by name; a second one is not waited for."""
-    came: list[str] = []
-
-    def note(number: int, _: FrameType | None) -> None:
-        came.append(signal.Signals(number).name)
-        if len(came) > 1:
-            raise KeyboardInterrupt
-
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield lambda: came[0] if came else None
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _host_port(text: str) -> tuple[str, int]:
@@ -215,15 +168,3 @@ def _write_summary(figures: dict[str, object], where: str | None) -> None:
         print(text, end="")
     else:
         Path(where).write_text(text, encoding="utf-8")
-
-
-def _say(line: str) -> None:
-    """Write a line for people; the status line before it is wiped."""
-    wipe = "\r\x1b[K" if sys.stderr.isatty() else ""
-    print(f"{wipe}{line}", file=sys.stderr, flush=True)
-
-
-def _status(line: str) -> None:
-    """Rewrite the status line."""
-    width = shutil.get_terminal_size().columns - 1
-    print(f"\r\x1b[K{line[:width]}", end="", file=sys.stderr, flush=True)

@@ -5,7 +5,7 @@ and its acceleration, and always able to stop before the end of the range. Radia
 """
 
 from dataclasses import dataclass, field
-from math import isfinite, radians, sqrt
+from math import inf, isfinite, radians, sqrt
 from typing import NamedTuple
 
 from robot.types import JOINTS, JointAngles, JointState, Level, Verdict
@@ -14,12 +14,19 @@ _TOLERANCE_RAD = 1e-9
 
 
 class JointLimit(NamedTuple):
-    """One joint's range, top speed and top acceleration (rad, rad/s, rad/s^2)."""
+    """One joint's range, top speed and top acceleration (rad, rad/s, rad/s^2).
+
+    The rest is what the joint's servo bears before it switches itself off: degrees
+    Celsius, lowest and highest volts.
+    """
 
     low_rad: float
     high_rad: float
     speed_rad_s: float
     accel_rad_s2: float
+    hottest_c: float = 70.0
+    lowest_v: float = 0.0
+    highest_v: float = inf
 
 
 @dataclass(frozen=True)
@@ -147,7 +154,7 @@ class Guard:
         v'^2 / 2a bounds every later sequence of braking steps, a joint that keeps this
         can always stop in time, whatever the length of the ticks to come.
         """
-        low, high, fastest, accel = self._limits[i]
+        low, high, fastest, accel, *_ = self._limits[i]
         p, v = self._command[i], self._speed[i]
         step = accel * dt_s
         if wish is not None and not self._gentle[i] and low <= wish <= high:

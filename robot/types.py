@@ -32,12 +32,26 @@ class JointState(NamedTuple):
     position_rad, velocity_rad_s: last fresh values
     measured_s: host time of each joint's last fresh answer
     missing: joints without a fresh answer in this tick
+
+    What follows is empty where nothing is known, else has one value a joint:
+
+    torque: the torque is on
+    fault: latched hardware errors in words, "" where none
+    load: share of the servo's stall torque, signed, -1..1
+    temperature_c, voltage_v: None before the first reading
+    rearmed: the torque came on anew with the measured position as goal
     """
 
     position_rad: JointAngles
     velocity_rad_s: JointAngles
     measured_s: tuple[float, ...]
     missing: tuple[str, ...]
+    torque: tuple[bool, ...] = ()
+    fault: tuple[str, ...] = ()
+    load: tuple[float, ...] = ()
+    temperature_c: tuple[float | None, ...] = ()
+    voltage_v: tuple[float | None, ...] = ()
+    rearmed: tuple[bool, ...] = ()
 
 
 class Verdict(NamedTuple):

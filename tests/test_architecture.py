@@ -13,14 +13,21 @@ ROOMS = ("config", "drivers", "gaze", "robot", "sim_mock")
 # The pure parts of the machine that a second world may also stand on.
 PURE = {"robot.clock", "robot.frames", "robot.kinematics", "robot.face_pose"}
 # Where config, the machine and the second world meet.
-TOP = {"robot.assemble", "robot.cli"}
+TOP = {
+    "robot.assemble",
+    "robot.cli",
+    "robot.cli_emulate",
+    "robot.cli_motion",
+    "robot.cli_servos",
+    "robot.cli_terminal",
+}
 
 # Vendor packages, and the only modules that may see each.
 OWNERS = {
     "serial": ("drivers.dynamixel_port", "sim_mock.ports"),
     "dynamixel_sdk": ("drivers.dynamixel", "sim_mock.ports"),
     "depthai": ("drivers.oak_camera",),
-    "ruamel": ("config.load",),
+    "ruamel": ("config.load", "config.save"),
     "pydantic": ("config.",),
     "pydantic_core": ("config.",),
     "typer": ("robot.cli",),

@@ -1,0 +1,98 @@
+"""Packets of Dynamixel Protocol 2.0 as servos send them, and as they look for them on the line.
+
+Source: ROBOTIS e-Manual, Protocol 2.0. Fast replies are one packet of blocks that several
+servos send one after another; each block ends with the CRC over all bytes before it.
+"""
+
+import struct
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from fastcrc.crc16 import umts
+
+HEADER = b"\xff\xff\xfd\x00"
+RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
+BROADCAST = 0xFE
+STATUS = 0x55
+SHORTEST = 10
+LONGEST = 1024
+"""No packet is longer; a larger length is noise."""
+
+_HEAD = struct.Struct("<4sBHB")
+_CRC = struct.Struct("<H")
+
+
+class Answer(NamedTuple):
+    """What one servo has to say.
+
+    delay_s: its return delay; late_s: what it waits beyond that
+    twin: what another servo with the same id says at the same time
+    """
+
+    servo_id: int
+    error: int
+    params: bytes
+    delay_s: float = 0.0
+    late_s: float = 0.0
+    twin: "Answer | None" = None
+
+
+class Piece(NamedTuple):
+    """Bytes that one servo puts on the line in one go, after waiting.
+
+    delay_s counts on a line with wire time only, late_s always.
+    """
+
+    servo_id: int
+    data: bytes
+    delay_s: float = 0.0
+    late_s: float = 0.0
+
+
+def status(servo_id: int, error: int, params: bytes) -> bytes:
+    """Build a status packet."""
+    if RAW in params:
+        params = params.replace(RAW, STUFFED)
+    packet = _HEAD.pack(HEADER, servo_id, len(params) + 4, STATUS) + bytes((error,)) + params
+    return packet + _CRC.pack(umts(packet))
+
+
+def plain_pieces(answers: Sequence[Answer]) -> list[Piece]:
+    """Send each answer as a status of its own."""
+    return [
+        Piece(a[0], status(a[0], a[1], a[2]) if a[5] is None else _status_of_two(a), a[3], a[4])
+        for a in answers
+    ]
+
+
+def fast_pieces(answers: Sequence[Answer], length: int) -> list[Piece]:
+    """Send answers as blocks of one packet whose length field says ``length``.
+
+    The first servo sends the head. Nobody can take the place of a missing block: the
+    packet ends where the answers end.
+    """
+    head = _HEAD.pack(HEADER, BROADCAST, length, STATUS)
+    crc = umts(head)
+    pieces = []
+    for answer in answers:
+        body = bytes((answer[1], answer[0])) + answer[2]
+        block = body + _CRC.pack(umts(body, crc))
+        if answer[5] is not None:
+            other = bytes((answer[5].error, answer[5].servo_id)) + answer[5].params
+            block = merge(block, other + _CRC.pack(umts(other, crc)))
+        crc = umts(block, crc)
+        pieces.append(Piece(answer[0], head + block, 0.0 if pieces else answer[3], answer[4]))
+        head = b""
+    return pieces
+
+
+def _status_of_two(answer: Answer) -> bytes:
+    assert answer.twin is not None
+    one = status(answer.servo_id, answer.error, answer.params)
+    return merge(one, status(answer.twin.servo_id, answer.twin.error, answer.twin.params))
+
+
+def merge(one: bytes, other: bytes) -> bytes:
+    """Mix what two servos send at once: the line is low where either pulls it low."""
+    longer, shorter = (one, other) if len(one) >= len(other) else (other, one)
+    return bytes(a & b for a, b in zip(longer, shorter, strict=False)) + longer[len(shorter) :]
