@@ -29,7 +29,7 @@ from robot.body import JointParams
 from robot.frames import CameraParams
 from robot.kinematics import GeometryParams
 from robot.loop import LoopParams
-from robot.safety import GuardParams
+from robot.safety import Guard, GuardParams
 from robot.tracks import TrackParams
 from robot.types import JOINTS
 
@@ -179,7 +179,7 @@ def load_rig(name_or_path: str, character: str | None = None, profile: str | Non
     Raises:
         config.load.ConfigError: with every fault.
     """
-    rules = (_joint_names, _servo_ids, _models, _lid_ranges, _park_ranges, _part_names)
+    rules = (_joint_names, _servo_ids, _models, _lid_ranges, _park_ranges, _part_names, _collisions)
     layers = [_find("rigs", name_or_path)]
     named = profile or read_yaml(layers[0]).data.get("profile")
     if isinstance(named, str):
@@ -251,6 +251,16 @@ def _lid_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
                     f"lid_joints.{side}_{end}_deg",
                     f"{angle} is outside the joint's range {joint.min_deg}..{joint.max_deg}",
                 )
+
+
+def _collisions(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Let the guard itself say whether its forbidden boxes leave any pose."""
+    if any(name not in rig.joints for name in JOINTS):
+        return
+    try:
+        Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS))
+    except ValueError as error:
+        yield "guard.collisions", str(error)
 
 
 def _park_ranges(rig: Rig) -> Iterable[tuple[str, str]]:

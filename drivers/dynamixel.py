@@ -1,68 +1,38 @@
 """Dynamixel X servos on one serial bus (Protocol 2.0): one read and one write a tick."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from math import ceil
 
 from drivers.dynamixel_care import Care
-from drivers.dynamixel_group import STARTS, Answer, FastGroup, Group, PlainGroup, silent_ones
+from drivers.dynamixel_health import Health
+from drivers.dynamixel_journal import Journal, call
 from drivers.dynamixel_line import Line
-from drivers.dynamixel_packets import ALERT, ERROR_NUMBER, SyncWrite
+from drivers.dynamixel_packets import SyncWrite
+from drivers.dynamixel_params import DynamixelParams as DynamixelParams
 from drivers.dynamixel_port import BusPort
+from drivers.dynamixel_reader import Heard, Reader, Whole
+from drivers.dynamixel_readings import Readings
+from drivers.dynamixel_reconnect import Reconnect
 from drivers.dynamixel_registers import Registers
+from drivers.dynamixel_revival import Revival
 from drivers.dynamixel_roll import Roll
-from drivers.dynamixel_setup import find, prepare
+from drivers.dynamixel_roster import find
+from drivers.dynamixel_setup import Fitting
 from drivers.dynamixel_table import (
     FAST_READ_SINCE,
     MODELS,
     REGISTERS,
-    VELOCITY_UNIT_STEPS_S,
     WATCHDOG_UNIT_S,
+    IndirectBlock,
+    indirect_blocks,
 )
-from drivers.dynamixel_torque import insist, positions, switch_off, switch_on
+from drivers.dynamixel_torque import switch_off
+from drivers.dynamixel_views import alone_turns, direct_turns, indirect_turns
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from drivers.types import BusHealth, ServoReading, ServoSetup
 
-
-@dataclass(frozen=True, slots=True)
-class DynamixelParams:
-    """How to speak with the servos."""
-
-    baud: int = field(
-        default=1_000_000,
-        metadata={
-            "choices": (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000),
-            "unit": "bit/s",
-            "says": "Speed of the bus; the servos must be set to the same.",
-        },
-    )
-    reply_timeout_ms: float = field(
-        default=20.0,
-        metadata={
-            "low": 1.0,
-            "high": 200.0,
-            "unit": "ms",
-            "says": "Patience for an answer beyond the time its bytes take on the wire.",
-        },
-    )
-    watchdog_ms: int = field(
-        default=200,
-        metadata={
-            "low": 0,
-            "high": 2540,
-            "unit": "ms",
-            "says": "Servos stop by themselves after so much silence, in steps of 20; 0: never.",
-        },
-    )
-    fast_sync_read: bool = field(
-        default=True,
-        metadata={"unit": "", "says": "Read all servos in one packet where their firmware can."},
-    )
-
-    def __post_init__(self) -> None:
-        """Refuse a watchdog shorter than its smallest step."""
-        if 0 < self.watchdog_ms < 20:
-            raise ValueError(f"watchdog_ms {self.watchdog_ms} is too short: 0 or 20..2540")
+RESTART_S = 0.1
+"""Servos that were all silent for so long may all have restarted: their power was cut."""
 
 
 class DynamixelBus:
@@ -83,21 +53,46 @@ class DynamixelBus:
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
-        self._units_ma = tuple(MODELS[setup.model].current_unit_ma for setup in setups)
         goal = REGISTERS["goal_position"]
         self._goals = SyncWrite(self._ids, goal.address, goal.size)
         self._watchdog = ceil(params.watchdog_ms / 1000.0 / WATCHDOG_UNIT_S)
-        self._line = Line(port, params.reply_timeout_ms / 1000.0, params.baud)
+        self._journal = Journal()
+        self._line = Line(
+            port,
+            params.prompt_timeout_ms / 1000.0,
+            params.reply_timeout_ms / 1000.0,
+            params.baud,
+            {setup.id: call(setup) for setup in setups},
+        )
         self._opened = False
-        self._forget()
+        self._now_s = 0.0
+        self._assemble(None, False)
 
-    def _forget(self) -> None:
-        """Start with a clean sheet, as after opening."""
-        self._fast = False
+    def _assemble(self, block: IndirectBlock | None, fast: bool) -> None:
+        """Make the parts, with a clean sheet, for what the servos can do."""
+        by_id = {setup.id: setup for setup in self._setups}
+        self._fast, self._block = fast, block
+        self._link = Reconnect()
         self._roll = Roll(self._ids)
-        self._groups: dict[tuple[tuple[int, ...], int], Group] = {}
-        self._span = 0
-        self._care = Care(self._line, self._setups, self._watchdog)
+        self._readings = Readings(self._setups)
+        self._health = Health(by_id, self._journal)
+        together = indirect_turns(block) if block else direct_turns()
+        self._reader = Reader(self._line, self._roll, together, alone_turns(), fast)
+        self._fitting = Fitting(
+            self._line, Registers(self._port, tries=1), self._setups, block, self._journal
+        )
+        self._revival = Revival(
+            self._line, self._fitting, by_id, self._watchdog, self._health, self._journal
+        )
+        self._care = Care(
+            self._line,
+            by_id,
+            self._watchdog,
+            self._revival,
+            self._health,
+            self._readings,
+            covered=block is not None,
+        )
 
     # --- the bus as others see it
 
@@ -111,41 +106,41 @@ class DynamixelBus:
         where, baud = self._port.port_name, self._params.baud
         if not self._port.setBaudRate(baud):
             raise PortError(f"{where} cannot run at {baud} bit/s: choose 57600 or 1000000")
-        self._forget()
         registers = Registers(self._port)
         try:
-            firmware = find(registers, self._setups, where)
-            prepare(registers, self._setups, where)
+            firmware = find(self._line, registers, self._setups, self._journal)
+            self._assemble(self._common_block(firmware), self._all_fast(firmware))
+            fitting = Fitting(self._line, registers, self._setups, self._block, self._journal)
+            fitting.rest(self._ids)
+            fitting.fit(self._ids)
+            self._line.starved = False
+            self._care.find_alerts(self._ids)
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
         self._opened = True
-        self._fast = self._params.fast_sync_read and all(
-            firmware[setup.id] >= FAST_READ_SINCE[MODELS[setup.model].family]
-            for setup in self._setups
-        )
-        for servo_id in registers.alerts:
-            self._care.alert(servo_id)
-        self._care.name_alerts()
 
     def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
         """Read all servos in one exchange; None where no fresh answer came.
 
         A servo that keeps silent is left out of the exchange and asked alone now and
-        then, so whatever is wrong, a read takes a bounded time.
+        then, so whatever is wrong, a read takes a bounded time. While the port is gone all
+        is None, and the port is tried again now and then.
 
         Raises:
-            drivers.errors.BusLost: the port is gone, or no servo has answered for 0.5 s.
+            drivers.errors.BusLost: port or servos have been gone for longer than ``give_up_s``.
         """
-        if self._line.starved:
-            self._care.heal()
-        group, due = self._roll.group, self._roll.due(now_s)
-        readings: list[ServoReading | None] = [None] * len(self._ids)
-        heard = self._read_group(group, readings, now_s) if group else 0
-        if due is not None:
-            heard += self._read_group((due,), readings, now_s)
-        self._care.tend(readings, heard, self._roll.group, now_s)
-        return tuple(readings)
+        self._now_s = now_s
+        if self._link.down and not self._reopened(now_s):
+            return (None,) * len(self._ids)
+        try:
+            readings = self._read(now_s)
+        except BusLost as lost:
+            self._lose(lost)
+            return (None,) * len(self._ids)
+        if self._roll.troubled:
+            self._mind_silence(now_s)
+        return readings
 
     def engage(self) -> tuple[int, ...]:
         """Set every goal to the present position (clipped to its limits), then torque on.
@@ -158,15 +153,10 @@ class DynamixelBus:
             drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
             drivers.errors.ServoFault: a servo has latched an error or lost its zero.
         """
-        line, ids = self._line, self._ids
-        present = positions(line, ids)
-        goals = self._clip(present)
-        outside = {i for i, p, g in zip(ids, present, goals, strict=True) if p != g}
         try:
-            insist(line, ids, "bus_watchdog", [0] * len(ids))
-            insist(line, ids, "profile_velocity", self._care.entry_speeds(outside))
-            switch_on(line, ids, goals)
-            insist(line, ids, "bus_watchdog", [self._watchdog] * len(ids))
+            # A servo may have restarted since it was prepared.
+            self._fitting.fit(self._ids)
+            goals, outside = self._revival.take_on(self._ids)
         except (ServoMissing, ServoFault):
             self.release()
             raise
@@ -176,37 +166,57 @@ class DynamixelBus:
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo in one packet; goals are clipped to the limits.
 
-        Sends nothing while the torque is off.
+        Sends nothing while the torque is off, the port is gone, or servos that stopped by
+        themselves have not been given their present positions as goals yet: the next
+        read sees to that.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            ValueError: a goal is not a number, or there are not as many as servos.
         """
-        if not self._care.engaged:
+        goals = self._clip(goals_steps)
+        if not self._care.engaged or self._link.down or self._line.starved:
             return
-        if self._line.starved:
-            self._care.heal()
-        self._line.send(self._goals.packet(self._clip(goals_steps)))
+        try:
+            self._line.send(self._goals.packet(goals))
+        except BusLost as lost:
+            self._lose(lost)
 
     def faults(self) -> tuple[str, ...]:
-        """Name every latched servo fault found so far, e.g. "servo 7: overload"."""
-        return tuple(f"servo {i}: {fault}" for i, fault in sorted(self._care.faults.items()))
+        """Name every fault that servos suffer from now, e.g. "neck_yaw (servo 7): overload"."""
+        return tuple(
+            f"{self._line.who(i)}: {fault}" for i, fault in sorted(self._health.faults.items())
+        )
 
     def events(self) -> tuple[str, ...]:
         """Say what has happened since the last call."""
-        return ()
+        return self._journal.take()
 
     def release(self) -> None:
-        """Torque off on every servo; never raises for a servo that does not answer.
+        """Torque off on every servo, confirmed; never raises for a servo that does not answer.
 
         Raises:
-            drivers.errors.BusLost: the port is gone; armed watchdogs stop the servos.
+            drivers.errors.BusLost: the port is gone, and stays so when tried once more.
         """
         self._care.let_go()
-        if self._opened:
-            self._line.errors["refused"] += len(switch_off(self._line, self._ids))
+        if not self._opened:
+            return
+        if self._link.down:
+            if not self._open_port():
+                raise BusLost(self._cannot_release())
+            self._link.back(self._now_s)
+        try:
+            released = switch_off(self._line, self._ids)
+        except BusLost as lost:
+            self._lose(lost)
+            raise BusLost(self._cannot_release()) from lost
+        self._line.errors["refused"] += len(released.holding)
+        for kind, ids in (("still reports torque", released.holding), ("mute", released.mute)):
+            for servo_id in ids:
+                what = kind if kind != "mute" else "does not confirm that its torque is off"
+                self._journal.say(f"{self._line.who(servo_id)} {what}: cut the servo power")
 
     def health(self) -> BusHealth:
-        """Give byte and error counts of the exchanges after setup."""
+        """Give byte and error counts of all exchanges."""
         errors = {kind: count for kind, count in self._line.errors.items() if count}
         return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
 
@@ -216,81 +226,131 @@ class DynamixelBus:
         self._care.let_go()
         self._port.closePort()
 
+    # --- what the servos can do
+
+    def _all_fast(self, firmware: Mapping[int, int]) -> bool:
+        """Tell whether everybody understands fast sync read."""
+        return self._params.fast_sync_read and all(
+            firmware[setup.id] >= FAST_READ_SINCE[MODELS[setup.model].family]
+            for setup in self._setups
+        )
+
+    def _common_block(self, firmware: Mapping[int, int]) -> IndirectBlock | None:
+        """Give the indirect block that all have in the same place, None where there is none."""
+        if not self._params.indirect_block:
+            return None
+        blocks = [indirect_blocks(MODELS[s.model], firmware[s.id])[0] for s in self._setups]
+        same = len({(block.address_base, block.data_base) for block in blocks}) == 1
+        return blocks[0] if same else None
+
     # --- reading
 
-    def _group(self, ids: tuple[int, ...]) -> Group:
-        """Give the prepared exchange for some servos."""
-        start = STARTS[self._span]
-        if (ids, start) not in self._groups:
-            kind = FastGroup if self._fast else PlainGroup
-            self._groups[ids, start] = kind(ids, start)
-        return self._groups[ids, start]
+    def _read(self, now_s: float) -> tuple[ServoReading | None, ...]:
+        if self._line.starved:
+            self._care.heal(self._roll.group)
+        answer = self._reader.read(now_s)
+        readings = self._readings.whole(answer) if isinstance(answer, Whole) else None
+        if readings is None:
+            readings = self._take(answer, now_s)
+        self._care.tend(readings, self._roll.group, now_s)
+        return tuple(readings)
 
-    def _read_group(
-        self, ids: tuple[int, ...], readings: list[ServoReading | None], now_s: float
-    ) -> int:
-        """Read some servos into ``readings``; gives how many answered."""
-        group = self._group(ids)
-        raw, deadline_s = self._line.exchange(group.request, group.reply_length)
-        at_s = self._port.now_s()
-        whole = group.whole(raw)
-        if whole is None:
-            raw = self._line.complete(raw, group.missing, deadline_s)
-            return self._save(group, raw, readings, now_s)
-        if any(whole.errors) or self._roll.troubled:
-            for servo_id, *answer in zip(ids, *whole, strict=True):
-                self._take(servo_id, Answer(*answer), readings, at_s)
-            return len(ids)
-        units, slot = self._units_ma, self._slot
-        for servo_id, _, current, velocity, position in zip(ids, *whole, strict=True):
-            i = slot[servo_id]
-            speed = velocity * VELOCITY_UNIT_STEPS_S
-            readings[i] = ServoReading(position, speed, current * units[i], at_s, False)
-        return len(ids)
+    def _take(self, answer: Whole | dict[int, Heard], now_s: float) -> list[ServoReading | None]:
+        """Take an answer servo by servo, each with its errors."""
+        heard = answer.each() if isinstance(answer, Whole) else answer
+        readings: list[ServoReading | None] = [None] * len(self._ids)
+        if heard and self._health.silent_for_s(now_s) >= RESTART_S:
+            self._care.suspect_all()
+        for servo_id, one in heard.items():
+            slot = self._slot[servo_id]
+            was_out = self._roll.answered(servo_id)
+            believed = self._care.judge(servo_id, one.sample)
+            if was_out and self._care.engaged:
+                self._care.check(servo_id)
+            reading = self._readings.one(slot, one)
+            if reading is None:
+                self._line.errors["refused"] += 1
+            elif believed:
+                readings[slot] = reading
+        self._health.note_silent(self._roll.out, now_s, self._roll.garbling)
+        return readings
 
-    def _save(
-        self, group: Group, raw: bytes, readings: list[ServoReading | None], now_s: float
-    ) -> int:
-        """Save what is right of an answer that is not; gives how many servos answered."""
-        at_s = self._port.now_s()
-        answers, damaged = group.pieces(raw)
-        for servo_id, answer in answers.items():
-            self._take(servo_id, answer, readings, at_s)
-        if len(answers) == len(group.ids):
-            return len(answers)
-        for servo_id in damaged:
-            self._line.errors["corrupt"] += 1
-            self._roll.damaged(servo_id, now_s)
-        for servo_id in silent_ones(group.ids, answers.keys() | damaged):
-            self._line.errors["timeout"] += 1
-            self._roll.silent(servo_id, now_s)
-        # What still comes must neither be taken for the next answer nor look like one.
-        self._port.drain()
-        self._span = (self._span + 1) % len(STARTS)
-        return len(answers)
+    def _mind_silence(self, now_s: float) -> None:
+        """Give up where nobody has answered for too long.
 
-    def _take(
-        self, servo_id: int, answer: Answer, readings: list[ServoReading | None], at_s: float
-    ) -> None:
-        """Take one servo's answer with its error byte; welcome one that had been out."""
-        if self._roll.answered(servo_id) and self._care.engaged:
-            self._care.check(servo_id)
-        alert = bool(answer.error & ALERT)
-        if alert:
-            self._care.alert(servo_id)
-        if answer.error & ERROR_NUMBER:
-            self._line.errors["refused"] += 1
-            return
-        i = self._slot[servo_id]
-        speed = answer.velocity * VELOCITY_UNIT_STEPS_S
-        current = answer.current * self._units_ma[i]
-        readings[i] = ServoReading(answer.position, speed, current, at_s, alert)
+        Raises:
+            drivers.errors.BusLost: so it is.
+        """
+        silent_s = self._health.silent_for_s(now_s)
+        if silent_s >= self._params.give_up_s:
+            raise BusLost(
+                f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s: "
+                "check servo power and the cable"
+            )
 
-    def _clip(self, steps: Sequence[int]) -> tuple[int, ...]:
-        """Keep goals inside the limits."""
-        return tuple(
-            [
-                low if goal < low else high if goal > high else goal
-                for goal, (low, high) in zip(steps, self._limits, strict=True)
-            ]
+    # --- a port that goes away
+
+    def _lose(self, lost: BusLost) -> None:
+        """Note that the port is gone."""
+        self._link.lost(self._now_s)
+        self._port.closePort()
+        self._journal.say(f"port lost: {lost}")
+
+    def _reopened(self, now_s: float) -> bool:
+        """Try to open the port again where that is due."""
+        gone_s = self._link.gone_for_s(now_s)
+        if self._link.due(now_s):
+            if self._open_port():
+                self._journal.say(f"port back after {self._link.back(now_s):.1f} s")
+                return True
+            self._link.failed(now_s)
+        if gone_s >= self._params.give_up_s:
+            raise BusLost(
+                f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
+            )
+        return False
+
+    def _open_port(self) -> bool:
+        """Open the port anew and trust no servo on it."""
+        try:
+            if not self._port.setBaudRate(self._params.baud):
+                return False
+            self._port.clearPort()
+        except (PortError, BusLost):
+            self._port.closePort()
+            return False
+        self._roll = self._reader.roll = Roll(self._ids)
+        self._line.starved = False
+        self._care.suspect_all()
+        return True
+
+    def _cannot_release(self) -> str:
+        """Say what servos do that cannot be told to let go."""
+        rest = (
+            f"their bus watchdog stops them within {self._watchdog * WATCHDOG_UNIT_S:.2f} s "
+            "and they hold their place"
+            if self._watchdog
+            else "they go on to their last goal and hold it"
         )
+        return (
+            f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
+            f"power keep their torque, {rest}: cut the servo power to free them"
+        )
+
+    def _clip(self, steps: Sequence[int]) -> list[int]:
+        """Keep goals inside the limits."""
+        return [
+            goal if low <= goal <= high else _inside(goal, low, high)
+            for goal, (low, high) in zip(steps, self._limits, strict=True)
+        ]
+
+
+def _inside(goal: float, low: int, high: int) -> int:
+    """Give the nearest limit to a goal outside.
+
+    Raises:
+        ValueError: it is not a number.
+    """
+    if goal != goal:
+        raise ValueError("a goal is not a number: every goal must be a whole number of steps")
+    return low if goal < low else high

@@ -1,17 +1,14 @@
-"""Group reads of current, velocity and position, with everything fixed beforehand.
+"""Group reads with everything fixed beforehand.
 
 A plain group is answered by one status a servo, a fast group by one packet in which
 every servo's block ends with the CRC over all bytes since the header. Where the whole
 answer is right, one unpacking gives all values; otherwise what can be proved right is
 taken out piece by piece, so that a bad servo costs only itself.
-
-A group may start its reading a few registers early. An answer that comes too late then
-has another length than the one waited for now and cannot be taken for it.
 """
 
 import struct
 from collections.abc import Collection, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fastcrc.crc16 import umts
 
@@ -25,110 +22,133 @@ from drivers.dynamixel_packets import (
     statuses,
     sync_read,
 )
+from drivers.dynamixel_views import Sample, View
 
-FROM, END = 126, 136
-"""Present Current (126, 2 bytes), Velocity (128, 4) and Position (132, 4)."""
-
-STARTS = (126, 124, 122, 120)
-"""Addresses a reading may start at: the registers before 126 are live values as well."""
-
-_VALUES = struct.Struct("<hii")
+Values = tuple[Any, ...]
+"""All numbers of a whole answer; ``Group.columns`` says which are whose."""
 
 
 class Columns(NamedTuple):
-    """Answers of a whole group, in the order of its ids and in register units."""
+    """Slices of a whole answer: one number a servo, in the order asked; None where not read."""
 
-    errors: tuple[int, ...]
-    currents: tuple[int, ...]
-    velocities: tuple[int, ...]
-    positions: tuple[int, ...]
-
-
-class Answer(NamedTuple):
-    """One servo's answer in register units."""
-
-    error: int
-    current: int
-    velocity: int
-    position: int
+    error: slice
+    current: slice
+    velocity: slice
+    position: slice
+    torque: slice | None = None
+    hardware_error: slice | None = None
+    temperature: slice | None = None
+    voltage: slice | None = None
 
 
 class Pieces(NamedTuple):
-    """What could be saved of an answer: proved values, and servos whose bytes were damaged."""
+    """What could be saved of an answer.
 
-    answers: dict[int, Answer]
+    samples: proved values by id
+    damaged: servos whose bytes were spoilt
+    unproved: servos whose bytes cannot be judged because of a damaged one before them
+    """
+
+    samples: dict[int, Sample]
     damaged: frozenset[int]
+    unproved: frozenset[int] = frozenset()
 
 
 class PlainGroup:
     """A sync read: one status a servo."""
 
-    def __init__(self, ids: Sequence[int], start: int) -> None:
-        self.ids = tuple(ids)
-        self._length = END - start
-        self._size = self._length + STATUS_OVERHEAD
-        self.request = sync_read(ids, start, self._length)
+    def __init__(self, ids: Sequence[int], view: View) -> None:
+        self.ids, self.view = tuple(ids), view
+        self._size = view.length + STATUS_OVERHEAD
+        self.request = sync_read(ids, view.address, view.length)
         self.reply_length = self._size * len(ids)
-        self._layout = struct.Struct("<" + f"8sB{FROM - start}xhiiH" * len(ids))
+        self._layout = struct.Struct("<" + f"8sB{view.layout}H" * len(ids))
         self._heads = tuple(
-            struct.pack("<4sBHB", HEADER, servo_id, self._length + 4, STATUS) for servo_id in ids
+            struct.pack("<4sBHB", HEADER, servo_id, view.length + 4, STATUS) for servo_id in ids
         )
+        self._stride = 3 + len(view.fields)
+        self.columns = _columns(1, 2, view, self._stride)
 
-    def whole(self, raw: bytes) -> Columns | None:
+    def whole(self, raw: bytes) -> Values | None:
         """Give all values, None where anything at all is not as it should be."""
         if len(raw) != self.reply_length:
             return None
         values = self._layout.unpack(raw)
-        if values[0::6] != self._heads:
+        if values[0 :: self._stride] != self._heads:
             return None
         size = self._size
-        for i, crc in enumerate(values[5::6]):
+        for i, crc in enumerate(values[self._stride - 1 :: self._stride]):
             if umts(raw[i * size : (i + 1) * size - 2]) != crc:
                 return None
-        return Columns(values[1::6], values[2::6], values[3::6], values[4::6])
+        return values
 
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""
-        return bytes_missing(raw, len(self.ids), self._length)
+        count = len(self.ids)
+        missing = bytes_missing(raw, count, self.view.length)
+        if missing:
+            return missing
+        # Repeated statuses, and others' than asked for, are not those waited for.
+        found = [status.id for status in statuses(raw)]
+        there = len(set(self.ids).intersection(found))
+        return bytes_missing(raw, len(found) + count - there, self.view.length)
 
     def pieces(self, raw: bytes) -> Pieces:
         """Save what can be proved right."""
-        answers: dict[int, Answer] = {}
-        damaged: set[int] = set()
+        samples: dict[int, Sample] = {}
+        damaged, twofold = set[int](), set[int]()
         for status in statuses(raw):
             if status.id not in self.ids:
                 continue
             if not status.intact:
                 damaged.add(status.id)
-            elif len(status.params) == self._length:
-                answers[status.id] = Answer(status.error, *_values(status.params))
+            elif len(status.params) == self.view.length:
+                sample = self.view.sample(status.error, status.params)
+                # Twice the same is an echo; two that differ cannot both be this servo's.
+                if samples.setdefault(status.id, sample) != sample:
+                    twofold.add(status.id)
             elif not status.params and status.error & ERROR_NUMBER:
-                answers[status.id] = Answer(status.error, 0, 0, 0)
-        return Pieces(answers, frozenset(damaged - answers.keys()))
+                samples[status.id] = Sample(status.error, 0, 0, 0)
+            else:
+                # Whole, but not what was asked for: late, or the servo is out of its mind.
+                damaged.add(status.id)
+        for servo_id in twofold:
+            del samples[servo_id]
+        return Pieces(samples, frozenset((damaged | twofold) - samples.keys()))
 
 
 class FastGroup:
     """A fast sync read: one packet for all."""
 
-    def __init__(self, ids: Sequence[int], start: int) -> None:
-        self.ids = tuple(ids)
-        self._length = END - start
-        self._block = self._length + 4
-        self.request = sync_read(ids, start, self._length, fast=True)
+    def __init__(self, ids: Sequence[int], view: View) -> None:
+        self.ids, self.view = tuple(ids), view
+        self._block = view.length + 4
+        self.request = sync_read(ids, view.address, view.length, fast=True)
         size = self._block * len(ids)
         self._head = struct.pack("<4sBHB", HEADER, BROADCAST, size + 1, STATUS)
         self.reply_length = len(self._head) + size
-        self._layout = struct.Struct("<8s" + f"BB{FROM - start}xhiiH" * len(ids))
+        self._layout = struct.Struct("<8s" + f"BB{view.layout}H" * len(ids))
+        # From each CRC, or the header, up to the next CRC.
+        ends = [len(self._head) + self._block * (k + 1) - 2 for k in range(len(ids))]
+        self._parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+        self._stride = 3 + len(view.fields)
+        self.columns = _columns(1, 3, view, self._stride)
 
-    def whole(self, raw: bytes) -> Columns | None:
+    def whole(self, raw: bytes) -> Values | None:
         """Give all values, None where anything at all is not as it should be."""
         if len(raw) != self.reply_length:
             return None
         values = self._layout.unpack(raw)
-        # The last CRC covers every byte before it, inner CRCs included.
-        if values[0] != self._head or values[2::6] != self.ids or umts(raw[:-2]) != values[-1]:
+        if values[0] != self._head or values[2 :: self._stride] != self.ids:
             return None
-        return Columns(values[1::6], values[3::6], values[4::6], values[5::6])
+        # The last CRC alone proves too little: it is made of the bytes as they were on the
+        # line, so it is right even where two servos with one id spoilt each other's block.
+        crc = 0
+        for part, sent in zip(self._parts, values[self._stride :: self._stride], strict=True):
+            crc = umts(raw[part], crc)
+            if crc != sent:
+                return None
+        return values
 
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""
@@ -139,36 +159,42 @@ class FastGroup:
         """Save what can be proved right.
 
         Every block's CRC continues from the CRC before it as it was sent, so a damaged
-        block does not spoil the proof of the next.
+        block does not spoil the proof of the next. Of several damaged in a row the first
+        is to blame: a lost byte moves all that follows, a spoilt CRC spoils the next proof.
         """
-        answers: dict[int, Answer] = {}
-        damaged: set[int] = set()
+        samples: dict[int, Sample] = {}
+        damaged, unproved = set[int](), set[int]()
         at = raw.find(self._head)
         if at < 0:
-            return Pieces(answers, frozenset())
+            return Pieces(samples, frozenset())
         crc = umts(self._head)
         at += len(self._head)
-        for servo_id in self.ids:
+        well = True
+        for i, servo_id in enumerate(self.ids):
             block = raw[at : at + self._block]
             if len(block) < self._block:
+                unproved.update(() if well else self.ids[i:])
                 break
             sent = int.from_bytes(block[-2:], "little")
             if umts(block[:-2], crc) == sent and block[1] == servo_id:
-                answers[servo_id] = Answer(block[0], *_values(block[2:-2]))
+                samples[servo_id] = self.view.sample(block[0], block[2:-2])
+                well = True
             else:
-                damaged.add(servo_id)
+                (damaged if well else unproved).add(servo_id)
+                well = False
             crc = umts(block[-2:], sent)
             at += self._block
-        return Pieces(answers, frozenset(damaged))
+        return Pieces(samples, frozenset(damaged), frozenset(unproved))
 
 
 Group = PlainGroup | FastGroup
 
 
-def _values(span: bytes) -> tuple[int, int, int]:
-    """Give current, velocity and position, which end every span."""
-    current, velocity, position = _VALUES.unpack(span[-_VALUES.size :])
-    return current, velocity, position
+def _columns(error: int, first: int, view: View, stride: int) -> Columns:
+    """Give the slices of every field in a tuple of ``stride`` numbers a servo."""
+    # A fast answer has one number before the first servo's, a plain one its head.
+    named = {name: slice(first + i, None, stride) for i, name in enumerate(view.fields)}
+    return Columns(slice(error, None, stride), **named)
 
 
 def silent_ones(ids: Sequence[int], heard: Collection[int]) -> tuple[int, ...]:

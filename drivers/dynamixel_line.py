@@ -1,19 +1,35 @@
 """Exchanges on the servo bus: bounded waiting, clean lines, counts, starvation noticed."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
+from drivers.dynamixel_group import silent_ones
 from drivers.dynamixel_packets import (
+    BROADCAST,
     ERROR_NUMBER,
+    PING,
     STATUS_OVERHEAD,
     SyncWrite,
     bytes_missing,
+    instruction,
     statuses,
     sync_read,
 )
-from drivers.dynamixel_port import BITS_PER_BYTE, BusPort
+from drivers.dynamixel_patience import Patience
+from drivers.dynamixel_port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 from drivers.dynamixel_table import REGISTERS
+
+TRIES, HURRIED = 3, 4.0
+
+PING_QUIET_S = 0.04
+"""All who will answer a ping to everybody have done so when nothing came for so long."""
+
+PING_MOST_S = 0.8
+"""The SDK waits so long for them; nobody answers later."""
+
+_ROOM = 4096
+_BACKLOG_S = 0.05
 
 
 class Line:
@@ -21,80 +37,178 @@ class Line:
 
     tx_bytes, rx_bytes: counts since it was made
     errors: counts by kind
+    patience: that of the cyclic exchange; all others have the longest
+    tries: how often a servo is asked outside the cyclic exchange; in the loop, once
     starving_s: silence after which a servo's own watchdog trips; inf where none is armed
     starved: such a silence has happened
+    quiet: nothing came any more when the last exchange was given up
+    whole_s: when the last exchange's answer was due as far as the wire goes
+    deadline_s: end of the last exchange's patience
     """
 
-    def __init__(self, port: BusPort, patience_s: float, baud: int) -> None:
+    def __init__(
+        self,
+        port: BusPort,
+        least_s: float,
+        most_s: float,
+        baud: int,
+        names: Mapping[int, str] | None = None,
+    ) -> None:
         self.port = port
+        self._names = names or {}
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
+        self.patience = Patience(least_s, most_s)
+        self.most_s = most_s
+        self.tries = TRIES
         self.starving_s = inf
         self.starved = False
-        self._patience_s = patience_s
+        self.quiet = True
+        self.whole_s = self.deadline_s = 0.0
         self._byte_s = BITS_PER_BYTE / baud
         self._sent_s = port.now_s()
+        self._free_s = self._sent_s
 
-    def send(self, packet: bytes) -> float:
-        """Send a packet; gives the time before it went out."""
+    def who(self, servo_id: int) -> str:
+        """Name a servo for people."""
+        return self._names.get(servo_id, f"servo {servo_id}")
+
+    def send(self, packet: bytes) -> None:
+        """Send a packet."""
         now_s = self.port.now_s()
         self.port.write(packet)
         # Up to after the write: the host may have been asleep just before the bytes left.
         if self.port.now_s() - self._sent_s >= self.starving_s:
             self.starved = True
         self._sent_s = now_s
+        # Bytes leave after those still on their way out, at the bus's own speed.
+        free_s = self._free_s
+        if not now_s <= free_s <= now_s + _BACKLOG_S:
+            free_s = now_s
+        self._free_s = free_s + len(packet) * self._byte_s
         self.tx_bytes += len(packet)
-        return now_s
 
     def exchange(self, request: bytes, length: int) -> tuple[bytes, float]:
-        """Send a request and wait for ``length`` bytes; gives what came, and the deadline."""
+        """Send a request, wait for ``length`` bytes; gives what came, and when.
+
+        The wait ends as the patience does, beyond the time the bytes take on the wire.
+        """
+        port = self.port
         # What is here before the question cannot be its answer.
-        self.port.clearPort()
-        wire_s = (len(request) + length) * self._byte_s
-        deadline_s = self.send(request) + self._patience_s + wire_s
-        raw = self.port.read_until(length, deadline_s)
+        port.clearPort()
+        self.send(request)
+        self.quiet = False
+        whole_s = self._free_s + length * self._byte_s
+        half_s = 0.5 * self.patience.seconds
+        raw = port.read_until(length, whole_s + half_s)
+        if len(raw) < length:
+            # The second half shows whether the line has fallen silent.
+            more = port.read_until(length - len(raw), whole_s + 2.0 * half_s)
+            self.quiet = not more
+            raw += more
+        at_s = port.now_s()
+        self.whole_s, self.deadline_s = whole_s, whole_s + 2.0 * half_s
         self.rx_bytes += len(raw)
-        return raw, deadline_s
+        if len(raw) == length:
+            self.patience.note(at_s - whole_s)
+        return raw, at_s
 
     def complete(self, raw: bytes, missing: Callable[[bytes], int], deadline_s: float) -> bytes:
         """Wait on for an answer that has turned out to be longer than its shortest form."""
         while wanted := missing(raw):
             more = self.port.read_until(wanted, deadline_s)
             if not more:
+                self.quiet = True
                 break
             self.rx_bytes += len(more)
             raw += more
         return raw
 
-    def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
-        """Read one register of several servos; who is not in the answer did not answer well.
+    def drain(self, quiet_s: float = QUIET_S) -> int:
+        """Throw away what arrives until the line is quiet; gives the number of bytes.
 
-        A silent servo silences those behind it, so the missing ones are asked once more alone.
+        Gives up on a line that never falls silent.
         """
-        values = self._ask(ids, name)
-        if len(ids) > 1:
-            for servo_id in ids:
-                if servo_id not in values:
-                    values.update(self._ask((servo_id,), name))
+        end_s = self.port.now_s() + BABBLE_S
+        dropped = 0
+        while True:
+            more = self.port.read_until(_ROOM, self.port.now_s() + quiet_s)
+            dropped += len(more)
+            self.rx_bytes += len(more)
+            if not more or self.port.now_s() >= end_s or dropped >= 16 * _ROOM:
+                return dropped
+
+    def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
+        """Read one register of several servos; who is not in the answer did not answer well."""
+        register = REGISTERS[name]
+        return {
+            servo_id: int.from_bytes(data, "little", signed=register.signed)
+            for servo_id, data in self.ask_bytes(ids, register.address, register.size).items()
+        }
+
+    def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
+        """Read the same bytes of several servos.
+
+        A silent servo silences those behind it: they are asked again without it, and it
+        alone where it may be asked more than once. In the loop, where nobody answers at all
+        that is the end of it.
+        """
+        values: dict[int, bytes] = {}
+        left, silent = tuple(ids), list[int]()
+        while left:
+            heard = self._ask(left, address, length)
+            values.update(heard)
+            if self.tries == 1 and not heard:
+                break
+            blamed = silent_ones(left, values)
+            silent += blamed
+            left = tuple(i for i in left if i not in values and i not in blamed)
+        for servo_id in silent:
+            for _ in range(self.tries - 1):
+                values.update(self._ask((servo_id,), address, length))
+                if servo_id in values:
+                    break
         return values
 
-    def _ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
-        _, address, size, *_, signed = REGISTERS[name]
-        raw, deadline_s = self.exchange(
-            sync_read(ids, address, size), len(ids) * (size + STATUS_OVERHEAD)
-        )
-        raw = self.complete(raw, lambda r: bytes_missing(r, len(ids), size), deadline_s)
+    def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
+        port, nominal = self.port, len(ids) * (length + STATUS_OVERHEAD)
+        port.clearPort()
+        self.send(sync_read(ids, address, length))
+        # In the loop others are waiting, and how late answers are has been measured.
+        hurried_s = min(self.most_s, HURRIED * self.patience.seconds)
+        patience_s = self.most_s if self.tries > 1 else hurried_s
+        deadline_s = self._free_s + nominal * self._byte_s + patience_s
+        raw = self.complete(b"", lambda r: bytes_missing(r, len(ids), length), deadline_s)
         values = {
-            status.id: int.from_bytes(status.params, "little", signed=signed)
+            status.id: status.params
             for status in statuses(raw)
             if status.intact
             and status.id in ids
-            and len(status.params) == size
+            and len(status.params) == length
             and not status.error & ERROR_NUMBER
         }
         if len(values) < len(ids):
-            self.port.drain()
+            self.drain()
         return values
+
+    def ping_all(self) -> dict[int, tuple[int, int]]:
+        """Ask everybody who is there; gives (model number, firmware) by id."""
+        port = self.port
+        port.clearPort()
+        self.send(instruction(BROADCAST, PING))
+        end_s = port.now_s() + PING_MOST_S
+        raw = b""
+        while port.now_s() < end_s:
+            more = port.read_until(_ROOM, port.now_s() + PING_QUIET_S)
+            raw += more
+            if not more or len(raw) >= 4 * _ROOM:
+                break
+        self.rx_bytes += len(raw)
+        return {
+            status.id: (status.params[0] | status.params[1] << 8, status.params[2])
+            for status in statuses(raw)
+            if status.intact and len(status.params) == 3
+        }
 
     def write_all(self, ids: Sequence[int], name: str, values: Iterable[int]) -> None:
         """Write one register of several servos; no servo confirms it."""

@@ -18,7 +18,7 @@ HEADER = b"\xff\xff\xfd\x00"
 RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
 BROADCAST = 0xFE
 STATUS = 0x55
-SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
+PING, SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x01, 0x82, 0x83, 0x8A
 
 STATUS_OVERHEAD = 11
 """Bytes of a status without params."""

@@ -25,7 +25,7 @@ QUIET_S = 0.003
 BABBLE_S = 0.06
 """Draining gives up on a line that never falls silent."""
 
-WRITE_S = 0.25
+WRITE_S = 0.05
 """A packet that cannot be handed to the adapter within this time never will be."""
 
 
@@ -86,6 +86,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         super().__init__(port_name)
         self.ser: Serial | None = None
         self._fd = -1
+        self._fds: tuple[int, ...] = (-1,)
         self._deadline_s = 0.0
 
     # --- what the driver's control loop uses
@@ -95,19 +96,24 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return time.monotonic()
 
     def write(self, data: bytes) -> None:
-        """Send bytes; waits at most 0.25 s for room in the adapter's buffer.
+        """Send bytes; waits at most 50 ms for room in the adapter's buffer.
 
         Raises:
             drivers.errors.BusLost: the port is gone or takes nothing.
         """
-        deadline_s = time.monotonic() + WRITE_S
-        while data:
+        deadline_s = 0.0
+        while True:
             try:
-                data = data[os.write(self._fd, data) :]
+                sent = os.write(self._fd, data)
             except BlockingIOError:
-                self._wait_for_room(deadline_s)
+                sent = 0
             except OSError as error:
                 raise self._lost(error) from error
+            if sent == len(data):
+                return
+            data = data[sent:]
+            deadline_s = deadline_s or time.monotonic() + WRITE_S
+            self._wait_for_room(deadline_s)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Give ``length`` bytes, or those that came before the deadline.
@@ -116,9 +122,20 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             drivers.errors.BusLost: the port is gone.
         """
         got = b""
-        while len(got) < length and self._wait(deadline_s):
+        while True:
+            try:
+                ready, _, _ = select.select(
+                    self._fds, (), (), max(0.0, deadline_s - time.monotonic())
+                )
+            except (OSError, ValueError) as error:
+                raise self._lost(error) from error
+            if not ready:
+                if not got and not os.path.exists(self.port_name):
+                    raise self._lost("it was unplugged")
+                return got
             got += self._take(length - len(got))
-        return got
+            if len(got) >= length:
+                return got
 
     def drain(self) -> int:
         """Throw away what arrives until nothing came for 3 ms; gives the number of bytes.
@@ -179,6 +196,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         except (SerialException, OSError) as error:
             raise PortError(explain(self.port_name, error.errno)) from error
         self._fd = self.ser.fileno()
+        self._fds = (self._fd,)
         ask_low_latency(self.ser)
         self.is_open = True
         self.is_using = False
@@ -189,7 +207,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Close; safe to call twice."""
         if self.ser is not None:
             self.ser.close()
-        self.ser, self._fd, self.is_open, self.is_using = None, -1, False, False
+        self.ser, self._fd, self._fds = None, -1, (-1,)
+        self.is_open = self.is_using = False
 
     def clearPort(self) -> None:
         """Throw away what has arrived."""

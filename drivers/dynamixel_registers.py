@@ -1,54 +1,88 @@
 """Single registers of single servos through the SDK: for all that is not done every tick."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import NamedTuple
 
-from dynamixel_sdk import COMM_SUCCESS, PacketHandler
+from dynamixel_sdk import COMM_SUCCESS
 
 from drivers.dynamixel_packets import ALERT, ERROR_NUMBER, SyncWrite
 from drivers.dynamixel_port import BusPort
+from drivers.dynamixel_sdk_packets import SdkPackets
 from drivers.dynamixel_table import REGISTERS
 
 TRIES = 3
 
+LATE_S = 0.15
+"""No answer is later than so long after waiting for it has ended."""
+
+ROOM = 4096
+
+
+class Identity(NamedTuple):
+    """What a ping tells: the model number and the firmware version."""
+
+    model_number: int
+    firmware: int
+
 
 class Registers:
-    """Single registers by name; every exchange is tried three times."""
+    """Single registers by name; every exchange is tried three times.
 
-    def __init__(self, port: BusPort) -> None:
+    alerts: servos that have reported a latched hardware error
+    refusal: error number of the newest refused exchange, 0 where the newest one was not refused
+    """
+
+    def __init__(self, port: BusPort, tries: int = TRIES) -> None:
         self._port = port
-        self._packets: Any = PacketHandler(2.0)
+        self._tries = tries
+        self._packets = SdkPackets()
+        self._late_until_s: dict[int, float] = {}
         self.alerts: set[int] = set()
-        """Servos that have reported a latched hardware error."""
+        self.refusal = 0
 
     def ping(self, servo_id: int) -> int | None:
         """Give the model number, None where nobody answers."""
-        for _ in range(TRIES):
-            number, result, error = self._packets.ping(self._port, servo_id)
+        found = self.identify(servo_id)
+        return None if found is None else found.model_number
+
+    def identify(self, servo_id: int) -> Identity | None:
+        """Give model number and firmware, None where nobody answers."""
+        for _ in range(self._tries):
+            number, firmware, result, error = self._packets.identify(self._port, servo_id)
             if self._good(servo_id, result, error):
-                return int(number)
+                return Identity(number, firmware)
         return None
 
     def read(self, servo_id: int, name: str) -> int | None:
         """Give a register's value, None where no good answer came."""
         register = REGISTERS[name]
-        read = getattr(self._packets, f"read{register.size}ByteTxRx")
-        for _ in range(TRIES):
-            try:
-                value, result, error = read(self._port, servo_id, register.address)
-            except IndexError:
-                # SDK 4.1.0 looks for the data of a refused read, which has none.
-                return None
+        data = self.read_bytes(servo_id, register.address, register.size)
+        return None if data is None else int.from_bytes(data, "little", signed=register.signed)
+
+    def read_bytes(self, servo_id: int, address: int, length: int) -> bytes | None:
+        """Give bytes of the control table, None where no good answer came."""
+        for _ in range(self._tries):
+            self._let_late_ones_pass(servo_id)
+            data, result, error = self._packets.readTxRx(self._port, servo_id, address, length)
             if self._good(servo_id, result, error):
-                return _signed(value, register.size) if register.signed else int(value)
+                return bytes(data)
+            if self.refusal:
+                return None
         return None
 
     def write(self, servo_id: int, name: str, value: int) -> bool:
         """Write a register; tells whether the servo confirmed it."""
         register = REGISTERS[name]
-        write = getattr(self._packets, f"write{register.size}ByteTxRx")
-        for _ in range(TRIES):
-            result, error = write(self._port, servo_id, register.address, value)
+        data = (value & (1 << 8 * register.size) - 1).to_bytes(register.size, "little")
+        return self.write_bytes(servo_id, register.address, data)
+
+    def write_bytes(self, servo_id: int, address: int, data: bytes) -> bool:
+        """Write bytes of the control table; tells whether the servo confirmed it."""
+        for _ in range(self._tries):
+            self._let_late_ones_pass(servo_id)
+            result, error = self._packets.writeTxRx(
+                self._port, servo_id, address, len(data), list(data)
+            )
             if self._good(servo_id, result, error):
                 return True
         return False
@@ -63,15 +97,23 @@ class Registers:
         """Write a register only where it differs; tells whether it now has the value."""
         return self.read(servo_id, name) == value or self.write(servo_id, name, value)
 
+    def _let_late_ones_pass(self, servo_id: int) -> None:
+        """Wait until no answer to an earlier question can come any more.
+
+        An answer does not say which register it is of.
+        """
+        until_s = self._late_until_s.pop(servo_id, None)
+        if until_s is not None:
+            while self._port.read_until(ROOM, until_s):
+                pass
+
     def _good(self, servo_id: int, result: int, error: int) -> bool:
+        self.refusal = 0
         if result != COMM_SUCCESS:
-            # A late answer must not be taken for the next one.
+            self._late_until_s[servo_id] = self._port.now_s() + LATE_S
             self._port.drain()
             return False
         if error & ALERT:
             self.alerts.add(servo_id)
-        return error & ERROR_NUMBER == 0
-
-
-def _signed(value: int, size: int) -> int:
-    return int(value) - (1 << 8 * size) if value >> (8 * size - 1) else int(value)
+        self.refusal = error & ERROR_NUMBER
+        return self.refusal == 0

@@ -14,7 +14,12 @@ DAMAGED_IN_A_ROW = 3
 
 
 class Roll:
-    """The servos by id, in the order of the bus."""
+    """The servos by id, in the order of the bus.
+
+    group: those asked together
+    troubled: somebody is out of the group, or has answered badly of late
+    garbling: those who are out because what they answer arrives damaged
+    """
 
     def __init__(self, ids: Sequence[int]) -> None:
         self._ids = tuple(ids)
@@ -22,11 +27,13 @@ class Roll:
         self._wait_s: dict[int, float] = {}
         self._damaged: dict[int, int] = {}
         self.group = self._ids
+        self.troubled = False
+        self.garbling: set[int] = set()
 
     @property
-    def troubled(self) -> bool:
-        """Tell whether anybody is out or has answered badly of late."""
-        return bool(self._due_s or self._damaged)
+    def out(self) -> tuple[int, ...]:
+        """Name those who are out of the group."""
+        return tuple(self._due_s)
 
     def due(self, now_s: float) -> int | None:
         """Name one servo to be asked alone now; where all are out there is always one."""
@@ -47,20 +54,26 @@ class Roll:
     def damaged(self, servo_id: int, now_s: float) -> None:
         """Note that a servo's answer arrived damaged."""
         self._damaged[servo_id] = self._damaged.get(servo_id, 0) + 1
+        self.troubled = True
         if self._damaged[servo_id] >= DAMAGED_IN_A_ROW or servo_id in self._due_s:
+            self.garbling.add(servo_id)
             self.silent(servo_id, now_s)
 
     def answered(self, servo_id: int) -> bool:
         """Note a good answer; gives whether the servo had been out."""
-        self._damaged.pop(servo_id, None)
+        self.garbling.discard(servo_id)
+        if self._damaged.pop(servo_id, None) is not None:
+            self.troubled = bool(self._due_s or self._damaged)
         if self._due_s.pop(servo_id, None) is None:
             return False
         self._wait_s.pop(servo_id, None)
         if not self.group:
             # The whole line was dead and is back: no reason to let the others wait.
-            self._due_s = dict.fromkeys(self._due_s, 0.0)
+            self._due_s.clear()
+            self._wait_s.clear()
         self._regroup()
         return True
 
     def _regroup(self) -> None:
         self.group = tuple(servo_id for servo_id in self._ids if servo_id not in self._due_s)
+        self.troubled = bool(self._due_s or self._damaged)

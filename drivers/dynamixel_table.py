@@ -15,12 +15,24 @@ STEPS_PER_TURN = 4096
 VELOCITY_UNIT_STEPS_S = 0.229 / 60.0 * STEPS_PER_TURN
 ACCELERATION_UNIT_STEPS_S2 = 214.577 / 3600.0 * STEPS_PER_TURN
 WATCHDOG_UNIT_S = 0.02
+PWM_FULL = 885
+"""Units of PWM at 100 %."""
+
+BAUD_RATES = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
+"""Bit/s by the value of Baud Rate (8); the last one on X430 alone."""
+
+RETURN_DELAY_UNIT_S = 2e-6
+SHADOW_OFF = 253
+"""Secondary ID (12) from here on means none."""
 
 EEPROM_END = 64
 """Addresses below are kept without power and locked while the torque is on."""
 
 FAST_READ_SINCE: dict[Family, int] = {"x330": 46, "x430": 45}
 """First firmware with Fast Sync Read and Fast Bulk Read."""
+
+BACKUP_SINCE: dict[Family, int] = {"x330": 46, "x430": 45}
+"""First firmware with Control Table Backup, Startup Configuration and torque on by goal update."""
 
 X330_WIDE_INDIRECT_SINCE = 53
 """First X330 firmware whose indirect data starts at 224 instead of 208."""
@@ -101,7 +113,9 @@ class Model(NamedTuple):
         """Give one unit of Present Current, 0 where the model has none."""
         if self.current_limit is None:
             return 0.0
-        return 1.0 if self.family == "x330" else 2.69
+        if self.family == "x330":
+            return 1.0
+        return 1.34 if self.name.startswith("xh430-v") else 2.69
 
 
 # fmt: off
@@ -128,6 +142,10 @@ MODELS: dict[str, Model] = {m.name: m for m in (
           (1920, 100, 0, 0, 900), 3.4, 12.0, 1.3, 30.0),
     Model("xh430-w210", 1010, "x430", 80, 160, 95, 648, 210, 52,
           (1920, 100, 0, 0, 900), 2.5, 12.0, 1.3, 50.0),
+    Model("xh430-v350", 1040, "x430", 80, 300, 110, 689, 135, 52,
+          (1920, 100, 0, 0, 800), 3.3, 24.0, 0.7, 31.0),
+    Model("xh430-v210", 1050, "x430", 80, 300, 110, 689, 230, 52,
+          (1920, 100, 0, 0, 800), 2.6, 24.0, 0.7, 52.0),
 )}
 
 _BASE = (
@@ -255,11 +273,16 @@ def _ranges(model: Model) -> dict[str, tuple[int, int]]:
     return {
         "baud_rate": (0, 6 if small else 7),
         "protocol_type": (2, 22) if small else (1, 2),
-        "max_voltage_limit": (model.min_voltage, model.max_voltage),
-        "min_voltage_limit": (model.min_voltage, model.max_voltage),
+        "max_voltage_limit": (_lowest_voltage(model), model.max_voltage),
+        "min_voltage_limit": (_lowest_voltage(model), model.max_voltage),
         "current_limit": (0, model.current_limit or 0),
         "velocity_limit": (0, 2047 if small else 1023),
     }
+
+
+def _lowest_voltage(model: Model) -> int:
+    """Give the low end of both voltage limits, 0.1 V; the 5 V models go below their initial."""
+    return 31 if model.rated_v == 5.0 else model.min_voltage
 
 
 def name_errors(status: int) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ again after.
 """
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from drivers.dynamixel_line import Line
 from drivers.dynamixel_table import STEPS_PER_TURN, name_errors
@@ -44,7 +45,7 @@ def insist(line: Line, ids: Sequence[int], name: str, values: Sequence[int]) -> 
         if not left:
             return
     _raise_missing(line, [servo_id for servo_id in left if servo_id not in found])
-    refused = ", ".join(f"servo {servo_id}: {value}" for servo_id, value in left.items())
+    refused = ", ".join(f"{line.who(servo_id)}: {value}" for servo_id, value in left.items())
     raise ServoMissing(
         f"{line.port.port_name}: {name} is not taken ({refused}): restart the servo power"
     )
@@ -62,37 +63,49 @@ def switch_on(line: Line, ids: Sequence[int], goals: Sequence[int]) -> None:
     try:
         insist(line, ids, "torque_enable", [1] * len(ids))
     except ServoMissing:
-        latched = name_latched(line, ids)
+        latched = find_latched(line, ids)
         if not latched:
             raise
-        named = ", ".join(f"servo {servo_id}: {fault}" for servo_id, fault in latched.items())
+        named = ", ".join(
+            f"{line.who(servo_id)}: {' and '.join(name_errors(status))}"
+            for servo_id, status in latched.items()
+        )
         raise ServoFault(f"{named}: let it cool, free it, then restart the servo power") from None
     for servo_id, was, now in zip(ids, before, positions(line, ids), strict=True):
         if abs(now - was) > JUMP_STEPS:
             raise ServoFault(
-                f"servo {servo_id}: position jumped from {was} to {now} as the torque came on: "
+                f"{line.who(servo_id)}: position jumped from {was} to {now} as the torque came on: "
                 "set its Homing Offset to 0"
             )
 
 
-def switch_off(line: Line, ids: Sequence[int]) -> tuple[int, ...]:
-    """Take the torque away, watchdog first; gives the servos that still report torque."""
+class Released(NamedTuple):
+    """Servos that still report torque, and those that report nothing."""
+
+    holding: tuple[int, ...]
+    mute: tuple[int, ...]
+
+
+def switch_off(line: Line, ids: Sequence[int]) -> Released:
+    """Take the torque away, watchdog first, and see that it is gone."""
     left = tuple(ids)
+    found: dict[int, int] = {}
     for _ in range(TRIES):
         # Twice: no servo confirms a group write, and this one matters most.
         for name in ("bus_watchdog", "torque_enable", "torque_enable"):
             line.write_all(left, name, [0] * len(left))
         found = line.ask(left, "torque_enable")
-        left = tuple(servo_id for servo_id in left if found.get(servo_id, 0))
+        left = tuple(servo_id for servo_id in left if found.get(servo_id, 1))
         if not left:
             break
-    return left
+    holding = tuple(servo_id for servo_id in left if servo_id in found)
+    return Released(holding, tuple(servo_id for servo_id in left if servo_id not in found))
 
 
-def name_latched(line: Line, ids: Sequence[int]) -> dict[int, str]:
-    """Name the latched hardware errors of the servos that answer and have any."""
+def find_latched(line: Line, ids: Sequence[int]) -> dict[int, int]:
+    """Give Hardware Error Status of the servos that answer and have latched any."""
     found = line.ask(ids, "hardware_error_status")
-    return {servo_id: " and ".join(name_errors(v)) for servo_id, v in found.items() if v}
+    return {servo_id: status for servo_id, status in found.items() if status}
 
 
 def heal_tripped(
@@ -118,5 +131,5 @@ def heal_tripped(
 
 def _raise_missing(line: Line, missing: Sequence[int]) -> None:
     if missing:
-        named = ", ".join(f"servo {servo_id}" for servo_id in missing)
+        named = ", ".join(line.who(servo_id) for servo_id in missing)
         raise ServoMissing(f"{line.port.port_name}: no answer from {named}: check its cable")

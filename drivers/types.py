@@ -67,7 +67,7 @@ class ServoSetup(NamedTuple):
     name: what people call it, e.g. "neck_yaw", for messages; "" where it has no name
     firmware_min: oldest firmware that will do
     gains: registers Position P, I and D Gain (84, 82, 80), None where they stay as they are
-    max_current_ma: Current Limit (38), None where it stays as it is
+    strength: PWM Limit (36) as a share of full drive, None where it stays as it is
     """
 
     id: int
@@ -78,7 +78,7 @@ class ServoSetup(NamedTuple):
     name: str = ""
     firmware_min: int = 0
     gains: tuple[int, int, int] | None = None
-    max_current_ma: float | None = None
+    strength: float | None = None
 
 
 class ServoBus(Protocol):

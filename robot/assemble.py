@@ -34,6 +34,7 @@ from gaze.top_down import TopDown
 from gaze.types import Angles2, Mat3, Vec3
 from robot.body import Body, JointParams
 from robot.clock import Clock, RealClock, SimulatedClock
+from robot.emulated_rig import emulated_servos
 from robot.frames import CameraMount, CameraParams, PoseHistory, standing_still
 from robot.kinematics import Kinematics
 from robot.loop import LoopParams, Robot
@@ -51,20 +52,13 @@ from sim_mock.servo_chain import ServoChain, build_chain
 
 P = TypeVar("P", ScanpathParams, SaccadeParams)
 
-# Emulated joints start a little crooked, as a head that somebody has moved by hand does.
-_CROOKED_DEG = {
-    "left_eye_pan": 6.0,
-    "right_eye_pan": -4.0,
-    "neck_yaw": -12.0,
-    "neck_pitch": -8.0,
-}
-
 
 @dataclass(frozen=True)
 class Choice:
     """What to run: wires or emulation, what to look at, which clock, which dice.
 
     Exactly one of scene, video and camera is set.
+    port: serial port instead of the rig's
     """
 
     mock: bool
@@ -76,6 +70,7 @@ class Choice:
     scanpath: str | None = None
     saccade: str | None = None
     rules: str | None = None
+    port: str | None = None
     film_delay_s: float = 0.05
 
 
@@ -132,7 +127,7 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
     wires = _wires(rig, choice, clock)
     try:
         bus = DynamixelBus(
-            wires.port, [rig.joints[name].setup() for name in JOINTS], rig.bus.dynamixel
+            wires.port, [rig.joints[name].setup(name) for name in JOINTS], rig.bus.dynamixel
         )
         body = Body(bus, rig.joints)
         lids = Lids(rig.gaze.lids, lid_dice)
@@ -169,6 +164,17 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
         wires.close,
         notes,
     )
+
+
+def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
+    """Give a rig's geometry and its oculomotor model, for looking without a camera."""
+    lid_dice, landing_dice = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
+    )
+    kinematics = _kinematics(rig)
+    choice = Choice(mock=False, fast=False, seed=seed)
+    lids = Lids(rig.gaze.lids, lid_dice)
+    return kinematics, _oculomotor(rig, choice, kinematics, lids, landing_dice)
 
 
 def _scene(rig: Rig, name: str) -> Scene:
@@ -215,19 +221,17 @@ def _camera_params(
 def _wires(rig: Rig, choice: Choice, clock: Clock) -> _Wires:
     """Give the real port, an emulated bus in this process, or one on a pseudo-terminal."""
     if not choice.mock:
-        return _Wires(BlockingPort(rig.bus.port), None, _no_digest, _nothing)
-    specs = [_spec(name, rig.joints[name]) for name in JOINTS]
+        port = choice.port if choice.port is not None else rig.bus.port
+        return _Wires(BlockingPort(port), None, _no_digest, _nothing)
+    specs = emulated_servos(rig)
     if not choice.fast:
         bus = PtyBus()
-        return _Wires(BlockingPort(bus.start(specs)), None, _no_digest, bus.stop)
+        return _Wires(
+            BlockingPort(bus.start(specs, baud=rig.bus.dynamixel.baud)), None, _no_digest, bus.stop
+        )
     sent = hashlib.sha256()
-    chain = build_chain(specs, clock.now_s)
+    chain = build_chain(specs, clock.now_s, baud=rig.bus.dynamixel.baud)
     return _Wires(InProcessPort(chain, sent.update), chain, sent.hexdigest, _nothing)
-
-
-def _spec(name: str, joint: JointParams) -> tuple[int, str, int]:
-    """Give id, model and start position of the emulated servo of a joint."""
-    return joint.id, joint.model, round(joint.steps(radians(_CROOKED_DEG.get(name, 0.0))))
 
 
 def _no_digest() -> str | None:

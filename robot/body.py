@@ -65,13 +65,14 @@ class JointParams:
             "says": "the servo's Position P, I and D Gain; null: left as they are",
         },
     )
-    max_current_ma: float | None = field(
+    strength: float | None = field(
         default=None,
         metadata={
-            "low": 1.0,
-            "high": 5000.0,
-            "unit": "mA",
-            "says": "the servo's Current Limit, so its strength; null: left as it is",
+            "low": 0.05,
+            "high": 1.0,
+            "unit": "",
+            "says": "share of its full drive that the servo may use (PWM Limit), which bounds "
+            "force and top speed alike; null: left as it is",
         },
     )
     firmware_min: int = field(
@@ -133,7 +134,7 @@ class JointParams:
             name,
             self.firmware_min,
             self.gains,
-            self.max_current_ma,
+            self.strength,
         )
 
 

@@ -10,6 +10,7 @@ import typer
 from config.load import load
 from config.schema import Rig, load_rig
 from drivers.errors import SetupError
+from robot import cli_emulate, cli_motion, cli_servos
 from robot.cli_terminal import FAULT, RigArgument, clear_errors, say, signals, status
 
 app = typer.Typer(
@@ -18,12 +19,15 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Makes an animatronic head look at people the way people look at each other.",
 )
+for part in (cli_servos, cli_motion, cli_emulate):
+    app.add_typer(part.app)
 
 
 @app.command()
 def run(
     rig: RigArgument = "desk",
     mock: Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")] = False,
+    port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
     scene: Annotated[
         str | None, typer.Option(help="Look at a simulated scene (default with --mock: visitor).")
     ] = None,
@@ -88,6 +92,7 @@ def run(
             scanpath=scanpath,
             saccade=saccade,
             rules=rules,
+            port=port,
             asked=tuple(
                 (menu, choice)
                 for menu, choice in (("behaviour", behaviour), ("conversation", conversation))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import inf, radians
 from typing import NamedTuple
 
-from drivers.errors import DriverError, ServoFault
+from drivers.errors import DriverError
 from drivers.types import Camera, Detections
 from gaze.attention import Attention
 from gaze.aversion import MODES, Aversion
@@ -25,7 +25,10 @@ from robot.types import JointAngles, JointState, Verdict
 
 
 class Tick(NamedTuple):
-    """Everything one tick knew and decided; wish, permitted and measured side by side."""
+    """Everything one tick knew and decided; wish, permitted and measured side by side.
+
+    events: what has happened on the bus, in words
+    """
 
     t_s: float
     joints: JointState
@@ -36,6 +39,7 @@ class Tick(NamedTuple):
     gaze: GazeCommand
     wish_rad: JointAngles
     verdict: Verdict
+    events: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -161,7 +165,7 @@ class Robot:
         """Read, see, choose, plan, guard, write.
 
         Raises:
-            drivers.errors.DriverError: bus or camera are gone, or a servo has failed.
+            drivers.errors.DriverError: bus or camera are gone.
         """
         self._obey(t_s)
         joints = self.body.read(t_s)
@@ -178,8 +182,8 @@ class Robot:
         age_s = percept.age_s(t_s) if percept is not None else inf
         verdict = self._guard.check(wish, joints, age_s, t_s)
         self.body.write(verdict.command_rad)
-        self._look_for_faults()
-        return Tick(t_s, joints, pose, detections, percept, target, gaze, wish, verdict)
+        events = self.body.bus.events()
+        return Tick(t_s, joints, pose, detections, percept, target, gaze, wish, verdict, events)
 
     def park(self, pose_rad: JointAngles, clock: Clock, params: LoopParams) -> bool:
         """Move slowly to the parking pose; tell whether it was reached in time."""
@@ -216,11 +220,6 @@ class Robot:
             else:
                 LID_COMMANDS[choice](self._lids, t_s)
 
-    def _look_for_faults(self) -> None:
-        faults = self.body.bus.faults()
-        if faults:
-            raise ServoFault("; ".join(faults))
-
 
 def _first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
     """Put the present choice before the others."""
@@ -251,9 +250,12 @@ def run(
         if reason is not None:
             return LoopCount(ticks, overruns, reason)
         try:
-            watch(robot.tick(t_s, t_s - last_s))
+            tick = robot.tick(t_s, t_s - last_s)
         except DriverError as error:
             return LoopCount(ticks, overruns, f"fault: {error}")
+        watch(tick)
+        if tick.verdict.level == "limp":
+            return LoopCount(ticks, overruns, f"fault: {'; '.join(tick.verdict.gravest)}")
         last_s = t_s
         ticks += 1
         late = int((clock.now_s() - start_s) / period) - slot

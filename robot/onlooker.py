@@ -20,7 +20,7 @@ from robot.frames import CameraMount, PoseHistory
 from robot.loop import Tick
 from robot.page import Page
 from robot.page_picture import draw_detections, encode
-from robot.types import SeenBody, SeenFace, Snapshot
+from robot.types import SeenBody, SeenFace, Snapshot, Verdict
 
 _SNAPSHOT_S = 0.04
 _PICTURE_S = 0.1
@@ -122,7 +122,7 @@ class Onlooker:
         parts = [
             f"{rate_hz:5.1f} Hz",
             f"{target_name(tick.target)} - {tick.target.why}",
-            tick.verdict.level,
+            _verdict_words(tick.verdict),
             _health_words(self._health()),
         ]
         return " | ".join([*parts, *([note] if note else []), *([url] if url else [])])
@@ -185,6 +185,14 @@ def target_name(target: Target) -> str:
     """Give a target's name for people, e.g. "face 3: left eye"."""
     name = target.kind if target.id < 0 else f"{target.kind} {target.id}"
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
+
+
+def _verdict_words(verdict: Verdict) -> str:
+    """Say what the guard made of the wish, e.g. "limited (neck_yaw: too fast, +2)"."""
+    if not verdict.reasons:
+        return verdict.level
+    more = f", +{len(verdict.reasons) - 1}" if len(verdict.reasons) > 1 else ""
+    return f"{verdict.level} ({verdict.reasons[0]}{more})"
 
 
 def _health_words(health: BusHealth) -> str:

@@ -1,37 +1,32 @@
 """The guard between wish and bus: knows limits, measurements and ages, nothing of gaze.
 
 Whatever is wished, what leaves is finite, inside every joint's range, within its speed
-and its acceleration, and always able to stop before the end of the range. Radians.
+and its acceleration, always able to stop before the end of the range, and in no pose in
+which joints collide. What is hot, overloaded, short of voltage or stuck slows down or
+stops, each joint by itself. Radians.
 """
 
 from dataclasses import dataclass, field
-from math import inf, isfinite, radians, sqrt
-from typing import NamedTuple
+from math import isfinite, radians
+from typing import Literal, NamedTuple
 
+from robot.safety_collisions import CollisionParams, Collisions
+from robot.safety_health import Health, HealthParams
+from robot.safety_motion import JointLimit as JointLimit
+from robot.safety_motion import Motion
+from robot.safety_stuck import Stuck, StuckParams
 from robot.types import JOINTS, JointAngles, JointState, Level, Verdict
 
-_TOLERANCE_RAD = 1e-9
-
-
-class JointLimit(NamedTuple):
-    """One joint's range, top speed and top acceleration (rad, rad/s, rad/s^2).
-
-    The rest is what the joint's servo bears before it switches itself off: degrees
-    Celsius, lowest and highest volts.
-    """
-
-    low_rad: float
-    high_rad: float
-    speed_rad_s: float
-    accel_rad_s2: float
-    hottest_c: float = 70.0
-    lowest_v: float = 0.0
-    highest_v: float = inf
+# A loop that was stopped for seconds goes on from where it was, not where it would be by now.
+_LONGEST_TICK_S = 0.1
+_NEAR_RAD = radians(1.0)
+_ROUNDING_RAD = 1e-9
+_LEVELS: tuple[Level, ...] = ("ok", "limited", "hold", "limp")
 
 
 @dataclass(frozen=True)
 class GuardParams:
-    """Ages beyond which nothing moves, and the speed of slow passages."""
+    """Ages beyond which nothing moves, slow passages, and what the servos bear."""
 
     stale_joints_ms: float = field(
         default=150.0,
@@ -78,32 +73,77 @@ class GuardParams:
             "says": "acceleration after torque-on and while parking",
         },
     )
+    health: HealthParams = field(
+        default_factory=HealthParams, metadata={"says": "what the servos bear"}
+    )
+    stuck: StuckParams = field(
+        default_factory=StuckParams, metadata={"says": "joints that are told to move and do not"}
+    )
+    collision_margin_deg: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.1,
+            "high": 20.0,
+            "unit": "deg",
+            "says": "distance kept from collisions; servos round and lag",
+        },
+    )
+    collisions: tuple[CollisionParams, ...] = field(
+        default=(),
+        metadata={"says": "pairs of joint ranges that may not be taken together"},
+    )
+
+
+class _Hold(NamedTuple):
+    """Why a joint does not follow its wish, and what it does instead.
+
+    goal: where it goes; None: it comes to a stop
+    slowly: it goes there slowly
+    again: how it begins when this is over
+    """
+
+    reason: str
+    goal: float | None = None
+    slowly: bool = False
+    again: Literal["at once", "slowly"] = "at once"
 
 
 class Guard:
     """Checks every command, one tick after the other."""
 
     def __init__(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
-        """Take one limit a joint, in the order of JOINTS."""
+        """Take one limit a joint, in the order of JOINTS.
+
+        Raises:
+            ValueError: a collision leaves no pose inside the limits.
+        """
         self._params = params
+        self._gentle_speed = radians(params.gentle_speed_deg_s)
+        self._gentle_accel = radians(params.gentle_accel_deg_s2)
         self._limits = limits
         self._neck = tuple(name.startswith("neck") for name in JOINTS)
+        self._motion = Motion(limits)
+        self._health = Health(params.health, limits)
+        self._stuck = Stuck(params.stuck, len(limits))
+        self._collisions = Collisions(params.collisions, params.collision_margin_deg, limits)
         self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
 
     def reset(self, t_s: float, command_rad: JointAngles) -> None:
         """Begin from the goals that are in force on the bus, at rest, gently."""
-        self._command = [
-            min(max(angle, limit.low_rad), limit.high_rad)
-            for angle, limit in zip(command_rad, self._limits, strict=True)
-        ]
-        self._speed = [0.0] * len(self._limits)
         self._t_s = t_s
+        self._held = [False] * len(self._limits)
+        self._retrying = [False] * len(self._limits)
+        self._retreat: list[float | None] = [None] * len(self._limits)
+        self._health.reset()
+        for i, angle in enumerate(command_rad):
+            self._motion.restart(i, angle)
+            self._stuck.forget(i)
         self.go_gently()
 
     def go_gently(self) -> None:
         """Move slowly for a while, and each joint until it has once met its wish."""
         self._gentle = [True] * len(self._limits)
-        self._gentle_until_s = self._t_s + self._params.gentle_ms / 1e3
+        self._gentle_until_s = [self._t_s + self._params.gentle_ms / 1e3] * len(self._limits)
 
     @property
     def gentle(self) -> bool:
@@ -118,93 +158,199 @@ class Guard:
         wish_rad: any numbers at all
         picture_age_s: age of the newest picture; infinity before the first
         """
-        dt_s = t_s - self._t_s
-        if dt_s <= 0.0:
-            return Verdict(tuple(self._command), "hold", ("all: time stands still",))
+        if True in joints.rearmed:
+            self._rearm(joints)
+        since_s = t_s - self._t_s
+        if not (since_s > 0.0 and isfinite(since_s)):
+            return self._standstill(wish_rad)
         self._t_s = t_s
-        reasons: list[str] = []
-        level: Level = "ok"
-        blind = picture_age_s > self._params.stale_picture_ms / 1e3
+        dt_s = min(since_s, _LONGEST_TICK_S)
+        self._health.step(joints, dt_s)
+        if self._collisions:
+            self._collisions.look(self._motion, wish_rad, joints.position_rad, self._held)
         stale_s = t_s - self._params.stale_joints_ms / 1e3
-        for i, wish in enumerate(wish_rad):
-            held = ""
-            if not isfinite(wish):
-                held = "not finite"
-            elif joints.measured_s[i] < stale_s:
-                held = "stale joints"
-            elif blind and self._neck[i]:
-                held = "stale picture"
-            reason = held or self._range_reason(i, wish)
-            changed = self._advance(i, None if held else wish, dt_s)
-            reason = reason or changed
+        blind = not picture_age_s <= self._params.stale_picture_ms / 1e3
+        usual = self._all_well(joints)
+        far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
+        columns = zip(wish_rad, joints.position_rad, joints.measured_s, strict=True)
+        why: dict[int, str] = {}
+        ranks: dict[int, int] = {}
+        for i, (wish, position, at_s) in enumerate(columns):
+            unseen = blind and self._neck[i]
+            near = -far <= command[i] - position <= far and not watched[i]
+            well = near and at_s >= stale_s and not unseen and (usual or self._well(i, joints))
+            if well and self._motion.follow(i, wish, dt_s):
+                continue  # nearly every wish is a good one and is passed on as it is
+            rank, reason = self._pass(i, wish, joints, at_s >= stale_s, unseen, dt_s)
             if reason:
-                reasons.append(f"{JOINTS[i]}: {reason}")
-                level = "hold" if held or level == "hold" else "limited"
-        return Verdict(tuple(self._command), level, tuple(reasons))
+                why[i], ranks[i] = reason, rank
+        return self._verdict(wish_rad, why, ranks)
 
-    def _range_reason(self, i: int, wish: float) -> str:
-        limit = self._limits[i]
-        outside = wish < limit.low_rad - 1e-9 or wish > limit.high_rad + 1e-9
-        return "out of range" if outside else ""
+    def _standstill(self, wish_rad: JointAngles) -> Verdict:
+        """Move nothing, as no time has passed."""
+        why = ("time stands still",) * len(self._limits)
+        reasons = ("all: time stands still",)
+        return Verdict(tuple(self._motion.command), "hold", reasons, wish_rad, why, reasons)
 
-    def _advance(self, i: int, wish: float | None, dt_s: float) -> str:
-        """Move one joint towards its wish (None: to a stop); give why it fell short.
+    def _verdict(
+        self, wish_rad: JointAngles, why: dict[int, str], ranks: dict[int, int]
+    ) -> Verdict:
+        command = tuple(self._motion.command)
+        if not why:
+            return Verdict(command, "ok", (), wish_rad)
+        worst = max(ranks.values())
+        reasons = {i: f"{JOINTS[i]}: {reason}" for i, reason in why.items()}
+        return Verdict(
+            command,
+            _LEVELS[worst],
+            tuple(reasons.values()),
+            wish_rad,
+            tuple([why.get(i, "") for i in range(len(command))]),
+            tuple([reasons[i] for i in reasons if ranks[i] == worst]),
+        )
 
-        The speed v' of this step must keep p' + v'^2 / 2a inside the range. As
-        v'^2 / 2a bounds every later sequence of braking steps, a joint that keeps this
-        can always stop in time, whatever the length of the ticks to come.
-        """
-        low, high, fastest, accel, *_ = self._limits[i]
-        p, v = self._command[i], self._speed[i]
-        step = accel * dt_s
-        if wish is not None and not self._gentle[i] and low <= wish <= high:
-            # Nearly every wish is a good one and is passed on as it is.
-            wanted = (wish - p) / dt_s
-            brake = 0.5 * wanted * wanted / accel
-            fits = wish + brake <= high if wanted > 0.0 else wish - brake >= low
-            if fits and -fastest <= wanted <= fastest and v - step <= wanted <= v + step:
-                self._command[i], self._speed[i] = wish, wanted
-                return ""
-        if self._gentle[i]:
-            fastest = min(fastest, radians(self._params.gentle_speed_deg_s))
-            # Braking keeps the joint's own strength: a gentle passage may begin in flight.
-            gentle = min(accel, radians(self._params.gentle_accel_deg_s2))
+    def _all_well(self, joints: JointState) -> bool:
+        """Tell whether nothing but limits, ages and distances need be looked at."""
+        return not (
+            not self._health.fine
+            or True in self._gentle
+            or True in self._held
+            or self._collisions.exits
+            or self._collisions.still
+            or False in joints.torque
+            or any(joints.fault)
+        )
+
+    def _well(self, i: int, joints: JointState) -> bool:
+        """Tell the same of one joint."""
+        return not (
+            self._gentle[i]
+            or self._held[i]
+            or self._health.share[i] < 1.0
+            or self._health.held[i]
+            or i in self._collisions.exits
+            or i in self._collisions.still
+            or (joints.torque and not joints.torque[i])
+            or (joints.fault and joints.fault[i])
+        )
+
+    def _rearm(self, joints: JointState) -> None:
+        """Begin where the bus has put the goals of joints whose torque came on anew."""
+        for i, (angle, anew) in enumerate(zip(joints.position_rad, joints.rearmed, strict=True)):
+            if anew and isfinite(angle):
+                self._motion.restart(i, angle)
+                self._stuck.forget(i)
+                self._retreat[i] = None
+                self._slow_down(i)
+
+    def _slow_down(self, i: int) -> None:
+        """Let one joint go on slowly, as after torque-on."""
+        self._gentle[i] = True
+        self._gentle_until_s[i] = self._t_s + self._params.gentle_ms / 1e3
+
+    def _pass(
+        self, i: int, wish: float, joints: JointState, fresh: bool, unseen: bool, dt_s: float
+    ) -> tuple[int, str]:
+        """Move one joint; give the rank of the level and the reason, if there is one."""
+        position = joints.position_rad[i]
+        fault = joints.fault[i] if joints.fault else ""
+        fresh = fresh and isfinite(position)
+        hold = self._servo_hold(i, joints, fault, fresh)
+        self._held[i] = hold is not None
+        if hold is None:
+            self._retreat[i] = None
+            hold = self._outer_hold(i, wish, unseen)
+        if fault:  # what still moves, moves to its parking place
+            self._slow_down(i)
+        if hold is not None:
+            self._stand(i, hold, dt_s)
+            rank, reason = 2, hold.reason
         else:
-            gentle = accel
-        wanted = 0.0 if wish is None else (min(max(wish, low), high) - p) / dt_s
-        if wish is not None and self._gentle[i]:
-            wanted = _approach(min(max(wish, low), high) - p, gentle, dt_s)
-            if abs(wish - p) < radians(1.0) and self._t_s >= self._gentle_until_s:
-                self._gentle[i] = False
-        top = min(fastest, _brakeable(high - p, accel, dt_s))
-        bottom = -min(fastest, _brakeable(p - low, accel, dt_s))
-        hardest = v + (gentle if v >= 0.0 else accel) * dt_s
-        softest = v - (gentle if v <= 0.0 else accel) * dt_s
-        allowed = min(max(wanted, bottom), top)
-        chosen = min(max(allowed, softest), hardest)
-        # The range and the braking distance win over gentleness, never over the joint's
-        # own acceleration, which the invariant above makes sufficient.
-        chosen = min(max(chosen, max(bottom, v - step)), max(min(top, v + step), v - step))
-        moved = min(max(p + chosen * dt_s, low), high)
-        self._command[i] = moved
-        self._speed[i] = (moved - p) / dt_s
-        if wish is None or abs(wanted - chosen) * dt_s <= _TOLERANCE_RAD:
-            return "starting slowly" if self._gentle[i] else ""
+            reason = self._go(i, wish, position, dt_s)
+            rank = 1 if reason else 0
+        return (3, fault) if fault else (rank, reason)
+
+    def _servo_hold(self, i: int, joints: JointState, fault: str, fresh: bool) -> _Hold | None:
+        """Say why a joint's servo cannot or must not go where it is sent."""
+        position = joints.position_rad[i]
+        powered = joints.torque[i] if joints.torque else not fault
+        if not powered:
+            # Where it is when the torque comes back, its command is already.
+            self._stuck.forget(i)
+            return _Hold("torque off", position if isfinite(position) else None, again="slowly")
+        if "encoder" in fault:
+            return _Hold(fault)
+        if self._is_stuck(i, joints, fresh):
+            return self._give_way(i, "not moving", position, fresh)
+        strain = self._health.held[i]
+        if strain == "overloaded":
+            return self._give_way(i, strain, position, fresh)
+        if not fresh:
+            return _Hold("stale joints")
+        return _Hold(strain, again="slowly") if strain else None
+
+    def _outer_hold(self, i: int, wish: float, unseen: bool) -> _Hold | None:
+        """Say what else keeps a joint from its wish."""
+        if i in self._collisions.exits:
+            return _Hold("self-collision", self._collisions.exits[i], slowly=True, again="slowly")
+        if i in self._collisions.still:
+            return _Hold("self-collision", again="slowly")
+        if not isfinite(wish):
+            return _Hold("not finite")
+        return _Hold("stale picture") if unseen else None
+
+    def _is_stuck(self, i: int, joints: JointState, fresh: bool) -> bool:
+        """Tell whether a joint is told to move and does not."""
+        if self._stuck.holds(i, self._t_s):
+            return True
+        command, position = self._motion.command[i], joints.position_rad[i]
+        if fresh and self._stuck.found(i, command, position, joints.measured_s[i], self._t_s):
+            self._retrying[i] = True
+            return True
+        return False
+
+    def _give_way(self, i: int, reason: str, position: float, fresh: bool) -> _Hold:
+        """Take the command back to where the joint is, and again if it is pushed away.
+
+        Not all the time: a neck would sink under its own weight.
+        """
+        back = self._retreat[i]
+        if fresh and (back is None or abs(back - position) > self._stuck.far_rad):
+            self._retreat[i] = back = position
+        return _Hold(reason, back, again="slowly")
+
+    def _stand(self, i: int, hold: _Hold, dt_s: float) -> None:
+        """Bring a joint to a stop, or to where it should be meanwhile."""
+        if hold.again == "slowly":
+            self._slow_down(i)
+        if hold.goal is None:
+            self._motion.brake(i, dt_s)
+        elif hold.slowly:
+            self._motion.seek(i, hold.goal, dt_s, self._gentle_speed, self._gentle_accel)
+        else:
+            limit = self._limits[i]
+            self._motion.seek(i, hold.goal, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
+
+    def _go(self, i: int, wish: float, position: float, dt_s: float) -> str:
+        """Move a joint towards its wish as far as it may; give why it fell short."""
+        motion, limit, share = self._motion, self._limits[i], self._health.share[i]
+        began = motion.command[i]
+        target = min(max(wish, motion.low[i]), motion.high[i])
+        top, soft = share * limit.speed_rad_s, share * limit.accel_rad_s2
+        if self._gentle[i]:
+            lead = self._stuck.lead_rad
+            pull = min(max(wish, position - lead), position + lead) if self._retrying[i] else wish
+            motion.seek(i, pull, dt_s, min(top, self._gentle_speed), min(soft, self._gentle_accel))
+            if abs(target - motion.command[i]) < _NEAR_RAD and self._t_s >= self._gentle_until_s[i]:
+                self._gentle[i] = self._retrying[i] = False
+        elif share < 1.0 or not motion.follow(i, wish, dt_s):
+            motion.chase(i, wish, dt_s, top, soft)
+        if abs(wish - target) > _ROUNDING_RAD:
+            outside = not limit.low_rad <= wish <= limit.high_rad
+            return "out of range" if outside else "self-collision"
         if self._gentle[i]:
             return "starting slowly"
-        return "too fast" if abs(wanted) > fastest else "too hard"
-
-
-def _brakeable(room: float, accel: float, dt_s: float) -> float:
-    """Give the highest speed for one step after which a stop within ``room`` is possible.
-
-    Solves v dt + v^2 / 2a = room for v.
-    """
-    half = accel * dt_s
-    return sqrt(half * half + 2.0 * accel * max(0.0, room)) - half
-
-
-def _approach(distance: float, accel: float, dt_s: float) -> float:
-    """Give the speed towards a resting wish from which braking at ``accel`` ends on it."""
-    speed = _brakeable(abs(distance), accel, dt_s)
-    return speed if distance >= 0.0 else -speed
+        if abs(target - motion.command[i]) <= _ROUNDING_RAD:
+            return ""
+        fast = abs(target - began) > limit.speed_rad_s * dt_s
+        return self._health.why[i] or ("too fast" if fast else "too hard")

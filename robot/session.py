@@ -9,6 +9,7 @@ import numpy as np
 from drivers.errors import DriverError, SetupError
 from robot.assemble import Assembly, Choice
 from robot.behaviours import Behaviours
+from robot.bus_events import drawn_together
 from robot.clock import RealClock
 from robot.face_gaze import FaceGaze
 from robot.heatmap import heatmap
@@ -40,6 +41,7 @@ class Wanted:
     scanpath: str | None = None
     saccade: str | None = None
     rules: str | None = None
+    port: str | None = None
     asked: tuple[tuple[str, str], ...] = ()
     heatmap: Path | None = None
     heatmap_face: Path | None = None
@@ -65,6 +67,8 @@ class Wanted:
                     "nothing to look at: give --camera N, --video FILE or --scene NAME"
                 )
             scene = "visitor"
+        if self.port is not None and self.mock:
+            raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
         if self.fast and not self.mock:
             raise SetupError("--fast needs --mock: real servos cannot be hurried")
         if self.fast and self.camera is not None:
@@ -81,6 +85,7 @@ class Wanted:
             scanpath=self.scanpath,
             saccade=self.saccade,
             rules=self.rules,
+            port=self.port,
         )
 
 
@@ -138,6 +143,8 @@ def _run(
     def watch(tick: Tick) -> None:
         for note in watchers:
             note(tick)
+        for event in drawn_together(tick.events):
+            say(f"{tick.t_s - start_s:.2f} s: {event}")
 
     longest_s = _longest_s(made, wanted)
 
@@ -148,7 +155,8 @@ def _run(
     began_s = wall.now_s()
     count = LoopCount(0, 0, "fault: unexpected error")
     robot.start(made.clock)
-    for note in made.notes:
+    start_s = made.clock.now_s()
+    for note in (*made.notes, *drawn_together(robot.body.bus.events())):
         say(note)
     try:
         if page is not None:
@@ -209,7 +217,7 @@ def _leave(made: Assembly, count: LoopCount, say: Callable[[str], None]) -> None
         robot.stop()
         how += ", torque off"
     except DriverError as error:
-        how += f", torque-off could not be sent ({error}): the servos' watchdog stops them"
+        how += f", torque-off could not be sent ({error})"
     say(f"stopped by {count.stopped_by}: {how}")
 
 

@@ -1,6 +1,6 @@
 """Figures of a run, gathered tick by tick and given as one JSON object at the end."""
 
-from collections import Counter, defaultdict
+from collections import Counter, defaultdict, deque
 from collections.abc import Mapping
 from math import degrees, radians
 
@@ -14,6 +14,9 @@ from robot.loop import Tick
 _FIXATION_RAD_S = radians(40.0)
 """Slower is fixating; 30 is usual, and one servo step in a 5 ms tick is already 18 deg/s."""
 
+_EVENTS_KEPT = 100
+"""The newest; a rig that runs for weeks must not fill the memory."""
+
 
 class Summary:
     """Counts and shares over a run."""
@@ -23,6 +26,7 @@ class Summary:
         self._target_s: defaultdict[str, float] = defaultdict(float)
         self._part_s: defaultdict[str, float] = defaultdict(float)
         self._limited: Counter[str] = Counter()
+        self._events: deque[tuple[float, str]] = deque(maxlen=_EVENTS_KEPT)
         # Counted by thousandths of a degree: a list would grow for as long as the rig runs.
         self._errors_mdeg: Counter[int] = Counter()
         self._first_s: float | None = None
@@ -42,6 +46,7 @@ class Summary:
             self._part_s[tick.target.part] += dt_s
         if self._fixates(tick, dt_s):
             self._errors_mdeg[round(1000.0 * degrees(gaze_error_rad(tick)))] += 1
+        self._events.extend((tick.t_s - self._first_s, event) for event in tick.events)
         for reason in tick.verdict.reasons:
             self._limited[reason.partition(": ")[2]] += 1
 
@@ -67,6 +72,7 @@ class Summary:
                 "p95": _percentile_deg(self._errors_mdeg, 95.0),
             },
             "limited": dict(sorted(self._limited.items())),
+            "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
         }
 
 

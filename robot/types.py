@@ -54,17 +54,46 @@ class JointState(NamedTuple):
     rearmed: tuple[bool, ...] = ()
 
 
+class Applied(NamedTuple):
+    """What became of one joint's wish.
+
+    wish_rad: as it was asked for; permitted_rad: as it was sent
+    reason: why they differ, "" where nothing stood in the way
+    """
+
+    wish_rad: float
+    permitted_rad: float
+    reason: str
+
+
 class Verdict(NamedTuple):
     """What the guard let through.
 
     command_rad: permitted joint angles
     level: ok, limited (changed), hold (neck or all stand still), limp (torque must go)
     reasons: "joint: reason" for every joint that was changed, empty when ok
+    wish_rad: what was asked for
+    why: one reason a joint, "" where it was not changed; empty when ok
+    gravest: those of the reasons that make the level what it is
     """
 
     command_rad: JointAngles
     level: Level
     reasons: tuple[str, ...]
+    wish_rad: JointAngles = ()
+    why: tuple[str, ...] = ()
+    gravest: tuple[str, ...] = ()
+
+    def applied(self, joint: str) -> Applied:
+        """Give what became of one joint's wish.
+
+        Raises:
+            ValueError: there is no such joint; the message lists those there are.
+        """
+        if joint not in JOINTS:
+            raise ValueError(f"unknown joint {joint!r}; known are {', '.join(JOINTS)}")
+        i = JOINTS.index(joint)
+        return Applied(self.wish_rad[i], self.command_rad[i], self.why[i] if self.why else "")
 
 
 @dataclass(frozen=True, slots=True)

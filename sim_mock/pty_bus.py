@@ -1,65 +1,109 @@
-"""An emulated chain on a pseudo-terminal, served by a process of its own.
-
-A server in a thread of the client's process would fight it for the interpreter lock.
-``python -m sim_mock.pty_bus '[[1, "xl330-m077", 2048], ...]'`` prints one JSON line with
-the terminal's path and serves until its standard input closes or SIGTERM comes. Imports
-nothing heavy, so that it is up within a tenth of a second. Any baud rate is understood.
-"""
+"""The client's side of an emulated bus on a pseudo-terminal: starts, commands and ends it."""
 
 import json
-import os
-import pty
-import select
-import signal
 import subprocess
 import sys
-import time
-import tty
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
 from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import ServoChain, build_chain
-
-GAP_S = 0.05
-"""On a real line 1.5 ms; here the host's scheduler may tear a packet apart for longer."""
 
 STOP_S = 2.0
 ROOT = Path(__file__).parents[1]
 
 
 class PtyBus:
-    """The client's side: starts the server and knows the terminal's path."""
+    """A server process of ``sim_mock.emulate`` and the terminal it serves."""
 
     def __init__(self) -> None:
         self._server: subprocess.Popen[bytes] | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
 
-    def start(self, specs: Sequence[ServoSpec | tuple[int, str, float]]) -> str:
-        """Start a server for these servos; gives the path to open as a serial port."""
-        command = [sys.executable, "-m", "sim_mock.pty_bus", json.dumps(specs)]
+    def start(
+        self,
+        specs: Sequence[ServoSpec | tuple[int, str, float]],
+        baud: int | None = None,
+        wire_time: bool = False,
+        turnaround_us: float = 0.0,
+        choices: Mapping[str, str] | None = None,
+    ) -> str:
+        """Start a server for these servos; gives the path to open as a serial port.
+
+        The path stays the same over ``unplug`` and ``plug``. The rest as in
+        sim_mock.emulate.Settings.
+
+        Raises:
+            RuntimeError: the server did not start; its message is on standard error.
+        """
+        self._folder = tempfile.TemporaryDirectory(prefix="servo-bus-")
+        settings = {
+            "servos": [list(spec) for spec in specs],
+            "baud": baud,
+            "wire_time": wire_time,
+            "turnaround_us": turnaround_us,
+            "link": str(Path(self._folder.name) / "tty"),
+            "until_eof": True,
+            "choices": dict(choices or {}),
+        }
         self._server = subprocess.Popen(
-            command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            [sys.executable, "-m", "sim_mock.emulate", json.dumps(settings)],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            # Ctrl-C and timeouts go to a whole group: the servos must outlive their client's
+            # way out. They end when their standard input does.
+            start_new_session=True,
         )
-        line = self._server.stdout.readline() if self._server.stdout else b""
+        line = self._hear()
         if not line:
             self.stop()
             raise RuntimeError("the emulated bus did not start: its message is above")
         return str(json.loads(line)["path"])
 
+    @property
+    def pid(self) -> int:
+        """Give the server's process id."""
+        if self._server is None:
+            raise RuntimeError("the emulated bus is not running: start it first")
+        return self._server.pid
+
+    def command(self, text: str) -> str:
+        """Carry out a fault command in the server; gives what it did.
+
+        Raises:
+            ValueError: names the word that is wrong and what would be right.
+            RuntimeError: the server is not running.
+        """
+        if self._server is None or self._server.stdin is None:
+            raise RuntimeError("the emulated bus is not running: start it first")
+        self._server.stdin.write(text.replace("\n", " ").encode() + b"\n")
+        self._server.stdin.flush()
+        answer = json.loads(self._hear() or '{"error": "the emulated bus has ended"}')
+        if "error" in answer:
+            raise ValueError(answer["error"])
+        return json.dumps(answer) if len(answer) > 1 else str(answer["ok"])
+
+    def _hear(self) -> bytes:
+        assert self._server is not None and self._server.stdout is not None
+        return self._server.stdout.readline()
+
     def stop(self) -> None:
         """End the server; safe to call twice."""
-        if self._server is None:
-            return
-        server, self._server = self._server, None
-        for pipe in (server.stdin, server.stdout):
-            if pipe is not None:
-                pipe.close()
-        try:
-            server.wait(STOP_S)
-        except subprocess.TimeoutExpired:
-            server.kill()
-            server.wait()
+        if self._server is not None:
+            server, self._server = self._server, None
+            for pipe in (server.stdin, server.stdout):
+                if pipe is not None:
+                    pipe.close()
+            try:
+                server.wait(STOP_S)
+            except subprocess.TimeoutExpired:
+                server.kill()
+                server.wait()
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
 
     def __enter__(self) -> "PtyBus":
         """Nothing is started before ``start``."""
@@ -73,38 +117,3 @@ class PtyBus:
     ) -> None:
         """End the server."""
         self.stop()
-
-
-def serve(chain: ServoChain, master: int, ending: int) -> None:
-    """Pass bytes between a terminal and the chain until ``ending`` closes."""
-    os.set_blocking(master, False)
-    while True:
-        ready, _, _ = select.select((master, ending), (), ())
-        if ending in ready and not os.read(ending, 4096):
-            return
-        if master in ready:
-            _send(master, chain.receive(os.read(master, 4096)))
-
-
-def _send(master: int, answer: bytes) -> None:
-    """Write an answer; what a full terminal does not take is lost, as on a wire."""
-    try:
-        os.write(master, answer)
-    except BlockingIOError:
-        return
-
-
-def main() -> None:
-    """Serve the servos named on the command line."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    chain = build_chain(json.loads(sys.argv[1]), time.monotonic, packet_gap_s=GAP_S)
-    master, slave = pty.openpty()
-    # Raw, and the slave kept open: else it echoes, and fails between two clients.
-    tty.setraw(slave)
-    sys.stdout.write(json.dumps({"path": os.ttyname(slave)}) + "\n")
-    sys.stdout.flush()
-    serve(chain, master, sys.stdin.fileno())
-
-
-if __name__ == "__main__":
-    main()

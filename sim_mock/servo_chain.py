@@ -1,96 +1,151 @@
 """The device side of Dynamixel Protocol 2.0: bytes in, bytes out, nothing opened.
 
-Where documents and devices are silent or differ, the choice is a constructor option or
-named here: a wrong CRC is met with silence; instructions are framed by their length, so
-bytes that should have been stuffed and were not are still understood. What it does not
-do: wire time, return delay, id collisions, faults of the wire.
+Where documents and devices are silent or differ, the choice is one of ``Habits``. A
+client whose baud rate is not a servo's neither hears it nor is heard. Sources: ROBOTIS
+e-Manual, Protocol 2.0 and X series.
 """
 
-import struct
 from collections.abc import Callable, Iterable, Sequence
-from typing import Literal
+from typing import NamedTuple
 
-from fastcrc.crc16 import umts
-
+from drivers.dynamixel_table import BAUD_RATES, EEPROM_END
+from sim_mock.line_faults import Faults
 from sim_mock.servo import Servo, ServoSpec
-from sim_mock.servo_memory import ACCESS, DATA_RANGE, INSTRUCTION_ERROR
+from sim_mock.servo_fast_read import fast_reply
+from sim_mock.servo_framing import Framing, Instruction
+from sim_mock.servo_habits import AfterMissing, Habits, chosen
+from sim_mock.servo_instructions import (
+    BULK_READ,
+    BULK_WRITE,
+    CRC_ERROR,
+    FAST_BULK_READ,
+    FAST_SYNC_READ,
+    PING,
+    SYNC_READ,
+    SYNC_WRITE,
+    Wanted,
+    answered_from,
+    bulk_rows,
+    bulk_writes,
+    carry_out,
+    obeys_broadcast,
+    sync_rows,
+    sync_writes,
+    touches_eeprom,
+)
+from sim_mock.servo_memory import ACCESS
+from sim_mock.servo_packets import BROADCAST, Answer, Piece, fast_pieces, plain_pieces, status
+from sim_mock.servo_roster import Roster, hears
 
-HEADER = b"\xff\xff\xfd\x00"
-RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
-BROADCAST = 0xFE
-STATUS = 0x55
-SHORTEST = 10
-LONGEST = 1024
-"""No packet is longer; a larger length is noise."""
+__all__ = ["Habits", "Reply", "ServoChain", "build_chain", "status", "whole_ms"]
 
-PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, REBOOT, CLEAR = 1, 2, 3, 4, 5, 6, 8, 0x10
-SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
-BULK_READ, BULK_WRITE, FAST_BULK_READ = 0x92, 0x93, 0x9A
-
-CLEAR_TURNS = b"\x01\x44\x58\x4c\x22"
 MIN_WATCHDOG_MS = 20
+BAUD_AT = 8
+TWIN_AWAY_STEPS = 257
+"""A second servo with a taken id stands so far from the first, so that they differ."""
 
-Wanted = tuple[int, int, int]
-"""id, address, length of one servo's part of a group read."""
 
-_SPAN = struct.Struct("<HH")
-_ROW = struct.Struct("<BHH")
-_HEAD = struct.Struct("<4sBHB")
-_CRC = struct.Struct("<H")
+class Reply(NamedTuple):
+    """What an instruction is answered with; ``end``: where it ended among the bytes sent."""
+
+    end: int
+    pieces: list[Piece]
 
 
 class ServoChain:
     """Servos on one bus.
 
     Args:
-        servos: any order; ids must differ.
+        servos: any order; servos with one id answer at the same time.
         now_s: the chain's clock.
-        after_missing: what servos later in a group read do when one before them is
-            silent: "silence" (they wait for its status and never answer) or "skip".
-        packet_gap_s: a packet that stays unfinished so long is dropped.
+        habits: what servos do where documents and devices differ.
+        heed_baud: only a client at a servo's baud rate is heard; else every client is.
+        seed: of the dice that faults throw.
     """
 
     def __init__(
         self,
         servos: Iterable[Servo],
         now_s: Callable[[], float],
-        after_missing: Literal["silence", "skip"] = "silence",
-        packet_gap_s: float = 0.0015,
+        habits: Habits | None = None,
+        heed_baud: bool = False,
+        seed: int = 0,
     ) -> None:
         self.servos = tuple(servos)
         self.now_s = now_s
-        self._skip = after_missing == "skip"
-        self._gap_s = packet_gap_s
-        self._unfinished = b""
-        self._arrived_s = now_s()
-        self._now_ms = self._fed_ms = whole_ms(self._arrived_s)
-        self._index()
-        self._single: dict[int, Callable[[Servo, bytes], tuple[int, bytes]]] = {
-            PING: self._ping,
-            READ: self._read,
-            WRITE: self._write,
-            REG_WRITE: self._register,
-            ACTION: lambda servo, params: (servo.action(), b""),
-            FACTORY_RESET: self._factory_reset,
-            REBOOT: self._reboot,
-            CLEAR: self._clear,
-        }
-        self._group: dict[int, Callable[[bytes], bytes]] = {
-            PING: self._ping_all,
-            SYNC_READ: lambda params: self._plain(_sync_rows(params)),
-            FAST_SYNC_READ: lambda params: self._fast(_sync_rows(params)),
-            BULK_READ: lambda params: self._plain(_bulk_rows(params)),
-            FAST_BULK_READ: lambda params: self._fast(_bulk_rows(params)),
-            SYNC_WRITE: self._sync_write,
-            BULK_WRITE: self._bulk_write,
+        self.habits = habits or Habits()
+        self.heed_baud = heed_baud
+        self.faults = Faults(self, seed)
+        self._wire = self.faults.wire
+        self._framing = Framing(self.habits.packet_gap_s, now_s())
+        self._now_s = now_s()
+        self._now_ms = self._fed_ms = whole_ms(self._now_s)
+        self._client_baud: int | None = None
+        self.refresh()
+        self._group: dict[int, Callable[[bytes], list[Piece]]] = {
+            PING: lambda params: self._plain_out(self._ping_all()),
+            SYNC_READ: lambda params: self._plain(sync_rows(params)),
+            FAST_SYNC_READ: lambda params: self._fast(sync_rows(params)),
+            BULK_READ: lambda params: self._plain(bulk_rows(params)),
+            FAST_BULK_READ: lambda params: self._fast(bulk_rows(params)),
+            SYNC_WRITE: lambda params: self._write_all(sync_writes(params)),
+            BULK_WRITE: lambda params: self._write_all(bulk_writes(params)),
         }
 
-    def _index(self) -> None:
-        self._by_id = {servo.id: servo for servo in self.servos}
+    # --- who is there
+
+    def refresh(self) -> None:
+        """Look again at ids, bauds and return delays; needed after changes from outside."""
+        roster = Roster(self.servos, self._client_baud if self.heed_baud else None)
+        self._roster = roster
+        self._by_id, self._twins, self._delay_s = roster.by_id, roster.twins, roster.delay_s
+
+    def hears(self, client_baud: int) -> bool:
+        """Tell whether any servo understands a client at this baud rate."""
+        return not self.heed_baud or any(hears(servo, client_baud) for servo in self.servos)
 
     def __getitem__(self, servo_id: int) -> Servo:
         """Give a servo by its id, as it was when last looked at."""
-        return self._by_id[servo_id]
+        for servo in self.servos:
+            if servo.id == servo_id:
+                return servo
+        raise KeyError(f"no servo {servo_id}; there is {', '.join(map(str, self.ids()))}")
+
+    def here(self, servo_id: int) -> Servo:
+        """Give a servo by its id, brought up to now."""
+        servo = self[servo_id]
+        servo.advance(whole_ms(self.now_s()), self._fed_ms)
+        return servo
+
+    def ids(self) -> tuple[int, ...]:
+        """List the ids in the order of the servos."""
+        return tuple(servo.id for servo in self.servos)
+
+    def join(self, servo_id: int) -> None:
+        """Put a second servo with a taken id on the bus, a little turned from the first."""
+        first, now_ms = self.here(servo_id), whole_ms(self.now_s())
+        start = (first.position_steps + TWIN_AWAY_STEPS) % 4096
+        twin = Servo(ServoSpec(servo_id, first.model.name, start, first.firmware), now_ms)
+        settings = first.read(BAUD_AT, 2)
+        assert settings is not None
+        twin.write(BAUD_AT, settings)
+        self.servos = (*self.servos, twin)
+        self.refresh()
+
+    def choose(self, case: str, value: str) -> None:
+        """Choose one of the habits by its name, or whether baud rates are heeded.
+
+        Raises:
+            ValueError: there is no such case or value.
+        """
+        if case == "baud":
+            if value not in ("heed", "any"):
+                raise ValueError(f"baud {value!r}: it can be heed, any")
+            self.heed_baud = value == "heed"
+            self.refresh()
+            return
+        self.habits = chosen(self.habits, case, value)
+        self._framing.gap_s = self.habits.packet_gap_s
 
     def positions_steps(self) -> tuple[float, ...]:
         """Give the true positions now, in the order of ``servos``."""
@@ -99,44 +154,65 @@ class ServoChain:
             servo.advance(now_ms, self._fed_ms)
         return tuple(servo.position_steps for servo in self.servos)
 
-    def receive(self, data: bytes) -> bytes:
-        """Take bytes off the wire and give the bytes all servos answer with."""
-        now_s = self.now_s()
-        if self._unfinished:
-            fresh = now_s - self._arrived_s < self._gap_s
-            data = self._unfinished + data if fresh else data
-        self._arrived_s = now_s
-        self._now_ms = whole_ms(now_s)
-        answers, at, done = [], 0, 0
-        while done < len(data):
-            at = data.find(HEADER, at)
-            if at < 0:
-                done = max(done, len(data) - len(HEADER) + 1)
-                break
-            end = at + 7 + int.from_bytes(data[at + 5 : at + 7], "little")
-            if len(data) - at < SHORTEST or len(data) < end <= at + LONGEST:
-                done = at
-                break
-            if at + SHORTEST <= end <= len(data) and _intact(data[at:end]):
-                answers.append(self._execute(data[at + 4], data[at + 7], data[at + 8 : end - 2]))
-                at = done = end
-            else:
-                at += len(HEADER)
-        self._unfinished = data[done:]
-        return b"".join(answers)
+    # --- bytes
 
-    def _execute(self, servo_id: int, instruction: int, params: bytes) -> bytes:
-        """Let the addressed servos carry out one instruction; gives their answers."""
+    def receive(self, data: bytes, client_baud: int | None = None) -> bytes:
+        """Take bytes off the wire and give the bytes all servos answer with."""
+        replies = self.exchange(data, client_baud)
+        return b"".join([piece[1] for reply in replies for piece in reply[1]])
+
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Reply]:
+        """Take bytes off the wire and give what is answered to each instruction in them."""
+        now_s = self._now_s = self.now_s()
+        self._now_ms = whole_ms(now_s)
+        if client_baud != self._client_baud:
+            self._client_baud = client_baud
+            self._framing.forget()
+            self.refresh()
+        if not self._by_id:
+            return self._garbage(data)
+        found = self._framing.feed(data, now_s, self.habits.stuffing == "strict")
+        replies = [Reply(i.end, pieces) for i in found if (pieces := self._execute(i))]
+        return self._amid_others(replies, data) if self._wire.any else replies
+
+    def _amid_others(self, replies: list[Reply], data: bytes) -> list[Reply]:
+        """Let the host hear itself and a babbling node, where the line has such faults."""
+        if self._wire.on("echo", self._now_s):
+            replies.insert(0, Reply(len(data), [Piece(-1, data)]))
+        babble = self._wire.babble(self._now_s)
+        if babble:
+            replies.insert(0, Reply(0, [Piece(-1, babble)]))
+        return replies
+
+    def _garbage(self, data: bytes) -> list[Reply]:
+        """Answer a client that no servo understands: nothing, or the ruins of its own bytes."""
+        if self.habits.wrong_baud == "silence" or not data:
+            return []
+        return [Reply(len(data), [Piece(-1, bytes(b & 0x6E | 0x80 for b in data[::2]))])]
+
+    def _execute(self, instruction: Instruction) -> list[Piece]:
+        """Let the addressed servos carry out one instruction; gives what they send."""
+        servo_id, code, params, _ = instruction
+        if code < 0:
+            return self._reject(servo_id)
         self._feed()
-        params = params.replace(STUFFED, RAW)
         if servo_id != BROADCAST:
-            servo = self._by_id.get(servo_id)
-            return self._answer(servo, instruction, params) if servo else b""
-        if instruction in self._group:
-            return self._group[instruction](params)
-        for servo in self.servos:
-            self._answer(servo, instruction, params)
-        return b""
+            answer = self._answer_all(servo_id, code, params)
+            return self._plain_out([answer]) if answer is not None else []
+        if code in self._group:
+            return self._group[code](params)
+        for servo in self._roster.everyone():
+            if obeys_broadcast(servo, code, params):
+                self._answer(servo, code, params)
+        return []
+
+    def _reject(self, servo_id: int) -> list[Piece]:
+        """Meet an instruction with a wrong CRC."""
+        servo = self._awake(servo_id)
+        if servo is None or self.habits.bad_crc == "silent" or servo.status_level < 2:
+            return []
+        error = CRC_ERROR | servo.error_flag
+        return self._plain_out([Answer(servo_id, error, b"", self._delay_s[servo_id])])
 
     def _feed(self) -> None:
         """Feed every bus watchdog, after those that have starved have tripped."""
@@ -152,146 +228,159 @@ class ServoChain:
             return servo
         return None
 
-    # --- one servo
+    def _silent(self, servo_id: int) -> bool:
+        """Tell whether a fault keeps this servo from answering."""
+        return self._wire.any and self._wire.take("lose", servo_id, self._now_s) is not None
 
-    def _answer(self, servo: Servo, instruction: int, params: bytes) -> bytes:
-        servo_id = servo.id
-        if self._awake(servo_id) is None:
-            return b""
-        # Flags and level as they were before: an answer leaves under the old settings.
-        level, flag = servo.status_level, servo.error_flag
-        action = self._single.get(instruction)
-        error, answer = (INSTRUCTION_ERROR, b"") if action is None else action(servo, params)
-        needed = 0 if instruction == PING else 1 if instruction == READ else 2
-        if servo.id != servo_id:
-            self._index()
-        return status(servo_id, error | flag, answer) if level >= needed else b""
+    # --- one id
 
-    def _ping(self, servo: Servo, params: bytes) -> tuple[int, bytes]:
-        return 0, struct.pack("<HB", servo.model.number, servo.firmware)
+    def _answer_all(self, servo_id: int, code: int, params: bytes) -> Answer | None:
+        """Let all servos that listen to an id carry out an instruction."""
+        # Looked up first: the instruction may change who has this id.
+        servo, twins = self._by_id.get(servo_id), self._twins.get(servo_id, ())
+        shadows = self._roster.shadows.get(servo_id, ())
+        answer = None if servo is None else self._answer(servo, code, params)
+        for twin in twins:
+            other = self._answer(twin, code, params)
+            answer = other if answer is None else answer._replace(twin=other)
+        for shadow in shadows:
+            if not touches_eeprom(code, params):
+                self._answer(shadow, code, params)
+        return None if answer is None or self._silent(servo_id) else answer
 
-    def _read(self, servo: Servo, params: bytes) -> tuple[int, bytes]:
-        if len(params) != _SPAN.size:
-            return INSTRUCTION_ERROR, b""
-        data = servo.read(*_SPAN.unpack(params))
-        return (ACCESS, b"") if data is None else (0, data)
-
-    def _write(self, servo: Servo, params: bytes) -> tuple[int, bytes]:
-        return servo.write(int.from_bytes(params[:2], "little"), params[2:]), b""
-
-    def _register(self, servo: Servo, params: bytes) -> tuple[int, bytes]:
-        return servo.register(int.from_bytes(params[:2], "little"), params[2:]), b""
-
-    def _reboot(self, servo: Servo, params: bytes) -> tuple[int, bytes]:
-        servo.reboot()
-        return 0, b""
-
-    def _factory_reset(self, servo: Servo, params: bytes) -> tuple[int, bytes]:
-        return servo.factory_reset(params[0] if params else -1), b""
-
-    def _clear(self, servo: Servo, params: bytes) -> tuple[int, bytes]:
-        return (servo.clear_turns() if params == CLEAR_TURNS else DATA_RANGE), b""
+    def _answer(self, servo: Servo, code: int, params: bytes) -> Answer | None:
+        """Let one servo carry out an instruction; gives what it says, None where it is silent."""
+        if not servo.advance(self._now_ms, self._fed_ms):
+            return None
+        # Flags, level, id and delay as they were before: an answer leaves under the old settings.
+        level, flag, servo_id = servo.status_level, servo.error_flag, servo.id
+        delay_s = self._delay_s[servo_id]
+        error, data = carry_out(servo, code, params)
+        if touches_eeprom(code, params):
+            self.refresh()
+        if level < answered_from(servo, code):
+            return None
+        return Answer(servo_id, error | flag, data, delay_s)
 
     # --- groups
 
-    def _ping_all(self, params: bytes) -> bytes:
-        return b"".join(self._answer(self._by_id[i], PING, b"") for i in sorted(self._by_id))
+    def _ping_all(self) -> list[Answer]:
+        answers = (self._answer_all(i, PING, b"") for i in sorted(self._by_id))
+        return [answer for answer in answers if answer is not None]
 
-    def _plain(self, rows: Sequence[Wanted]) -> bytes:
+    def _part(self, servo_id: int, address: int, length: int) -> Answer | None:
+        """Give a servo's part of a group read, None where it is silent."""
+        servo = self._awake(servo_id)
+        if servo is None or servo.status_level < 1 or self._silent(servo_id):
+            return None
+        answer = self._seen(servo, address, length)
+        for twin in self._twins.get(servo_id, ()) if self._twins else ():
+            if twin.advance(self._now_ms, self._fed_ms):
+                answer = answer._replace(twin=self._seen(twin, address, length))
+        return answer
+
+    def _seen(self, servo: Servo, address: int, length: int) -> Answer:
+        data, servo_id, flag = servo.read(address, length), servo.id, servo.error_flag
+        if data is None:
+            return Answer(servo_id, flag | ACCESS, b"", self._delay_s[servo_id])
+        return Answer(servo_id, flag, data, self._delay_s[servo_id])
+
+    def _plain(self, rows: Sequence[Wanted]) -> list[Piece]:
         """Answer with one status a servo, in the order asked."""
-        out = []
+        answers, late_s, policy = [], 0.0, self.habits.after_missing
         for servo_id, address, length in rows:
-            servo = self._awake(servo_id)
-            if servo is not None and servo.status_level >= 1:
-                data = servo.read(address, length)
-                error = servo.error_flag | (ACCESS if data is None else 0)
-                out.append(status(servo_id, error, data or b""))
-            elif not self._skip:
+            answer = self._part(servo_id, address, length)
+            if answer is not None:
+                answers.append(answer if late_s == 0.0 else answer._replace(late_s=late_s))
+                late_s = 0.0
+            elif policy == "silence":
                 break
-        return b"".join(out)
+            elif policy == "timeout":
+                late_s += self.habits.slot_timeout_s
+        return self._plain_out(answers)
 
-    def _fast(self, rows: Sequence[Wanted]) -> bytes:
-        """Answer as one packet; every block ends with the CRC over all bytes before it.
+    def _plain_out(self, answers: list[Answer]) -> list[Piece]:
+        if not self._wire.any:
+            return plain_pieces(answers)
+        spoilt = plain_pieces(self._wire.spoil_answers(answers, False, self._now_s))
+        return self._wire.spoil_pieces(spoilt, False, self._now_s)
 
-        Nobody can take the place of a missing block: the packet ends there.
-        """
+    def _fast(self, rows: Sequence[Wanted]) -> list[Piece]:
+        """Answer as one packet; a servo that refuses fills its block with zeros."""
         length = 1 + sum([4 + row[2] for row in rows])
-        parts = [_HEAD.pack(HEADER, BROADCAST, length, STATUS)]
-        crc = umts(parts[0])
+        if not self._wire.any and not self._twins:
+            packet = fast_reply(self._by_id, rows, length, self._now_ms, self._fed_ms)
+            return [Piece(rows[0][0], packet, self._delay_s[rows[0][0]])] if packet else []
+        return self._fast_with_faults(rows, length)
+
+    def _fast_with_faults(self, rows: Sequence[Wanted], length: int) -> list[Piece]:
+        """Do the same block by block, where some are missing, spoilt or sent by two servos."""
+        answers: list[Answer] = []
         for servo_id, address, size in rows:
-            servo = self._awake(servo_id)
-            if servo is None or not servo.fast_reads or servo.status_level < 1:
+            servo = self._by_id.get(servo_id)
+            answer = self._part(servo_id, address, size) if servo and servo.fast_reads else None
+            if answer is None:
                 break
-            data = servo.read(address, size)
-            error = servo.error_flag | (ACCESS if data is None else 0)
-            block = bytes((error, servo_id)) + (data or bytes(size))
-            crc = umts(block, crc)
-            tail = _CRC.pack(crc)
-            crc = umts(tail, crc)
-            parts += (block, tail)
-        return b"".join(parts) if len(parts) > 1 else b""
+            answers.append(answer if answer[2] else answer._replace(params=bytes(size)))
+        spoilt = fast_pieces(self._wire.spoil_answers(answers, True, self._now_s), length)
+        return self._wire.spoil_pieces(spoilt, True, self._now_s)
 
-    def _sync_write(self, params: bytes) -> bytes:
-        if len(params) < _SPAN.size:
-            return b""
-        address, length = _SPAN.unpack_from(params)
-        if (len(params) - _SPAN.size) % (1 + length) == 0:
-            for servo_id, data in struct.iter_unpack(f"<B{length}s", params[_SPAN.size :]):
-                self._write_at(servo_id, address, data)
-        return b""
-
-    def _bulk_write(self, params: bytes) -> bytes:
-        at = 0
-        while len(params) - at > _ROW.size:
-            servo_id, address, length = _ROW.unpack_from(params, at)
-            at += _ROW.size + length
-            if at <= len(params):
-                self._write_at(servo_id, address, params[at - length : at])
-        return b""
+    def _write_all(self, writes: Sequence[tuple[int, int, bytes]]) -> list[Piece]:
+        """Carry out a group write; nobody answers."""
+        if self._wire.any and self._wire.take("lose_writes", None, self._now_s):
+            return []
+        changed = False
+        for servo_id, address, data in writes:
+            self._write_at(servo_id, address, data)
+            changed = changed or address < EEPROM_END
+        if changed:
+            self.refresh()
+        return []
 
     def _write_at(self, servo_id: int, address: int, data: bytes) -> None:
+        """Write one servo's part of a group write, in everyone who listens to the id."""
         servo = self._awake(servo_id)
         if servo is not None:
             servo.write(address, data)
-            if servo.id != servo_id:
-                self._index()
+        roster = self._roster
+        if not roster.twins and not roster.shadows:
+            return
+        shadows = roster.shadows.get(servo_id, ()) if address >= EEPROM_END else ()
+        for other in (*roster.twins.get(servo_id, ()), *shadows):
+            if other.advance(self._now_ms, self._fed_ms):
+                other.write(address, data)
 
 
 def build_chain(
     specs: Iterable[ServoSpec | tuple[int, str, float]],
     now_s: Callable[[], float],
-    after_missing: Literal["silence", "skip"] = "silence",
+    after_missing: AfterMissing = "silence",
     packet_gap_s: float = 0.0015,
+    baud: int | None = None,
+    habits: Habits | None = None,
+    seed: int = 0,
 ) -> ServoChain:
-    """Build servos and their bus; a plain tuple is (id, model, start position in steps)."""
+    """Build servos and their bus; a plain tuple is (id, model, start position in steps).
+
+    With a baud rate the servos are set to it, return delay and all else as from the
+    factory, and only clients at their rate are heard; without one every client is.
+    ``habits`` instead of ``after_missing`` and ``packet_gap_s`` chooses all cases at once.
+
+    Raises:
+        ValueError: not all of these servos know this baud rate.
+    """
     now_ms = whole_ms(now_s())
     servos = [Servo(ServoSpec(*spec), now_ms) for spec in specs]
-    return ServoChain(servos, now_s, after_missing, packet_gap_s)
+    if baud is not None:
+        if baud not in BAUD_RATES:
+            raise ValueError(f"baud {baud}: servos know {', '.join(map(str, BAUD_RATES))}")
+        for servo in servos:
+            if servo.write(BAUD_AT, bytes((BAUD_RATES.index(baud),))):
+                raise ValueError(f"baud {baud}: {servo.model.name} does not know it")
+    habits = habits or Habits(after_missing=after_missing, packet_gap_s=packet_gap_s)
+    return ServoChain(servos, now_s, habits, baud is not None, seed)
 
 
 def whole_ms(now_s: float) -> int:
     """Give the whole milliseconds of a time; the margin keeps 0.005 s from being 4 ms."""
     return int(now_s * 1000.0 + 1e-3)
-
-
-def status(servo_id: int, error: int, params: bytes) -> bytes:
-    """Build a status packet."""
-    if RAW in params:
-        params = params.replace(RAW, STUFFED)
-    packet = _HEAD.pack(HEADER, servo_id, len(params) + 4, STATUS) + bytes((error,)) + params
-    return packet + _CRC.pack(umts(packet))
-
-
-def _intact(packet: bytes) -> bool:
-    return umts(packet[:-2]) == int.from_bytes(packet[-2:], "little")
-
-
-def _sync_rows(params: bytes) -> tuple[Wanted, ...]:
-    if len(params) <= _SPAN.size:
-        return ()
-    address, length = _SPAN.unpack_from(params)
-    return tuple((servo_id, address, length) for servo_id in params[_SPAN.size :])
-
-
-def _bulk_rows(params: bytes) -> tuple[Wanted, ...]:
-    return tuple(_ROW.iter_unpack(params)) if len(params) % _ROW.size == 0 else ()

@@ -5,6 +5,7 @@ lock, limit registers, watchdog) is asked by sim_mock.servo.
 """
 
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 from drivers.dynamixel_table import (
     EEPROM_END,
@@ -14,6 +15,7 @@ from drivers.dynamixel_table import (
     indirect_blocks,
     registers_of,
 )
+from sim_mock.servo_live import PROFILED
 
 # Numbers of the status error byte (Protocol 2.0).
 RESULT_FAIL = 1
@@ -27,6 +29,13 @@ Fields = tuple[tuple[Register, int], ...]
 """Registers with the values to be written to them."""
 
 
+class Gather(NamedTuple):
+    """The runs of real addresses behind a range, and whether any of them tells of the profile."""
+
+    runs: tuple[slice, ...]
+    profiled: bool
+
+
 class Memory:
     """One servo's control table."""
 
@@ -38,6 +47,8 @@ class Memory:
         self._layouts: dict[tuple[int, int], tuple[Register, ...] | int] = {}
         self._windows = [(b.data_base, b.data_base + b.entries, b.address_base) for b in blocks]
         self._window_low = min(low for low, _, _ in self._windows)
+        self._pointers_low = min(pointers for _, _, pointers in self._windows)
+        self._gathers: dict[tuple[int, int], Gather] = {}
         size = max(register.address + register.size for register in registers)
         self.bytes = bytearray(size)
         self._defined = bytearray(size)
@@ -66,11 +77,23 @@ class Memory:
         """Tell whether this model has a register."""
         return name in self._by_name
 
+    def named(self, name: str) -> Register:
+        """Give a register by its name."""
+        return self._by_name[name]
+
+    def writable(self) -> Iterator[Register]:
+        """List the registers that may be written; through a window one writes to others."""
+        for register in self._by_address.values():
+            if register.access == "rw" and not register.name.startswith("indirect_data"):
+                yield register
+
     def put(self, register: Register, value: int) -> None:
         """Store a value, two's complement where it is negative."""
         size = register.size
         raw = (value & ((1 << 8 * size) - 1)).to_bytes(size, "little")
         self.bytes[register.address : register.address + size] = raw
+        if register.address >= self._pointers_low:
+            self._gathers.clear()
 
     def read(self, address: int, length: int) -> bytes | None:
         """Give bytes as they are on the wire, None where an address is not defined."""
@@ -80,7 +103,26 @@ class Memory:
             return None
         if end <= self._window_low:
             return bytes(self.bytes[address:end])
-        return bytes(self.bytes[self.real(a)] for a in range(address, end))
+        content = self.bytes
+        return b"".join([content[run] for run in self.gather(address, length).runs])
+
+    def gather(self, address: int, length: int) -> Gather:
+        """Give what stands behind a range; kept, as a control loop reads the same ever again."""
+        found = self._gathers.get((address, length))
+        if found is None:
+            found = self._gathers[address, length] = self._gather(address, address + length)
+        return found
+
+    def _gather(self, address: int, end: int) -> Gather:
+        """Join neighbouring real addresses to runs."""
+        runs: list[list[int]] = []
+        for real in map(self.real, range(address, end)):
+            if runs and runs[-1][1] == real:
+                runs[-1][1] = real + 1
+            else:
+                runs.append([real, real + 1])
+        profiled = any(low < end and high > at for low, high in runs for at, end in PROFILED)
+        return Gather(tuple(slice(low, high) for low, high in runs), profiled)
 
     def real(self, address: int) -> int:
         """Give the address an indirect data byte stands for, others unchanged."""

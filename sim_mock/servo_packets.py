@@ -18,8 +18,8 @@ SHORTEST = 10
 LONGEST = 1024
 """No packet is longer; a larger length is noise."""
 
-_HEAD = struct.Struct("<4sBHB")
-_CRC = struct.Struct("<H")
+HEAD = struct.Struct("<4sBHB")
+CRC = struct.Struct("<H")
 
 
 class Answer(NamedTuple):
@@ -53,16 +53,22 @@ def status(servo_id: int, error: int, params: bytes) -> bytes:
     """Build a status packet."""
     if RAW in params:
         params = params.replace(RAW, STUFFED)
-    packet = _HEAD.pack(HEADER, servo_id, len(params) + 4, STATUS) + bytes((error,)) + params
-    return packet + _CRC.pack(umts(packet))
+    packet = HEAD.pack(HEADER, servo_id, len(params) + 4, STATUS) + bytes((error,)) + params
+    return packet + CRC.pack(umts(packet))
 
 
 def plain_pieces(answers: Sequence[Answer]) -> list[Piece]:
     """Send each answer as a status of its own."""
     return [
-        Piece(a[0], status(a[0], a[1], a[2]) if a[5] is None else _status_of_two(a), a[3], a[4])
+        Piece(a[0], status(a[0], a[1], a[2]) if a[5] is None else _mixed(a), a[3], a[4])
         for a in answers
     ]
+
+
+def _mixed(answer: Answer) -> bytes:
+    """Build the status of servos that answer under one id at the same time."""
+    own = status(answer.servo_id, answer.error, answer.params)
+    return own if answer.twin is None else merge(own, _mixed(answer.twin))
 
 
 def fast_pieces(answers: Sequence[Answer], length: int) -> list[Piece]:
@@ -71,25 +77,22 @@ def fast_pieces(answers: Sequence[Answer], length: int) -> list[Piece]:
     The first servo sends the head. Nobody can take the place of a missing block: the
     packet ends where the answers end.
     """
-    head = _HEAD.pack(HEADER, BROADCAST, length, STATUS)
+    head = HEAD.pack(HEADER, BROADCAST, length, STATUS)
     crc = umts(head)
-    pieces = []
+    pieces: list[Piece] = []
     for answer in answers:
-        body = bytes((answer[1], answer[0])) + answer[2]
-        block = body + _CRC.pack(umts(body, crc))
-        if answer[5] is not None:
-            other = bytes((answer[5].error, answer[5].servo_id)) + answer[5].params
-            block = merge(block, other + _CRC.pack(umts(other, crc)))
+        block = _block(answer, crc)
         crc = umts(block, crc)
         pieces.append(Piece(answer[0], head + block, 0.0 if pieces else answer[3], answer[4]))
         head = b""
     return pieces
 
 
-def _status_of_two(answer: Answer) -> bytes:
-    assert answer.twin is not None
-    one = status(answer.servo_id, answer.error, answer.params)
-    return merge(one, status(answer.twin.servo_id, answer.twin.error, answer.twin.params))
+def _block(answer: Answer, crc: int) -> bytes:
+    """Build a servo's part of a fast reply behind bytes whose CRC is ``crc``."""
+    body = bytes((answer[1], answer[0])) + answer[2]
+    block = body + CRC.pack(umts(body, crc))
+    return block if answer[5] is None else merge(block, _block(answer[5], crc))
 
 
 def merge(one: bytes, other: bytes) -> bytes:

@@ -17,7 +17,11 @@ TOP = {
     "robot.assemble",
     "robot.cli",
     "robot.cli_emulate",
+    "robot.cli_calibrate",
     "robot.cli_motion",
+    "robot.cli_wires",
+    "robot.emulated_rig",
+    "robot.cli_monitor",
     "robot.cli_servos",
     "robot.cli_terminal",
 }

@@ -10,7 +10,7 @@ from dynamixel_sdk import PacketHandler
 from drivers.dynamixel import DynamixelBus, DynamixelParams
 from drivers.dynamixel_packets import instruction
 from drivers.dynamixel_port import BlockingPort
-from drivers.errors import BusLost, ServoMissing
+from drivers.errors import ServoMissing
 from drivers.types import ServoSetup
 from sim_mock.ports import InProcessPort
 from sim_mock.pty_bus import PtyBus
@@ -36,7 +36,8 @@ class Twin(NamedTuple):
 
     def bus(self, setups=SETUPS, **params) -> DynamixelBus:
         # A shared machine may stall a process for longer than real servos ever wait.
-        chosen = {"reply_timeout_ms": 100.0, "watchdog_ms": 0, **params}
+        patience = {"reply_timeout_ms": 100.0, "prompt_timeout_ms": 100.0}
+        chosen = {**patience, "watchdog_ms": 0, **params}
         return DynamixelBus(self.port, setups, DynamixelParams(**chosen))
 
     def run(self, bus, seconds, goals=None):
@@ -86,6 +87,11 @@ def registers(twin, address, size, ids=(3, 1, 12, 7)):
     return {i: read(twin.port, i, address)[0] for i in ids}
 
 
+def near(readings, goals, steps=12):
+    """Tell whether all servos are where they should be, but for what friction leaves."""
+    return all(abs(at - goal) <= steps for at, goal in zip(places(readings), goals, strict=True))
+
+
 def places(readings):
     return [None if r is None else r.position_steps for r in readings]
 
@@ -114,13 +120,13 @@ def test_engage_holds_every_servo_where_it_is(twin, bus):
 def test_goals_are_followed(twin, bus):
     bus.engage()
     twin.run(bus, 0.6, [1900, 1900, 2200, 2200])
-    assert places(bus.read(twin.port.now_s())) == [1900, 1900, 2200, 2200]
+    assert places(bus.read(twin.port.now_s())) == pytest.approx([1900, 1900, 2200, 2200], abs=12)
 
 
 def test_goals_are_clipped_to_the_setup(twin, bus):
     bus.engage()
     twin.run(bus, 1.2, [-5000, 99999, 999, 3001])
-    assert places(bus.read(twin.port.now_s())) == [1000, 3000, 1000, 3000]
+    assert places(bus.read(twin.port.now_s())) == pytest.approx([1000, 3000, 1000, 3000], abs=12)
 
 
 def test_release_takes_the_torque_and_is_verified(twin, bus):
@@ -143,8 +149,10 @@ def test_a_silent_servo_costs_only_itself_and_is_taken_back(twin, bus):
         seen.append(places(twin.run(bus, 0.02)))
     assert [1800, None, 2300, 2048] in seen
     assert seen[-1] == [1800, 2048, 2300, 2048]
+    assert registers(twin, 64, 1) == {3: 1, 1: 1, 12: 1, 7: 1}
     assert bus.health().errors["timeout"] >= 1
-    assert bus.faults() == ("servo 1: restarted, torque off",)
+    assert bus.faults() == ()
+    assert "servo 1 restarted: set up anew" in bus.events()
 
 
 def test_open_names_every_problem_at_once(twin):
@@ -162,9 +170,12 @@ def test_open_names_every_problem_at_once(twin):
     assert "\n" not in message
 
 
-def test_open_tells_a_dead_bus_from_a_missing_servo(twin):
-    with pytest.raises(ServoMissing, match="no servo answers: check servo power"):
+def test_open_names_servos_that_nobody_expects_beside_the_missing_ones(twin):
+    with pytest.raises(ServoMissing, match="unexpected: servo 1 .xl330-m077., 3 .xl330-m077."):
         twin.bus([ServoSetup(i, "xl330-m288", 0, 4095, SPEED) for i in (50, 51)]).open()
+    bus = twin.bus(SETUPS[:3])
+    bus.open()
+    assert "servo 7 (xc330-m288) belongs to no joint: left alone" in bus.events()
 
 
 def test_a_bus_can_be_opened_again(twin):
@@ -189,22 +200,10 @@ def test_a_joint_outside_its_limits_comes_in_slowly(kind):
         for _ in range(60):
             readings = bus.read(twin.port.now_s())
             outside = [r for r in readings if not 1000 <= r.position_steps <= 3000]
-            assert all(abs(r.velocity_steps_s) <= slowest + 16 for r in outside)
+            assert all(abs(r.velocity_steps_s) <= slowest + 64 for r in outside)
             twin.wait(0.02)
-        assert places(readings) == [1000, 3000]
+        assert near(readings, [1000, 3000])
+        twin.run(bus, 1.0, [1100, 2900])
         assert registers(twin, 112, 4, ids=(1, 2)) == {1: 383, 2: 383}
         bus.release()
-        bus.close()
-
-
-def test_a_vanished_terminal_is_a_lost_bus():
-    with PtyBus() as server:
-        port = BlockingPort(server.start(SPECS))
-        bus = DynamixelBus(port, SETUPS, DynamixelParams())
-        bus.open()
-        server.stop()
-        with pytest.raises(BusLost, match=f"{port.port_name} is gone"):
-            for _ in range(3):
-                bus.read(port.now_s())
-        assert not port.is_using
         bus.close()

@@ -9,12 +9,13 @@ from sim_mock.servo import ServoSpec
 from sim_mock.servo_chain import build_chain
 
 IDS = (1, 2, 3)
+STARTS = (2001, 2002, 2003)
 
 
 class Rig:
     """Three servos in this process, a driver, and a clock set by hand."""
 
-    def __init__(self, fast=True, starts=(2001, 2002, 2003), **params):
+    def __init__(self, fast=True, starts=STARTS, **params):
         self.now_s = 100.0
         specs = [ServoSpec(i, "xl330-m077", at) for i, at in zip(IDS, starts, strict=True)]
         self.chain = build_chain(specs, lambda: self.now_s)
@@ -39,8 +40,13 @@ class Rig:
 
 
 @pytest.fixture(params=[True, False], ids=["fast", "plain"])
-def rig(request):
-    return Rig(request.param)
+def fast(request):
+    return request.param
+
+
+@pytest.fixture
+def rig(fast):
+    return Rig(fast)
 
 
 def test_the_watchdog_stops_the_servos_when_the_host_falls_silent():
@@ -54,7 +60,7 @@ def test_the_watchdog_stops_the_servos_when_the_host_falls_silent():
 
 def test_a_host_that_stalled_brings_the_servos_back_without_a_jump(rig):
     rig.bus.engage()
-    rig.tick([3000] * 3)
+    rig.tick([2800] * 3)
     rig.now_s += 5.0
     stopped = rig.chain.positions_steps()
     # The first exchange shows the stall, the next one heals it.
@@ -63,18 +69,23 @@ def test_a_host_that_stalled_brings_the_servos_back_without_a_jump(rig):
     assert rig.errors() == {"watchdog": 3}
     assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [10] * 3
     rig.now_s += 0.1
-    assert all(abs(a - b) <= 1 for a, b in zip(rig.chain.positions_steps(), stopped, strict=True))
+    assert all(abs(a - b) <= 40 for a, b in zip(rig.chain.positions_steps(), stopped, strict=True))
     for _ in range(200):
         rig.tick([2500] * 3)
-    assert rig.places() == [2500] * 3
+    assert rig.places() == pytest.approx([2500] * 3, abs=12)
     assert rig.errors() == {"watchdog": 3}
 
 
-def test_a_stall_shown_by_a_write_is_healed_by_the_next_write(rig):
+def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(rig):
     rig.bus.engage()
     rig.now_s += 1.0
     rig.bus.write([2500] * 3)
+    # Whoever plans goals has not heard of it yet: no goal goes out before a read has told.
     rig.bus.write([2500] * 3)
+    rig.now_s += 0.1
+    assert all(abs(x - at) < 1 for x, at in zip(rig.chain.positions_steps(), STARTS, strict=True))
+    assert [r.rearmed for r in rig.tick([2500] * 3)] == [True] * 3
+    assert [r.rearmed for r in rig.tick([2500] * 3)] == [False] * 3
     rig.now_s += 0.19
     assert all(x > 2100 for x in rig.chain.positions_steps())
     assert rig.errors() == {"watchdog": 3}
@@ -88,28 +99,32 @@ def test_a_sleep_that_the_clock_does_not_show_is_found_by_asking(rig):
     for _ in range(250):
         rig.tick([2500] * 3)
     assert rig.errors() == {"watchdog": 3}
-    assert rig.places() == [2500] * 3
+    assert rig.places() == pytest.approx([2500] * 3, abs=12)
 
 
-def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_found():
-    rig = Rig(watchdog_ms=0)
+@pytest.mark.parametrize("indirect", [True, False])
+def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_healed(indirect):
+    rig = Rig(watchdog_ms=0, indirect_block=indirect)
     rig.bus.engage()
     assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [0] * 3
     rig.now_s += 60.0
     rig.chain[2].reboot()
     for _ in range(300):
         rig.tick([2500] * 3)
-    assert rig.bus.faults() == ("servo 2: restarted, torque off",)
+    assert rig.bus.faults() == ()
+    assert "servo 2 restarted: set up anew" in rig.bus.events()
+    assert rig.places() == pytest.approx([2500] * 3, abs=12)
 
 
-def test_a_quick_restart_between_two_reads_is_found_by_asking(rig):
+def test_a_quick_restart_between_two_reads_is_found_by_asking_in_turn(fast):
+    rig = Rig(fast, indirect_block=False)
     rig.bus.engage()
     rig.chain[2].reboot()
     rig.chain[2]._deaf_until_ms = 0
-    for _ in range(700):
+    for _ in range(100):
         rig.tick([2500] * 3)
-    assert rig.bus.faults() == ("servo 2: restarted, torque off",)
-    assert rig.places() == [2500, 2002, 2500]
+    assert rig.bus.events()[-1] == "servo 2 restarted: set up anew"
+    assert rig.chain[2].torque
 
 
 def test_healing_keeps_to_the_limits():
@@ -123,7 +138,8 @@ def test_healing_keeps_to_the_limits():
     assert rig.chain[1].memory.get("goal_position") == 1000
 
 
-def test_an_alert_whose_name_is_not_told_is_asked_about_seldom(rig):
+def test_an_alert_whose_name_is_not_told_is_asked_about_seldom(fast):
+    rig = Rig(fast, indirect_block=False)
     rig.bus.engage()
     rig.chain[2].alert = 0x20
     for _ in range(50):

@@ -4,9 +4,10 @@ import struct
 
 import pytest
 
-from drivers.dynamixel_group import STARTS, FastGroup, PlainGroup, silent_ones
+from drivers.dynamixel_group import FastGroup, PlainGroup, silent_ones
 from drivers.dynamixel_roll import AGAIN_FIRST_S, AGAIN_LAST_S, Roll
-from sim_mock.servo_chain import build_chain
+from drivers.dynamixel_views import DIRECT, direct_turns
+from sim_mock.servo_chain import build_chain, status
 
 IDS = (4, 1, 9)
 PLACES = {4: 1000, 1: 2000, 9: 3000}
@@ -21,25 +22,28 @@ def kind(request):
     return request.param
 
 
-@pytest.mark.parametrize("start", STARTS)
-def test_a_whole_answer_is_taken_at_once(kind, start):
-    group = kind(IDS, start)
+VIEWS = (DIRECT, *direct_turns()._spare)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_a_whole_answer_is_taken_at_once(kind, view):
+    group = kind(IDS, view)
     raw = chain().receive(group.request)
     assert len(raw) == group.reply_length
-    assert group.whole(raw).positions == (1000, 2000, 3000)
+    assert group.whole(raw)[group.columns.position] == (1000, 2000, 3000)
     assert group.missing(raw) == 0
-    assert {i: a.position for i, a in group.pieces(raw).answers.items()} == PLACES
+    assert {i: a.position for i, a in group.pieces(raw).samples.items()} == PLACES
 
 
 def test_any_single_damaged_byte_is_found_and_costs_little(kind):
-    group = kind(IDS, 126)
+    group = kind(IDS, DIRECT)
     raw = chain().receive(group.request)
     head = 8 if kind is FastGroup else 0
     for at in range(len(raw)):
         for flip in (0x01, 0x80, 0xFF):
             bad = raw[:at] + bytes([raw[at] ^ flip]) + raw[at + 1 :]
             assert group.whole(bad) is None
-            answers, _ = group.pieces(bad)
+            answers = group.pieces(bad).samples
             assert all(answer.position == PLACES[i] for i, answer in answers.items())
             # A damaged CRC of a fast block is also the start of the next block's proof.
             assert len(answers) >= (1 if at >= head else 0)
@@ -48,57 +52,52 @@ def test_any_single_damaged_byte_is_found_and_costs_little(kind):
 
 
 def test_any_lost_or_added_byte_never_makes_a_wrong_value(kind):
-    group = kind(IDS, 126)
+    group = kind(IDS, DIRECT)
     raw = chain().receive(group.request)
     for at in range(len(raw)):
         for bad in (raw[:at] + raw[at + 1 :], raw[:at] + b"\xff" + raw[at:], raw[:at]):
             if bad == raw:
                 continue
-            answers, _ = group.pieces(bad)
+            answers = group.pieces(bad).samples
             assert all(answer.position == PLACES[i] for i, answer in answers.items())
 
 
 def test_a_short_answer_gives_what_it_has(kind):
-    group = kind(IDS, 126)
+    group = kind(IDS, DIRECT)
     raw = chain().receive(group.request)
     cut = raw[: len(raw) - 5]
     assert group.whole(cut) is None
     assert group.missing(cut) == 5
-    assert set(group.pieces(cut).answers) == {4, 1}
+    assert set(group.pieces(cut).samples) == {4, 1}
 
 
 def test_an_answer_of_another_reading_is_not_taken(kind):
-    late, now = kind(IDS, 126), kind(IDS, 124)
+    late, now = kind(IDS, DIRECT), kind(IDS, VIEWS[1])
     raw = chain().receive(late.request)
     assert now.whole(raw) is None
-    assert now.pieces(raw).answers == {}
+    assert now.pieces(raw).samples == {}
 
 
 def test_noise_before_the_answer_does_no_harm(kind):
-    group = kind(IDS, 126)
+    group = kind(IDS, DIRECT)
     raw = b"\xff\xff\xfd\x00" + chain().receive(group.request)
-    assert {i: a.position for i, a in group.pieces(raw).answers.items()} == PLACES
+    assert {i: a.position for i, a in group.pieces(raw).samples.items()} == PLACES
 
 
 def test_stuffed_answers_are_longer_and_understood():
-    bus = chain()
-    servo = bus[1]
-    servo.shaft.v = -3 * 0.229 / 60 * 4096 / 1000
-    servo._current_full, servo.torque, servo.shaft.effort = 1.0, True, -1.0
-    group = PlainGroup(IDS, 126)
-    raw = bus.receive(group.request)
-    assert struct.pack("<hi", -1, -3)[:3] + b"\xfd" in raw
+    everyday = struct.pack("<hii", -1, -3, 2000)
+    group = PlainGroup(IDS, DIRECT)
+    raw = b"".join(status(i, 0, everyday if i == 1 else bytes(10)) for i in IDS)
+    assert everyday[:3] + b"\xfd" in raw
     assert group.whole(raw) is None
     assert group.missing(raw[: group.reply_length]) == 1
-    assert group.pieces(raw).answers[1] == (0, -1, -3, 2000)
+    assert group.pieces(raw).samples[1][:4] == (0, -1, -3, 2000)
 
 
 def test_a_refusal_without_bytes_is_an_answer_with_its_error():
-    from sim_mock.servo_chain import status
-
-    group = PlainGroup((1,), 126)
-    assert group.pieces(status(1, 0x87, b"")).answers[1].error == 0x87
-    assert group.pieces(status(1, 0x80, b"")).answers == {}
+    group = PlainGroup((1,), DIRECT)
+    assert group.pieces(status(1, 0x87, b"")).samples[1].error == 0x87
+    assert group.pieces(status(1, 0x80, b"")).samples == {}
 
 
 @pytest.mark.parametrize(
@@ -145,7 +144,7 @@ def test_where_all_are_out_somebody_is_always_asked_and_one_answer_calls_all_bac
     roll.silent(4, 1.0)
     assert roll.due(1.0) == 1
     assert roll.answered(1)
-    assert (roll.group, roll.due(1.0)) == ((1,), 4)
+    assert (roll.group, roll.due(1.0)) == (IDS, None)
 
 
 def test_damage_three_times_in_a_row_takes_a_servo_out():

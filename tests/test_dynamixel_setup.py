@@ -71,11 +71,101 @@ def test_opening_a_prepared_bus_writes_nothing_to_the_eeprom():
     assert writes == []
 
 
-def test_open_finds_a_servo_whose_own_limits_are_narrower():
+def test_open_sets_the_limits_of_the_setup_and_says_so():
     rig = Rig()
     rig.chain[2].memory.set("max_position_limit", 2500)
-    with pytest.raises(ServoMissing, match=r"servo 2 allows 0\.\.2500 steps, not 1000\.\.3000"):
+    rig.open()
+    get = rig.chain[2].memory.get
+    assert (get("min_position_limit"), get("max_position_limit")) == (1000, 3000)
+    events = rig.bus.events()
+    assert "servo 2: Max Position Limit 2500 -> 3000" in events
+    assert "servo 2: Return Delay Time 250 -> 0" in events
+    assert rig.bus.events() == ()
+
+
+def test_open_tells_a_dead_bus_from_a_missing_servo():
+    rig = Rig()
+    rig.port.spoil = lambda code, raw: b""
+    with pytest.raises(ServoMissing, match="no servo answers: check servo power"):
         rig.open()
+
+
+def test_one_message_names_missing_unexpected_wrong_and_old_servos_by_joint():
+    rig = Rig()
+    setups = [
+        ServoSetup(1, "xl430-w250", 1000, 3000, 6000.0, "neck_yaw"),
+        ServoSetup(2, "xl330-m077", 1000, 3000, 6000.0, "eye_left", 99),
+        ServoSetup(9, "xl330-m077", 1000, 3000, 6000.0, "jaw"),
+    ]
+    with pytest.raises(ServoMissing) as caught:
+        DynamixelBus(rig.port, setups, DynamixelParams()).open()
+    message = str(caught.value)
+    assert "neck_yaw (servo 1) is xl330-m077, not xl430-w250" in message
+    assert "eye_left (servo 2) has firmware 53, older than 99" in message
+    assert "jaw (servo 9) does not answer" in message
+    assert "unexpected: servo 3 (xl330-m077)" in message
+    assert "is one of them the one that is missing?" in message
+
+
+def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told():
+    rig = Rig()
+    servo = rig.chain[2]
+    servo.memory.set("velocity_limit", 100)
+    setup = ServoSetup(2, "xl330-m077", 1000, 3000, 6000.0, "jaw", 0, (700, 10, 30), 0.4)
+    bus = DynamixelBus(rig.port, [setup], DynamixelParams())
+    bus.open()
+    get = servo.memory.get
+    names = ("position_p_gain", "position_i_gain", "position_d_gain")
+    assert [get(name) for name in names] == [700, 10, 30]
+    assert (get("pwm_limit"), get("velocity_limit")) == (354, 383)
+    events = bus.events()
+    assert "jaw (servo 2): PWM Limit 885 -> 354" in events
+    assert "jaw (servo 2): Velocity Limit 100 -> 383" in events
+    assert "jaw (servo 2): Position P Gain 400 -> 700" in events
+    bus.open()
+    assert not any("->" in line for line in bus.events())
+
+
+@pytest.mark.parametrize(
+    ("firmwares", "indirect", "fast"),
+    [((53, 53), 224, True), ((46, 52), 208, True), ((45, 52), 208, False), ((46, 53), None, True)],
+)
+def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
+    firmwares, indirect, fast
+):
+    specs = [ServoSpec(i, "xl330-m077", 2000 + i, fw) for i, fw in enumerate(firmwares, 1)]
+    sent: list[bytes] = []
+    now_s = [0.0]
+    port = InProcessPort(build_chain(specs, lambda: now_s[0]), sent.append)
+    setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
+    bus = DynamixelBus(port, setups, DynamixelParams())
+    bus.open()
+    bus.engage()
+    spans = set()
+    for _ in range(60):
+        now_s[0] += 0.01
+        readings = bus.read(now_s[0])
+        read = next(p for p in reversed(sent) if p[7] == (0x8A if fast else 0x82))
+        spans.add((int.from_bytes(read[8:10], "little"), read[10]))
+        bus.write([2001, 2002])
+    if indirect is None:
+        assert (126, 10) in spans
+    else:
+        assert spans >= {(indirect, 13), (indirect + 1, 14)}
+    for k, reading in enumerate(readings):
+        assert abs(reading.position_steps - 2001 - k) <= 2
+        assert (reading.torque, reading.fault) == (True, "")
+        assert (reading.voltage_v, reading.temperature_c) == (pytest.approx(5.0, abs=0.3), 30)
+
+
+def test_the_block_can_be_left_out_by_choice():
+    rig = Rig()
+    setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
+    bus = DynamixelBus(rig.port, setups, DynamixelParams(indirect_block=False))
+    bus.open()
+    rig.sent.clear()
+    bus.read(1.0)
+    assert {int.from_bytes(packet[8:10], "little") for packet in rig.sent} >= {126}
 
 
 def test_open_with_an_impossible_baud_rate_names_it():

@@ -1,19 +1,40 @@
 """The control table agrees with the vendor's own files and with itself."""
 
+import math
 import re
+from pathlib import Path
 
 import pytest
-from dynamixel_easy_sdk.control_table import ControlTable
+from dynamixel_easy_sdk.control_table import CONTROL_TABLE_PATH, ControlTable
 
 from drivers.dynamixel_table import (
     MODELS,
     REGISTERS,
+    STEPS_PER_TURN,
+    VELOCITY_UNIT_STEPS_S,
     indirect_blocks,
     name_errors,
     registers_of,
 )
 
 RENAMED = {"secondary_shadow_id": "secondary_id", "present_load": "present_current"}
+
+NOT_THE_VENDORS = {"startup_configuration", "backup_ready"}
+"""Registers of the manual, from firmware 45 (X430) or 46 (X330) on, that no vendor file lists."""
+
+OLD_FIRMWARE = {m.name for m in MODELS.values() if m.family == "x330"}
+"""Models with a second vendor file for firmware below 53."""
+
+UNITS_IN_TORQUE = {"xc330-t181", "xc330-t288"}
+"""Models whose vendor files give the current as torque; the others as the register has it."""
+
+
+def vendor_units(number: int) -> dict[str, tuple[float, str]]:
+    """Read the unit section of the vendor's file."""
+    lines = Path(CONTROL_TABLE_PATH / ControlTable.getModelName(number)).read_text().splitlines()
+    start = lines.index("[unit info]") + 2
+    rows = (line.split("\t") for line in lines[start : lines.index("[control table]")] if line)
+    return {row[0]: (float(row[1]), row[2]) for row in rows}
 
 
 def vendor_table(number: int) -> dict[str, tuple[int, int]]:
@@ -31,7 +52,7 @@ def test_addresses_and_sizes_are_the_vendors(model):
     ours = {r.name: (r.address, r.size) for r in registers_of(model)}
     both = ours.keys() & vendor.keys()
     assert {name: ours[name] for name in both} == {name: vendor[name] for name in both}
-    assert len(both) > 40
+    assert ours.keys() - vendor.keys() == NOT_THE_VENDORS
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
@@ -49,6 +70,37 @@ def test_nothing_of_the_vendors_table_is_left_out(model):
 def test_model_numbers_are_the_vendors(model):
     stem = ControlTable.getModelName(model.number).removesuffix(".model")
     assert stem.replace("_", "-") == model.name
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
+def test_units_and_turns_are_the_vendors(model):
+    units = vendor_units(model.number)
+    rad_s = VELOCITY_UNIT_STEPS_S / STEPS_PER_TURN * 2.0 * math.pi
+    # The vendor's file rounds 0.229 rev/min to 0.02396912 rad/s, 0.05 % less.
+    assert units["Present Velocity"] == (pytest.approx(rad_s, rel=6e-4), "rad/s")
+    assert units["Goal Velocity"] == units["Present Velocity"]
+    if model.current_limit is None:
+        assert "Present Current" not in units
+    elif model.name in UNITS_IN_TORQUE:
+        # Nm for a unit, called N/m there: stall torque over stall current, to a third.
+        nm = model.stall_torque_nm / model.stall_current_a * model.current_unit_ma / 1000.0
+        assert units["Present Current"] == (pytest.approx(nm, rel=0.35), "N/m")
+    else:
+        assert units["Present Current"] == (1.0, "raw")
+
+
+@pytest.mark.parametrize("name", sorted(OLD_FIRMWARE))
+def test_the_vendors_files_for_old_firmware_differ_in_the_indirect_data_alone(name):
+    stem = ControlTable.getModelName(MODELS[name].number).removesuffix(".model")
+    new, old = (
+        Path(CONTROL_TABLE_PATH / f"{stem}{tail}.model").read_text().splitlines()
+        for tail in ("", "_fw52")
+    )
+    differing = [(a, b) for a, b in zip(new, old, strict=True) if a != b]
+    assert {(a.split("\t")[0], b.split("\t")[0]) for a, b in differing} == {
+        ("224", "208"), ("230", "214"),
+    }  # fmt: skip
+    assert [block[:3] for block in indirect_blocks(MODELS[name], 52)] == [(168, 208, 20)]
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
@@ -86,3 +138,32 @@ def test_error_bits_are_named_even_where_unknown():
     assert name_errors(0x21) == ("input voltage", "overload")
     assert name_errors(0x02) == ("error bit 1",)
     assert name_errors(0) == ()
+
+
+def test_ranges_that_differ_from_model_to_model():
+    def span(model, name):
+        (found,) = (r for r in registers_of(MODELS[model]) if r.name == name)
+        return found.low, found.high
+
+    assert span("xl330-m077", "baud_rate") == (0, 6)
+    assert span("xm430-w350", "baud_rate") == (0, 7)
+    assert span("xl330-m077", "protocol_type") == (2, 22)
+    assert span("xl430-w250", "protocol_type") == (1, 2)
+    assert span("xl330-m077", "max_voltage_limit") == (31, 70)
+    assert span("xc330-t288", "min_voltage_limit") == (55, 140)
+    assert span("xh430-v350", "max_voltage_limit") == (110, 300)
+    assert span("xm430-w210", "current_limit") == (0, 1193)
+    assert span("xl330-m077", "velocity_limit") == (0, 2047)
+    assert MODELS["xh430-v210"].current_unit_ma == 1.34
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
+def test_no_model_has_what_old_tables_and_clients_list(model):
+    """Acceleration Limit (40, 4) left the tables long ago; live registers cannot be written."""
+    registers = {r.address: r for r in registers_of(model)}
+    assert 40 not in registers
+    assert all(
+        registers[a].access == "r" for a in (0, 2, 6, 69, 70, *(120, 122, 123), 124, 126, 147)
+    )
+    assert registers[10].high == 13
+    assert all(registers[a].signed for a in (100, 104, 116, 124, 126, 128, 132))

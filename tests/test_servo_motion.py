@@ -1,124 +1,284 @@
-"""The emulated shaft: profile speed, acceleration, lag and standstill."""
+"""The emulated shaft: what gains, limits, load, friction, stops and play make of it."""
+
+import math
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from drivers.dynamixel_table import MODELS
-from sim_mock.servo_motion import Feel, Shaft
+from sim_mock.servo_motion import LIMP, Loop, Shaft
+from sim_mock.servo_physics import Physics, checked
 
 DEG = 4096.0 / 360.0
+P, D = 800 / 128 / 885, 800 / 16 / 885
+SMOOTH = {"coulomb_share": 0.0, "viscous_share": 0.0, "play_deg": 0.0, "supply_ohm": 0.0}
 
 
-def shaft(model: str = "xl330-m077", feel: Feel = Feel()) -> Shaft:  # noqa: B008
-    return Shaft(0.0, MODELS[model].no_load_steps_s, feel)
+def shaft(model: str = "xl330-m077", loop: Loop = Loop(p=P, d=D), **physics) -> Shaft:  # noqa: B008
+    made = Shaft(MODELS[model], checked(Physics(**physics)), 0.0)
+    made.drive(loop)
+    return made
 
 
-def path(made: Shaft, ms: int) -> list[float]:
-    positions = []
+def go(made: Shaft, goal: float, ms: int, cruise: float = 0.0, ramp: float = 0.0) -> list[float]:
+    """Lead to a goal; give the position after every millisecond."""
+    made.profile.by_velocity(goal, cruise, ramp)
+    made.wake()
+    return run(made, ms)
+
+
+def run(made: Shaft, ms: int) -> list[float]:
+    path = []
     for _ in range(ms):
-        made.advance(1)
-        positions.append(made.x)
-    return positions
+        made.run(1)
+        path.append(made.x)
+    return path
 
 
-def test_an_unloaded_m077_reaches_500_deg_s_in_10_to_15_ms():
-    eye = shaft()
-    eye.drive(90 * DEG)
-    ms = 0
-    while eye.speed_steps_s < 500 * DEG:
-        eye.advance(1)
-        ms += 1
-    assert 10 <= ms <= 15
+@pytest.mark.parametrize("model", ["xl330-m077", "xc330-m288", "xl430-w250", "xh430-v350"])
+def test_full_pwm_reaches_the_no_load_speed_of_the_data_sheet(model):
+    made = shaft(model, Loop(bias=1.0), supply_ohm=0.0)
+    run(made, 1500)
+    assert made.speed_steps_s == pytest.approx(MODELS[model].no_load_steps_s, rel=1e-3)
 
 
-def test_a_larger_spin_up_time_is_slower():
-    light, heavy = shaft("xc330-m288"), shaft("xc330-m288", Feel(spin_up_s=0.3))
-    for made in (light, heavy):
-        made.drive(20 * DEG)
-        made.advance(30)
-    assert heavy.x < 0.5 * light.x
+def test_speed_and_stall_torque_scale_with_the_voltage():
+    weak = shaft(loop=Loop(bias=1.0), supply_v=3.7, **SMOOTH)
+    run(weak, 1500)
+    assert weak.speed_steps_s / 4096 * 60 == pytest.approx(383 * 3.7 / 5.0, rel=1e-3)
+    weak.hold_fast(True)
+    weak.run(2)
+    assert weak.effort == pytest.approx(0.74)
 
 
-@pytest.mark.parametrize("model", ["xl330-m077", "xc330-m288"])
-@pytest.mark.parametrize(
-    ("cruise", "ramp"), [(0, 0), (500, 0), (500, 8000), (80, 0), (80, 400)], ids=repr
+def test_a_light_eye_passes_500_deg_s_within_15_ms():
+    made = shaft(loop=Loop(bias=1.0))
+    path = run(made, 15)
+    assert path[-1] - path[-2] > 500 * DEG / 1000
+
+
+def test_more_inertia_is_slower():
+    light, heavy = shaft(), shaft(load_kg_m2=1e-3)
+    assert go(heavy, 200, 30)[-1] < 0.5 * go(light, 200, 30)[-1]
+
+
+# --- what the gains do
+
+
+@pytest.mark.parametrize("gain", [1.0, 2.0, 4.0])
+def test_the_steady_error_under_load_is_the_load_over_p(gain):
+    # 0.05 Nm of 0.215 Nm, no friction: PWM 0.2326, of which P makes one share per step.
+    made = shaft(loop=Loop(p=gain * P, d=D), load_nm=-0.05, **SMOOTH)
+    end = go(made, 300, 4000)[-1]
+    assert 300 - end == pytest.approx(0.05 / 0.215 / (gain * P), rel=1e-3)
+
+
+def test_i_removes_the_steady_error():
+    without = shaft(load_nm=-0.05)
+    with_i = shaft(loop=Loop(p=P, i=P / 200.0, d=D), load_nm=-0.05)
+    assert abs(go(without, 300, 4000)[-1] - 300) > 20
+    assert abs(go(with_i, 300, 4000)[-1] - 300) < 1.0
+
+
+def test_the_i_part_does_not_wind_up_beyond_the_limit():
+    made = shaft(loop=Loop(p=P, i=0.01, d=D, u_most=0.5), stop_high_steps=100.0)
+    go(made, 4000, 3000)
+    back = go(made, 0, 300)
+    assert back[-1] < 60
+
+
+def test_d_damps_the_overshoot():
+    tops = [max(go(shaft(loop=Loop(p=P, d=k * D)), 200, 500)) for k in (0.0, 1.0, 3.0)]
+    assert tops[0] > tops[1] + 20 > tops[2] + 20
+    assert tops[2] < 210
+
+
+def test_the_first_feed_forward_gain_shortens_the_lag():
+    ends = []
+    for f1 in (0.0, 0.5 / 26.0, 1.0 / 26.0):
+        made = shaft(loop=Loop(p=P, d=D, f1=f1), coulomb_share=0.0)
+        go(made, 4000, 250, cruise=5.0)
+        ends.append(made.profile.r - made.x)
+    assert ends[0] > 1.5 * ends[1] > 2.0 * abs(ends[2])
+
+
+def test_the_second_feed_forward_gain_shortens_the_lag_of_acceleration():
+    errors = []
+    for f2 in (0.0, 0.7 / Shaft(MODELS["xl330-m077"], Physics(), 0.0)._accel):
+        made = shaft(loop=Loop(p=P, d=D, f1=1 / 27.0, f2=f2), **SMOOTH)
+        go(made, 4000, 60, cruise=20.0, ramp=0.1)
+        errors.append(made.profile.r - made.x)
+    assert errors[0] > 2.0 * abs(errors[1])
+
+
+def test_pwm_limit_and_slope_bound_the_output():
+    made = shaft(loop=Loop(p=P, d=D, u_most=0.3, slew=0.01))
+    made.profile.step(3000)
+    made.wake()
+    before = 0.0
+    for _ in range(200):
+        made.run(1)
+        assert abs(made.u) <= 0.3 and abs(made.u - before) <= 0.01 + 1e-12
+        before = made.u
+    assert made.u > 0.15
+
+
+@given(limit=st.floats(0.0, 1.0), goal=st.floats(-4000, 4000), load=st.floats(-0.3, 0.3))
+@settings(max_examples=40, deadline=None)
+def test_the_current_limit_holds_always(limit, goal, load):
+    made = shaft(loop=Loop(p=4 * P, d=D, t_most=limit), load_nm=load)
+    made.profile.step(goal)
+    made.wake()
+    for _ in range(60):
+        made.run(1)
+        assert abs(made.effort) <= limit + 1e-12
+
+
+# --- body and surroundings
+
+
+def test_nothing_moves_without_cause():
+    for loop in (LIMP, Loop(p=P, d=D), Loop(p=P, i=0.001, d=D)):
+        made = shaft(loop=loop)
+        run(made, 3)
+        assert (made.x, made.v, made.quiet) == (0.0, 0.0, True)
+        made.run(10**9)
+        assert made.x == 0.0
+
+
+def test_without_torque_friction_takes_the_speed_and_never_adds_any():
+    made = shaft(loop=Loop(bias=1.0))
+    run(made, 100)
+    made.let_go()
+    speeds = []
+    for _ in range(3000):
+        made.run(1)
+        speeds.append(made.v)
+    assert speeds == sorted(speeds, reverse=True)
+    assert speeds[0] > 10 and speeds[-1] == 0.0 and made.effort == 0.0
+
+
+def test_friction_stops_a_servo_short_of_its_goal_as_real_ones():
+    # 3 % of 885 units are 26.6; 640/128 of them a step.
+    made = shaft("xl430-w250", Loop(p=640 / 128 / 885, d=4000 / 16 / 885))
+    end = go(made, 300, 3000)[-1]
+    assert 1.0 < 300 - end <= 26.6 / 5.0
+
+
+def test_a_load_below_friction_is_held_without_torque_and_a_larger_one_falls_to_the_stop():
+    held = shaft(loop=LIMP, load_nm=0.006)
+    falls = shaft(loop=LIMP, load_nm=0.02, stop_high_steps=500.0)
+    assert run(held, 1000)[-1] == 0.0
+    assert run(falls, 1000)[-1] == 500.0
+    assert falls.quiet and falls.v == 0.0
+
+
+def test_gravity_pulls_away_from_upright_and_back_to_hanging():
+    top = shaft(loop=LIMP, gravity_nm=0.1, upright_steps=-300.0)
+    hanging = shaft(loop=LIMP, gravity_nm=-0.1, upright_steps=-300.0)
+    assert run(top, 300)[-1] > 300
+    assert run(hanging, 300)[-1] < -100
+
+
+def test_stops_are_never_passed_and_a_stalled_motor_draws_its_stall_current():
+    made = shaft(stop_low_steps=-50.0, stop_high_steps=80.0, supply_ohm=0.0)
+    assert max(go(made, 2000, 500)) == 80.0
+    assert made.effort == pytest.approx(1.0)
+    assert min(go(made, -2000, 500)) == -50.0
+    assert made.effort == pytest.approx(-1.0)
+
+
+def test_a_jammed_joint_stays_until_it_is_freed():
+    made = shaft()
+    go(made, 100, 20)
+    made.hold_fast(True)
+    at = made.x
+    assert go(made, 1000, 200)[-1] == at
+    made.hold_fast(False)
+    assert run(made, 500)[-1] > at + 500
+
+
+def test_load_sags_the_voltage():
+    made = shaft(loop=Loop(bias=1.0), stop_high_steps=0.0, supply_ohm=0.4)
+    run(made, 50)
+    assert made.volts == pytest.approx(1.0 / (1.0 + 0.4 * 1.47 / 5.0), rel=1e-3)
+    assert made.volts < 0.9
+
+
+def test_the_joint_lags_behind_the_encoder_by_half_the_play():
+    made = shaft(loop=Loop(p=P, d=6 * D), play_deg=0.5)
+    go(made, 300, 1500)
+    assert made.x - made.joint == pytest.approx(0.25 * DEG)
+    go(made, 0, 1500)
+    assert made.joint - made.x == pytest.approx(0.25 * DEG)
+
+
+def test_a_hand_turns_a_limp_shaft_and_a_driven_one_springs_back():
+    limp, driven = shaft(loop=LIMP), shaft()
+    for made in (limp, driven):
+        run(made, 5)
+        made.turn(100.0)
+        run(made, 1000)
+    assert limp.x == 100.0
+    assert abs(driven.x) < 10.0
+
+
+# --- numbers
+
+REGISTER = st.integers(0, 16383)
+
+
+@given(
+    gains=st.tuples(REGISTER, REGISTER, REGISTER, REGISTER, REGISTER),
+    goals=st.lists(st.integers(-1_048_575, 1_048_575), min_size=1, max_size=6),
+    profile=st.tuples(st.integers(0, 32767), st.integers(0, 32767)),
+    volts=st.floats(0.0, 3.0),
+    load=st.floats(-5.0, 5.0),
+    rotor=st.floats(0.001, 1.0),
 )
-@pytest.mark.parametrize("span", [-40, -1, 5, 40, 120])
-def test_every_profile_ends_on_the_goal_without_overshoot(model, cruise, ramp, span):
-    made = shaft(model)
-    made.shape(cruise * DEG, ramp * DEG)
-    made.drive(span * DEG)
-    positions = path(made, 4000)
-    assert made.settled
-    assert positions[-1] == made.goal == span * DEG
-    assert max(abs(p) for p in positions) <= abs(span * DEG) + 0.01
+@settings(max_examples=60, deadline=None)
+def test_no_gains_and_goals_break_the_numbers(gains, goals, profile, volts, load, rotor):
+    p, i, d, f1, f2 = gains
+    loop = Loop(
+        p=p / 128 / 885, i=i / 65536 / 885, d=d / 16 / 885, f1=f1 / 4 / 885, f2=f2 / 4 / 885
+    )
+    made = shaft(loop=loop, load_nm=load, rotor_s=rotor)
+    made.feed(volts)
+    fastest = 26.2 * (volts + abs(load) / 0.215) / 0.02 + 10
+    for goal in goals:
+        for x in go(made, goal, 25, profile[0] / 1000, profile[1] / 1e4):
+            assert math.isfinite(x)
+            assert abs(made.v) < fastest and abs(made.u) <= 1.0
+            assert math.isfinite(made.effort)
 
 
-@pytest.mark.parametrize("ramp", [0, 8000])
-def test_profile_speed_is_never_exceeded(ramp):
-    made = shaft()
-    made.shape(300 * DEG, ramp * DEG)
-    made.drive(90 * DEG)
-    steps = path(made, 800)
-    fastest = max(b - a for a, b in zip(steps, steps[1:], strict=False))
-    assert fastest == pytest.approx(300 * DEG / 1000.0, rel=1e-6)
-
-
-def test_no_load_speed_is_never_exceeded():
-    made = shaft("xc330-m288")
-    made.drive(360 * DEG)
-    steps = path(made, 1500)
-    fastest = max(b - a for a, b in zip(steps, steps[1:], strict=False))
-    assert fastest == pytest.approx(81 * 4096 / 60 / 1000, rel=1e-6)
-
-
-def test_trapezoid_ramps_as_the_registers_say():
-    # 64 V/A ms of ramp in register units: V = 100, A = 10 is 640 ms.
-    made = shaft()
-    v, a = 100 * 0.229 / 60 * 4096, 10 * 214.577 / 3600 * 4096
-    made.shape(v, a)
-    made.drive(3000)
-    ms = 0
-    while made.profile_speed_steps_s < v * (1 - 1e-9):
-        made.advance(1)
-        ms += 1
-    assert ms == pytest.approx(640, abs=3)
-
-
-def test_the_position_lags_the_profile_by_its_time_constant():
-    made = shaft(feel=Feel(lag_s=0.010))
-    made.shape(100 * DEG, 0)
-    made.drive(90 * DEG)
-    made.advance(300)
-    # One internal step of 1 ms lies between profile and position.
-    assert (made.r - made.x) / (100 * DEG) == pytest.approx(0.009, abs=0.0005)
-
-
-def test_a_new_goal_in_mid_flight_starts_from_the_present_speed():
-    made = shaft()
-    made.shape(300 * DEG, 3000 * DEG)
-    made.drive(60 * DEG)
-    made.advance(100)
-    before = made.profile_speed_steps_s
-    made.aim(-60 * DEG)
-    made.advance(1)
-    assert made.profile_speed_steps_s == pytest.approx(before - 3 * DEG)
-
-
-def test_standing_still_is_exact_and_free():
-    made = shaft()
-    made.drive(10 * DEG)
-    made.advance(1000)
-    assert (made.x, made.v, made.settled) == (10 * DEG, 0.0, True)
-    made.advance(10**9)
-    assert made.x == 10 * DEG
-
-
-def test_in_one_go_or_in_steps_is_the_same():
-    once, often = shaft(), shaft()
+@given(st.lists(st.integers(1, 9), min_size=1, max_size=30), REGISTER, st.integers(0, 4000))
+@settings(max_examples=40, deadline=None)
+def test_in_one_go_or_in_steps_is_the_same(pieces, gain, goal):
+    loop = Loop(p=gain / 128 / 885, i=0.0001, d=D, f1=0.01, f2=0.1, slew=0.05)
+    once, often = (shaft(loop=loop, load_nm=0.02, gravity_nm=0.01) for _ in range(2))
     for made in (once, often):
-        made.shape(200 * DEG, 2000 * DEG)
-        made.drive(33 * DEG)
-    once.advance(123)
-    for _ in range(123):
-        often.advance(1)
-    assert (once.x, once.v, once.r, once.rv) == (often.x, often.v, often.r, often.rv)
+        made.profile.by_velocity(goal, 3.0, 0.02)
+        made.wake()
+    once.run(sum(pieces))
+    for piece in pieces:
+        often.run(piece)
+    assert all(
+        getattr(once, name) == getattr(often, name)
+        for name in ("x", "v", "u", "effort", "joint", "volts", "_integral")
+    )
+
+
+@pytest.mark.parametrize(
+    ("bad", "named"),
+    [
+        ({"rotor_s": 0.0}, "rotor_s is 0.0, not in 0.001..10.0"),
+        ({"load_nm": math.nan}, "load_nm is nan"),
+        ({"stop_low_steps": 5.0, "stop_high_steps": 4.0}, "stop_low_steps is above"),
+        ({"coulomb_share": 0.6, "viscous_share": 0.5}, "both frictions"),
+    ],
+)
+def test_impossible_physics_are_refused_by_name(bad, named):
+    with pytest.raises(ValueError, match=named):
+        checked(Physics(**bad))

@@ -13,6 +13,9 @@ from dynamixel_sdk import (
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_chain import build_chain
 
+STEADY_STEPS = 12
+"""Friction keeps a servo with factory gains so far from its goal."""
+
 
 class World:
     def __init__(self):
@@ -61,7 +64,7 @@ def test_group_write_and_both_group_reads(world):
     world.now_s = 1.0
     for read in (places.txRxPacket, places.fastSyncRead):
         assert read() == COMM_SUCCESS
-        assert [places.getData(i, 132, 4) for i in (1, 2, 3)] == [1500] * 3
+        assert all(abs(places.getData(i, 132, 4) - 1500) < STEADY_STEPS for i in (1, 2, 3))
 
 
 def test_bulk_read(world):

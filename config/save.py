@@ -1,0 +1,272 @@
+"""Writing values into somebody's YAML file: nothing of theirs is lost, whatever goes wrong.
+
+The new text is checked as a file of its own before it takes the old one's place, in one
+step; the old file stays beside it under a name with the time.
+"""
+
+import contextlib
+import importlib.resources
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from config.load import ConfigError, Fault, read_yaml, shipped
+from config.save_text import Unchangeable, Value, edited, written
+from config.schema import Rig, load_rig
+
+Check = Callable[[str], Any]
+"""Loads a file by its path and gives what it holds; raises config.load.ConfigError."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One value that differs; ``old`` is None where the key was not in the file.
+
+    key: dotted key path; old, new: as YAML
+    """
+
+    key: str
+    old: str | None
+    new: str
+
+    def __str__(self) -> str:
+        """Write ``key: old -> new``."""
+        return f"{self.key}: {'(not in the file)' if self.old is None else self.old} -> {self.new}"
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """What was done: ``backup`` is None and the file untouched where nothing differed."""
+
+    path: Path
+    backup: Path | None
+    changes: tuple[Change, ...]
+
+
+def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> Saved:
+    """Write values into a rig file: ``save_rig("my.yaml", {"loop.rate_hz": 100.0}, now)``.
+
+    path: the file; the name of a shipped rig is understood too, to be refused with the cure
+
+    Raises:
+        config.load.ConfigError: see ``save``.
+    """
+    return save(rig_file(path), changes, now, load_rig, Rig)
+
+
+def rig_file(name_or_path: Path | str) -> Path:
+    """Give the file behind a rig's name or path, as ``config.schema.load_rig`` takes it.
+
+    Raises:
+        config.load.ConfigError: no rig of that name is shipped.
+    """
+    text = str(name_or_path)
+    if isinstance(name_or_path, Path) or "/" in text or text.endswith((".yaml", ".yml")):
+        return Path(name_or_path)
+    return shipped("rigs", text)
+
+
+def save(
+    path: Path | str, changes: Mapping[str, Value], now: datetime, check: Check, into: type
+) -> Saved:
+    """Write values at dotted key paths into a YAML file and keep the old file beside it.
+
+    Keys that are not there are added with a comment. Comments, order, style and anchors
+    stay. The file is replaced only after ``check`` has loaded the new one and found every
+    value in it; on any error the file is as it was.
+
+    now: goes into the backup's name, ``rig.yaml.bak-20260131-235959``
+    check: loads a file by path, as ``config.schema.load_rig`` does
+    into: the Params dataclass of the file, whose fields explain added keys
+
+    Raises:
+        config.load.ConfigError: the file is shipped, unreadable or not writable, a value
+            is refused, or another layer overrides it.
+    """
+    target = Path(os.path.realpath(path))
+    _refuse_shipped(target)
+    before, text, found = _proposal(target, changes, into)
+    if not found:
+        return Saved(target, None, ())
+    with _errors_named(target), _beside(target, text) as fresh:
+        _check_new(target, fresh, changes, check)
+        if target.read_bytes() != before:
+            raise _fault(target, "was changed by somebody else meanwhile; try again")
+        backup = _backup(target, before, now)
+        shutil.copymode(target, fresh)
+        os.replace(fresh, target)
+    return Saved(target, backup, found)
+
+
+def propose(path: Path | str, changes: Mapping[str, Value], into: type = Rig) -> tuple[Change, ...]:
+    """List what ``save`` would change; nothing is written.
+
+    Raises:
+        config.load.ConfigError: the file cannot be read, or a value cannot be written.
+    """
+    return _proposal(Path(os.path.realpath(path)), changes, into)[2]
+
+
+def copy_shipped(name: str, to: Path | str, kind: str = "rigs") -> Path:
+    """Copy a file that comes with the package, to be changed; never over another file.
+
+    Raises:
+        config.load.ConfigError: none of that name is shipped, or ``to`` exists or cannot
+            be written.
+    """
+    source, target = shipped(kind, name), Path(to)
+    with _errors_named(target), target.open("xb") as file:
+        file.write(source.read_bytes())
+    return target
+
+
+def _proposal(
+    target: Path, changes: Mapping[str, Value], into: type
+) -> tuple[bytes, bytes, tuple[Change, ...]]:
+    """Give the file as it is, as it would be, and the difference."""
+    before = read_yaml(target)  # refuses what is no YAML, with the line
+    raw = target.read_bytes()
+    mark = b"\xef\xbb\xbf" if raw.startswith(b"\xef\xbb\xbf") else b""
+    try:
+        text = edited(before.text, changes, into)
+        _refuse_side_effects(before.data, text, changes)
+    except Unchangeable as error:
+        raise _fault(target, str(error)) from None
+    old = {key: _follow(before.data, key) for key in changes}
+    found = tuple(
+        Change(key, None if old[key] is _ABSENT else written(old[key]), written(value))
+        for key, value in changes.items()
+        if old[key] is _ABSENT or written(old[key]) != written(value)
+    )
+    return raw, mark + text.encode() if found else raw, found
+
+
+_ABSENT: Any = object()
+_ANY_WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
+
+
+def _follow(value: Any, key: str) -> Any:
+    """Follow a dotted path through mappings or through the attributes of frozen values."""
+    for step in key.split("."):
+        if isinstance(value, Mapping):
+            value = value.get(step, _ABSENT)
+        else:
+            value = getattr(value, step, _ABSENT)
+    return value
+
+
+def _refuse_side_effects(before: dict[str, Any], text: str, changes: Mapping[str, Value]) -> None:
+    """See that the new text differs in the values asked for and in nothing else.
+
+    An anchor lends its value to other places, which must not change unseen.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "new.yaml"
+        file.write_bytes(text.encode())
+        after = read_yaml(file).data
+    kept, found = _leaves(before), _leaves(after)
+    for key in sorted({*kept, *found}):
+        wished = key in changes or any(c.startswith(f"{key}.") for c in changes)
+        if not wished and kept.get(key, _ABSENT) != found.get(key, _ABSENT):
+            raise Unchangeable(
+                f"{key} would change as well, as an anchor (&) ties it to "
+                f"{', '.join(changes)}; write its value out first"
+            )
+
+
+def _leaves(value: Any, path: str = "") -> dict[str, Any]:
+    """List all that is no mapping, or an empty one, by dotted path."""
+    if not isinstance(value, dict) or not value:
+        return {path: value}
+    found: dict[str, Any] = {}
+    for key, item in value.items():
+        found |= _leaves(item, f"{path}.{key}" if path else key)
+    return found
+
+
+def _check_new(target: Path, fresh: Path, changes: Mapping[str, Value], check: Check) -> None:
+    """Load the new file and see that every value is in force."""
+    try:
+        loaded = check(str(fresh))
+    except ConfigError as error:
+        named = [
+            replace(f, file=str(target) if f.file == str(fresh) else f.file) for f in error.faults
+        ]
+        raise ConfigError(named) from None
+    for key, value in changes.items():
+        held = _follow(loaded, key)
+        if held is not _ABSENT and not _same(held, value):
+            raise _fault(
+                target, f"{key} stays {held} whatever this file says: a later layer sets it", key
+            )
+
+
+def _same(held: Any, value: Value) -> bool:
+    if isinstance(value, list | tuple):
+        return list(held) == list(value)
+    return bool(held == value)
+
+
+def _refuse_shipped(target: Path) -> None:
+    """Refuse a file inside the installed package: an update would overwrite it."""
+    package = Path(os.path.realpath(str(importlib.resources.files("config"))))
+    if package in target.parents:
+        raise _fault(
+            target,
+            "comes with the program and is never changed: copy it "
+            f"(cp {target} my{target.name}) and name the copy",
+        )
+
+
+@contextlib.contextmanager
+def _beside(target: Path, text: bytes) -> Iterator[Path]:
+    """Write a new file in the same folder, gone again unless it has taken the target's place."""
+    handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=".yaml", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        if not (os.access(target, os.W_OK) and target.stat().st_mode & _ANY_WRITE):
+            raise PermissionError(None, "it is read-only; chmod u+w gives the right to write")
+        yield Path(name)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(name)
+
+
+def _backup(target: Path, before: bytes, now: datetime) -> Path:
+    """Keep the old file under a name that nobody has yet."""
+    stem = f"{target}.bak-{now:%Y%m%d-%H%M%S}"
+    for number in range(1, 100):
+        path = Path(stem if number == 1 else f"{stem}-{number}")
+        with contextlib.suppress(FileExistsError):
+            with path.open("xb") as file:
+                file.write(before)
+            return path
+    raise _fault(target, f"has 99 backups of this second ({stem} ...); clear some away")
+
+
+@contextlib.contextmanager
+def _errors_named(target: Path) -> Iterator[None]:
+    """Say in one line what the disk refuses."""
+    try:
+        yield
+    except FileExistsError:
+        raise _fault(
+            target, "is there already and is not overwritten; choose another name"
+        ) from None
+    except OSError as error:
+        raise _fault(
+            target, f"cannot be written: {error.strerror}; check it and its folder"
+        ) from error
+
+
+def _fault(target: Path, rule: str, key: str = "") -> ConfigError:
+    return ConfigError([Fault(str(target), None, key, "", rule)])

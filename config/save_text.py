@@ -1,0 +1,244 @@
+"""Changing values inside YAML text: every byte that is not part of a change stays as it is.
+
+The text is parsed only to learn where each value stands. Comments, order, indentation,
+quotes, anchors and line ends survive because nobody writes them anew.
+"""
+
+import json
+import operator
+import re
+import textwrap
+from collections.abc import Mapping
+from math import isfinite
+from typing import NamedTuple
+
+from ruamel.yaml import YAML
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from config.bounds import Shape, shapes_of
+
+Value = str | int | float | bool | None | tuple["Value", ...] | list["Value"]
+WIDTH = 100
+
+_ANCHOR = re.compile(r"(?:&\S+\s+)?(?:!\S*\s+)?")
+_ALIAS = re.compile(r"\s*:?\s*(\*[^\s,\]}]+)")
+_PLAIN_TEXT = re.compile(r"[A-Za-z/][\w./-]*")
+_NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
+
+
+class Unchangeable(ValueError):
+    """A value cannot be changed in place; the message says which one, why, and the cure."""
+
+
+class _Edit(NamedTuple):
+    """Text that takes the place of ``text[start:end]``."""
+
+    start: int
+    end: int
+    new: str
+
+
+def edited(text: str, changes: Mapping[str, Value], into: type) -> str:
+    """Give the text with the values at dotted key paths replaced, missing keys added.
+
+    into: the Params dataclass of the file; its fields' ``says`` explain keys that are added
+
+    Raises:
+        Unchangeable: a value cannot be written where it should stand.
+    """
+    root = _composed(text)
+    edits, absent = [], {}
+    for key, value in changes.items():
+        place = _find(root, key.split("."))
+        if place is None:
+            absent[key] = value
+        else:
+            edits += _replaced(text, key, place, value)
+    for edit in sorted(edits, reverse=True):
+        text = text[: edit.start] + edit.new + text[edit.end :]
+    for key, value in absent.items():
+        # One after the other: the first may make the mapping that the next one needs.
+        edit = _added(text, _composed(text), key, value, into)
+        text = text[: edit.start] + edit.new + text[edit.end :]
+    return text
+
+
+def written(value: Value) -> str:
+    """Write a value as YAML on one line.
+
+    Raises:
+        Unchangeable: not finite, or no scalar or list.
+    """
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        plain = _PLAIN_TEXT.fullmatch(value) and value.lower() not in _NO_TEXT
+        return value if plain else json.dumps(value, ensure_ascii=False)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(written, value))}]"
+    if isinstance(value, float):
+        if not isfinite(value):
+            raise Unchangeable(f"{value} is not a finite number and is never written")
+        return repr(float(value))
+    try:
+        return str(operator.index(value))
+    except TypeError:
+        raise Unchangeable(f"{value!r} is no number, text, truth value or list of those") from None
+
+
+def _composed(text: str) -> MappingNode:
+    """Parse the text as far as nodes, which know where they stand."""
+    node = YAML(typ="safe", pure=True).compose(text)
+    if not isinstance(node, MappingNode):
+        raise Unchangeable("the top level is no mapping; write 'key: value' lines")
+    return node
+
+
+# --- finding
+
+
+class _Place(NamedTuple):
+    """A value with the node (a key, or the list itself) that stands before it."""
+
+    before: Node
+    node: Node
+
+
+def _find(root: MappingNode, steps: list[str]) -> _Place | None:
+    """Find the value at a path, None where it or a mapping above it is missing."""
+    place = _Place(root, root)
+    for step in steps:
+        if not isinstance(place.node, MappingNode):
+            return None
+        for key, value in place.node.value:
+            if key.value == step:
+                place = _Place(key, value)
+                break
+        else:
+            return None
+    return place
+
+
+def _span(text: str, place: _Place) -> tuple[int, int]:
+    """Give where a value stands: after its anchor and tag; an alias stands for the whole."""
+    before, node = place
+    at = before.start_mark.index if isinstance(before, SequenceNode) else before.end_mark.index
+    if node.start_mark.index < at:  # the value itself stands at its anchor, further up
+        alias = _ALIAS.match(text, at)
+        if alias is None:
+            raise Unchangeable("stands behind an alias that cannot be followed; write it out")
+        return alias.span(1)
+    if node.start_mark.index == node.end_mark.index:  # nothing but "key:"
+        colon = text.index(":", at) + 1
+        return colon, colon
+    anchor = _ANCHOR.match(text, node.start_mark.index)
+    start = anchor.end() if anchor else node.start_mark.index
+    return start, node.end_mark.index
+
+
+def _end(text: str, place: _Place) -> int:
+    """Give where the last character of a value stands, comments after it left out."""
+    node = place.node
+    inside = isinstance(node, MappingNode | SequenceNode) and not node.flow_style
+    if not inside or node.start_mark.index < place.before.start_mark.index:
+        return _span(text, place)[1]
+    if isinstance(node, MappingNode):
+        return _end(text, _Place(*node.value[-1]))
+    return _end(text, _Place(node, node.value[-1]))
+
+
+# --- replacing
+
+
+def _replaced(text: str, key: str, place: _Place, value: Value) -> list[_Edit]:
+    """Replace a value that is there."""
+    node = place.node
+    if isinstance(node, MappingNode):
+        raise Unchangeable(f"{key} is a mapping; name one of its keys")
+    start, end = _span(text, place)
+    block = isinstance(node, SequenceNode) and not node.flow_style and text[start] != "*"
+    if block and isinstance(value, list | tuple) and len(value) == len(node.value):
+        items = zip(node.value, value, strict=True)
+        return [e for item, v in items for e in _replaced(text, key, _Place(node, item), v)]
+    if block or getattr(node, "style", None) in ("|", ">"):
+        raise Unchangeable(f"{key} is spread over several lines; write it on one line first")
+    new = written(value)
+    if start == end:
+        new = f" {new}"
+    return [] if text[start:end] == new else [_Edit(start, end, new)]
+
+
+# --- adding
+
+
+def _added(text: str, root: MappingNode, key: str, value: Value, into: type) -> _Edit:
+    """Add a key, and the mappings above it that are not there, with a comment for each."""
+    steps = key.split(".")
+    depth = next(n for n in range(len(steps) - 1, -1, -1) if _find(root, steps[:n]) is not None)
+    holder = _find(root, steps[:depth])
+    if holder is None or holder.node.start_mark.index < holder.before.start_mark.index:
+        raise Unchangeable(f"{key}: its mapping is an alias (*); write it out first")
+    node, newline = holder.node, "\r\n" if "\r\n" in text else "\n"
+    if isinstance(node, MappingNode) and node.flow_style:
+        new = ": {".join(steps[depth:]) + f": {written(value)}" + "}" * (len(steps) - depth - 1)
+        if not node.value:
+            at = text.index("{", node.start_mark.index) + 1
+            return _Edit(at, at, new)
+        at = _end(text, _Place(*node.value[-1]))
+        return _Edit(at, at, f", {new}")
+    if isinstance(node, MappingNode):
+        at, indent = _end(text, _Place(*node.value[-1])), node.value[0][0].start_mark.column
+    elif isinstance(node, ScalarNode) and node.start_mark.index == node.end_mark.index:
+        at, indent = _span(text, holder)[1], holder.before.start_mark.column + 2
+    else:
+        raise Unchangeable(f"{key}: {'.'.join(steps[:depth])} is no mapping; make it one")
+    at = _end_of_line(text, at)
+    lines = _block(steps, depth, indent, value, into)
+    return _Edit(at, at, "".join(f"{newline}{line}" for line in lines))
+
+
+def _end_of_line(text: str, at: int) -> int:
+    """Give where a line ends, before its line end."""
+    end = text.find("\n", at)
+    end = len(text) if end < 0 else end
+    return end - 1 if end > at and text[end - 1] == "\r" else end
+
+
+def _block(steps: list[str], depth: int, indent: int, value: Value, into: type) -> list[str]:
+    """Write the lines of a new key and of the new mappings above it."""
+    lines = []
+    for n in range(depth, len(steps)):
+        body = f"{steps[n]}:" if n < len(steps) - 1 else f"{steps[n]}: {written(value)}"
+        lines += _explained(body, comment(into, steps[: n + 1]), " " * (indent + 2 * (n - depth)))
+    return lines
+
+
+def _explained(body: str, says: str, indent: str) -> list[str]:
+    """Put a comment behind a line, or above it where it is too long."""
+    line = f"{indent}{body}"
+    if not says:
+        return [line]
+    if len(line) + len(says) + 4 <= WIDTH:
+        return [f"{line}  # {says}"]
+    above = textwrap.wrap(says, WIDTH - len(indent) - 2)
+    return [*(f"{indent}# {part}" for part in above), line]
+
+
+def comment(into: type, steps: list[str]) -> str:
+    """Say unit, range and meaning of the key at a path; "" where the file may hold no such key."""
+    shape: Shape | None = Shape("params", params=into)
+    for step in steps:
+        if shape is None:
+            return ""
+        shape = shapes_of(shape.params).get(step) if shape.params is not None else shape.inner
+    return _described(shape) if shape is not None else ""
+
+
+def _described(shape: Shape) -> str:
+    inner = shape.inner or shape
+    limits = " | ".join(map(str, inner.choices))
+    if inner.low is not None and inner.high is not None:
+        limits = f"{inner.low:.12g}..{inner.high:.12g}"
+    return "; ".join(filter(None, (", ".join(filter(None, (shape.unit, limits))), shape.says)))

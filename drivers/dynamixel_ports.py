@@ -1,0 +1,160 @@
+"""Serial ports of this computer as the system shows them: who may open them, who holds them.
+
+Nothing is opened here. ``Host`` names the places of the system that are looked into, so
+that another tree can stand in for them.
+"""
+
+import contextlib
+import grp
+import os
+import stat
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from serial.tools import list_ports
+
+WISHED_LATENCY_MS = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Host:
+    """Where the system tells about ports.
+
+    latency: one folder a USB serial device, with its latency_timer in ms
+    by_id: links named after the adapter, the same after every plugging
+    processes: one folder a process
+    """
+
+    latency: Path = Path("/sys/bus/usb-serial/devices")
+    by_id: Path = Path("/dev/serial/by-id")
+    processes: Path = Path("/proc")
+
+
+class SerialPort(NamedTuple):
+    """One serial port.
+
+    device: path to open; by_id: the same by its lasting name, None where it has none
+    usb: USB vendor and product id, "0403:6014"; "" for a port that is not on USB
+    """
+
+    device: str
+    description: str
+    usb: str
+    by_id: str | None
+
+
+class Access(NamedTuple):
+    """What this user may do with a path.
+
+    exists: there is such a file; serial: it is a device of its own kind, no plain file
+    allowed: it may be read and written
+    group: the group that may; joined: this user is in it (but perhaps not this session)
+    """
+
+    exists: bool
+    serial: bool
+    allowed: bool
+    group: str
+    joined: bool
+
+
+def serial_ports(host: Host | None = None) -> tuple[SerialPort, ...]:
+    """List the serial ports there are, those on USB first."""
+    names = _lasting_names((host or Host()).by_id)
+    ports = [
+        SerialPort(
+            port.device,
+            port.description,
+            f"{port.vid:04x}:{port.pid:04x}" if port.vid is not None else "",
+            names.get(os.path.realpath(port.device)),
+        )
+        for port in list_ports.comports()
+    ]
+    return tuple(sorted(ports, key=lambda port: (not port.usb, port.device)))
+
+
+def _lasting_names(by_id: Path) -> dict[str, str]:
+    """Give the lasting name of every device that has one."""
+    if not by_id.is_dir():
+        return {}
+    return {os.path.realpath(link): str(link) for link in sorted(by_id.iterdir())}
+
+
+def access(device: str) -> Access:
+    """Tell whether this user may open a path."""
+    try:
+        found = os.stat(device)
+    except OSError:
+        return Access(False, False, False, "", False)
+    allowed = os.access(device, os.R_OK | os.W_OK)
+    group, members = str(found.st_gid), []
+    with contextlib.suppress(KeyError):
+        entry = grp.getgrgid(found.st_gid)
+        group, members = entry.gr_name, entry.gr_mem
+    joined = found.st_gid in os.getgroups() or _user() in members
+    return Access(True, stat.S_ISCHR(found.st_mode), allowed, group, joined)
+
+
+def _user() -> str:
+    return os.environ.get("USER", "")
+
+
+def holders(device: str, host: Host | None = None) -> tuple[str, ...]:
+    """Name the other programs that hold a port open, "python3 (process 1234)".
+
+    Only those that this user may look into are found.
+    """
+    real, own = os.path.realpath(device), str(os.getpid())
+    if real.startswith("/dev/pts/"):  # the program that serves a pseudo-terminal holds it too
+        return ()
+    found = []
+    for process in sorted((host or Host()).processes.glob("[0-9]*")):
+        if process.name != own and real in _open_files(process):
+            found.append(f"{_program(process)} (process {process.name})")
+    return tuple(found)
+
+
+def _open_files(process: Path) -> Iterable[str]:
+    """List the files a process has open; none where it may not be looked into."""
+    files = []
+    with contextlib.suppress(OSError):
+        for link in (process / "fd").iterdir():
+            with contextlib.suppress(OSError):
+                files.append(os.readlink(link))
+    return files
+
+
+def _program(process: Path) -> str:
+    try:
+        return (process / "comm").read_text(encoding="utf-8").strip()
+    except (OSError, ValueError):
+        return "a program"
+
+
+# --- latency timer of FTDI adaptors
+
+
+def latency_file(device: str, host: Host | None = None) -> Path | None:
+    """Give the file that holds the adaptor's latency timer, None where it has none."""
+    name = Path(os.path.realpath(device)).name
+    file = (host or Host()).latency / name / "latency_timer"
+    return file if file.is_file() else None
+
+
+def latency_ms(file: Path) -> int | None:
+    """Read a latency timer, None where it cannot be read."""
+    try:
+        return int(file.read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return None
+
+
+def set_latency(file: Path, ms: int = WISHED_LATENCY_MS) -> bool:
+    """Write a latency timer; tells whether the adaptor has it now. Needs the right to write."""
+    try:
+        file.write_text(f"{ms}\n", encoding="ascii")
+    except OSError:
+        return False
+    return latency_ms(file) == ms

@@ -1,0 +1,156 @@
+"""How a joint's command may move: range, speed, acceleration and room to brake. Radians.
+
+Every step keeps p + v^2 / 2a inside the range that is in force. As v^2 / 2a bounds every
+later sequence of braking steps, a joint that keeps this can always stop in time, whatever
+the length of the ticks to come.
+"""
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+_ROUNDING_RAD = 1e-9
+
+
+class JointLimit(NamedTuple):
+    """One joint's range, top speed and top acceleration (rad, rad/s, rad/s^2).
+
+    The rest is what the joint's servo bears before it switches itself off: degrees
+    Celsius, lowest and highest volts.
+    """
+
+    low_rad: float
+    high_rad: float
+    speed_rad_s: float
+    accel_rad_s2: float
+    hottest_c: float = 70.0
+    lowest_v: float = 0.0
+    highest_v: float = inf
+
+
+class Motion:
+    """The commands of all joints and their speeds, moved one step at a time.
+
+    command, speed: what was sent last
+    low, high: the ranges in force; a wall inside a joint's own range may be put up as
+        long as the joint can stop before it (``keeps_below``, ``keeps_above``)
+    """
+
+    def __init__(self, limits: tuple[JointLimit, ...]) -> None:
+        """Begin in the middle of every range."""
+        self.limits = limits
+        self.command = [0.5 * (limit.low_rad + limit.high_rad) for limit in limits]
+        self.speed = [0.0] * len(limits)
+        self.low = [limit.low_rad for limit in limits]
+        self.high = [limit.high_rad for limit in limits]
+        self._wished = list(self.command)
+
+    def restart(self, i: int, angle_rad: float) -> None:
+        """Begin anew from an angle, clipped into the range, at rest."""
+        limit = self.limits[i]
+        self.command[i] = min(max(angle_rad, limit.low_rad), limit.high_rad)
+        self._wished[i] = self.command[i]
+        self.speed[i] = 0.0
+
+    def keeps_below(self, i: int, wall_rad: float) -> bool:
+        """Tell whether a joint is below a wall and can stop there."""
+        p, v = self.command[i], self.speed[i]
+        stop = p + 0.5 * v * v / self.limits[i].accel_rad_s2 if v > 0.0 else p
+        return stop <= wall_rad + _ROUNDING_RAD
+
+    def keeps_above(self, i: int, wall_rad: float) -> bool:
+        """Tell whether a joint is above a wall and can stop there."""
+        p, v = self.command[i], self.speed[i]
+        stop = p - 0.5 * v * v / self.limits[i].accel_rad_s2 if v < 0.0 else p
+        return stop >= wall_rad - _ROUNDING_RAD
+
+    def follow(self, i: int, wish: float, dt_s: float) -> bool:
+        """Go where the wish is, if that keeps every limit; else do nothing and say no.
+
+        Who is still catching up would run past the wish: that is for ``chase``.
+        """
+        limit = self.limits[i]
+        accel = limit.accel_rad_s2
+        p, v = self.command[i], self.speed[i]
+        wanted = (wish - p) / dt_s
+        step, top = accel * dt_s, limit.speed_rad_s
+        if not (-top <= wanted <= top and v - step <= wanted <= v + step):
+            return False
+        if not -step * dt_s <= self._wished[i] - p <= step * dt_s:
+            return False
+        brake = 0.5 * wanted * wanted / accel
+        if wish + brake > self.high[i] if wanted > 0.0 else wish - brake < self.low[i]:
+            return False
+        self.command[i] = self._wished[i] = wish
+        self.speed[i] = wanted
+        return True
+
+    def chase(self, i: int, wish: float, dt_s: float, top: float, soft: float) -> None:
+        """Catch up with a wish that moves and fall into its pace."""
+        target = min(max(wish, self.low[i]), self.high[i])
+        along = (target - self._wished[i]) / dt_s
+        if not -top <= along <= top:  # it jumped, or is too fast: there is no pace to fall into
+            along = 0.0
+        self.seek(i, wish, dt_s, top, soft, along)
+
+    def seek(
+        self, i: int, wish: float, dt_s: float, top: float, soft: float, along: float = 0.0
+    ) -> None:
+        """Go to a wish below a speed ``top``, gathering it with ``soft``, to end there.
+
+        Braking may take all of the joint's own acceleration, as a slow passage may begin
+        in full flight.
+
+        top, soft: the joint's own speed and acceleration hold all the same
+        along: the speed of the wish itself
+        """
+        top = min(top, self.limits[i].speed_rad_s)
+        soft = min(soft, self.limits[i].accel_rad_s2)
+        target = min(max(wish, self.low[i]), self.high[i])
+        gap = target - along * dt_s - self.command[i]
+        closing = reachable_speed(abs(gap), soft, dt_s)
+        self._wished[i] = target
+        self._step(i, along + (closing if gap >= 0.0 else -closing), dt_s, top, soft)
+
+    def brake(self, i: int, dt_s: float) -> None:
+        """Come to a stop as fast as the joint may."""
+        limit = self.limits[i]
+        self._step(i, 0.0, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
+        self._wished[i] = self.command[i]
+
+    def _step(self, i: int, wanted: float, dt_s: float, top: float, soft: float) -> None:
+        """Take the speed nearest to the wanted one that keeps every limit."""
+        accel = self.limits[i].accel_rad_s2
+        p, v, low, high = self.command[i], self.speed[i], self.low[i], self.high[i]
+        most, least = _faster(v, accel, soft, dt_s), -_faster(-v, accel, soft, dt_s)
+        chosen = most if wanted > most else least if wanted < least else wanted
+        # Top speed, range and braking distance win over softness, never over the joint's own
+        # acceleration, which is enough for them as long as every step is taken here.
+        if chosen > 0.0 or v > 0.0:
+            up = min(top, reachable_speed(high - p, accel, dt_s))
+            if chosen > up:
+                chosen = max(up, v - accel * dt_s)
+        if chosen < 0.0 or v < 0.0:
+            down = -min(top, reachable_speed(p - low, accel, dt_s))
+            if chosen < down:
+                chosen = min(down, v + accel * dt_s)
+        moved = p + chosen * dt_s
+        moved = low if moved < low else high if moved > high else moved
+        self.command[i] = moved
+        self.speed[i] = (moved - p) / dt_s
+
+
+def reachable_speed(room_rad: float, accel: float, dt_s: float) -> float:
+    """Give the highest speed for one step after which a stop within the room is possible.
+
+    Solves v dt + v^2 / 2a = room for v.
+    """
+    half = accel * dt_s
+    return sqrt(half * half + 2.0 * accel * max(0.0, room_rad)) - half
+
+
+def _faster(v: float, accel: float, soft: float, dt_s: float) -> float:
+    """Give the highest speed after one step: braking to rest is hard, what follows is soft."""
+    if v >= 0.0:
+        return v + soft * dt_s
+    at_rest_s = -v / accel
+    return v + accel * dt_s if at_rest_s >= dt_s else soft * (dt_s - at_rest_s)

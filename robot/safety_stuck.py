@@ -1,0 +1,128 @@
+"""Joints that are told to move and do not: a jam, a blocked lid, a finger.
+
+A servo pushes harder the farther its goal is away, so what does not move must not be
+pushed: the command comes back to where the joint is, waits, and tries again softly.
+"""
+
+from dataclasses import dataclass, field
+from math import nan, radians
+
+
+@dataclass(frozen=True)
+class StuckParams:
+    """When a joint counts as stuck, and how it tries again."""
+
+    stuck_deg: float = field(
+        default=3.0,
+        metadata={
+            "low": 0.5,
+            "high": 45.0,
+            "unit": "deg",
+            "says": "a joint this far from its command ought to be moving; more than friction "
+            "and weight leave",
+        },
+    )
+    moved_deg: float = field(
+        default=0.5,
+        metadata={
+            "low": 0.1,
+            "high": 10.0,
+            "unit": "deg",
+            "says": "a way towards the command that counts as moving",
+        },
+    )
+    # Dead time of a healthy servo is some 30 ms; with an answer's age and one tick more the
+    # joint is found within 200 ms.
+    stuck_ms: float = field(
+        default=150.0,
+        metadata={
+            "low": 50.0,
+            "high": 5000.0,
+            "unit": "ms",
+            "says": "a joint that has not moved for so long is stuck: it stops pushing",
+        },
+    )
+    retry_ms: float = field(
+        default=1000.0,
+        metadata={
+            "low": 100.0,
+            "high": 60000.0,
+            "unit": "ms",
+            "says": "a stuck joint tries again, slowly, after so long",
+        },
+    )
+    retry_deg: float = field(
+        default=4.5,
+        metadata={
+            "low": 0.5,
+            "high": 45.0,
+            "unit": "deg",
+            "says": "then the command is never farther ahead of the joint, so it pushes weakly",
+        },
+    )
+
+    def __post_init__(self) -> None:
+        """Check that a joint that tries again can be found stuck again.
+
+        Raises:
+            ValueError: it could not; the message says what would do.
+        """
+        if self.retry_deg <= self.stuck_deg:
+            raise ValueError(f"retry_deg {self.retry_deg} must be above stuck_deg {self.stuck_deg}")
+        if self.moved_deg >= self.stuck_deg:
+            raise ValueError(f"moved_deg {self.moved_deg} must be below stuck_deg {self.stuck_deg}")
+
+
+class Stuck:
+    """Watches how joints follow their commands.
+
+    far_rad: joints nearer to their commands than this are well
+    lead_rad: how far a command may be ahead of a joint that tries again
+    watched: side of the joint on which its command is far away, 0 where it is near
+    """
+
+    def __init__(self, params: StuckParams, count: int) -> None:
+        """Find all joints well."""
+        self._stuck_s = params.stuck_ms / 1e3
+        self._retry_s = params.retry_ms / 1e3
+        self._moved_rad = radians(params.moved_deg)
+        self.far_rad = radians(params.stuck_deg)
+        self.lead_rad = radians(params.retry_deg)
+        self.watched = [0] * count
+        self._since_s = [0.0] * count
+        self._anchor_rad = [0.0] * count
+        self._until_s = [nan] * count
+
+    def forget(self, i: int) -> None:
+        """Find a joint well: it rests on its command."""
+        self.watched[i] = 0
+        self._until_s[i] = nan
+
+    def holds(self, i: int, t_s: float) -> bool:
+        """Tell whether a joint was found stuck and has not waited long enough."""
+        if t_s >= self._until_s[i]:
+            self.forget(i)
+        return t_s < self._until_s[i]
+
+    def found(self, i: int, command: float, position: float, at_s: float, t_s: float) -> bool:
+        """Look at one fresh answer; tell whether the joint is stuck from now on.
+
+        Only motion towards the command counts: who drags a joint the other way is to be
+        given way to.
+
+        at_s: when the answer came
+        """
+        lead = command - position
+        if -self.far_rad <= lead <= self.far_rad:
+            self.watched[i] = 0
+            return False
+        side = 1 if lead > 0.0 else -1
+        begins = side != self.watched[i]
+        if begins or (position - self._anchor_rad[i]) * side > self._moved_rad:
+            self.watched[i], self._since_s[i], self._anchor_rad[i] = side, at_s, position
+            return False
+        if at_s - self._since_s[i] < self._stuck_s:
+            return False
+        self.watched[i] = 0
+        self._until_s[i] = t_s + self._retry_s
+        return True

@@ -1,0 +1,191 @@
+"""Leading a joint slowly to its stop, and knowing when it is there. Pure.
+
+The goal runs ahead of the joint by a few degrees at most, so the servo pushes no harder
+than its position gain makes of that; where the joint stands still although it is pushed,
+its stop is reached and the goal goes back at once. It cannot tell a stop from a finger:
+both are treated alike, gently and for half a second at the longest.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+from drivers.dynamixel_table import STEPS_PER_TURN
+
+STEPS_PER_DEG = STEPS_PER_TURN / 360.0
+
+NEAR_DEG = 1.0
+"""With its factory gains a servo comes no nearer to its goal than that under a light load."""
+
+BACK_OFF_EXCHANGES = 25
+"""Half a second at 50 Hz, for the way back from a stop."""
+
+
+@dataclass(frozen=True)
+class StopSearchParams:
+    """How gently to look for a stop; angles are those of the servo."""
+
+    speed_deg_s: float = field(
+        default=15.0,
+        metadata={"low": 1.0, "high": 60.0, "unit": "deg/s", "says": "speed of the search"},
+    )
+    strength: float = field(
+        default=0.3,
+        metadata={
+            "low": 0.05,
+            "high": 1.0,
+            "unit": "",
+            "says": "the servo's Goal PWM as a share of its limit, so of its stall torque",
+        },
+    )
+    lead_deg: float = field(
+        default=8.0,
+        metadata={
+            "low": 1.0,
+            "high": 30.0,
+            "unit": "deg",
+            "says": "the goal is never farther ahead of the joint",
+        },
+    )
+    progress_deg: float = field(
+        default=0.3,
+        metadata={
+            "low": 0.1,
+            "high": 5.0,
+            "unit": "deg",
+            "says": "a smaller advance counts as standing still",
+        },
+    )
+    touch_share: float = field(
+        default=0.15,
+        metadata={
+            "low": 0.01,
+            "high": 1.0,
+            "unit": "",
+            "says": "share of the stall current that, standing still, is a push",
+        },
+    )
+    touch_ms: float = field(
+        default=200.0,
+        metadata={
+            "low": 20.0,
+            "high": 500.0,
+            "unit": "ms",
+            "says": "standing still under such a current for so long is a stop",
+        },
+    )
+    longest_push_ms: float = field(
+        default=450.0,
+        metadata={
+            "low": 50.0,
+            "high": 500.0,
+            "unit": "ms",
+            "says": "standing still for so long is a stop whatever the current",
+        },
+    )
+    back_off_deg: float = field(
+        default=3.0,
+        metadata={
+            "low": 0.5,
+            "high": 20.0,
+            "unit": "deg",
+            "says": "so far the joint goes back from its stop",
+        },
+    )
+
+
+class Stop(NamedTuple):
+    """Where a search ended, in unwrapped steps.
+
+    kind: "stop", pushed and did not move; "limit", the end of what the servo allows
+    pushed_s: time for which it stood still under the goal
+    """
+
+    position_steps: int
+    kind: Literal["stop", "limit"]
+    pushed_s: float
+
+
+class StopSearch:
+    """One search in one direction; ask ``step`` for the goal until ``found`` is not None.
+
+    Args:
+        params: how gently.
+        direction: 1 towards more steps, -1 towards fewer.
+        low, high: the goals that the servo allows, in steps.
+    """
+
+    def __init__(self, params: StopSearchParams, direction: int, low: int, high: int) -> None:
+        self._params = params
+        self._way = direction
+        self._end = high if direction > 0 else low
+        self._room = (low, high)
+        self._goal: float | None = None
+        self.found: Stop | None = None
+
+    def step(self, position_steps: int, load: float, t_s: float) -> int:
+        """Take a measurement, give the goal; after the end the goal that backs off.
+
+        load: present current as a share of the stall current, 0 where it is not known
+        """
+        par, way = self._params, self._way
+        if self._goal is None:
+            self._goal = self._best = float(position_steps)
+            self._moved_s = self._t_s = t_s
+        if self.found is None:
+            if (position_steps - self._best) * way > par.progress_deg * STEPS_PER_DEG:
+                self._best, self._moved_s = float(position_steps), t_s
+            self.found = self._judge(position_steps, load, t_s)
+        if self.found is not None:
+            back = self.found.position_steps - way * par.back_off_deg * STEPS_PER_DEG
+            return self._within(back)
+        ahead = self._goal + way * par.speed_deg_s * STEPS_PER_DEG * (t_s - self._t_s)
+        most = position_steps + way * par.lead_deg * STEPS_PER_DEG
+        nearer = min if way > 0 else max
+        self._goal, self._t_s = nearer(ahead, most, self._end), t_s
+        return self._within(self._goal)
+
+    def _judge(self, position_steps: int, load: float, t_s: float) -> Stop | None:
+        par = self._params
+        still_s = t_s - self._moved_s
+        near = (self._end - position_steps) * self._way <= NEAR_DEG * STEPS_PER_DEG
+        if near:
+            return Stop(position_steps, "limit", still_s)
+        pushed = abs(load) >= par.touch_share and still_s >= par.touch_ms / 1e3
+        if pushed or still_s >= par.longest_push_ms / 1e3:
+            return Stop(position_steps, "stop", still_s)
+        return None
+
+    def _within(self, goal: float) -> int:
+        low, high = self._room
+        return round(min(max(goal, low), high))
+
+
+Exchange = Callable[[int | None], tuple[int, float, float]]
+"""Sends a goal (None: none) and gives position in steps, load share and time in seconds."""
+
+
+def search(
+    params: StopSearchParams, direction: int, limits: tuple[int, int], exchange: Exchange
+) -> Stop:
+    """Run one search to its end and the way back; gives where the stop is."""
+    look = StopSearch(params, direction, *limits)
+    goal: int | None = None
+    while look.found is None:
+        goal = look.step(*exchange(goal))
+    for _ in range(BACK_OFF_EXCHANGES):
+        exchange(goal)
+    return look.found
+
+
+def go(goal_steps: int, params: StopSearchParams, exchange: Exchange) -> bool:
+    """Lead a joint slowly to a position; tells whether it came there unhindered."""
+    position, _, _ = exchange(None)
+    way = 1 if goal_steps > position else -1
+    look = StopSearch(params, way, min(goal_steps, position), max(goal_steps, position))
+    goal: int | None = None
+    while look.found is None:
+        goal = look.step(*exchange(goal))
+    free = look.found.kind == "limit"
+    exchange(goal_steps if free else goal)
+    return free

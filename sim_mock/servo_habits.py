@@ -1,0 +1,77 @@
+"""What servos do where documents and devices are silent or differ.
+
+Sources: ROBOTIS e-Manual, Protocol 2.0; the device side of ROBOTIS' Dynamixel2Arduino
+(silent on a wrong CRC); logic analyser traces published by users of ROBOTIS' SDK (later
+servos of a group wait for a missing one). Times marked [A] are assumed.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+AfterMissing = Literal["silence", "skip", "timeout"]
+BadCrc = Literal["silent", "reply"]
+Stuffing = Literal["accept", "strict"]
+WrongBaud = Literal["silence", "garbage"]
+
+
+@dataclass(frozen=True)
+class Habits:
+    """The choices.
+
+    after_missing: what servos do that come after a silent one in a plain group read:
+        never answer, answer at once, or answer after ``slot_timeout_s`` [A]
+    bad_crc: a wrong CRC is met with silence or with error number 3
+    stuffing: an instruction with FF FF FD among its parameters that was not stuffed is
+        understood by its length, or dropped
+    wrong_baud: a client at another baud rate hears nothing, or garbage
+    packet_gap_s: a packet that stays unfinished so long is dropped
+    """
+
+    after_missing: AfterMissing = "silence"
+    bad_crc: BadCrc = "silent"
+    stuffing: Stuffing = "accept"
+    wrong_baud: WrongBaud = "silence"
+    slot_timeout_s: float = 0.001
+    packet_gap_s: float = 0.0015
+
+
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "after_missing": get_args(AfterMissing),
+    "bad_crc": get_args(BadCrc),
+    "stuffing": get_args(Stuffing),
+    "wrong_baud": get_args(WrongBaud),
+}
+_TIMES = {"slot_timeout_ms": "slot_timeout_s", "packet_gap_ms": "packet_gap_s"}
+
+
+def cases() -> dict[str, str]:
+    """Give the name of every case, as it is typed, and its possible values."""
+    named = {name.replace("_", "-"): "|".join(values) for name, values in _CHOICES.items()}
+    return named | {name.replace("_", "-"): "MS" for name in _TIMES} | {"baud": "heed|any"}
+
+
+def chosen(habits: Habits, case: str, value: str) -> Habits:
+    """Give the habits with one case decided otherwise.
+
+    Raises:
+        ValueError: there is no such case or value.
+    """
+    name = case.replace("-", "_")
+    if name in _TIMES:
+        time_s = _milliseconds(case, value) / 1000.0
+        return replace(habits, **{_TIMES[name]: time_s})  # type: ignore[arg-type]
+    if name not in _CHOICES:
+        raise ValueError(f"set {case!r}: unknown; there is {', '.join(cases())}")
+    if value not in _CHOICES[name]:
+        raise ValueError(f"{case} {value!r}: it can be {', '.join(_CHOICES[name])}")
+    return replace(habits, **{name: value})  # type: ignore[arg-type]
+
+
+def _milliseconds(case: str, value: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = -1.0
+    if not 0.0 <= number < 1e6:
+        raise ValueError(f"{case} {value!r}: not a number of milliseconds of 0 or more")
+    return number

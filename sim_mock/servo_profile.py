@@ -1,0 +1,176 @@
+"""The profile generator of an emulated servo: from a goal to a position for every millisecond.
+
+Units: steps and milliseconds. The path to a goal is planned once, in closed form, from
+where the generator is and how fast it moves: a phase that reaches the cruise speed, one
+that holds it, one that brakes. So what it gives does not depend on how it is asked.
+Source: ROBOTIS e-Manual, X series, "What is the Profile".
+"""
+
+from math import sqrt
+
+STEP, RECTANGLE, TRIANGLE, TRAPEZOID = 0, 1, 2, 3
+"""Profile types as bits 4-5 of Moving Status (123) name them."""
+
+
+class Profile:
+    """Position and speed that the shaft should have.
+
+    r, v: position in steps and speed in steps/ms now
+    goal: where it leads
+    kind: profile type
+    running: whether it is still on its way
+    """
+
+    __slots__ = (
+        "_cruise", "_from", "_out", "_p1", "_slow", "_start", "_t", "_t1", "_t2", "_t3",
+        "goal", "kind", "r", "running", "v",
+    )  # fmt: skip
+
+    def __init__(self, position: float) -> None:
+        self.rest(position)
+
+    @property
+    def jumps(self) -> bool:
+        """Tell whether it has no speed to follow: Velocity Trajectory of a step is 0."""
+        return self.kind == STEP
+
+    def rest(self, position: float) -> None:
+        """Stand at a position."""
+        self.r = self.goal = position
+        self.v = 0.0
+        self.kind = STEP
+        self.running = False
+
+    def step(self, goal: float) -> None:
+        """Jump to a goal with the next millisecond."""
+        self.goal = goal
+        self.kind = STEP
+        self.running = True
+        self._t = 0
+        self._t1 = self._t2 = self._t3 = 0.0
+
+    def by_velocity(self, goal: float, cruise: float, ramp: float) -> None:
+        """Lead to a goal at a speed (steps/ms, 0: step) with a ramp (steps/ms2, 0: rectangle)."""
+        if cruise <= 0.0:
+            self.step(goal)
+        elif ramp <= 0.0:
+            # The everyday one, two hundred times a second: planned here, at once.
+            distance = goal - self.r
+            self.goal, self.kind, self.running = goal, RECTANGLE, True
+            self._t, self._t1, self._p1, self._slow = 0, 0.0, self.r, 0.0
+            self._cruise = cruise if distance >= 0.0 else -cruise
+            self._t2 = self._t3 = distance / self._cruise
+        else:
+            self._ramps(goal, cruise, ramp)
+
+    def by_time(self, goal: float, total_ms: float, ramp_ms: float) -> None:
+        """Lead to a goal in a time (0: step), of which ramps take their part, half at most."""
+        distance = goal - self.r
+        if total_ms <= 0.0:
+            self.step(goal)
+        elif ramp_ms <= 0.0:
+            self._plan(goal, RECTANGLE, distance / total_ms, 0.0, total_ms, 0.0)
+        else:
+            ramp_ms = min(ramp_ms, 0.5 * total_ms)
+            cruise = (distance - 0.5 * self.v * ramp_ms) / (total_ms - ramp_ms)
+            kind = TRIANGLE if ramp_ms == 0.5 * total_ms else TRAPEZOID
+            self._plan(goal, kind, cruise, ramp_ms, total_ms - 2.0 * ramp_ms, ramp_ms)
+
+    def _ramps(self, goal: float, cruise: float, ramp: float) -> None:
+        """Plan by velocity and acceleration from the present speed."""
+        distance = goal - self.r
+        side = 1.0 if distance >= self.v * abs(self.v) / (2.0 * ramp) else -1.0
+        start, ahead = side * self.v, side * distance
+        if start > cruise:
+            top = cruise
+        else:
+            top = min(cruise, sqrt(max(0.0, ramp * ahead + 0.5 * start * start)))
+        first = abs(top - start) / ramp
+        left = ahead - 0.5 * (start + top) * first - 0.5 * top * top / ramp
+        flat = max(0.0, left / top) if top > 0.0 else 0.0
+        kind = TRAPEZOID if flat > 0.0 else TRIANGLE
+        self._plan(goal, kind, side * top, first, flat, top / ramp)
+
+    def _plan(
+        self, goal: float, kind: int, cruise: float, first: float, flat: float, last: float
+    ) -> None:
+        """Take a plan: phases of ``first``, ``flat`` and ``last`` ms around a cruise speed."""
+        start = self.v if first > 0.0 else cruise
+        self.goal, self.kind, self.running = goal, kind, True
+        self._t, self._from, self._start, self._cruise = 0, self.r, start, cruise
+        self._t1, self._t2, self._t3 = first, first + flat, first + flat + last
+        self._out = 0.5 * (cruise - start) / first if first > 0.0 else 0.0
+        self._p1 = self.r + 0.5 * (start + cruise) * first
+        self._slow = 0.5 * cruise / last if last > 0.0 else 0.0
+
+    def ahead(self, ticks: int) -> list[float]:
+        """Give the positions of the next milliseconds and go on by them."""
+        if not self.running:
+            return [self.goal] * ticks
+        begun, t1, t2, t3, goal = self._t, self._t1, self._t2, self._t3, self.goal
+        if t3 <= begun + 1:
+            self.r, self.v, self.running = goal, 0.0, False
+            return [goal] * ticks
+        path = []
+        for t in range(begun + 1, begun + ticks + 1):
+            if t < t1:
+                path.append(self._from + t * (self._start + t * self._out))
+            elif t < t2:
+                path.append(self._p1 + (t - t1) * self._cruise)
+            elif t < t3:
+                path.append(goal - (t3 - t) * (t3 - t) * self._slow)
+            else:
+                path.append(goal)
+        self.r = path[-1]
+        self._t = begun + ticks
+        self._speed(begun + ticks)
+        return path
+
+    def _speed(self, t: int) -> None:
+        """Bring the speed up to a time of the plan."""
+        if t < self._t1:
+            self.v = self._start + 2.0 * t * self._out
+        elif t < self._t2:
+            self.v = self._cruise
+        elif t < self._t3:
+            self.v = 2.0 * (self._t3 - t) * self._slow
+        else:
+            self.v = 0.0
+            self.running = False
+
+
+class SpeedProfile:
+    """What Profile is to a position, for the velocity mode: a ramp to a speed.
+
+    ``r`` counts on from where it started; only its changes matter.
+    """
+
+    jumps = False
+
+    __slots__ = ("_ramp", "goal", "kind", "r", "running", "v")
+
+    def __init__(self, position: float, speed: float) -> None:
+        self.r, self.v, self.goal = position, speed, 0.0
+        self._ramp = 0.0
+        self.kind = STEP
+        self.running = False
+
+    def aim(self, speed: float, ramp: float) -> None:
+        """Lead to a speed (steps/ms) with a ramp (steps/ms2, 0: at once)."""
+        self.goal = speed
+        self._ramp = ramp
+        self.kind = TRAPEZOID if ramp > 0.0 else STEP
+        self.running = speed != self.v or speed != 0.0
+
+    def ahead(self, ticks: int) -> list[float]:
+        """Give the positions of the next milliseconds and go on by them."""
+        r, v, goal, ramp, path = self.r, self.v, self.goal, self._ramp, []
+        for _ in range(ticks):
+            if v != goal:
+                left = goal - v
+                v = goal if ramp <= 0.0 or abs(left) <= ramp else v + (ramp if left > 0 else -ramp)
+            r += v
+            path.append(r)
+        self.r, self.v = r, v
+        self.running = v != 0.0 or goal != 0.0
+        return path

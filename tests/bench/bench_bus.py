@@ -1,0 +1,375 @@
+"""What the servo driver costs and survives: python tests/bench/bench_bus.py [--seconds 20]
+
+One run, nine emulated servos, side by side with the maker's SDK and rustypot on the same
+bus: loop rate against the wire's own limit, processor time a cycle, a silent servo, an
+unplugged adapter, and faults by the dice with a count of stale values. Nothing here passes
+or fails: machines differ and are shared, so compare figures of one run with each other.
+"""
+
+import argparse
+import os
+import random
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import count
+from statistics import fmean, median
+from typing import NamedTuple
+
+from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler, PortHandler
+from rich.console import Console
+from rich.table import Table
+from rustypot import Xl330PyController
+
+from drivers.dynamixel import DynamixelBus, DynamixelParams
+from drivers.dynamixel_port import BlockingPort
+from drivers.types import ServoSetup
+from sim_mock.ports import InProcessPort
+from sim_mock.pty_bus import PtyBus
+from sim_mock.servo import ServoSpec
+from sim_mock.servo_chain import build_chain
+
+IDS = tuple(range(1, 10))
+MODEL = "xl330-m077"
+SPECS = [ServoSpec(i, MODEL, 2048) for i in IDS]
+SETUPS = [ServoSetup(i, MODEL, 1000, 3000, 6000.0, f"joint_{i}") for i in IDS]
+WIRE_BYTES = 59 + 23 + 134
+"""Sync write of nine goals, fast sync read of 10 bytes from nine servos, and its answer."""
+
+Cycle = Callable[[int], int]
+"""Reads all servos and writes goals; takes a number, gives how many values came."""
+
+out = Console(width=110)
+
+
+def main() -> None:
+    """Run all parts and print their figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=20.0, help="for all parts together")
+    share = parser.parse_args().seconds / 40.0
+    out.print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.2f} at the start")
+    rates(2.0 * share)
+    line_alone()
+    silent_servo(max(500, int(3000 * share)))
+    unplug(max(2, int(4 * share)))
+    dice(int(60 * 100 * share))
+
+
+# --- the three clients
+
+
+@contextmanager
+def ours(path: str, baud: int, **chosen: object) -> Iterator[Cycle]:
+    """Our driver, its torque on."""
+    params = DynamixelParams(baud=baud, **chosen)  # type: ignore[arg-type]
+    bus = DynamixelBus(BlockingPort(path), SETUPS, params)
+    bus.open()
+    bus.engage()
+
+    def cycle(k: int) -> int:
+        readings = bus.read(time.monotonic())
+        bus.write([2048 + k % 8] * len(IDS))
+        return len(IDS) - readings.count(None)
+
+    try:
+        yield cycle
+    finally:
+        bus.release()
+        bus.close()
+
+
+@contextmanager
+def sdk(path: str, baud: int) -> Iterator[Cycle]:
+    """The maker's SDK: fast sync read of 10 bytes, sync write."""
+    port, packets = PortHandler(path), PacketHandler(2.0)
+    port.openPort()
+    port.setBaudRate(baud)
+    reads, writes = GroupSyncRead(port, packets, 126, 10), GroupSyncWrite(port, packets, 116, 4)
+    for servo_id in IDS:
+        reads.addParam(servo_id)
+
+    def cycle(k: int) -> int:
+        reads.fastSyncRead()
+        values = [reads.getData(i, 132, 4) for i in IDS if reads.isAvailable(i, 132, 4)]
+        writes.clearParam()
+        for servo_id in IDS:
+            writes.addParam(servo_id, (2048 + k % 8).to_bytes(4, "little"))
+        writes.txPacket()
+        return len(values)
+
+    try:
+        yield cycle
+    finally:
+        port.closePort()
+
+
+@contextmanager
+def rusty(path: str, baud: int) -> Iterator[Cycle]:
+    """rustypot: fast sync read of the position alone (it reads one register), sync write."""
+    client = Xl330PyController(path, baud, 0.05)
+    client.set_fast_sync_read(True)
+    ids = list(IDS)
+
+    def cycle(k: int) -> int:
+        try:
+            values = len(client.sync_read_raw_present_position(ids))
+        except (OSError, RuntimeError, ValueError):
+            values = 0
+        client.sync_write_raw_goal_position(ids, [2048 + k % 8] * len(ids))
+        return values
+
+    yield cycle
+
+
+# --- (a) and (b): rate and processor time
+
+
+class Figures(NamedTuple):
+    """Of one client: cycles a second, median cycle and processor time a cycle."""
+
+    rate_hz: float
+    median_us: float
+    cpu_us: float
+
+
+def measure(cycle: Cycle, seconds: float) -> Figures:
+    """Run cycles without a pause."""
+    for k in range(300):
+        cycle(k)
+    spans = []
+    cpu, start = time.process_time(), time.perf_counter()
+    now = start
+    for k in count():
+        cycle(k)
+        before, now = now, time.perf_counter()
+        spans.append(now - before)
+        if now - start >= seconds:
+            break
+    used = time.process_time() - cpu
+    return Figures(len(spans) / (now - start), median(spans) * 1e6, used / len(spans) * 1e6)
+
+
+def rates(seconds: float) -> None:
+    """Print rate and processor time, without wire time and at two speeds of the wire."""
+    for baud, wire in ((1_000_000, False), (1_000_000, True), (4_000_000, True)):
+        limit_hz = baud / (10.0 * WIRE_BYTES)
+        what = f"wire at {baud // 1_000_000} Mbaud, limit {limit_hz:.0f} Hz" if wire else "no wire"
+        table = Table("client", "reads", "Hz", "of limit", "p50 us", "CPU us", title=what)
+        clients: list[tuple[str, str, Callable[[str], object]]] = [
+            ("ours", "10 B", lambda path, b=baud: ours(path, b, indirect_block=False)),
+            ("ours, indirect", "13 or 14 B", lambda path, b=baud: ours(path, b)),
+            ("rustypot", "4 B", lambda path, b=baud: rusty(path, b)),
+            ("SDK", "10 B", lambda path, b=baud: sdk(path, b)),
+        ]
+        for name, reads, client in clients:
+            with PtyBus() as server:
+                path = server.start(SPECS, baud=baud if wire else None, wire_time=wire)
+                _no_return_delay(path, baud)
+                with client(path) as cycle:  # type: ignore[attr-defined]
+                    got = measure(cycle, seconds)
+            part = f"{got.rate_hz / limit_hz:.1%}" if wire else "-"
+            row = f"{got.rate_hz:.0f}", part, f"{got.median_us:.0f}", f"{got.cpu_us:.1f}"
+            table.add_row(name, reads, *row)
+        out.print(table)
+
+
+def _no_return_delay(path: str, baud: int) -> None:
+    """Let all servos answer at once, as our driver does, for the other clients."""
+    port = PortHandler(path)
+    port.openPort()
+    port.setBaudRate(baud)
+    for servo_id in IDS:
+        PacketHandler(2.0).write1ByteTxRx(port, servo_id, 9, 0)
+    port.closePort()
+
+
+# --- (c) a silent servo
+
+
+def silent_servo(cycles: int) -> None:
+    """Print what one silent servo of nine costs, in the middle of the group."""
+    table = Table(
+        "client", "healthy ms", "first extra ms", "mean extra", "values kept", title="silent servo"
+    )
+    clients: list[tuple[str, Callable[[str], object]]] = [
+        ("ours", lambda path: ours(path, 1_000_000)),
+        ("rustypot", lambda path: rusty(path, 1_000_000)),
+        ("SDK", lambda path: sdk(path, 1_000_000)),
+    ]
+    for name, client in clients:
+        with PtyBus() as server:
+            path = server.start(SPECS, baud=1_000_000, wire_time=True)
+            _no_return_delay(path, 1_000_000)
+            with client(path) as cycle:  # type: ignore[attr-defined]
+                for k in range(400):
+                    cycle(k)
+                healthy, first, ill = [], [], []
+                for _ in range(5):
+                    healthy += [_timed(cycle, k) for k in range(300)]
+                    server.command("lose 5")
+                    first.append(_timed(cycle, 0))
+                    ill += [_timed(cycle, k) for k in range(cycles // 5 if name == "ours" else 8)]
+                    server.command("clear")
+                    for k in range(100):
+                        cycle(k)
+        usual = fmean(span for span, _ in healthy)
+        extra = median(span for span, _ in first) - median(span for span, _ in healthy)
+        mean = fmean(span for span, _ in ill) / usual - 1.0
+        kept = fmean(values for _, values in first + ill)
+        row = f"{usual * 1e3:.2f}", f"{extra * 1e3:.2f}", f"{mean:+.1%}", f"{kept:.2f} of 9"
+        table.add_row(name, *row)
+    out.print(table)
+
+
+def _timed(cycle: Cycle, k: int) -> tuple[float, int]:
+    start = time.perf_counter()
+    values = cycle(k)
+    return time.perf_counter() - start, values
+
+
+def line_alone() -> None:
+    """Print the same on a simulated line: what the exchange itself costs, without any host."""
+    table = Table(title="simulated line, no host: rate, and servo 5 silent")
+    for head in ("reads", "Mbaud", "Hz", "of limit", "first extra ms", "mean extra", "values kept"):
+        table.add_column(head)
+    for baud in (1_000_000, 4_000_000):
+        for indirect in (False, True):
+            now = [0.0]
+            chain = build_chain(SPECS, lambda now=now: now[0])  # type: ignore[misc]
+            port = InProcessPort(
+                chain,
+                sleep_until=lambda t, now=now: now.__setitem__(0, max(now[0], t)),
+                wire_time=True,
+            )
+            bus = DynamixelBus(port, SETUPS, DynamixelParams(baud=baud, indirect_block=indirect))
+            bus.open()
+            bus.engage()
+            _line_cycles(bus, now, 300)
+            usual_s, _ = _line_cycles(bus, now, 500)
+            chain.faults.command("lose 5")
+            first_s, _ = _line_cycles(bus, now, 1)
+            mean_s, kept = _line_cycles(bus, now, 2000)
+            table.add_row(
+                "13 or 14 B" if indirect else "10 B",
+                f"{baud // 1_000_000}",
+                f"{1.0 / usual_s:.0f}",
+                f"{10.0 * WIRE_BYTES / baud / usual_s:.1%}",
+                f"{(first_s - usual_s) * 1e3:.2f}",
+                f"{mean_s / usual_s - 1.0:+.1%}",
+                f"{kept:.2f} of 9",
+            )
+    out.print(table)
+
+
+def _line_cycles(bus: DynamixelBus, now: list[float], cycles: int) -> tuple[float, float]:
+    """Run cycles in simulated time; gives the mean time and the mean number of values."""
+    began, values = now[0], 0
+    for k in range(cycles):
+        readings = bus.read(now[0])
+        bus.write([2048 + k % 8] * len(IDS))
+        values += len(IDS) - readings.count(None)
+    return (now[0] - began) / cycles, values / cycles
+
+
+# --- (d) unplugged
+
+
+def unplug(times: int) -> None:
+    """Print how soon an unplugged adapter is noticed, and motion goes on after replugging."""
+    notices, returns = [], []
+    with PtyBus() as server:
+        path = server.start(SPECS)
+        bus = DynamixelBus(BlockingPort(path), SETUPS, DynamixelParams())
+        bus.open()
+        bus.engage()
+        for _ in range(times):
+            _cycles(bus, lambda readings: False, 0.3)
+            bus.events()
+            server.command("unplug")
+            notices.append(_cycles(bus, lambda readings: "lost" in " ".join(bus.events()), 5.0))
+            _cycles(bus, lambda readings: False, 0.5)
+            server.command("plug")
+            returns.append(_cycles(bus, lambda r: all(x and x.torque for x in r), 5.0))
+        bus.release()
+        bus.close()
+    table = Table("", "median ms", "worst ms", title=f"unplugged for 0.5 s, {times} times, 100 Hz")
+    table.add_row("unplug to notice", f"{median(notices):.1f}", f"{max(notices):.1f}")
+    table.add_row("replug to torque", f"{median(returns):.0f}", f"{max(returns):.0f}")
+    out.print(table)
+
+
+def _cycles(bus: DynamixelBus, done: Callable[[Sequence[object]], bool], most_s: float) -> float:
+    """Run at 100 Hz until something is so; gives how long that took in ms."""
+    start = time.perf_counter()
+    while time.perf_counter() - start < most_s:
+        readings = bus.read(time.monotonic())
+        bus.write([2060] * len(IDS))
+        if done(readings):
+            break
+        time.sleep(0.01)
+    return (time.perf_counter() - start) * 1e3
+
+
+# --- (e) faults by the dice
+
+FAULTS = (
+    "lose {i} count {n}", "delay {i} {ms} count {n}", "truncate {i} {k} count {n}",
+    "duplicate {i} count {n}", "corrupt {i} count {n}", "drop {i} {k} count {n}",
+    "stall {i} {ms} count {n}", "noise before random count {n}", "noise after random count {n}",
+    "fragment {i} count {n}", "reorder count {n}", "wrong-id {i} {j} count {n}",
+    "short {i} 2 count {n}", "long {i} 2 count {n}", "refuse {i} 7 count {n}",
+    "lose-writes {n}", "delay all {ms} count {n}", "lose all count {n}", "unplug for 0.3",
+    "brown-out {i}", "echo on for 0.05",
+)  # fmt: skip
+
+
+def dice(cycles: int) -> None:
+    """Print faults injected, survived, and values delivered that were not true in their cycle."""
+    now = [10.0]
+    chain = build_chain(SPECS, lambda: now[0])
+    truth: list[tuple[float, ...]] = []
+    port = InProcessPort(
+        chain,
+        tap=lambda data: truth.append(chain.positions_steps()),
+        sleep_until=lambda t: now.__setitem__(0, max(now[0], t)),
+    )
+    bus = DynamixelBus(port, SETUPS, DynamixelParams(give_up_s=600.0))
+    bus.open()
+    bus.engage()
+    dice = random.Random(7)
+    injected = stale = values = missing = longest = 0
+    for k in range(cycles):
+        if dice.random() < 0.1:
+            i, j = dice.sample(IDS, 2)
+            words = {"i": i, "j": j, "n": dice.randint(1, 4), "k": dice.randint(0, 20)}
+            chain.faults.command(dice.choice(FAULTS).format(ms=dice.randint(1, 120), **words))
+            injected += 1
+        now[0] += 0.01
+        began = now[0]
+        truth.clear()
+        truth.append(chain.positions_steps())
+        readings = bus.read(now[0])
+        truth.append(chain.positions_steps())
+        longest = max(longest, now[0] - began)
+        for reading, *places in zip(readings, *truth, strict=True):
+            values += reading is not None
+            missing += reading is None
+            if reading is not None:
+                stale += not min(places) - 1 <= reading.position_steps <= max(places) + 1
+        bus.write([2048 + round(300 * ((k / 40 + i / 9) % 2 - 1)) for i in IDS])
+    chain.faults.clear()
+    for _ in range(300):
+        now[0] += 0.01
+        readings = bus.read(now[0])
+    table = Table(title=f"faults by the dice, {cycles} cycles at 100 Hz, simulated time")
+    for head in ("injected", "values", "missing", "stale as fresh", "longest read", "well after"):
+        table.add_column(head)
+    well = sum(x is not None and x.torque for x in readings)
+    row = (injected, values, missing, stale, f"{longest * 1e3:.0f} ms", f"{well} of 9")
+    table.add_row(*map(str, row))
+    out.print(table)
+    out.print("faults that stay:", bus.faults() or "none")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,373 @@
+"""Values written into YAML: everything else stays to the byte, and no failure loses anything."""
+
+import os
+import string
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from config.load import ConfigError, load, read_yaml, shipped
+from config.save import Change, copy_shipped, propose, rig_file, save, save_rig
+from config.save_text import Unchangeable, edited, written
+from config.schema import Rig, load_rig
+
+NOW = datetime(2026, 1, 31, 23, 59, 58)
+
+
+@dataclass(frozen=True)
+class Joint:
+    id: int = field(default=1, metadata={"low": 0, "high": 252, "unit": "", "says": "servo id"})
+    zero_step: int = field(
+        default=2048, metadata={"low": 0, "high": 4095, "unit": "steps", "says": "at 0 deg"}
+    )
+    min_deg: float = field(
+        default=-30.0, metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "lowest"}
+    )
+    gains: tuple[int, int, int] | None = field(default=None, metadata={"says": "P, I and D"})
+    note: str = field(default="", metadata={"says": " ".join(["long"] * 30)})
+
+
+@dataclass(frozen=True)
+class Head:
+    name: str = "a"
+    joints: dict[str, Joint] = field(default_factory=dict, metadata={"says": "one entry a joint"})
+    spare: Joint = field(default_factory=Joint, metadata={"says": "one on the shelf"})
+
+
+SMALL = """\
+# a head
+name: nod   # its name
+
+joints:
+    pan:   {id: 1, zero_step: 2000}  # flow
+    tilt:
+        id: 2
+        zero_step:    2048   # by hand, 3 May
+        # the stop is soft
+        min_deg: -35.0
+        gains:
+        - 400   # P
+        - 0
+        - 10    # D
+# the end
+"""
+
+
+def check(path):
+    return load(Path(path), Head)
+
+
+@pytest.fixture
+def small(tmp_path):
+    file = tmp_path / "head.yaml"
+    file.write_text(SMALL)
+    return file
+
+
+def lines_that_differ(old: str, new: str) -> list[tuple[str, str]]:
+    pairs = zip(old.splitlines(), new.splitlines(), strict=True)
+    return [pair for pair in pairs if pair[0] != pair[1]]
+
+
+def test_a_value_changes_and_every_other_byte_stays(small):
+    saved = save(small, {"joints.tilt.zero_step": 2051}, NOW, check, Head)
+    assert lines_that_differ(SMALL, small.read_text()) == [
+        (
+            "        zero_step:    2048   # by hand, 3 May",
+            "        zero_step:    2051   # by hand, 3 May",
+        )
+    ]
+    assert saved.changes == (Change("joints.tilt.zero_step", "2048", "2051"),)
+    assert str(saved.changes[0]) == "joints.tilt.zero_step: 2048 -> 2051"
+    assert saved.backup == small.with_name("head.yaml.bak-20260131-235958")
+    assert saved.backup.read_text() == SMALL
+
+
+def test_flow_mappings_and_block_lists_keep_their_style(small):
+    save(small, {"joints.pan.id": 7, "joints.tilt.gains": (800, 1, 10)}, NOW, check, Head)
+    text = small.read_text()
+    assert "    pan:   {id: 7, zero_step: 2000}  # flow\n" in text
+    assert "        - 800   # P\n        - 1\n        - 10    # D\n" in text
+
+
+def test_missing_keys_are_added_with_what_they_mean(small):
+    saved = save(
+        small,
+        {"joints.pan.min_deg": -20.0, "spare.id": 9, "spare.note": "x", "joints.tilt.note": "y"},
+        NOW,
+        check,
+        Head,
+    )
+    text = small.read_text()
+    assert "    pan:   {id: 1, zero_step: 2000, min_deg: -20.0}  # flow\n" in text
+    assert "spare:  # one on the shelf\n  id: 9  # 0..252; servo id\n  # long long" in text
+    assert '\n        note: "y"\nspare:  #' in text  # behind the list, indented as its mapping
+    assert all(len(line) <= 100 for line in text.splitlines())
+    assert saved.changes[1] == Change("spare.id", None, "9")
+    assert str(saved.changes[1]) == "spare.id: (not in the file) -> 9"
+    assert check(small).spare.id == 9
+
+
+def test_a_mapping_without_entries_gets_its_first(small):
+    for text in ("name: a\nspare: {}\n", "name: a\nspare:  # none yet\njoints: {}\n"):
+        small.write_text(text)
+        save(small, {"spare.id": 3}, NOW, load_loosely, Head)
+        assert check(small).spare.id == 3, small.read_text()
+    assert small.read_text().startswith("name: a\nspare:  # none yet\n  id: 3")
+
+
+def load_loosely(path):
+    return load(Path(path), Head)
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+def test_line_ends_and_byte_order_mark_stay(small, newline, mark):
+    raw = mark + SMALL.replace("\n", newline).encode()
+    small.write_bytes(raw)
+    save(small, {"joints.tilt.zero_step": 2051, "spare.id": 9}, NOW, check, Head)
+    after = small.read_bytes()
+    assert after.startswith(raw.replace(b"2048", b"2051").rstrip().removesuffix(b"# the end"))
+    assert after.count(b"\n") == after.count(newline.encode())
+    assert check(small).spare.id == 9
+
+
+def test_anchors_and_aliases(small):
+    small.write_text(
+        "joints:\n  pan: {id: 1, zero_step: &mid 2048}\n  tilt: {id: 2, zero_step: *mid}\n"
+        "  roll: &roll\n    id: 3\n  nod: *roll\n"
+    )
+    # An alias gives way to a value of its own.
+    save(small, {"joints.tilt.zero_step": 2100}, NOW, check, Head)
+    assert "zero_step: &mid 2048}\n  tilt: {id: 2, zero_step: 2100}" in small.read_text()
+    # Nobody is tied to the anchor now: it stays, with another value.
+    save(small, {"joints.pan.zero_step": 2001}, NOW, check, Head)
+    assert "zero_step: &mid 2001}" in small.read_text()
+    before = small.read_bytes()
+    for key in ("joints.roll.id", "joints.nod.id", "joints.nod.zero_step"):
+        with pytest.raises(ConfigError, match="nod|roll"):
+            save(small, {key: 4}, NOW, check, Head)
+    assert small.read_bytes() == before
+
+
+def test_a_tied_value_is_not_changed_unseen(small):
+    text = "joints:\n  pan: {zero_step: &mid 2048}\n  tilt: {zero_step: *mid}\n"
+    small.write_text(text)
+    with pytest.raises(ConfigError, match=r"joints\.tilt\.zero_step would change as well"):
+        save(small, {"joints.pan.zero_step": 1}, NOW, check, Head)
+    assert small.read_text() == text and len(list(small.parent.iterdir())) == 1
+
+
+def test_nothing_differs_nothing_is_written(small):
+    saved = save(small, {"joints.tilt.zero_step": 2048, "joints.tilt.gains": [400, 0, 10]}, NOW,
+                 check, Head)  # fmt: skip
+    assert (saved.backup, saved.changes) == (None, ())
+    assert [p.name for p in small.parent.iterdir()] == ["head.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        (
+            {"joints.tilt.zero_step": 5000},
+            r"head\.yaml:\d+: joints\.tilt\.zero_step: 5000 is above",
+        ),
+        ({"joints.tilt.min_deg": float("nan")}, "not a finite number"),
+        ({"joints.tilt.min_deg": float("-inf")}, "not a finite number"),
+        ({"joints.tilt.min_degree": 1.0}, "unknown key 'min_degree'"),
+        ({"joints.tilt": 1}, "joints.tilt is a mapping"),
+        ({"name.x": 1}, "name is no mapping"),
+        ({"joints.tilt.gains": (1, 2)}, "spread over several lines"),
+        ({"joints.tilt.note": object()}, "is no number, text"),
+    ],
+)
+def test_a_refused_value_leaves_everything_as_it_was(small, changes, says):
+    with pytest.raises(ConfigError, match=says):
+        save(small, changes, NOW, check, Head)
+    assert small.read_text() == SMALL
+    assert [p.name for p in small.parent.iterdir()] == ["head.yaml"]
+
+
+def test_a_later_layer_that_has_the_last_word_is_named(small):
+    def overridden(path):
+        return check(path).__class__(name="other", joints=check(path).joints)
+
+    with pytest.raises(ConfigError, match="name stays other whatever this file says"):
+        save(small, {"name": "mine"}, NOW, overridden, Head)
+    assert small.read_text() == SMALL
+
+
+def test_somebody_elses_change_meanwhile_is_not_lost(small):
+    def slow(path):
+        small.write_text(SMALL + "spare: {id: 77}\n")
+        return check(path)
+
+    with pytest.raises(ConfigError, match="changed by somebody else"):
+        save(small, {"name": "mine"}, NOW, slow, Head)
+    assert "id: 77" in small.read_text()
+
+
+def test_backups_of_one_second_do_not_overwrite_each_other(small):
+    first = save(small, {"name": "b"}, NOW, check, Head)
+    second = save(small, {"name": "c"}, NOW, check, Head)
+    assert second.backup.name == "head.yaml.bak-20260131-235958-2"
+    assert first.backup.read_text() == SMALL and "name: b" in second.backup.read_text()
+
+
+def test_rights_and_links_stay(small, tmp_path):
+    small.chmod(0o640)
+    link = tmp_path / "current.yaml"
+    link.symlink_to(small)
+    save(link, {"name": "b"}, NOW, check, Head)
+    assert link.is_symlink() and "name: b" in small.read_text()
+    assert small.stat().st_mode & 0o777 == 0o640
+
+
+def test_files_that_cannot_be_written(small, tmp_path):
+    small.chmod(0o444)
+    with pytest.raises(ConfigError, match="read-only; chmod u"):
+        save(small, {"name": "b"}, NOW, check, Head)
+    with pytest.raises(ConfigError, match="no such file"):
+        save(tmp_path / "none.yaml", {"name": "b"}, NOW, check, Head)
+    with pytest.raises(ConfigError, match="is a directory"):
+        save(tmp_path, {"name": "b"}, NOW, check, Head)
+    small.chmod(0o644)
+    small.write_text("a: 1\na: 2\n")
+    with pytest.raises(ConfigError, match="key stands twice"):
+        save(small, {"a": 3}, NOW, check, Head)
+    assert small.read_text() == "a: 1\na: 2\n"
+
+
+def test_a_disk_that_fails_loses_nothing(small, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    for name in ("fsync", "replace"):
+        with monkeypatch.context() as patched:
+            patched.setattr(os, name, full)
+            with pytest.raises(ConfigError, match="cannot be written: No space left"):
+                save(small, {"name": "b"}, NOW, check, Head)
+        assert small.read_text() == SMALL
+        assert not list(small.parent.glob(".head*"))
+
+
+def test_shipped_rigs_are_copied_not_changed(tmp_path):
+    before = shipped("rigs", "desk").read_bytes()
+    for name in ("desk", shipped("rigs", "desk")):
+        with pytest.raises(ConfigError, match=r"copy it \(cp .*desk\.yaml mydesk\.yaml\)"):
+            save_rig(name, {"joints.neck_yaw.zero_step": 1}, NOW)
+    mine = copy_shipped("desk", tmp_path / "mine.yaml")
+    assert mine.read_bytes() == before == shipped("rigs", "desk").read_bytes()
+    with pytest.raises(ConfigError, match="is there already"):
+        copy_shipped("desk", mine)
+    with pytest.raises(ConfigError, match="nothing named 'dsk'"):
+        rig_file("dsk")
+
+
+def test_a_whole_rig(tmp_path):
+    mine = copy_shipped("desk", tmp_path / "mine.yaml")
+    wishes = {
+        "joints.neck_yaw.zero_step": 2051,
+        "joints.neck_yaw.sign": -1,
+        "joints.left_eye_pan.min_deg": -31.5,
+        "joints.left_eye_pan.strength": 0.5,
+        "bus.port": "/dev/serial/by-id/usb-FTDI_USB__-__Serial-if00",
+    }
+    assert [c.key for c in propose(mine, wishes)] == list(wishes)
+    saved = save_rig(mine, wishes, NOW)
+    rig = load_rig(str(mine))
+    assert isinstance(rig, Rig)
+    assert (rig.joints["neck_yaw"].zero_step, rig.joints["neck_yaw"].sign) == (2051, -1)
+    assert rig.joints["left_eye_pan"].strength == 0.5
+    old, new = saved.backup.read_text().splitlines(), mine.read_text().splitlines()
+    assert len(set(new) - set(old)) <= 5 + 1 and len(new) - len(old) <= 2
+    # A rule between two sections is checked before anything is replaced.
+    before = mine.read_bytes()
+    with pytest.raises(
+        ConfigError, match=rf"{mine}:\d+: joints.left_eye_pan.id: .*|id 2 is already"
+    ):
+        save_rig(mine, {"joints.left_eye_pan.id": 2}, NOW)
+    assert mine.read_bytes() == before
+
+
+SCALARS = st.one_of(
+    st.integers(-(10**6), 10**6),
+    st.floats(allow_nan=False, allow_infinity=False, width=32),
+    st.booleans(),
+    st.none(),
+    st.text(st.characters(codec="utf-8", exclude_categories=("Cs", "Cc")), max_size=12),
+    st.sampled_from(
+        ["yes", "No", "null", "1e3", "0x10", "~", "a: b", "a #b", "*a", "&a", "2026-01-31"]
+    ),
+)
+
+
+@given(value=st.one_of(SCALARS, st.lists(SCALARS, max_size=3)))
+@settings(max_examples=150, deadline=None)
+def test_what_is_written_is_read_back(tmp_path_factory, value):
+    path = tmp_path_factory.getbasetemp() / "written.yaml"
+    path.write_bytes(f"a: {written(value)}\n".encode())
+    read = read_yaml(path).data["a"]
+    wanted = tuple(value) if isinstance(value, list) else value
+    assert read == wanted and type(read) is type(wanted)
+
+
+KEYS = st.text(string.ascii_lowercase, min_size=1, max_size=3)
+TREES = st.recursive(
+    st.integers(0, 99), lambda inner: st.dictionaries(KEYS, inner, min_size=1, max_size=3)
+)
+
+
+def as_yaml(tree, flow_below, depth=0):
+    """Write a tree in block style down to a depth, in flow style below, with comments."""
+    lines = []
+    for key, value in tree.items():
+        pad = "  " * depth
+        if not isinstance(value, dict):
+            lines.append(f"{pad}{key}: {value}  # {key} {depth}")
+        elif depth >= flow_below:
+            lines.append(f"{pad}{key}: {str(value).replace(chr(39), '')}  # flow")
+        else:
+            lines += [f"{pad}{key}:  # block", *as_yaml(value, flow_below, depth + 1)]
+    return lines
+
+
+@given(
+    tree=st.dictionaries(KEYS, TREES, min_size=1, max_size=4),
+    path=st.lists(KEYS, min_size=1, max_size=4),
+    value=st.integers(100, 999),
+    flow_below=st.integers(0, 3),
+)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_any_path_into_any_tree(tmp_path_factory, tree, path, value, flow_below):
+    text = "\n".join(as_yaml(tree, flow_below))
+    key = ".".join(path)
+    # The plain way: follow the path, make what is missing.
+    wanted, at = {"": tree}, ""
+    holder, possible = tree, True
+    for step in path[:-1]:
+        holder = holder.setdefault(step, {})
+        if not isinstance(holder, dict):
+            possible = False
+            break
+    possible = possible and not isinstance(holder.get(path[-1]), dict)
+    file = tmp_path_factory.getbasetemp() / "any.yaml"
+    try:
+        new = edited(text, {key: value}, Head)
+    except Unchangeable:
+        assert not possible
+        return
+    assert possible
+    holder[path[-1]] = value
+    file.write_text(new)
+    assert as_dict(read_yaml(file).data) == wanted[at]
+    kept = [line for line in text.splitlines() if line in new.splitlines()]
+    assert len(kept) >= len(text.splitlines()) - 1
+
+
+def as_dict(data):
+    return {k: as_dict(v) for k, v in data.items()} if isinstance(data, dict) else data

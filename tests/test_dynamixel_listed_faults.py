@@ -1,0 +1,520 @@
+"""Every listed fault of a servo bus, injected, and what the driver makes of it.
+
+What must be true of each: a read takes a bounded time; no value is delivered that was not
+true in its cycle; one bad servo does not blind the others; an alert is data and a named
+fault; a restarted servo is set up anew and holds where it is.
+
+Faults on the wire and in servos, by number, and their tests here:
+
+ 1 byte lost             test_passing_fault
+ 2 bit flipped           test_passing_fault
+ 3 bad CRC               test_passing_fault
+ 4 truncated             test_passing_fault
+ 5 duplicate             test_05_duplicates
+ 6 late                  test_06_everybody_late
+ 7 wrong id              test_passing_fault
+ 8 noise                 test_harmless
+ 9 loose headers         test_harmless
+10 echo                  test_harmless
+11 refused, no data      test_passing_fault
+12 too short or long     test_passing_fault
+13 out of order          test_13_out_of_order
+14 id missing            test_14_missing_id
+15 stuffed answer        test_dynamixel_faults
+16 EIO                   test_16_read_and_write_fail
+17 path gone and back    test_17_replugged_under_the_same_name
+18 no permission         test_18_opening_is_forbidden
+19 wrong baud            test_19_wrong_baud
+20 id collision          test_20_two_servos_with_one_id
+21 brown-out             test_21_brown_out
+22 overload              test_22_to_26_latched_errors
+23 overheating           test_22_to_26_latched_errors
+24 input voltage         test_24_input_voltage
+25 stuck joint           test_25_stuck_joint
+26 encoder               test_22_to_26_latched_errors
+27 bus watchdog          test_27_watchdog_trip
+28 stall mid-packet      test_passing_fault
+29 babbling node         test_29_babble
+30 factory defaults      test_30_factory_defaults
+31 group write lost      test_31_lost_writes
+32 write blocked         test_32_blocked_write
+
+What the maker's SDK makes of a single read is in test_dynamixel_sdk_packets. Of its group
+reads: silent, corrupt, lost byte, refused, alert, late and truncated are numbers 1 to 14
+and 22 here; a broadcast ping with noise or a bad CRC is test_ping_among_noise; fast bulk
+reads, which it takes apart wrongly, are never sent.
+"""
+
+import json
+
+import pytest
+
+from drivers.dynamixel import DynamixelBus, DynamixelParams
+from drivers.dynamixel_health import AGAIN_AND_AGAIN
+from drivers.errors import BusLost, PortError, ServoMissing
+from drivers.types import ServoSetup
+from sim_mock.ports import InProcessPort
+from sim_mock.servo import ServoSpec
+from sim_mock.servo_chain import build_chain
+
+IDS = (1, 2, 3, 4)
+NAMES = ("eye", "jaw", "neck", "lid")
+LONGEST_S = 0.1
+"""No read takes longer, but the one that opens a port anew or sets a servo up anew."""
+
+
+class Rig:
+    """Four moving servos in this process on a line whose time passes as it is waited for."""
+
+    def __init__(self, fast=True, indirect=True, heed_baud=False, **params):
+        self.now_s = 50.0
+        specs = [ServoSpec(i, "xl330-m077", 2000) for i in IDS]
+        self.chain = build_chain(specs, lambda: self.now_s)
+        self.chain.heed_baud = heed_baud
+        self.sent = []
+        self.port = InProcessPort(self.chain, self.sent.append, sleep_until=self.sleep_until)
+        setups = [
+            ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0, name)
+            for i, name in zip(IDS, NAMES, strict=True)
+        ]
+        chosen = DynamixelParams(fast_sync_read=fast, indirect_block=indirect, **params)
+        self.bus = DynamixelBus(self.port, setups, chosen)
+        self.k = self.longest_s = 0
+
+    def sleep_until(self, t_s):
+        self.now_s = max(self.now_s, t_s)
+
+    def start(self):
+        self.bus.open()
+        self.bus.engage()
+        self.bus.events()
+        # So many answers it takes to know how late they are.
+        for _ in range(130):
+            self.tick()
+        self.longest_s = 0.0
+        return self
+
+    def command(self, text):
+        self.chain.faults.command(text)
+
+    def tick(self, goals=None):
+        """Run one cycle with joints in motion; every value must have been true in it."""
+        self.now_s += 0.01
+        self.k += 1
+        before, began_s = self.chain.positions_steps(), self.now_s
+        readings = self.bus.read(self.now_s)
+        self.longest_s = max(self.longest_s, self.now_s - began_s)
+        after = self.chain.positions_steps()
+        for reading, was, is_now in zip(readings, before, after, strict=True):
+            if reading is not None:
+                assert min(was, is_now) - 1 <= reading.position_steps <= max(was, is_now) + 1
+        self.bus.write(goals or [2000 + abs(self.k % 80 - 40) * 10] * len(IDS))
+        return readings
+
+    def heard(self):
+        return [reading is not None for reading in self.tick()]
+
+    def until_all(self, most=300):
+        """Run until all servos give values under torque; gives the cycles that took."""
+        for k in range(most):
+            if all(r is not None and r.torque for r in self.tick()):
+                return k
+        raise AssertionError(f"not well after {most} cycles: {self.bus.faults()}")
+
+    def errors(self):
+        return self.bus.health().errors
+
+
+@pytest.fixture(
+    params=[(True, True), (False, False)],
+    ids=["fast indirect", "plain direct"],
+)
+def rig(request):
+    return Rig(*request.param).start()
+
+
+PASSING = [
+    (1, "drop 2 0"),
+    (1, "drop 2 3"),
+    (1, "drop 2 8"),
+    (1, "drop 2 -1"),
+    (2, "corrupt 2 20"),
+    (2, "corrupt 2 70"),
+    (3, "corrupt 2 180"),
+    (4, "truncate 2 0"),
+    (4, "truncate 2 5"),
+    (4, "truncate 2 11"),
+    (6, "delay 2 10"),
+    (6, "delay 2 60"),
+    (7, "wrong-id 2 3"),
+    (7, "wrong-id 2 77"),
+    (11, "refuse 2 7"),
+    (12, "short 2 2"),
+    (12, "long 2 2"),
+    (14, "lose 2"),
+    (28, "stall 2 30"),
+    (28, "stall 2 60"),
+]
+
+
+@pytest.mark.parametrize(("number", "fault"), PASSING)
+def test_passing_fault(rig, number, fault):
+    for times in (1, 5):
+        rig.command(f"{fault} count {times}")
+        lost = 0
+        for _ in range(30):
+            heard = rig.heard()
+            lost += not (heard[0] and heard[2] and heard[3])
+        rig.until_all()
+        # One that is late or stalls keeps the line from everybody so long.
+        late_ms = int(fault.split()[2]) if number in (6, 28) else 0
+        # An answer under another's id spoils that other's, and too long a block the header.
+        two = fault in ("wrong-id 2 3", "long 2 2")
+        assert lost <= times * (late_ms / 10.0 + 2.0 if late_ms else two)
+        assert rig.heard() == [True] * 4
+    assert rig.longest_s < LONGEST_S
+    assert rig.bus.faults() == ()
+
+
+@pytest.mark.parametrize(
+    "fault",
+    ["noise before FFFFFD00", "noise before FFFFFD00010200", "noise before", "noise after FF",
+     "noise after", "fragment 1", "fragment", "echo on", "delay 2 0.3", "stall 3 0.3"],
+)  # fmt: skip
+def test_harmless(rig, fault):
+    rig.command(fault)
+    assert [rig.heard() for _ in range(20)] == [[True] * 4] * 20
+    assert rig.longest_s < LONGEST_S
+
+
+def test_05_duplicates(rig):
+    rig.command("duplicate all")
+    for _ in range(30):
+        assert rig.heard() == [True] * 4
+
+
+@pytest.mark.parametrize("late_ms", [3, 15, 60, 80, 200])
+def test_06_everybody_late(rig, late_ms):
+    for times in (1, 3, 12):
+        rig.command(f"delay all {late_ms} count {times}")
+        for _ in range(10):
+            rig.tick()
+        rig.until_all()
+    assert rig.longest_s < 0.3
+
+
+def test_13_out_of_order(rig):
+    rig.command("reorder count 1")
+    rig.tick()
+    assert rig.heard() == [True] * 4
+
+
+@pytest.mark.parametrize("policy", ["silence", "skip", "timeout"])
+@pytest.mark.parametrize("missing", [(1,), (4,), (2, 3)])
+def test_14_missing_id(rig, policy, missing):
+    rig.command(f"set after-missing {policy}")
+    for servo_id in missing:
+        rig.command(f"lose {servo_id}")
+    expected = [servo_id not in missing for servo_id in IDS]
+    assert [rig.heard() for _ in range(50)] == [expected] * 50
+    assert rig.longest_s < LONGEST_S
+    lines = rig.bus.events()
+    assert all(f"{NAMES[i - 1]} (servo {i}) does not answer" in lines for i in missing)
+    rig.command("clear")
+    assert rig.until_all() <= 60
+    assert any("answers again after" in line for line in rig.bus.events())
+
+
+def test_16_read_and_write_fail(rig):
+    rig.command("unplug for 0.4")
+    assert rig.heard() == [False] * 4
+    assert rig.bus.events()[0].startswith("port lost: ")
+    rig.bus.write([2000] * 4)
+    began_s = rig.now_s
+    rig.until_all()
+    assert rig.now_s - began_s < 1.0
+    assert any(line.startswith("port back after 0.") for line in rig.bus.events())
+
+
+def test_17_replugged_under_the_same_name(rig):
+    rig.tick([2500] * 4)
+    rig.command("unplug for 3.0")
+    for _ in range(250):
+        assert rig.heard() == [False] * 4
+    while None in (readings := rig.tick([2500] * 4)):
+        pass
+    assert [(r.rearmed, r.torque) for r in readings] == [(True, True)] * 4
+    assert [r.rearmed for r in rig.tick([2500] * 4)] == [False] * 4
+
+
+def test_17_no_goal_is_followed_before_positions_are_read_again(rig):
+    rig.command("unplug for 0.5")
+    rig.tick()
+    for servo_id in IDS:
+        rig.command(f"turn {servo_id} 150")
+    rig.now_s += 0.6
+    rig.sent.clear()
+    readings = rig.bus.read(rig.now_s)
+    present = [r.position_steps for r in readings]
+    goals = [p for p in rig.sent if p[7] == 0x83 and int.from_bytes(p[8:10], "little") == 116]
+    named = [int.from_bytes(goals[0][13 + 5 * k : 17 + 5 * k], "little") for k in range(4)]
+    assert all(abs(goal - at) <= 2 for goal, at in zip(named, present, strict=True))
+
+
+def test_17_servo_power_cut_and_back(rig):
+    rig.command("lose all for 2.0")
+    for _ in range(100):
+        assert rig.heard() == [False] * 4
+    for servo_id in IDS:
+        rig.chain[servo_id].reboot()
+    assert "no servo answers: check servo power and cable" in rig.bus.events()
+    rig.until_all()
+    assert rig.errors()["restarted"] >= 4
+    assert [s.memory.get("profile_velocity") for s in rig.chain.servos] == [383] * 4
+
+
+def test_17_a_port_that_stays_away_is_given_up():
+    rig = Rig(give_up_s=2.0).start()
+    rig.command("unplug")
+    began_s = rig.now_s
+    with pytest.raises(BusLost, match="has been gone for 2.0 s"):
+        for _ in range(1000):
+            rig.tick()
+    assert 2.0 <= rig.now_s - began_s <= 2.1
+    with pytest.raises(BusLost, match="cut the servo power to free them"):
+        rig.bus.release()
+    rig.command("plug")
+    rig.bus.release()
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def test_18_opening_is_forbidden():
+    rig = Rig()
+    rig.command("deny on")
+    with pytest.raises(PortError, match="Permission denied"):
+        rig.bus.open()
+
+
+@pytest.mark.parametrize("what", ["silence", "garbage"])
+def test_19_wrong_baud(what):
+    rig = Rig(heed_baud=True, baud=57_600)
+    rig.command(f"set wrong-baud {what}")
+    for servo in rig.chain.servos:
+        servo.memory.set("baud_rate", 3)
+    rig.chain.refresh()
+    with pytest.raises(ServoMissing, match="baud rate"):
+        rig.bus.open()
+
+
+def test_20_two_servos_with_one_id(rig):
+    rig.command("turn 2 300")
+    rig.command("collide 2")
+    rig.command("turn 2 -111")
+    for _ in range(200):
+        heard = [r is not None for r in _tick_blind(rig)]
+        assert heard[0] and heard[2] and heard[3]
+    assert rig.longest_s < LONGEST_S
+    assert any(line.startswith("jaw (servo 2) answers, but") for line in rig.bus.events())
+
+
+def _tick_blind(rig):
+    """Run a cycle in which servo 2's own value cannot be judged: there are two of it."""
+    rig.now_s += 0.01
+    began_s = rig.now_s
+    readings = rig.bus.read(rig.now_s)
+    rig.longest_s = max(rig.longest_s, rig.now_s - began_s)
+    rig.bus.write([2000] * len(IDS))
+    return readings
+
+
+def test_21_brown_out(rig):
+    rig.tick([2300] * 4)
+    rig.command("brown-out 3")
+    cycles = rig.until_all()
+    assert cycles * 0.01 <= 1.5
+    assert rig.bus.faults() == ()
+    lines = rig.bus.events()
+    assert "neck (servo 3) restarted: set up anew" in lines
+    get = rig.chain[3].memory.get
+    assert (get("profile_velocity"), get("bus_watchdog"), get("torque_enable")) == (383, 10, 1)
+
+
+def test_21_brown_out_in_the_middle_of_a_long_way_ends_where_it_is(rig):
+    for _ in range(3):
+        rig.tick([2900] * 4)
+    rig.command("brown-out 3")
+    seen = []
+    for _ in range(120):
+        rig.now_s += 0.01
+        at = rig.chain.positions_steps()[2]
+        reading = rig.bus.read(rig.now_s)[2]
+        if reading is not None and reading.rearmed:
+            assert abs(reading.position_steps - at) <= 2
+            assert abs(rig.chain[3].memory.get("goal_position") - at) <= 2
+            seen.append(at)
+        rig.bus.write([2900] * 4)
+    assert len(seen) == 1
+
+
+def test_21_a_servo_that_keeps_restarting_stays_limp(rig):
+    for _ in range(5):
+        rig.command("brown-out 2")
+        for _ in range(150):
+            rig.tick()
+    assert rig.bus.faults() == (f"jaw (servo 2): {AGAIN_AND_AGAIN}",)
+    reading = rig.tick()[1]
+    assert (reading.torque, reading.fault) == (False, AGAIN_AND_AGAIN)
+    assert not rig.chain[2].torque
+    assert rig.chain[1].torque
+
+
+@pytest.mark.parametrize(
+    ("fault", "name"),
+    [("overload", "overload"), ("overheat", "overheating"), ("encoder", "encoder"),
+     ("shock", "electrical shock")],
+)  # fmt: skip
+def test_22_to_26_latched_errors(rig, fault, name):
+    # Here every error takes the torque away.
+    rig.bus.release()
+    rig.chain[2].memory.set("shutdown", 0x3F)
+    rig.bus.engage()
+    rig.bus.events()
+    rig.command(f"{fault} 2")
+    readings = rig.tick()
+    assert None not in readings
+    assert readings[1].alert
+    for _ in range(40):
+        readings = rig.tick()
+    assert rig.bus.faults() == (f"jaw (servo 2): {name}",)
+    assert (readings[1].torque, readings[1].fault) == (False, name)
+    assert [r.fault for r in readings] == ["", name, "", ""]
+    assert rig.bus.events() == (f"jaw (servo 2): {name}",)
+    assert not rig.chain[2].torque
+    # Only a restart clears it; then the servo is set up anew.
+    rig.chain[2].reboot()
+    rig.until_all()
+    assert rig.bus.faults() == ()
+    assert rig.tick()[1].fault == ""
+
+
+def test_24_input_voltage(rig):
+    for servo_id in IDS:
+        rig.command(f"voltage {servo_id} 7.6")
+    for _ in range(100):
+        readings = rig.tick()
+    assert len(rig.bus.faults()) == 4
+    assert [(r.fault, r.torque) for r in readings] == [("input voltage", False)] * 4
+    assert all(abs(r.voltage_v - 7.6) < 0.2 for r in readings)
+
+
+def test_25_stuck_joint(rig):
+    rig.command("stick 2")
+    at = rig.chain.positions_steps()[1]
+    for _ in range(30):
+        readings = rig.tick([2600] * 4)
+    assert abs(readings[1].position_steps - at) <= 1
+    assert abs(readings[1].load) > 0.3
+    for _ in range(600):
+        readings = rig.tick([2600] * 4)
+    assert readings[1].fault == "overload"
+    assert None not in readings
+
+
+def test_27_watchdog_trip(rig):
+    rig.tick([2900] * 4)
+    rig.now_s += 1.0
+    assert [s.memory.get("torque_enable") for s in rig.chain.servos] == [1] * 4
+    rig.tick([2900] * 4)
+    readings = rig.tick([2900] * 4)
+    assert [r.rearmed for r in readings] == [True] * 4
+    assert rig.errors()["watchdog"] == 4
+    assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [10] * 4
+
+
+def test_29_babble(rig):
+    rig.command("babble on for 0.5")
+    for _ in range(30):
+        rig.tick()
+    assert rig.longest_s < 0.5
+    rig.until_all()
+
+
+def test_30_factory_defaults():
+    rig = Rig(heed_baud=True)
+    for servo in rig.chain.servos:
+        servo.memory.set("baud_rate", 3)
+    rig.chain.refresh()
+    rig.start()
+    rig.bus.release()
+    rig.command("reset 3")
+    rig.now_s += 1.0
+    with pytest.raises(ServoMissing, match="neck .servo 3. does not answer"):
+        rig.bus.open()
+
+
+def test_31_lost_writes(rig):
+    rig.command("lose-writes 3")
+    for _ in range(4):
+        rig.tick([2500] * 4)
+    assert [s.memory.get("goal_position") for s in rig.chain.servos] == [2500] * 4
+
+
+def test_31_lost_writes_while_the_torque_comes_on():
+    rig = Rig()
+    rig.bus.open()
+    rig.command("lose-writes 2")
+    rig.bus.engage()
+    rig.command("lose-writes 2")
+    rig.bus.release()
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def test_32_blocked_write(rig):
+    rig.command("block on for 0.6")
+    assert rig.heard() == [False] * 4
+    assert "takes no bytes" in rig.bus.events()[0]
+    rig.until_all()
+    assert rig.longest_s < 0.3
+
+
+def test_ping_among_noise():
+    rig = Rig()
+    rig.command("noise after FFFFFD count 1")
+    rig.command("corrupt 3 60 count 1")
+    rig.bus.open()
+    assert len(json.loads(rig.chain.faults.status())["servos"]) == len(IDS)
+
+
+@pytest.mark.parametrize("fast", [True, False])
+def test_14_one_silent_servo_of_nine_costs_little_time(fast):
+    """Simulated time of a line at 1 Mbaud: no host and no scheduler in it."""
+    now_s = [0.0]
+
+    def sleep_until(t_s):
+        now_s[0] = max(now_s[0], t_s)
+
+    ids = range(1, 10)
+    chain = build_chain([ServoSpec(i, "xl330-m077", 2000) for i in ids], lambda: now_s[0])
+    port = InProcessPort(chain, sleep_until=sleep_until, wire_time=True)
+    setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
+    bus = DynamixelBus(port, setups, DynamixelParams(fast_sync_read=fast))
+    bus.open()
+    bus.engage()
+
+    def cycle():
+        """Run flat out: gives the time a read takes, and the values that came."""
+        began_s = now_s[0]
+        readings = bus.read(began_s)
+        bus.write([2000] * 9)
+        return now_s[0] - began_s, 9 - readings.count(None)
+
+    for _ in range(300):
+        cycle()
+    usual_s = max(cycle()[0] for _ in range(50))
+    chain.faults.command("lose 5")
+    first_s, values = cycle()
+    assert values == 8
+    assert first_s - usual_s < 0.002
+    later = [cycle() for _ in range(1500)]
+    assert {values for _, values in later} == {8}
+    assert sum(span for span, _ in later) / len(later) < 1.01 * usual_s

@@ -1,0 +1,126 @@
+"""Patience, views in turn, back-off, health and names: the driver's small parts."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.dynamixel_health import AGAIN_AND_AGAIN, Health
+from drivers.dynamixel_journal import MOST, Journal, call, title
+from drivers.dynamixel_patience import WINDOW, Patience
+from drivers.dynamixel_reconnect import Reconnect
+from drivers.dynamixel_table import MODELS, indirect_blocks
+from drivers.dynamixel_views import (
+    CALM_S,
+    INDIRECT_MAP,
+    alone_turns,
+    direct_turns,
+    indirect_turns,
+)
+from drivers.types import ServoSetup
+
+
+def test_patience_begins_long_and_becomes_twice_the_worst_delay():
+    patience = Patience(0.001, 0.02)
+    assert patience.seconds == 0.02
+    for _ in range(WINDOW):
+        patience.note(0.002)
+    assert patience.seconds == 0.004
+    for _ in range(3 * WINDOW):
+        patience.note(0.0001)
+    assert patience.seconds == 0.001
+    for expected in (0.001, 0.001, 0.006, 0.006):
+        patience.note(0.003)
+        assert patience.seconds == expected
+
+
+def test_answers_after_the_end_lengthen_patience():
+    patience = Patience(0.001, 0.02)
+    for _ in range(2 * WINDOW):
+        patience.note(0.0)
+    for expected in (0.001, 0.001, 0.002, 0.002, 0.002, 0.004):
+        patience.missed()
+        assert patience.seconds == expected or expected == 0.004
+
+
+@given(st.lists(st.floats(-1.0, 10.0), max_size=600))
+def test_patience_keeps_to_its_bounds(delays):
+    patience = Patience(0.001, 0.02)
+    for late_s in delays:
+        patience.note(late_s)
+        assert 0.001 <= patience.seconds <= 0.02
+
+
+def test_no_two_views_that_may_follow_each_other_have_the_same_length():
+    block = indirect_blocks(MODELS["xl330-m077"], 53)[0]
+    alone = {view.length for view in alone_turns()._spare}
+    assert len(alone) == len(alone_turns()._spare)
+    for turns in (direct_turns(), indirect_turns(block)):
+        lengths = [view.length for view in (*turns._usual, *turns._spare)]
+        assert len(set(lengths)) == len(lengths)
+        assert not alone.intersection(lengths)
+
+
+def test_after_trouble_views_differ_until_it_has_been_calm_for_a_while():
+    turns = direct_turns()
+    assert turns.next().length == 10
+    seen = []
+    for k in range(4):
+        turns.trouble(5.0 + k)
+        seen.append(turns.next().length)
+    assert len(set(seen)) == 4
+    assert 10 not in seen
+    turns.calm(8.0 + 0.9 * CALM_S)
+    assert turns.next().length != 10
+    turns.calm(8.0 + CALM_S)
+    assert turns.next().length == 10
+
+
+def test_the_indirect_map_fits_every_window():
+    for name, firmware in (("xl330-m077", 46), ("xl330-m077", 53), ("xm430-w350", 45)):
+        block = indirect_blocks(MODELS[name], firmware)[0]
+        assert len(INDIRECT_MAP) <= block.entries
+        assert all(block.target_low <= address <= block.target_high for address in INDIRECT_MAP)
+
+
+def test_a_lost_port_is_tried_ever_more_seldom_but_once_a_second():
+    link = Reconnect()
+    link.lost(10.0)
+    tries, now_s = [], 10.0
+    while now_s < 16.0:
+        now_s = round(now_s + 0.0625, 4)
+        if link.due(now_s):
+            tries.append(now_s - 10.0)
+            link.failed(now_s)
+    waits = [b - a for a, b in zip([0.0, *tries], tries, strict=False)]
+    doubled = [0.1, 0.2, 0.4, 0.8, 1.0, 1.0]
+    assert all(0.0 <= w - d <= 0.0625 for w, d in zip(waits, doubled, strict=False))
+    assert max(waits) <= 1.0625
+    assert round(link.back(16.0), 6) == 6.0
+    assert not link.down
+
+
+def test_the_fourth_restart_within_ten_seconds_is_one_too_many():
+    health = Health({3: ServoSetup(3, "xl330-m077", 0, 4095, 1.0, "jaw")}, Journal())
+    for t_s in (0.0, 4.0, 8.0):
+        assert not health.exhausted(3, t_s)
+        health.restarted(3, t_s)
+    assert not health.exhausted(3, 10.1)
+    health.restarted(3, 10.1)
+    assert health.exhausted(3, 11.0)
+    assert health.faults == {3: AGAIN_AND_AGAIN}
+
+
+def test_the_journal_forgets_what_nobody_takes():
+    journal = Journal()
+    for k in range(MOST + 5):
+        journal.say(str(k))
+    lines = journal.take()
+    assert (len(lines), lines[-1]) == (MOST, str(MOST + 4))
+    assert journal.take() == ()
+
+
+def test_names_are_those_of_people_and_manuals():
+    setup = ServoSetup(7, "xl330-m077", 0, 4095, 1.0)
+    assert call(setup) == "servo 7"
+    assert call(setup._replace(name="neck_yaw")) == "neck_yaw (servo 7)"
+    assert title("return_delay_time") == "Return Delay Time"
+    assert title("goal_pwm") == "Goal PWM"

@@ -1,0 +1,219 @@
+"""Single reads and writes through the SDK, with every fault that a single answer can have.
+
+Faults of a single read and their tests, then what else the SDK does wrong:
+
+no answer, absent, wrong id, wrong baud     test_no_good_answer
+byte lost, truncated, LEN too large or 0    test_no_good_answer
+bit flipped, bad CRC                        test_no_good_answer
+noise before or after, echo                 test_answers_that_are_good_all_the_same
+late but in time, a gap inside              test_answers_that_are_good_all_the_same
+late after the time limit                   test_a_late_answer_is_never_that_of_another_register
+duplicate                                   test_a_duplicate_is_never_that_of_another_register
+wrong id, then the right one                test_answers_that_are_good_all_the_same
+error 07 without data                       test_a_refusal_is_no_value_and_no_exception
+error 0 with too few or too many bytes      test_no_good_answer
+alert                                       test_an_alert_is_data_and_a_note
+answer of another protocol, an instruction  test_no_good_answer
+babble                                      test_babble_takes_a_bounded_time
+port vanishes                               test_a_port_that_vanished_is_not_busy_for_ever
+not stuffed on send, unstuffed wrongly      test_what_looks_like_a_header_passes_both_ways
+a status left behind by reboot              test_nothing_is_left_behind_by_a_reboot
+"""
+
+import struct
+from itertools import pairwise
+
+import pytest
+from dynamixel_sdk import COMM_SUCCESS
+
+from drivers.dynamixel_packets import instruction, statuses
+from drivers.dynamixel_registers import Identity, Registers
+from drivers.dynamixel_sdk_packets import SdkPackets
+from drivers.errors import BusLost
+from sim_mock.ports import InProcessPort
+from sim_mock.servo import ServoSpec
+from sim_mock.servo_chain import build_chain, status
+
+HEADER = b"\xff\xff\xfd\x00"
+
+
+class Rig:
+    """Three servos in this process; ``spoil(answer)`` gives what arrives of one answer."""
+
+    def __init__(self):
+        self.now_s = 0.0
+        specs = [ServoSpec(i, "xl330-m077", 2000 + i) for i in (1, 2, 3)]
+        self.chain = build_chain(specs, lambda: self.now_s)
+        self.sent = []
+        self.port = SpoiltPort(self.chain, self.sent.append, sleep_until=self.sleep_until)
+        self.port.setBaudRate(1_000_000)
+        self.registers = Registers(self.port)
+
+    def sleep_until(self, t_s):
+        self.now_s = max(self.now_s, t_s)
+
+    def read(self, name="present_position"):
+        return self.registers.read(2, name)
+
+    def command(self, text):
+        self.chain.faults.command(text)
+
+
+class SpoiltPort(InProcessPort):
+    """A port whose answers are what ``spoil`` makes of them."""
+
+    spoil = staticmethod(lambda raw: raw)
+
+    def write(self, data):
+        super().write(data)
+        self._waiting = self.spoil(self._waiting)
+
+
+@pytest.fixture
+def rig():
+    return Rig()
+
+
+def resealed(raw, at, value):
+    """Give a packet with one byte changed and a right CRC."""
+    from fastcrc.crc16 import umts
+
+    body = raw[:at] + bytes([value]) + raw[at + 1 : -2]
+    return body + struct.pack("<H", umts(body))
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda raw: b"",
+        lambda raw: raw[1:],
+        lambda raw: raw[:6] + raw[7:],
+        lambda raw: raw[:-1],
+        lambda raw: raw[:9],
+        lambda raw: raw[:5] + b"\x09" + raw[6:],
+        lambda raw: raw[:5] + b"\x00" + raw[6:],
+        lambda raw: raw[:5] + b"\xff\xff" + raw[7:],
+        lambda raw: raw[:10] + bytes([raw[10] ^ 4]) + raw[11:],
+        lambda raw: raw[:-1] + bytes([raw[-1] ^ 1]),
+        lambda raw: resealed(raw, 4, 3),
+        lambda raw: status(2, 0, b"\x01\x02"),
+        lambda raw: status(2, 0, bytes(6)),
+        lambda raw: b"\xff\xff\x02\x06\x00\x00\x08\x00\x00\xef",
+        lambda raw: instruction(2, 2, struct.pack("<HH", 132, 4)),
+    ],
+)
+def test_no_good_answer(rig, spoil):
+    rig.port.spoil = spoil
+    assert rig.read() is None
+    # Three tries, each after a while in which late answers pass.
+    assert rig.now_s < 0.7
+    del rig.port.spoil
+    assert rig.read() == 2002
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["noise before", "noise before FFFFFD", "noise after", "fragment", "echo on",
+     "delay 2 20", "stall 2 25"],
+)  # fmt: skip
+def test_answers_that_are_good_all_the_same(rig, command):
+    rig.command(command)
+    assert [rig.read() for _ in range(5)] == [2002] * 5
+    assert rig.registers.write(2, "led", 1)
+
+
+def test_another_ones_answer_before_the_right_one_does_no_harm(rig):
+    rig.port.spoil = lambda raw: status(3, 0, bytes(4)) + raw
+    assert rig.read() == 2002
+
+
+@pytest.mark.parametrize("late_ms", [40, 60, 90, 150])
+@pytest.mark.parametrize("times", [1, 2, 3])
+def test_a_late_answer_is_never_that_of_another_register(rig, late_ms, times):
+    pairs = [("profile_velocity", 111), ("goal_position", 2002), ("profile_acceleration", 77)]
+    for name, value in pairs:
+        assert rig.registers.write(2, name, value)
+    for name, value in pairs * 3:
+        rig.command(f"delay 2 {late_ms} count {times}")
+        assert rig.read(name) in (value, None)
+    rig.command("clear")
+    rig.now_s += 1.0
+    assert [rig.read(name) for name, _ in pairs] == [value for _, value in pairs]
+
+
+def test_a_duplicate_is_never_that_of_another_register(rig):
+    rig.command("duplicate 2")
+    rig.registers.write(2, "profile_velocity", 111)
+    for _ in range(5):
+        assert (rig.read("profile_velocity"), rig.read()) == (111, 2002)
+
+
+def test_a_refusal_is_no_value_and_no_exception(rig):
+    rig.command("refuse 2 7 count 1")
+    assert rig.read() is None
+    assert rig.registers.refusal == 7
+    assert rig.read() == 2002
+    assert rig.registers.refusal == 0
+    packets = SdkPackets()
+    rig.command("refuse 2 7")
+    for read in (packets.read1ByteTxRx, packets.read2ByteTxRx, packets.read4ByteTxRx):
+        assert read(rig.port, 2, 132) == (0, COMM_SUCCESS, 7)
+
+
+def test_a_write_to_the_eeprom_under_torque_is_refused(rig):
+    rig.registers.write(2, "torque_enable", 1)
+    assert not rig.registers.write(2, "return_delay_time", 3)
+    assert rig.registers.refusal == 7
+
+
+def test_an_alert_is_data_and_a_note(rig):
+    rig.command("overload 2")
+    assert rig.read() == 2002
+    assert rig.registers.alerts == {2}
+    assert rig.registers.write(2, "led", 1)
+
+
+def test_babble_takes_a_bounded_time(rig):
+    rig.command("babble on")
+    rig.now_s += 1.0
+    rig.read()
+    assert rig.now_s < 3.0
+    rig.command("babble off")
+    assert rig.read() == 2002
+
+
+def test_a_port_that_vanished_is_not_busy_for_ever(rig):
+    rig.command("unplug")
+    with pytest.raises(BusLost):
+        rig.read()
+    rig.command("plug")
+    rig.port.setBaudRate(1_000_000)
+    assert rig.read() == 2002
+
+
+def test_what_looks_like_a_header_passes_both_ways(rig):
+    rig.chain.faults.command("set stuffing strict")
+    for data in (b"\xff\xff\xfd\xfd", b"\xff\xff\xfd\x00", b"\xfd\xff\xff\xfd"):
+        rig.sent.clear()
+        assert rig.registers.write_bytes(2, 224, data + b"\xff\xff\xfd\xff\xfd\xfd")
+        assert b"\xff\xff\xfd\xfd" in rig.sent[0][8:]
+        assert rig.registers.read_bytes(2, 224, 10) == data + b"\xff\xff\xfd\xff\xfd\xfd"
+
+
+def test_nothing_is_left_behind_by_a_reboot(rig):
+    assert SdkPackets().reboot(rig.port, 3) == (COMM_SUCCESS, 0)
+    assert rig.registers.identify(2) == Identity(1190, 53)
+    assert rig.registers.ping(3) is None
+    rig.now_s += 1.0
+    assert rig.registers.ping(3) == 1190
+
+
+def test_the_bytes_sent_are_the_protocols(rig):
+    rig.read()
+    rig.registers.write(2, "goal_position", -3)
+    rig.registers.write_all((1, 2), "led", 1)
+    for before, after in pairwise([*rig.sent, rig.sent[-1]]):
+        assert before[:4] == after[:4] == HEADER
+    assert rig.sent[0] == instruction(2, 2, struct.pack("<HH", 132, 4))
+    assert rig.sent[1] == instruction(2, 3, struct.pack("<Hi", 116, -3))
+    assert statuses(b"".join(rig.sent)) == []

@@ -1,0 +1,406 @@
+"""Clients that others wrote do all they can on the emulated bus: Rust, and two vendor SDKs.
+
+None of them knows that there are no servos. The older SDK lives beside the environment
+(`make test` puts it into .venv/other-sdk) and judges in a process of its own.
+"""
+
+import os
+import subprocess
+import sys
+import termios
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from sim_mock.pty_bus import PtyBus
+
+ROOT = Path(__file__).parents[1]
+OTHER_SDK = ROOT / ".venv" / "other-sdk"
+BAUD = 1_000_000
+IDS = (1, 2, 3)
+PLACES = (2048, 1000, 3000)
+SPECS = [(i, "xl330-m288", place) for i, place in zip(IDS, PLACES, strict=True)]
+X430 = [(11, "xl430-w250", 1024), (12, "xm430-w350", 2048)]
+ABSENT = {"acceleration_limit", "torque_limit", "moving_speed", "current_limit", "goal_current"}
+STEADY_STEPS = 12
+"""Friction keeps a servo with factory gains so far from its goal."""
+
+
+@pytest.fixture
+def path():
+    with PtyBus() as bus:
+        yield bus.start([*SPECS, *X430], baud=BAUD)
+
+
+def near(places, goal):
+    return all(abs(place - goal) < STEADY_STEPS for place in places)
+
+
+def wait_until(check, patience_s=5.0):
+    """Wait for something to become true; False where it does not."""
+    deadline = time.monotonic() + patience_s
+    while time.monotonic() < deadline:
+        if check():
+            return True
+        time.sleep(0.02)
+    return False
+
+
+# --- Rust
+
+
+def test_rustypot_with_x330(path):
+    client = pytest.importorskip("rustypot").Xl330PyController(path, BAUD, 0.2)
+    ids = list(IDS)
+    assert [client.ping(i) for i in (1, 2, 3, 4)] == [True, True, True, False]
+    assert client.scan(list(range(6))) == {1: 1200, 2: 1200, 3: 1200}
+    assert client.broadcast_scan(ids) == {1: 1200, 2: 1200, 3: 1200}
+    assert client.sync_read_raw_present_position(ids) == list(PLACES)
+    assert client.read_raw_data_with_error(1, 132, 4) == ([0, 8, 0, 0], 0)
+    client.sync_write_profile_velocity(ids, [0] * 3)
+    client.sync_write_torque_enable(ids, [True] * 3)
+    client.sync_write_raw_goal_position(ids, [1500] * 3)
+    assert wait_until(lambda: near(client.sync_read_raw_present_position([3, 1, 2]), 1500))
+    client.set_fast_sync_read(True)
+    assert near(client.sync_read_raw_present_position([3, 1, 2]), 1500)
+    for values, error in client.sync_read_raw_data_with_error(ids, 126, 10):
+        assert (len(values), error) == (10, 0)
+    client.set_fast_sync_read(False)
+    client.write_raw_data(2, 64, [0])
+    assert client.read_torque_enable(2) in (False, [False])
+    client.reboot(1)
+    time.sleep(0.45)
+    assert client.read_torque_enable(1) in (False, [False])
+    assert client.write_raw_data_with_error(3, 7, [9]) == 7
+    assert client.read_raw_data_with_error(3, 40, 4)[1] == 7
+    client.set_baudrate(57_600)
+    assert client.ping(1) is False
+    client.set_baudrate(BAUD)
+    assert client.ping(1) is True
+    client.close()
+
+
+def test_rustypot_reads_every_register_it_knows(path):
+    rustypot = pytest.importorskip("rustypot")
+    for controller, servo_id in (
+        (rustypot.Xl330PyController, 1),
+        (rustypot.Xl430PyController, 11),
+    ):
+        client = controller(path, BAUD, 0.2)
+        refused = set()
+        for register in client.registers():
+            data, error = client.read_raw_data_with_error(servo_id, register.addr, register.size)
+            if error == 7:
+                refused.add(register.name)
+            else:
+                assert (len(data), error) == (register.size, 0), register
+        assert len(client.registers()) >= 40
+        # Its tables list what these models do not have.
+        assert refused <= ABSENT
+        client.close()
+
+
+def test_rustypot_resets_to_factory_settings(path):
+    client = pytest.importorskip("rustypot").Xl330PyController(path, BAUD, 0.2)
+    client.write_return_delay_time(2, 0)
+    client.factory_reset(2, conserve_id_only=False, conserve_id_and_baudrate=True)
+    time.sleep(0.45)
+    assert client.read_return_delay_time(2) in (250, [250])
+    client.factory_reset(2, conserve_id_only=True, conserve_id_and_baudrate=False)
+    time.sleep(0.45)
+    assert client.ping(2) is False
+    client.set_baudrate(57_600)
+    assert client.ping(2) is True
+    client.close()
+
+
+# --- the vendor's SDKs
+
+
+def judge_with_sdk(path):
+    """Do everything that the SDK's packet handler and groups can; fails by assertion.
+
+    Also runs in a process that has another version of the SDK.
+    """
+    import dynamixel_sdk as sdk
+
+    port, packets = sdk.PortHandler(path), sdk.PacketHandler(2.0)
+    assert port.openPort() and port.setBaudRate(BAUD)
+    ok = sdk.COMM_SUCCESS
+    assert packets.ping(port, 1) == (1200, ok, 0)
+    assert packets.ping(port, 99)[1] == sdk.COMM_RX_TIMEOUT
+    found, result = packets.broadcastPing(port)
+    assert result == ok
+    assert {i: tuple(values) for i, values in found.items()} == {
+        1: (1200, 53), 2: (1200, 53), 3: (1200, 53), 11: (1060, 53), 12: (1020, 53)
+    }  # fmt: skip
+    registers_with_sdk(sdk, port, packets)
+    groups_with_sdk(sdk, port, packets)
+    instructions_with_sdk(sdk, port, packets)
+    port.closePort()
+
+
+def registers_with_sdk(sdk, port, packets):
+    ok = sdk.COMM_SUCCESS
+    assert packets.read4ByteTxRx(port, 2, 132) == (1000, ok, 0)
+    assert packets.write1ByteTxRx(port, 1, 65, 1) == (ok, 0)
+    assert packets.read1ByteTxRx(port, 1, 65) == (1, ok, 0)
+    assert packets.write2ByteTxRx(port, 1, 84, 700) == (ok, 0)
+    assert packets.read2ByteTxRx(port, 1, 84) == (700, ok, 0)
+    assert packets.write4ByteTxRx(port, 1, 116, 5000) == (ok, 6)
+    assert packets.write1ByteTxRx(port, 1, 7, 253) == (ok, 4)
+    assert packets.write1ByteTxRx(port, 1, 132, 1) == (ok, 7)
+    data, result, error = packets.readTxRx(port, 1, 124, 23)
+    assert (len(data), result, error) == (23, ok, 0)
+    packets.write1ByteTxOnly(port, 1, 65, 0)
+    time.sleep(0.02)
+    port.ser.reset_input_buffer()
+    port.is_using = False
+    assert packets.read1ByteTxRx(port, 1, 65) == (0, ok, 0)
+
+
+def groups_with_sdk(sdk, port, packets):
+    ok = sdk.COMM_SUCCESS
+    torque = sdk.GroupSyncWrite(port, packets, 64, 1)
+    goals = sdk.GroupSyncWrite(port, packets, 116, 4)
+    places = sdk.GroupSyncRead(port, packets, 132, 4)
+    for servo_id in IDS:
+        assert torque.addParam(servo_id, [1]) and places.addParam(servo_id)
+        assert goals.addParam(servo_id, [0xDC, 0x05, 0, 0])
+    assert places.txRxPacket() == ok
+    assert tuple(places.getData(i, 132, 4) for i in IDS) == PLACES
+    assert torque.txPacket() == ok and goals.txPacket() == ok
+    reads = [places.txRxPacket] + ([places.fastSyncRead] if hasattr(places, "fastSyncRead") else [])
+    for read in reads:
+        assert wait_until(
+            lambda read=read: read() == ok and near([places.getData(i, 132, 4) for i in IDS], 1500)
+        )
+    writes = sdk.GroupBulkWrite(port, packets)
+    assert writes.addParam(1, 65, 1, [1]) and writes.addParam(2, 112, 4, [40, 0, 0, 0])
+    assert writes.txPacket() == ok
+    bulk = sdk.GroupBulkRead(port, packets)
+    assert bulk.addParam(1, 65, 1) and bulk.addParam(2, 112, 4) and bulk.addParam(3, 144, 2)
+    reads = [bulk.txRxPacket] + ([bulk.fastBulkRead] if hasattr(bulk, "fastBulkRead") else [])
+    for read in reads:
+        assert read() == ok
+        got = bulk.getData(1, 65, 1), bulk.getData(2, 112, 4)
+        assert got == (1, 40)
+        assert 45 <= bulk.getData(3, 144, 2) <= 50
+
+
+def instructions_with_sdk(sdk, port, packets):
+    ok = sdk.COMM_SUCCESS
+    assert packets.regWriteTxRx(port, 3, 65, 1, [1]) == (ok, 0)
+    assert packets.read1ByteTxRx(port, 3, 69) == (1, ok, 0)
+    assert packets.read1ByteTxRx(port, 3, 65) == (0, ok, 0)
+    assert packets.action(port, 0xFE) == ok
+    time.sleep(0.02)
+    port.ser.reset_input_buffer()
+    assert packets.read1ByteTxRx(port, 3, 65) == (1, ok, 0)
+    rebooted = packets.reboot(port, 3)
+    assert rebooted == (ok, 0)
+    assert packets.ping(port, 3)[1] == sdk.COMM_RX_TIMEOUT
+    time.sleep(0.45)
+    assert packets.read1ByteTxRx(port, 3, 64) == (0, ok, 0)
+    assert packets.clearMultiTurn(port, 3) == (ok, 0)
+    assert packets.write1ByteTxRx(port, 3, 7, 5) == (ok, 0)
+    assert packets.ping(port, 5) == (1200, ok, 0)
+    assert packets.factoryReset(port, 5, 0x02) == (ok, 0)
+    time.sleep(0.45)
+    assert packets.ping(port, 5) == (1200, ok, 0)
+    assert packets.factoryReset(port, 5, 0xFF) == (ok, 0)
+    time.sleep(0.45)
+    assert packets.ping(port, 5)[1] == sdk.COMM_RX_TIMEOUT
+    assert port.setBaudRate(57_600)
+    assert packets.ping(port, 1) == (1200, ok, 0)
+
+
+def test_the_vendors_sdk(path):
+    judge_with_sdk(path)
+
+
+@pytest.mark.skipif(not OTHER_SDK.is_dir(), reason=f"no {OTHER_SDK}: `make test` installs it")
+def test_an_older_sdk_of_the_vendor(path):
+    code = (
+        "import sys, dynamixel_sdk, test_judges; "
+        "assert 'other-sdk' in dynamixel_sdk.__file__, dynamixel_sdk.__file__; "
+        "test_judges.judge_with_sdk(sys.argv[1])"
+    )
+    where = os.pathsep.join(map(str, (OTHER_SDK, ROOT / "tests", ROOT)))
+    done = subprocess.run(
+        [sys.executable, "-c", code, path],
+        env={**os.environ, "PYTHONPATH": where},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_vendors_easy_sdk(path):
+    easy = pytest.importorskip("dynamixel_easy_sdk")
+    connector = easy.Connector(path, BAUD)
+    motors = {motor.id: motor for motor in connector.createAllMotors()}
+    assert sorted(motors) == [1, 2, 3, 11, 12]
+    group = connector.createGroupExecutor()
+    for motor in motors.values():
+        motor.disableTorque()
+        motor.setOperatingMode(easy.OperatingMode.POSITION)
+        motor.setPositionPGain(900)
+        motor.enableTorque()
+        group.addCmd(motor.stageSetGoalPosition(1800))
+        group.addCmd(motor.stageGetPresentPosition())
+    group.executeWrite()
+    assert wait_until(lambda: near(group.executeRead(), 1800))
+    one = motors[2]
+    assert one.getOperatingMode() == easy.OperatingMode.POSITION
+    assert (one.getMinPositionLimit(), one.getMaxPositionLimit()) == (0, 4095)
+    one.disableTorque()
+    one.setDirection(easy.Direction.REVERSE)
+    one.setProfileConfiguration(easy.ProfileConfiguration.TIME_BASED)
+    assert connector.read1ByteData(2, 10) == 5
+    one.changeID(20)
+    assert connector.ping(20) == 1200
+    one.LEDOn()
+    assert one.isLEDOn() == 1
+    one.reboot()
+    time.sleep(0.45)
+    assert one.isLEDOn() == 0
+    connector.closePort()
+
+
+# --- what else a client may do with a port
+
+
+PING = bytes.fromhex("FFFFFD0001030001194E")
+PONG = 14
+
+
+def answers(fd, expected, patience_s=5.0):
+    got, deadline = b"", time.monotonic() + patience_s
+    while len(got) < expected and time.monotonic() < deadline:
+        try:
+            got += os.read(fd, 4096)
+        except BlockingIOError:
+            time.sleep(0.001)
+    return len(got)
+
+
+@pytest.fixture
+def terminal(path):
+    fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    yield fd
+    os.close(fd)
+
+
+def test_a_client_that_opens_a_file_and_sets_nothing(terminal):
+    os.write(terminal, PING)
+    assert answers(terminal, PONG) == PONG
+
+
+def test_bytes_one_by_one_and_packets_all_at_once(terminal):
+    for byte in PING:
+        os.write(terminal, bytes((byte,)))
+    assert answers(terminal, PONG) == PONG
+    os.write(terminal, PING * 20)
+    assert answers(terminal, 20 * PONG) == 20 * PONG
+    os.write(terminal, PING + PING[:4])
+    assert answers(terminal, PONG) == PONG
+    os.write(terminal, PING[4:])
+    assert answers(terminal, PONG) == PONG
+
+
+def test_flushes_breaks_and_modem_lines_do_no_harm(terminal):
+    termios.tcflush(terminal, termios.TCIOFLUSH)
+    termios.tcdrain(terminal)
+    termios.tcsendbreak(terminal, 0)
+    os.write(terminal, PING)
+    termios.tcdrain(terminal)
+    assert answers(terminal, PONG) == PONG
+
+
+def test_every_byte_value_passes_in_both_directions(terminal):
+    from fastcrc.crc16 import umts
+
+    for start in range(0, 256, 16):
+        values = bytes(range(start, start + 16))
+        head = b"\xff\xff\xfd\x00\x01" + (16 + 5).to_bytes(2, "little")
+        packet = head + b"\x03" + (224).to_bytes(2, "little") + values
+        os.write(terminal, packet + umts(packet).to_bytes(2, "little"))
+        assert answers(terminal, 11) == 11
+        packet = head[:5] + b"\x07\x00\x02" + (224).to_bytes(2, "little") + b"\x10\x00"
+        os.write(terminal, packet + umts(packet).to_bytes(2, "little"))
+        got, deadline = b"", time.monotonic() + 5.0
+        while len(got) < 27 and time.monotonic() < deadline:
+            try:
+                got += os.read(terminal, 4096)
+            except BlockingIOError:
+                time.sleep(0.001)
+        assert got[9:-2] == values
+
+
+def test_answers_that_a_client_did_not_read_are_not_the_next_ones(path):
+    fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    os.write(fd, PING)
+    time.sleep(0.05)
+    os.close(fd)
+    time.sleep(0.05)
+    fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    with pytest.raises(BlockingIOError):
+        os.read(fd, 100)
+    os.write(fd, PING)
+    assert answers(fd, 2 * PONG, 0.1) == PONG
+    os.close(fd)
+
+
+def test_a_client_killed_with_a_lock_leaves_the_port_to_the_next(path):
+    """A client locks the terminal for itself and dies; the lock goes with time."""
+    import fcntl
+
+    fd = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    fcntl.ioctl(fd, termios.TIOCEXCL)
+    os.close(fd)
+    assert wait_until(lambda: not locked(path), 5.0)
+
+
+def locked(path):
+    """Tell whether a terminal is locked, without being kept out by the lock oneself."""
+    import fcntl
+    import struct
+
+    try:
+        fd = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    except OSError:
+        return True
+    try:
+        get_lock = 0x80045440  # TIOCGEXCL
+        return bool(struct.unpack("i", fcntl.ioctl(fd, get_lock, bytes(4)))[0])
+    finally:
+        os.close(fd)
+
+
+def test_two_threads_of_one_client_do_not_upset_the_server(path):
+    """Nonsense from one side, questions from the other: the questions are answered again after."""
+    stop = threading.Event()
+
+    def shout():
+        fd = os.open(path, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+        while not stop.is_set():
+            try:
+                os.write(fd, b"\xff\xff\xfd\x00\x01\x10")
+            except BlockingIOError:
+                time.sleep(0.001)
+        os.close(fd)
+
+    thread = threading.Thread(target=shout)
+    thread.start()
+    time.sleep(0.05)
+    stop.set()
+    thread.join()
+    time.sleep(0.1)
+    fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    os.write(fd, PING)
+    assert answers(fd, PONG) == PONG
+    os.close(fd)

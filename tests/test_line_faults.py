@@ -1,0 +1,440 @@
+"""Each fault of the line, asked for by text, as the bytes that arrive at the host show it."""
+
+import json
+import struct
+
+import pytest
+from fastcrc.crc16 import umts
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.errors import BusLost, PortError
+from sim_mock.fault_commands import VERBS, usage
+from sim_mock.ports import InProcessPort
+from sim_mock.servo_chain import build_chain, status
+
+IDS = (1, 2, 3)
+GOLDEN_PING = bytes.fromhex("FFFFFD0001030001194E")
+READ_ONE = (2, struct.pack("<HH", 132, 4))
+READ_ALL = struct.pack("<HH", 132, 4) + bytes(IDS)
+
+
+def instruction(servo_id, code, params=b""):
+    packet = b"\xff\xff\xfd\x00" + struct.pack("<BHB", servo_id, len(params) + 3, code) + params
+    return packet + struct.pack("<H", umts(packet))
+
+
+def good(servo_id):
+    """Give the status of an unspoilt read of the position."""
+    return status(servo_id, 0, struct.pack("<i", 2000 + servo_id))
+
+
+def sound(packet):
+    return umts(packet[:-2]) == int.from_bytes(packet[-2:], "little")
+
+
+class World:
+    """Three servos, a port, and a clock that waiting moves on."""
+
+    def __init__(self, sleeps=True, **options):
+        self.now_s = 0.0
+        chain = build_chain(
+            [(i, "xl330-m077", 2000 + i) for i in IDS], lambda: self.now_s, **options
+        )
+        self.port = InProcessPort(chain, sleep_until=self.sleep_until if sleeps else None)
+        self.port.setBaudRate(1_000_000)
+        self.faults = self.port.faults
+
+    def sleep_until(self, t_s):
+        self.now_s = max(self.now_s, t_s)
+
+    def ask(self, servo_id, code, params=b"", patience_s=0.1):
+        """Send one instruction and give all that arrives in time."""
+        self.port.write(instruction(servo_id, code, params))
+        return self.port.read_until(2000, self.now_s + patience_s)
+
+    def one(self, servo_id=2):
+        return self.ask(servo_id, *READ_ONE)
+
+    def plain(self):
+        return self.ask(0xFE, 0x82, READ_ALL)
+
+    def fast(self):
+        return self.ask(0xFE, 0x8A, READ_ALL)
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+def test_a_lost_answer_silences_those_behind_it(world):
+    world.faults.command("lose 2 count 3")
+    assert world.one() == b""
+    assert world.plain() == good(1)
+    assert len(world.fast()) == 8 + 8
+    assert world.plain() == good(1) + good(2) + good(3)
+
+
+@pytest.mark.parametrize(
+    ("policy", "late_s"), [("skip", 0.0), ("timeout", 0.001)], ids=["skip", "timeout"]
+)
+def test_those_behind_a_missing_one_may_answer(policy, late_s):
+    world = World()
+    world.faults.command(f"set after-missing {policy}")
+    world.faults.command("lose 2")
+    world.port.write(instruction(0xFE, 0x82, READ_ALL))
+    assert world.port.read_until(15, 0.0) == good(1)
+    assert world.port.read_until(15, 1.0) == good(3)
+    assert world.now_s == pytest.approx(late_s)
+
+
+def test_a_servo_whose_answer_is_lost_has_obeyed_all_the_same(world):
+    world.faults.command("lose 1")
+    assert world.ask(1, 3, struct.pack("<HB", 65, 1)) == b""
+    world.faults.command("clear")
+    assert world.ask(1, 2, struct.pack("<HH", 65, 1))[9] == 1
+
+
+def test_a_late_answer_arrives_when_the_clock_gets_there(world):
+    world.faults.command("delay 2 30 count 1")
+    world.port.write(instruction(2, *READ_ONE))
+    assert world.port.read_until(15, 0.02) == b""
+    assert world.now_s == 0.02
+    assert world.port.drain() == 0
+    assert world.port.read_until(15, 0.1) == good(2)
+    assert world.now_s == pytest.approx(0.03)
+
+
+def test_without_a_clock_to_move_nobody_waits():
+    world = World(sleeps=False)
+    world.faults.command("delay 2 30")
+    assert world.one() == b""
+    assert world.now_s == 0.0
+    world.now_s = 0.04
+    assert world.port.read_until(99, 0.0) == good(2)
+
+
+def test_a_stall_is_a_gap_in_the_middle(world):
+    world.faults.command("stall 2 30 count 1")
+    world.port.write(instruction(2, *READ_ONE))
+    assert world.port.read_until(99, 0.01) == good(2)[:7]
+    assert world.port.read_until(99, 0.1) == good(2)[7:]
+
+
+def test_truncated(world):
+    world.faults.command("truncate 2 9")
+    assert world.one() == good(2)[:9]
+    assert world.plain() == good(1) + good(2)[:9] + good(3)
+    assert len(world.fast()) == 8 + 8 + 9 - 1
+    world.faults.clear()
+    assert sound(world.fast())
+
+
+def test_duplicated(world):
+    world.faults.command("duplicate 2")
+    assert world.one() == good(2) * 2
+    assert world.plain() == good(1) + good(2) * 2 + good(3)
+    again = world.fast()
+    assert again[: len(again) // 2] * 2 == again
+
+
+def test_a_flipped_bit_is_where_it_was_asked_for(world):
+    world.faults.command("corrupt 2 72")
+    got = world.one()
+    assert got[9] == good(2)[9] ^ 1
+    assert not sound(got)
+
+
+def test_flips_by_dice_are_the_same_each_time():
+    seen = []
+    for _ in range(2):
+        world = World(seed=5)
+        world.faults.command("corrupt all")
+        seen.append([world.one() for _ in range(20)])
+    assert seen[0] == seen[1]
+    assert len(set(seen[0])) > 10
+    assert all(bin(int.from_bytes(x) ^ int.from_bytes(good(2))).count("1") == 1 for x in seen[0])
+
+
+@pytest.mark.parametrize("byte", [0, 5, 14, -1])
+def test_a_dropped_byte(world, byte):
+    world.faults.command(f"drop 2 {byte}")
+    at = byte % 15
+    assert world.one() == good(2)[:at] + good(2)[at + 1 :]
+
+
+def test_noise_and_loose_headers(world):
+    world.faults.command("noise before FFFF count 1")
+    world.faults.command("noise after 00FDFD count 1")
+    assert world.one() == b"\xff\xff" + good(2) + b"\x00\xfd\xfd"
+    world.faults.command("fragment count 1")
+    assert world.one() == b"\xff\xff\xfd\x00" + good(2)
+    world.faults.command("noise before random count 1")
+    assert world.one()[8:] == good(2)
+    assert world.one() == good(2)
+
+
+def test_echo(world):
+    world.faults.command("echo on")
+    assert world.one() == instruction(2, *READ_ONE) + good(2)
+    world.faults.command("echo off")
+    assert world.one() == good(2)
+
+
+def test_wrong_id_has_a_right_crc(world):
+    world.faults.command("wrong-id 2 9")
+    assert world.one() == status(9, 0, good(2)[9:13])
+    assert sound(world.fast())
+
+
+def test_too_short_and_too_long(world):
+    world.faults.command("short 2 2 count 1")
+    assert world.one() == status(2, 0, good(2)[9:11])
+    world.faults.command("long 2 3 count 1")
+    assert world.one() == status(2, 0, good(2)[9:13] + bytes(3))
+
+
+def test_refused(world):
+    world.faults.command("refuse 2 7 count 1")
+    assert world.one() == status(2, 7, b"")
+    world.faults.command("refuse 2 7 count 1")
+    block = world.fast()[16:24]
+    assert block[:6] == b"\x07\x02" + bytes(4)
+
+
+def test_reordered(world):
+    world.faults.command("reorder count 2")
+    assert world.plain() == good(3) + good(2) + good(1)
+    fast = world.fast()
+    assert [fast[i] for i in (9, 17, 25)] == [3, 2, 1]
+    assert world.plain() == good(1) + good(2) + good(3)
+
+
+def test_babble_never_ends_and_the_answer_is_in_it(world):
+    world.faults.command("babble on")
+    for _ in range(5):
+        world.now_s += 0.005
+        got = world.one()
+        assert good(2) in got
+        assert len(got) >= 100
+    world.now_s += 0.005
+    assert world.port.drain() >= 100
+    world.faults.command("babble off")
+    assert world.one() == good(2)
+
+
+def test_colliding_servos_mix_where_they_differ(world):
+    world.faults.command("collide 2")
+    ping = world.ask(2, 1)
+    assert sound(ping)
+    assert len(ping) == 14
+    mixed = world.one()
+    twin = status(2, 0, struct.pack("<i", 2002 + 257))
+    assert mixed == bytes(a & b for a, b in zip(good(2), twin, strict=True))
+    assert not sound(mixed)
+    # The later servos heard the mixture and go on from it: only the inner CRC tells.
+    fast = world.fast()
+    assert sound(fast)
+    assert [sound(fast[: 8 + 8 * k]) for k in (1, 2, 3)] == [True, False, True]
+    assert world.one(1) == good(1)
+
+
+def test_lost_group_writes_leave_no_trace(world):
+    write = struct.pack("<HH", 65, 1) + bytes((1, 1, 2, 1, 3, 1))
+    world.faults.command("lose-writes 1")
+    led = struct.pack("<HH", 65, 1)
+    for expected in (0, 1):
+        assert world.ask(0xFE, 0x83, write) == b""
+        assert world.ask(3, 2, led)[9] == expected
+
+
+def test_latched_errors_by_command(world):
+    for command, bit in (("overload 1", 0x20), ("overheat 2", 4), ("encoder 3", 8)):
+        world.faults.command(command)
+        servo_id = int(command[-1])
+        assert world.ask(servo_id, 2, struct.pack("<HH", 70, 1))[8:10] == bytes((0x80, bit))
+
+
+def byte(world, servo_id, address):
+    return world.ask(servo_id, 2, struct.pack("<HH", address, 1))[9]
+
+
+def position(world, servo_id):
+    return struct.unpack("<i", world.one(servo_id)[9:13])[0]
+
+
+def test_a_brown_out_is_deafness_then_defaults_without_any_status(world):
+    world.ask(2, 3, struct.pack("<Hi", 112, 50))
+    world.ask(2, 3, struct.pack("<HB", 64, 1))
+    world.faults.command("brown-out 2")
+    assert world.one() == b""
+    world.now_s += 0.4
+    assert byte(world, 2, 64) == byte(world, 2, 70) == byte(world, 2, 112) == 0
+
+
+def test_a_reset_servo_speaks_as_from_the_factory():
+    world = World(baud=1_000_000)
+    assert "id 1, 57600" in world.faults.command("reset 3")
+    world.now_s += 0.5
+    assert world.one(3) == b""
+    world.port.setBaudRate(57_600)
+    assert position(world, 1) == 2003
+    world.port.setBaudRate(1_000_000)
+    assert position(world, 1) == 2001
+    world.ask(2, 3, struct.pack("<HB", 64, 1))
+    with pytest.raises(ValueError, match="its torque is on"):
+        world.faults.command("reset 2")
+
+
+def test_supply_heat_a_hand_and_a_jam(world):
+    world.faults.command("voltage all 3.2")
+    world.now_s += 0.1
+    assert [byte(world, i, 70) for i in IDS] == [1, 1, 1]
+    assert world.one(1)[8] == 0x80
+    world = World()
+    world.faults.command("temperature 1 90")
+    world.now_s += 0.1
+    assert (byte(world, 1, 70), byte(world, 2, 70)) == (4, 0)
+    world.faults.command("turn 2 -100")
+    assert abs(position(world, 2) - 1902) <= 3
+    world.faults.command("stick 3")
+    world.ask(3, 3, struct.pack("<HB", 64, 1))
+    world.ask(3, 3, struct.pack("<Hi", 116, 3000))
+    world.now_s += 0.2
+    assert abs(position(world, 3) - 2003) < 20
+    world.faults.command("free 3")
+    world.now_s += 1.0
+    held = position(world, 3)
+    assert held > 2900
+    world.faults.command("load 3 -0.1")
+    world.now_s += 0.5
+    assert position(world, 3) < held - 20
+
+
+def test_unplugged_until_plugged_and_opened_again(world):
+    world.faults.command("unplug")
+    for use in (lambda: world.port.write(GOLDEN_PING), world.port.drain):
+        with pytest.raises(BusLost, match="gone"):
+            use()
+    with pytest.raises(PortError, match="No such file"):
+        world.port.setBaudRate(1_000_000)
+    world.faults.command("plug")
+    with pytest.raises(BusLost):
+        world.port.read_until(1, 0.0)
+    world.port.setBaudRate(1_000_000)
+    assert world.one() == good(2)
+
+
+def test_unplugged_for_a_time(world):
+    world.faults.command("unplug for 0.5")
+    with pytest.raises(BusLost):
+        world.one()
+    world.now_s = 0.5
+    world.port.setBaudRate(1_000_000)
+    assert world.one() == good(2)
+
+
+def test_forbidden_and_blocked(world):
+    world.faults.command("deny on")
+    with pytest.raises(PortError, match="Permission denied"):
+        world.port.setBaudRate(1_000_000)
+    world.faults.command("deny off")
+    world.faults.command("block on")
+    with pytest.raises(BusLost, match="takes no bytes"):
+        world.one()
+    assert world.now_s == 0.25
+    world.faults.command("block off")
+    assert world.one() == good(2)
+
+
+def test_faults_last_for_a_count_a_time_or_until_cleared(world):
+    world.faults.command("lose 1 count 2")
+    world.faults.command("lose 2 for 1")
+    world.faults.command("lose 3")
+    assert [world.one(i) for i in IDS] == [b""] * 3
+    assert [world.one(i) for i in IDS] == [b""] * 3
+    assert world.one(1) == good(1)
+    world.now_s = 5.0
+    assert world.one(2) == good(2)
+    assert world.one(3) == b""
+    world.faults.command("clear 3")
+    assert world.one(3) == good(3)
+    assert not world.faults.wire.any
+
+
+def test_status_tells_servos_and_faults(world):
+    world.faults.command("delay all 3")
+    told = json.loads(world.faults.command("status"))
+    assert [servo["position"] for servo in told["servos"]] == [2001, 2002, 2003]
+    assert told["servos"][0]["torque"] == 0
+    assert told["faults"] == ["delay all"]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("lsoe 3", "'lsoe' is no command; there is lose, delay"),
+        ("lose", "ID is missing; usage: lose ID"),
+        ("lose 3 4", "'4' is too much"),
+        ("lose x", "'x' is not a servo id from 0 to 252"),
+        ("lose 9", "no servo 9; there is 1, 2, 3"),
+        ("lose 3 count none", "'none' is not a number of answers"),
+        ("delay 3 soon", "'soon' is not milliseconds from 0"),
+        ("delay 3 nan", "'nan' is not milliseconds"),
+        ("noise over", "'over' is neither before nor after"),
+        ("noise before xyz", "'xyz' is neither random nor bytes in hex"),
+        ("echo perhaps", "'perhaps' is neither on nor off"),
+        ("overload 1 count 3", "'count' has no meaning here"),
+        ("set after-missing wait", "it can be silence, skip, timeout"),
+        ("set afterwards skip", "unknown; there is after-missing, bad-crc"),
+        ("set slot-timeout-ms -1", "not a number of milliseconds"),
+    ],
+)
+def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
+    with pytest.raises(ValueError) as error:
+        world.faults.command(text)
+    assert says in str(error.value)
+    assert not world.faults.wire.any
+
+
+def test_help_explains_every_command(world):
+    text = world.faults.command("help")
+    assert all(usage(name) in text for name in VERBS)
+    assert world.faults.command("help lose").startswith("lose ID [count N]")
+
+
+def test_methods_do_what_commands_do():
+    by_text, by_method = World(), World()
+    by_text.faults.command("short 2 2")
+    by_text.faults.command("delay 2 5 for 1")
+    by_method.faults.short(2, 2)
+    by_method.faults.delay(2, 5.0, seconds=1.0)
+    assert by_text.plain() == by_method.plain() != good(1) + good(2) + good(3)
+
+
+_WORDS = st.sampled_from([*VERBS, "help", "1", "2", "3", "0", "-1", "5", "on", "off", "all"])
+
+
+@given(st.lists(st.lists(_WORDS, min_size=1, max_size=5), max_size=6))
+def test_no_mixture_of_commands_breaks_the_bus(lines):
+    """Whatever was asked for, the bus goes on, and is sound again once all is cleared."""
+    world = World()
+    for line in lines:
+        try:
+            world.faults.command(" ".join(line))
+        except ValueError as error:
+            assert str(error)
+        try:
+            world.fast()
+            world.plain()
+        except BusLost:
+            world.faults.command("plug")
+            world.faults.command("deny off")
+            world.port.setBaudRate(1_000_000)
+    world.faults.command("clear")
+    world.port.setBaudRate(1_000_000)
+    world.now_s += 100.0
+    world.port.drain()
+    if len(set(world.port.chain.ids())) == len(world.port.chain.ids()):
+        assert [world.one(i)[8] & 0x7F for i in IDS] == [0, 0, 0]

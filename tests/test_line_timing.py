@@ -1,0 +1,142 @@
+"""When bytes arrive on the emulated line: the written formula, to the microsecond."""
+
+import struct
+
+import pytest
+from fastcrc.crc16 import umts
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim_mock.servo_chain import build_chain
+from sim_mock.servo_line import ServoLine
+
+
+def instruction(servo_id, code, params=b""):
+    packet = b"\xff\xff\xfd\x00" + struct.pack("<BHB", servo_id, len(params) + 3, code) + params
+    return packet + struct.pack("<H", umts(packet))
+
+
+IDS = tuple(range(1, 10))
+SENSED = struct.pack("<HH", 126, 10) + bytes(IDS)
+PLAIN, FAST = instruction(0xFE, 0x82, SENSED), instruction(0xFE, 0x8A, SENSED)
+GOALS = instruction(
+    0xFE, 0x83, struct.pack("<HH", 116, 4) + b"".join(struct.pack("<Bi", i, 2048) for i in IDS)
+)
+PING = instruction(1, 1)
+
+
+class Wire:
+    """Nine servos on a line with wire time, and a clock that is set by hand."""
+
+    def __init__(self, return_delay=0, **options):
+        self.now_s = 0.0
+        self.chain = build_chain([(i, "xl330-m077", 2048) for i in IDS], lambda: self.now_s)
+        self.chain.receive(instruction(0xFE, 3, struct.pack("<HB", 9, return_delay)))
+        self.chain.refresh()
+        self.line = ServoLine(self.chain, wire_time=True, **options)
+
+    def answers(self, data, baud=1_000_000):
+        """Send bytes; give (time, bytes) of all that arrives."""
+        assert self.line.send(data, baud) == b""
+        out = []
+        while (due_s := self.line.next_due_s()) is not None:
+            self.now_s = due_s
+            out.append((due_s, self.line.arrived()))
+        return out
+
+
+@pytest.mark.parametrize("baud", [57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000])
+@pytest.mark.parametrize(
+    ("request_bytes", "size"), [(PLAIN, 23 + 189), (FAST, 23 + 134)], ids=["plain", "fast"]
+)
+@pytest.mark.parametrize("delay", [0, 250])
+def test_a_cycle_takes_what_the_formula_says(baud, request_bytes, size, delay):
+    wire = Wire(delay)
+    answers = wire.answers(GOALS + request_bytes, baud)
+    assert sum(len(data) for _, data in answers) == size - 23
+    delays = (9 if request_bytes is PLAIN else 1) * delay * 2e-6
+    assert answers[-1][0] == pytest.approx((59 + size) * 10 / baud + delays, abs=1e-9)
+
+
+def test_the_rates_of_nine_servos_are_the_known_ones():
+    """Sync write and read of nine servos: 369 and 463 cycles a second at 1 Mbaud."""
+    for request_bytes, rate in ((PLAIN, 369), (FAST, 463)):
+        assert round(1.0 / Wire().answers(GOALS + request_bytes)[-1][0]) == rate
+
+
+def test_the_turnaround_counts_once_a_status():
+    plain = Wire(turnaround_s=30e-6).answers(PLAIN)
+    fast = Wire(turnaround_s=30e-6).answers(FAST)
+    assert plain[-1][0] == pytest.approx(2120e-6 + 9 * 30e-6)
+    assert fast[-1][0] == pytest.approx(1570e-6 + 30e-6)
+
+
+def test_a_long_reply_comes_in_parts_of_a_millisecond():
+    times = [due_s for due_s, _ in Wire().answers(PLAIN)]
+    assert times == sorted(times)
+    assert len(times) == 2
+    assert all(len(data) >= 60 for _, data in Wire().answers(PLAIN))
+
+
+def test_answers_queue_behind_one_another():
+    answers = Wire().answers(PING + PING)
+    assert [round(due_s * 1e6) for due_s, _ in answers] == [240, 380]
+
+
+def test_bytes_of_the_host_queue_too():
+    wire = Wire()
+    wire.line.send(PING, 1_000_000)
+    wire.line.send(PING, 1_000_000)
+    times = []
+    while (due_s := wire.line.next_due_s()) is not None:
+        wire.now_s = due_s
+        wire.line.arrived()
+        times.append(round(due_s * 1e6))
+    assert times == [240, 380]
+
+
+def test_an_idle_line_owes_nothing():
+    wire = Wire()
+    wire.answers(PING)
+    wire.now_s = 5.0
+    assert wire.answers(PING)[-1][0] == pytest.approx(5.00024)
+
+
+def test_a_late_answer_makes_those_behind_it_late():
+    wire = Wire()
+    wire.chain.faults.delay(3, 2.0, count=1)
+    assert wire.answers(PLAIN)[-1][0] == pytest.approx(2120e-6 + 2e-3)
+
+
+def test_without_wire_time_all_is_there_at_once():
+    wire = Wire(250)
+    instant = ServoLine(wire.chain)
+    assert len(instant.send(PLAIN, 1_000_000)) == 189
+    assert instant.next_due_s() is None
+
+
+@settings(max_examples=40)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([PING, PLAIN, FAST, GOALS, GOALS + FAST]),
+            st.floats(0.0, 0.01),
+            st.sampled_from([57_600, 1_000_000, 4_000_000]),
+        ),
+        max_size=6,
+    ),
+    st.integers(0, 254),
+)
+def test_nothing_overtakes_and_nothing_is_lost(sendings, delay):
+    wire, plain = Wire(delay), Wire(delay)
+    got, expected, last_s = b"", b"", 0.0
+    for data, pause_s, baud in sendings:
+        wire.now_s += pause_s
+        plain.now_s = wire.now_s
+        got += wire.line.send(data, baud)
+        expected += plain.chain.receive(data)
+    while (due_s := wire.line.next_due_s()) is not None:
+        assert due_s >= last_s
+        last_s = wire.now_s = max(due_s, wire.now_s)
+        got += wire.line.arrived()
+    assert got == expected

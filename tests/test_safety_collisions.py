@@ -1,0 +1,254 @@
+"""Forbidden pairs of joint ranges: never entered, never crossed, left gently."""
+
+from collections.abc import Callable
+from math import degrees, radians
+
+import numpy as np
+import pytest
+
+from config.bounds import judge
+from robot.safety import Guard, GuardParams, JointLimit
+from robot.safety_collisions import CollisionParams
+from robot.types import JOINTS, JointState, Verdict
+
+EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
+NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))
+LIMITS = (EYE,) * 6 + (NECK,) * 3
+DT = 0.005
+LEFT, RIGHT, PITCH = (JOINTS.index(n) for n in ("left_upper_lid", "right_upper_lid", "neck_pitch"))
+LID = CollisionParams("neck_pitch", -30.0, -18.0, "left_upper_lid", 10.0, 25.0)
+OTHER_LID = CollisionParams("right_upper_lid", 10.0, 25.0, "neck_pitch", -30.0, -18.0)
+
+
+class World:
+    """Joints one tick behind their commands."""
+
+    def __init__(self, *pairs: CollisionParams, **start_deg: float) -> None:
+        self.guard = Guard(GuardParams(collisions=pairs), LIMITS)
+        self.pairs = pairs
+        start = tuple(radians(start_deg.get(name, 0.0)) for name in JOINTS)
+        self.guard.reset(0.0, start)
+        self.t_s = 0.0
+        self.path = [start]
+        self.measured: Callable[[tuple[float, ...]], tuple[float, ...]] = lambda angles: angles
+
+    def awake(self) -> "World":
+        self.guard._gentle = [False] * 9
+        return self
+
+    def tick(self, dt_s: float = DT, **wish_deg: float) -> Verdict:
+        self.t_s += dt_s
+        joints = JointState(self.measured(self.path[-1]), (0.0,) * 9, (self.t_s,) * 9, ())
+        wish = tuple(radians(wish_deg.get(name, 0.0)) for name in JOINTS)
+        verdict = self.guard.check(wish, joints, 0.0, self.t_s)
+        self.path.append(verdict.command_rad)
+        return verdict
+
+    def angle(self, joint: int) -> float:
+        return degrees(self.path[-1][joint])
+
+    def crossed(self) -> bool:
+        """Whether the straight way between any two commands in turn touches a box."""
+        path = np.degrees(np.array(self.path))
+        begin, end = path[:-1], path[1:]
+        return any(
+            bool(
+                touches(
+                    begin[:, [JOINTS.index(p.first), JOINTS.index(p.second)]],
+                    end[:, [JOINTS.index(p.first), JOINTS.index(p.second)]],
+                    np.array([p.first_min_deg, p.second_min_deg]),
+                    np.array([p.first_max_deg, p.second_max_deg]),
+                ).any()
+            )
+            for p in self.pairs
+        )
+
+
+def touches(begin: np.ndarray, end: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Tell of every step (n, 2) whether its straight line meets the box, by slabs."""
+    way = end - begin
+    with np.errstate(divide="ignore", invalid="ignore"):
+        a, b = (low - begin) / way, (high - begin) / way
+    still = way == 0.0
+    inside = (begin >= low) & (begin <= high)
+    enter = np.where(still, np.where(inside, -np.inf, np.inf), np.minimum(a, b)).max(axis=1)
+    leave = np.where(still, np.where(inside, np.inf, -np.inf), np.maximum(a, b)).min(axis=1)
+    return (enter <= leave) & (enter <= 1.0) & (leave >= 0.0)
+
+
+def test_the_judge_of_these_tests_sees_what_a_tick_leaps_over() -> None:
+    low, high = np.array([0.0, 0.0]), np.array([1.0, 1.0])
+    cases = [((-1, 0.5), (2, 0.5), True), ((-1, -1), (2, 2), True), ((-1, 1.2), (2, 1.2), False)]
+    cases += [((0.5, 0.5), (0.5, 0.5), True), ((2, 2), (2, 2), False), ((-1, 1), (1.2, 3.2), False)]
+    for begin, end, expected in cases:
+        found = touches(np.array([begin]), np.array([end]), low, high)
+        assert found.tolist() == [expected]
+
+
+def test_one_joint_waits_at_its_wall_and_the_other_is_free() -> None:
+    world = World(LID).awake()
+    for _ in range(400):
+        verdict = world.tick(neck_pitch=-25.0, left_upper_lid=20.0)
+    assert world.angle(PITCH) == pytest.approx(-17.0) and world.angle(LEFT) == pytest.approx(20.0)
+    assert verdict.reasons == ("neck_pitch: self-collision",) and verdict.level == "limited"
+    for _ in range(400):  # the lid makes room
+        verdict = world.tick(neck_pitch=-25.0, left_upper_lid=0.0)
+    assert world.angle(PITCH) == pytest.approx(-25.0) and verdict.level == "ok"
+    for _ in range(400):
+        verdict = world.tick(neck_pitch=-25.0, left_upper_lid=20.0)
+    assert world.angle(LEFT) == pytest.approx(9.0) and world.angle(PITCH) == pytest.approx(-25.0)
+    assert verdict.reasons == ("left_upper_lid: self-collision",)
+    for _ in range(400):
+        verdict = world.tick(neck_pitch=-40.0, left_upper_lid=20.0)
+    assert world.angle(LEFT) == pytest.approx(20.0) and world.angle(PITCH) == pytest.approx(-40.0)
+    for _ in range(400):
+        world.tick(neck_pitch=0.0, left_upper_lid=20.0)
+    assert world.angle(PITCH) == pytest.approx(-31.0)
+    for _ in range(400):
+        world.tick(neck_pitch=0.0, left_upper_lid=-20.0)
+    assert world.angle(PITCH) == pytest.approx(0.0, abs=1e-6)
+    assert not world.crossed()
+
+
+@pytest.mark.parametrize("off", np.linspace(-0.3, 0.3, 25).tolist())
+def test_the_four_walls_are_swept_densely(off: float) -> None:
+    for pitch, lid in ((-17.0 + off, 20.0), (-31.0 + off, 20.0), (-24.0, 9.0 + off)):
+        world = World(LID, neck_pitch=-45.0 if pitch < -30.0 else 0.0).awake()
+        for _ in range(200):
+            world.tick(neck_pitch=pitch, left_upper_lid=0.0 if lid > 10.0 else lid)
+            if lid > 10.0:
+                world.tick(neck_pitch=-45.0 if pitch < -30.0 else 0.0, left_upper_lid=lid)
+        for _ in range(400):
+            world.tick(neck_pitch=pitch, left_upper_lid=lid)
+        apart = (
+            world.angle(PITCH) >= -17.0 - 1e-6
+            or world.angle(PITCH) <= -31.0 + 1e-6
+            or world.angle(LEFT) <= 9.0 + 1e-6
+        )
+        assert apart and not world.crossed()
+
+
+@pytest.mark.parametrize("tick", [0.001, 0.005, 0.03, 0.1])
+@pytest.mark.parametrize("pairs", [(LID,), (LID, OTHER_LID)])
+def test_no_box_is_ever_touched(tick: float, pairs: tuple[CollisionParams, ...]) -> None:
+    rng = np.random.default_rng(int(1000 * tick))
+    world = World(*pairs).awake()
+    pitch, left, right = 0.0, 0.0, 0.0
+    inside = 0
+    for _ in range(1500):
+        if rng.random() < 0.1:
+            pitch, left, right = (float(a) for a in rng.uniform(-60.0, 50.0, 3))
+        wish = {"neck_pitch": pitch, "left_upper_lid": left, "right_upper_lid": right}
+        inside += bool(world.tick(tick * float(rng.uniform(0.2, 1.0)), **wish).reasons)
+    assert inside > 50 and not world.crossed()
+
+
+def test_the_other_joint_waits_until_the_first_is_measured_out() -> None:
+    world = World(LID, neck_pitch=-24.0, left_upper_lid=0.0).awake()
+    at_first = world.path[-1]
+    world.measured = lambda angles: (*angles[:PITCH], at_first[PITCH], *angles[PITCH + 1 :])
+    for _ in range(24):  # the neck lags: its command leaves, its head does not yet
+        world.tick(neck_pitch=0.0, left_upper_lid=20.0)
+    assert world.angle(PITCH) > -16.0 and world.angle(LEFT) <= 9.0 + 1e-9
+    world.measured = lambda angles: angles
+    for _ in range(100):
+        world.tick(neck_pitch=0.0, left_upper_lid=20.0)
+    assert world.angle(LEFT) == pytest.approx(20.0)
+
+
+def test_a_keeper_pushed_in_by_hand_keeps_the_other_out() -> None:
+    world = World(LID).awake()
+    world.measured = lambda angles: (*angles[:PITCH], radians(-20.0), *angles[PITCH + 1 :])
+    for _ in range(25):
+        world.tick(left_upper_lid=20.0)
+    assert world.angle(LEFT) <= 9.0 + 1e-9
+
+
+@pytest.mark.parametrize("pitch", [-29.9, -24.0, -18.1])
+@pytest.mark.parametrize("lid", [10.1, 17.0, 24.9])
+def test_who_begins_in_a_box_is_led_out_gently(pitch: float, lid: float) -> None:
+    world = World(LID, neck_pitch=pitch, left_upper_lid=lid)
+    verdict = world.tick(neck_pitch=pitch, left_upper_lid=lid)
+    assert verdict.level == "hold"
+    collide = {"neck_pitch: self-collision", "left_upper_lid: self-collision"}
+    assert {one for one in verdict.reasons if "slowly" not in one} == collide
+    out = [
+        p for p in range(400) if world.tick(neck_pitch=pitch, left_upper_lid=lid).level == "hold"
+    ]
+    assert 0 < len(out) < 399
+    path = np.degrees(np.array(world.path))[:, [PITCH, LEFT]]
+    speeds = np.diff(path[: len(out)], axis=0) / DT
+    assert np.abs(speeds).max() <= 60.0 + 1e-6
+    assert np.abs(np.diff(speeds, axis=0, prepend=0.0)).max() <= 301.0 * DT
+    assert (np.ptp(path[: len(out)], axis=0) == 0.0).sum() == 1  # the other one waits
+    assert not touches(
+        path[-2:-1], path[-1:], np.array([-30.0, 10.0]), np.array([-18.0, 25.0])
+    ).any()
+
+
+def test_a_held_joint_is_led_out_of_by_the_other() -> None:
+    world = World(LID, neck_pitch=-18.5, left_upper_lid=17.0)
+    for _ in range(400):
+        world.t_s += DT
+        torque = tuple(k != PITCH for k in range(9))
+        joints = JointState(world.path[-1], (0.0,) * 9, (world.t_s,) * 9, (), torque)
+        world.path.append(world.guard.check(world.path[0], joints, 0.0, world.t_s).command_rad)
+    assert world.angle(PITCH) == pytest.approx(-18.5)
+    assert world.angle(LEFT) == pytest.approx(9.0, abs=1e-3)
+
+
+def test_a_joint_shared_by_two_boxes_is_led_out_of_both() -> None:
+    start = {"neck_pitch": -24.0, "left_upper_lid": 17.0, "right_upper_lid": 17.0}
+    world = World(LID, OTHER_LID, **start)
+    for _ in range(600):
+        verdict = world.tick(**start)
+    assert verdict.level == "limited"
+    boxed = 18.0 <= -world.angle(PITCH) <= 30.0
+    assert not (boxed and world.angle(LEFT) >= 10.0) and not (boxed and world.angle(RIGHT) >= 10.0)
+
+
+def test_a_rearmed_joint_inside_a_box_is_led_out() -> None:
+    world = World(LID).awake()
+    for _ in range(100):
+        world.tick(left_upper_lid=20.0)
+    world.t_s += DT
+    at = (*world.path[-1][:PITCH], radians(-24.0), *world.path[-1][PITCH + 1 :])
+    anew = tuple(k == PITCH for k in range(9))
+    joints = JointState(at, (0.0,) * 9, (world.t_s,) * 9, (), rearmed=anew)
+    verdict = world.guard.check((0.0,) * 9, joints, 0.0, world.t_s)
+    assert verdict.applied("neck_pitch").reason == "self-collision"
+    world.path.append(verdict.command_rad)
+    for _ in range(400):
+        verdict = world.tick(left_upper_lid=20.0)
+    assert verdict.level == "ok"
+
+
+def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
+    pair = {
+        "first": "neck_pitch",
+        "first_min_deg": -30,
+        "first_max_deg": -18,
+        "second": "left_upper_lid",
+        "second_min_deg": 10,
+        "second_max_deg": 25,
+    }
+    params, errors = judge(GuardParams, {"collisions": (pair,)})
+    assert errors == [] and params is not None and params.collisions == (LID,)
+    wrong: list[tuple[dict[str, object], str]] = [
+        ({"first": "ear"}, "neck_pitch"),
+        ({"second": "neck_pitch"}, "first and second are both neck_pitch"),
+        ({"first_max_deg": -30}, "first_min_deg -30.0 must be below first_max_deg -30.0"),
+        ({"second_min_deg": 26}, "second_min_deg 26.0 must be below second_max_deg 25.0"),
+    ]
+    for change, says in wrong:
+        params, errors = judge(GuardParams, {"collisions": ({**pair, **change},)})
+        assert params is None and len(errors) == 1
+        assert says in str(errors[0].get("ctx"))
+    with pytest.raises(ValueError, match="unknown joint 'ear'; known are left_eye_pan"):
+        CollisionParams("ear", 0.0, 1.0, "neck_yaw", 0.0, 1.0)
+
+
+def test_a_pair_that_leaves_no_pose_is_refused() -> None:
+    whole = CollisionParams("neck_pitch", -60.0, 50.0, "left_upper_lid", -34.5, 34.5)
+    with pytest.raises(ValueError, match="neck_pitch -60..50 deg of -60..50 with left_upper_lid"):
+        Guard(GuardParams(collisions=(whole,)), LIMITS)

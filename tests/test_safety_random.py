@@ -1,0 +1,209 @@
+"""A million random wishes with random servos: nothing outside any limit leaves.
+
+Wishes, measurements, ages, faults, torque, heat, load, voltage, restarts and ticks are drawn
+at random, in sequences of one mood each; every command is then judged by itself, without
+the guard's own arithmetic.
+"""
+
+import os
+from collections.abc import Callable
+from math import inf, nan, radians
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from robot.safety import Guard, GuardParams, JointLimit
+from robot.safety_collisions import CollisionParams
+from robot.types import JOINTS, JointState
+
+Array = NDArray[np.float64]
+Row = tuple[float, ...]
+LENGTH = 25  # ticks of one sequence
+WISHES = int(float(os.environ.get("GUARD_WISHES", "1e6")))
+EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000), 70.0, 3.5, 7.0)
+LID = JointLimit(radians(-30), radians(25), radians(1200), radians(60_000), 70.0, 3.5, 7.0)
+NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500), 70.0, 3.5, 7.0)
+SLOW = JointLimit(radians(-5), radians(170), radians(3), radians(10), 80.0, 9.5, 16.0)
+RIGS = ((EYE,) * 4 + (LID,) * 2 + (NECK,) * 3, (SLOW, LID, NECK) * 3)
+BOXES = (
+    (),
+    (CollisionParams("neck_pitch", -30.0, -18.0, "left_upper_lid", 10.0, 20.0),),
+    (
+        CollisionParams("neck_pitch", -4.0, 12.0, "left_upper_lid", -10.0, 20.0),
+        CollisionParams("right_upper_lid", -3.0, 50.0, "neck_pitch", -60.0, -20.0),
+        CollisionParams("neck_yaw", -3.0, 4.0, "left_eye_pan", 10.0, 20.0),
+    ),
+)
+ODD = np.array([nan, inf, -inf, 1e300, -1e300, 1e-300, -0.0])
+
+
+class Trial:
+    """One guard and what it gave: begin is where a tick began, after restarts."""
+
+    def __init__(self, limits: tuple[JointLimit, ...], boxes: tuple[CollisionParams, ...]) -> None:
+        self.limits = np.array(limits)
+        self.boxes = boxes
+        self.guard = Guard(GuardParams(collisions=boxes, gentle_ms=100.0), limits)
+        self.low, self.high = self.limits[:, 0], self.limits[:, 1]
+        self.begin_p: list[Row] = []
+        self.begin_v: list[Row] = []
+        self.dt_s: list[float] = []
+        self.after: list[Row] = []
+        self.t_s = 0.0
+
+    def restart(self, angles: Array) -> None:
+        self.guard.reset(self.t_s, tuple(angles.tolist()))
+        self.p, self.v = tuple(np.clip(angles, self.low, self.high).tolist()), (0.0,) * 9
+
+    def tick(self, wish: Row, joints: JointState, age_s: float, dt_s: float) -> None:
+        self.t_s += dt_s
+        verdict = self.guard.check(wish, joints, age_s, self.t_s)
+        if True in joints.rearmed:
+            anew = np.array(joints.rearmed) & np.isfinite(joints.position_rad)
+            clipped = np.clip(joints.position_rad, self.low, self.high)
+            self.p = tuple(np.where(anew, clipped, self.p).tolist())
+            self.v = tuple(np.where(anew, 0.0, self.v).tolist())
+        self.begin_p.append(self.p)
+        self.begin_v.append(self.v)
+        self.dt_s.append(dt_s)
+        self.v = tuple([(b - a) / dt_s for a, b in zip(self.p, verdict.command_rad, strict=True)])
+        self.p = verdict.command_rad
+        self.after.append(self.p)
+        assert verdict.level == "limp" or not any(joints.fault)
+        assert (verdict.level == "ok") == (not verdict.reasons)
+
+    def judge(self) -> int:
+        """Assert every limit on every command; give how many wishes that were."""
+        p0, v0, p1 = map(np.array, (self.begin_p, self.begin_v, self.after))
+        dt_s = np.array(self.dt_s)[:, None]
+        low, high, speed, accel = self.limits[:, :4].T
+        v1 = (p1 - p0) / dt_s
+        assert np.isfinite(p1).all()
+        assert (p1 >= low).all() and (p1 <= high).all()
+        assert (np.abs(v1) <= speed + 1e-6).all()
+        assert (np.abs(v1 - v0) <= accel * dt_s + 4e-6).all()
+        for box in self.boxes:
+            self._judge_box(box, p0, v0, p1, v1)
+        return p1.size
+
+    def _judge_box(self, box: CollisionParams, p0: Array, v0: Array, p1: Array, v1: Array) -> None:
+        """Once a joint of the pair can stay out of its range, one always can, and does."""
+        i, j = JOINTS.index(box.first), JOINTS.index(box.second)
+        first = (radians(box.first_min_deg), radians(box.first_max_deg))
+        second = (radians(box.second_min_deg), radians(box.second_max_deg))
+        margin = radians(1.0)
+
+        def stays_out(k: int, span: tuple[float, float], p: Array, v: Array, off: float) -> Array:
+            stop = p[:, k] + 0.5 * v[:, k] * np.abs(v[:, k]) / self.limits[k, 3]
+            low = np.maximum(p[:, k], stop) <= span[0] - margin + off
+            high = np.minimum(p[:, k], stop) >= span[1] + margin - off
+            return np.where(low, -1, np.where(high, 1, 0))
+
+        safe = (stays_out(i, first, p0, v0, 0.0) != 0) | (stays_out(j, second, p0, v0, 0.0) != 0)
+        ways = [
+            stays_out(k, span, p0, v0, 1e-6) * stays_out(k, span, p1, v1, 1e-6)
+            for k, span in ((i, first), (j, second))
+        ]
+        # Out on one and the same side before and after: the straight way misses the box.
+        assert ((ways[0] > 0) | (ways[1] > 0))[safe].all()
+
+
+def sequence(trial: Trial, rng: np.random.Generator) -> None:
+    """Run one sequence: a mood of wishes, one of servos and one of time."""
+    n, limits = LENGTH, trial.limits
+    middle, reach = (trial.low + trial.high) / 2, trial.high - trial.low
+    if rng.random() < 0.1:
+        trial.restart(middle + reach * rng.uniform(-0.6, 0.6, 9))
+    if rng.random() < 0.5:
+        trial.guard._gentle = [False] * 9
+    if rng.random() < 0.75:  # in peace, inside every limit
+        sway = 0.001 * np.sin(np.arange(1, n + 1) / 8.0)[:, None] ** 3
+        wishes = np.array(trial.p) + sway * np.sign(middle - trial.p)
+    else:
+        wishes = middle + reach * WISH_MOODS[rng.integers(len(WISH_MOODS))](rng, n)
+    odd = rng.random((n, 9)) < rng.choice([0.0, 0.0, 0.05])
+    wishes[odd] = rng.choice(ODD, int(odd.sum()))
+    ticks = rng.uniform(0.001, 0.1, n) if rng.random() < 0.3 else np.full(n, rng.choice(TICKS))
+    rare = rng.choice([0.0, 0.0, 0.0, 0.01, 0.2])
+    off, faulty, anew, old = rng.random((4, n, 9)) < rare
+    stray = rng.random((n, 9)) < rng.choice([0.0, 0.0, 0.1, 1.0])
+    strays = middle + reach * rng.normal(0.0, 0.5, (n, 9))
+    strays[rng.random((n, 9)) < 0.02 * rare] = nan
+    jam = rng.random(9) < rng.choice([0.0, 0.0, 0.3])
+    jammed_at = trial.p
+    load = np.where(rng.random((n, 9)) < rng.choice([0.0, 0.0, 0.9]), rng.uniform(-1, 1, 9), 0.1)
+    heat = limits[:, 4] + np.where(rng.random(9) < rare, rng.uniform(-20, 2, 9), -30.0)
+    volts = np.where(rng.random((n, 9)) < rare, rng.uniform(3, 17, (n, 9)), limits[:, 5] + 1.0)
+    unseen = rng.random(n) < rare
+    instead = stray | anew | jam
+    places = np.where(jam, jammed_at, strays)
+    words = np.where(faulty, "overload", "")
+    ages = np.where(old, 1.0, 0.0)
+    rows = (wishes, instead, places, ages, ~off, words, load, np.tile(heat, (n, 1)), volts, anew)
+    for k, (wish, other, place, age, *told, rearmed) in enumerate(
+        zip(*[[tuple(row) for row in column.tolist()] for column in rows], strict=True)
+    ):
+        tick = float(ticks[k])
+        t_s = trial.t_s + tick
+        at = tuple([b if o else a for a, b, o in zip(trial.p, place, other, strict=True)])
+        since = tuple([t_s - one for one in age])
+        joints = JointState(at, (0.0,) * 9, since, (), *told, rearmed)
+        trial.tick(wish, joints, inf if unseen[k] else 0.0, tick)
+
+
+TICKS = (0.001, 0.004, 0.005, 0.005, 0.005, 0.02, 0.1)
+WISH_MOODS: tuple[Callable[[np.random.Generator, int], Array], ...] = (
+    lambda rng, n: rng.normal(0.0, 0.5, (n, 9)),  # shaking
+    lambda rng, n: np.repeat(rng.uniform(-0.6, 0.6, (1, 9)), n, axis=0),  # a jump
+    lambda rng, n: np.cumsum(rng.normal(0.0, 0.02, (n, 9)), axis=0),  # a walk
+    lambda rng, n: np.linspace(rng.uniform(-1, 1, 9), rng.uniform(-1, 1, 9), n),  # a sweep
+    lambda rng, n: np.where(rng.random((n, 9)) < 0.2, 0.5, -0.5) * rng.choice([1.0, 40.0]),
+)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_million_random_wishes_never_leave_the_limits(
+    seed: int, record_property: Callable[[str, object], None]
+) -> None:
+    rng = np.random.default_rng([2024, seed])
+    wishes = 0
+    trials = [Trial(RIGS[seed % 2], BOXES[seed // 2]) for _ in range(4)]
+    for trial in trials:
+        trial.restart(np.zeros(9))
+        while 9 * len(trial.after) < WISHES / 6 / len(trials):
+            sequence(trial, rng)
+        wishes += trial.judge()
+    record_property("wishes", wishes)
+    print(f"{wishes} wishes tried against the guard, no violation")
+    assert wishes >= WISHES // 6
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    seed=st.integers(0, 2**32),
+    wishes=st.lists(
+        st.one_of(st.floats(-4.0, 4.0), st.floats(allow_nan=True, allow_infinity=True)),
+        min_size=1,
+        max_size=30,
+    ),
+    ticks=st.lists(st.floats(0.001, 0.1), min_size=30, max_size=30),
+    rig=st.sampled_from(RIGS),
+    boxes=st.sampled_from(BOXES),
+)
+def test_any_shape_of_wishes_keeps_the_limits(
+    seed: int,
+    wishes: list[float],
+    ticks: list[float],
+    rig: tuple[JointLimit, ...],
+    boxes: tuple[CollisionParams, ...],
+) -> None:
+    rng = np.random.default_rng(seed)
+    trial = Trial(rig, boxes)
+    trial.restart(rng.uniform(trial.low, trial.high))
+    for wish, tick in zip(wishes, ticks, strict=False):
+        joints = JointState(trial.p, (0.0,) * 9, (trial.t_s + tick,) * 9, ())
+        trial.tick((wish,) * 9, joints, 0.0, tick)
+    trial.judge()

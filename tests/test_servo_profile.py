@@ -1,0 +1,99 @@
+"""The profile generator: shapes, times, new goals on the way."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim_mock.servo_profile import RECTANGLE, STEP, TRAPEZOID, TRIANGLE, Profile, SpeedProfile
+
+
+def path(made: Profile, most: int = 200_000) -> list[float]:
+    """Give all positions until the profile is done."""
+    out = [made.r]
+    while made.running:
+        out += made.ahead(1)
+        assert len(out) < most
+    return out
+
+
+def speeds(positions: list[float]) -> list[float]:
+    return [b - a for a, b in zip(positions, positions[1:], strict=False)]
+
+
+@pytest.mark.parametrize(
+    ("cruise", "ramp", "kind", "ms"),
+    [
+        (0.0, 0.0, STEP, 1),
+        (0.0, 0.5, STEP, 1),  # no velocity: the acceleration does not count
+        (2.0, 0.0, RECTANGLE, 500),
+        (2.0, 0.01, TRAPEZOID, 700),
+        (50.0, 0.01, TRIANGLE, 633),
+    ],
+)
+def test_the_shapes_of_the_manual(cruise, ramp, kind, ms):
+    made = Profile(0.0)
+    made.by_velocity(1000.0, cruise, ramp)
+    assert made.kind == kind
+    positions = path(made)
+    assert positions[-1] == 1000.0 and made.v == 0.0
+    assert len(positions) - 1 == ms
+    if kind:
+        assert max(speeds(positions)) <= cruise + 1e-9
+
+
+@pytest.mark.parametrize(("total", "ramp"), [(500, 0), (500, 100), (500, 250), (500, 400)])
+@pytest.mark.parametrize("goal", [7.0, 1000.0, -3000.0])
+def test_a_time_based_profile_takes_its_time_whatever_the_distance(total, ramp, goal):
+    made = Profile(0.0)
+    made.by_time(goal, total, ramp)
+    assert made.kind == (RECTANGLE if ramp == 0 else TRAPEZOID if ramp < 250 else TRIANGLE)
+    positions = path(made)
+    assert len(positions) - 1 == total
+    assert positions[-1] == goal
+    assert positions[total // 2] == pytest.approx(goal / 2)
+
+
+FLOATS = st.floats(-5000, 5000)
+
+
+@given(FLOATS, FLOATS, st.integers(0, 400), st.floats(0.05, 20), st.floats(0.001, 1.0))
+@settings(max_examples=150, deadline=None)
+def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
+    first, second, after, cruise, ramp
+):
+    made = Profile(0.0)
+    made.by_velocity(first, cruise, ramp)
+    positions = [0.0, *made.ahead(after + 1)]
+    made.by_velocity(second, cruise, ramp)
+    positions += path(made)[1:]
+    assert positions[-1] == second
+    v = speeds(positions)
+    assert max(abs(x) for x in v) <= cruise + 1e-6
+    # Average speeds of neighbouring milliseconds differ by one ramp, two where phases meet.
+    changes = [abs(b - a) for a, b in zip([0.0, *v], [*v, 0.0], strict=False)]
+    assert max(changes) <= 2.0 * ramp + 1e-6
+
+
+@given(st.lists(st.integers(1, 40), min_size=1, max_size=40), FLOATS, FLOATS)
+@settings(max_examples=60, deadline=None)
+def test_in_one_go_or_in_steps_is_the_same(pieces, goal, later):
+    once, often = Profile(5.0), Profile(5.0)
+    for made in (once, often):
+        made.by_velocity(goal, 2.0, 0.01)
+    whole = once.ahead(sum(pieces))
+    assert whole == [r for piece in pieces for r in often.ahead(piece)]
+    assert (once.r, once.v, once.running) == (often.r, often.v, often.running)
+    for made in (once, often):
+        made.by_time(later, 100, 20)
+    assert once.ahead(50) == often.ahead(50)
+
+
+def test_a_speed_profile_ramps_and_ends():
+    made = SpeedProfile(0.0, 0.0)
+    made.aim(2.0, 0.01)
+    positions = made.ahead(300)
+    assert made.v == 2.0 and made.running
+    assert speeds(positions)[:3] == pytest.approx([0.02, 0.03, 0.04])
+    made.aim(0.0, 0.0)
+    assert made.ahead(2) == [positions[-1]] * 2
+    assert not made.running
