@@ -122,20 +122,19 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             drivers.errors.BusLost: the port is gone.
         """
         got = b""
-        while True:
-            try:
-                ready, _, _ = select.select(
-                    self._fds, (), (), max(0.0, deadline_s - time.monotonic())
-                )
-            except (OSError, ValueError) as error:
-                raise self._lost(error) from error
-            if not ready:
-                if not got and not os.path.exists(self.port_name):
-                    raise self._lost("it was unplugged")
-                return got
-            got += self._take(length - len(got))
-            if len(got) >= length:
-                return got
+        try:
+            while True:
+                left_s = deadline_s - time.monotonic()
+                if not select.select(self._fds, (), (), left_s if left_s > 0.0 else 0.0)[0]:
+                    break
+                got += self._take(length - len(got))
+                if len(got) >= length:
+                    return got
+        except (OSError, ValueError) as error:
+            raise self._lost(error) from error
+        if not got and not os.path.exists(self.port_name):
+            raise self._lost("it was unplugged")
+        return got
 
     def drain(self) -> int:
         """Throw away what arrives until nothing came for 3 ms; gives the number of bytes.
@@ -212,8 +211,11 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def clearPort(self) -> None:
         """Throw away what has arrived."""
-        while self._wait(0.0):
-            self._take(4096)
+        try:
+            while select.select(self._fds, (), (), 0.0)[0]:
+                self._take(4096)
+        except (OSError, ValueError) as error:
+            raise self._lost(error) from error
 
     def getBytesAvailable(self) -> int:
         """Count the bytes that wait; none where the port is closed."""

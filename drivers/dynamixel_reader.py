@@ -63,7 +63,9 @@ class Reader:
             drivers.errors.BusLost: the port is gone.
         """
         roll = self.roll
-        if roll.troubled or self._together.troubled:
+        if self._together.troubled:
+            self._together.calm(now_s)
+        if roll.troubled:
             return self._with_care(now_s)
         group = self._group(roll.group, self._together)
         raw, at_s = self._line.exchange(group.request, group.reply_length)
@@ -79,7 +81,6 @@ class Reader:
         """Read the group, and one of those who are out of it."""
         heard: dict[int, Heard] = {}
         together, due = self.roll.group, self.roll.due(now_s)
-        self._together.calm(now_s)
         self._until_s = inf
         self._read(together, heard, now_s, self._together)
         if due is not None and self._line.port.now_s() < self._until_s:
