@@ -25,6 +25,8 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_gaze.py
 	$(BIN)/python tests/bench/bench_bus.py
 	$(BIN)/python tests/bench/bench_emulator.py
+	$(BIN)/python tests/bench/bench_motion.py
+	$(BIN)/python tests/bench/bench_camera.py
 
 figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/make_figures.py

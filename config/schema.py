@@ -8,9 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from config.load import load, read_yaml, shipped
+from drivers.camera_params import CameraCareParams, WebcamParams
 from drivers.dynamixel import DynamixelParams
 from drivers.dynamixel_table import MODELS
 from drivers.face_params import FaceDetectorParams
+from drivers.motion_params import MotionParams
+from drivers.oak_params import OakParams
 from gaze.attention import AttentionParams
 from gaze.aversion import AversionParams
 from gaze.bottom_up import BottomUpParams
@@ -148,6 +151,18 @@ class Rig:
     )
     camera: CameraParams = field(
         default_factory=CameraParams, metadata={"says": "where the camera sits"}
+    )
+    webcam: WebcamParams = field(
+        default_factory=WebcamParams, metadata={"says": "what is asked of a webcam"}
+    )
+    oak: OakParams = field(
+        default_factory=OakParams, metadata={"says": "what is asked of an OAK-D"}
+    )
+    camera_care: CameraCareParams = field(
+        default_factory=CameraCareParams, metadata={"says": "a camera that went away"}
+    )
+    motion: MotionParams = field(
+        default_factory=MotionParams, metadata={"says": "how moving things are found"}
     )
     detector: FaceDetectorParams = field(
         default_factory=FaceDetectorParams, metadata={"says": "how faces are found"}

@@ -1,4 +1,4 @@
-"""Draw the figures of docs/gaze.md from the program itself: make figures.
+"""Draw the figures of docs/ from the program itself: make figures.
 
 Every curve is what the models give at this moment; human data are marked as such, with
 their sources.
@@ -7,6 +7,7 @@ their sources.
 from collections.abc import Callable
 from math import degrees, radians
 from pathlib import Path
+from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen before
 
-from config.schema import load_walk  # noqa: E402
+from config.schema import load_rig, load_walk  # noqa: E402
 from gaze.binocular import (  # noqa: E402
     AT_REST,
     BinocularController,
@@ -26,6 +27,16 @@ from gaze.lids import LidParams, Lids  # noqa: E402
 from gaze.saccade import Saccade, SaccadeParams  # noqa: E402
 from gaze.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
 from gaze.types import PART_NAMES  # noqa: E402
+from robot.assemble import assemble, gaze_parts  # noqa: E402
+from robot.choice import Choice  # noqa: E402
+from robot.loop import Tick, run  # noqa: E402
+from sim_mock.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
+from sim_mock.true_gaze import (  # noqa: E402
+    angles_of_place,
+    gaze_angles,
+    gaze_off_rad,
+    true_part,
+)
 
 HERE = Path(__file__).parent / "figures"
 INK, HUMAN = "#1f5fa8", "#c0722e"
@@ -36,7 +47,16 @@ def main() -> None:
     """Draw all figures into docs/figures."""
     HERE.mkdir(exist_ok=True)
     plt.rcParams.update({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3})
-    for draw in (main_sequence, head_goal, pursuit, vergence, reflex, blink, scanpath):
+    for draw in (
+        main_sequence,
+        head_goal,
+        pursuit,
+        vergence,
+        reflex,
+        blink,
+        scanpath,
+        capture_time,
+    ):
         draw()
         print(f"docs/figures/{draw.__name__}.png")
 
@@ -201,6 +221,63 @@ def scanpath() -> None:
     right.set(ylim=(0.0, 0.7), ylabel="dwell, s", title="dwell times, 4000 draws a part")
     right.legend(fontsize=7)
     saved("scanpath", figure)
+
+
+def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"]) -> np.ndarray:
+    """Run a drawn scene; give rows of time and degrees: person, gaze, facing, head, gaze off."""
+    rig = load_rig("desk")
+    made = assemble(rig, Choice(True, True, 0, scene, pixels=True, placed_by=placed_by))
+    assert made.scene is not None
+    people, rows = made.scene.people, []
+    kinematics, _ = gaze_parts(rig, 0)
+
+    def watch(tick: Tick) -> None:
+        person = people(tick.t_s - (rows[0][0] if rows else tick.t_s))[0]
+        face, pose = person.p_world_face_m, tick.pose
+        part = true_part(person, tick.target.part)
+        yaws = angles_of_place(face, pose)[0], gaze_angles(pose)[0], kinematics.facing(face)[0]
+        rows.append((tick.t_s, *yaws, pose.head_rad[0], gaze_off_rad(part, pose)))
+
+    made.robot.start(made.clock)
+    run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch)
+    made.robot.stop()
+    made.close()
+    table = np.array(rows)
+    table[:, 0] -= table[0, 0]
+    table[:, 1:] = np.degrees(table[:, 1:])
+    return table
+
+
+def capture_time() -> None:
+    """Pictures placed by the pose at their capture and by the newest: a quick step, a walk."""
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(12.0, 3.8))
+    for placed_by, colour, name in (
+        ("capture", INK, "pose at the capture"),
+        ("newest", HUMAN, "newest pose"),
+    ):
+        t, person, gaze, facing, head, _ = watched(
+            "steps-aside", STEP_AT_S + STEP_S + 1.4, placed_by
+        ).T
+        if placed_by == "capture":
+            left.plot(t - STEP_AT_S, facing, "k", lw=0.8, label="straight at the person")
+            middle.plot(t - STEP_AT_S, person, "k", lw=0.8, label="the person's face")
+        left.plot(t - STEP_AT_S, head, colour, label=f"head, {name}")
+        middle.plot(t - STEP_AT_S, gaze, colour, label=f"gaze, {name}")
+        t, *_, off = watched("walks-past", 3.4, placed_by).T
+        right.plot(t - 1.0, off, colour, label=name)
+    step = {"xlim": (-0.2, 2.1), "xlabel": "s since the step began", "ylabel": "yaw, deg"}
+    left.set(title="a step of 40 deg in 0.7 s: head", **step)
+    middle.set(title="the same: gaze, over the parts of the face", **step)
+    right.set(
+        xlim=(-0.2, 2.4),
+        ylim=(0.0, 20.0),
+        xlabel="s since the walk began",
+        ylabel="gaze off the face part, deg",
+        title="1 m/s past at 1.5 m",
+    )
+    for axes in (left, middle, right):
+        axes.legend(fontsize=7)
+    saved("capture_time", figure)
 
 
 if __name__ == "__main__":

@@ -5,29 +5,45 @@ one piece. Pictures that come while the detector works are skipped.
 """
 
 import threading
+from collections import deque
 from collections.abc import Callable
 
+from drivers.camera_look import Motion
+from drivers.camera_params import CameraCareParams
+from drivers.camera_watch import CameraWatch, failed
 from drivers.errors import CameraError
-from drivers.picture_source import PictureSource, Shot
+from drivers.picture_source import PictureSource
 from drivers.types import Detections, FaceDetector
 
 # OpenCV gives up waiting for a camera after 10 s; a film stops at once.
 _LONGEST_WAIT_S = 12.0
+_MOST_EVENTS = 100
 
 
 class CameraThread:
-    """A camera, or a film paced by the real clock, watched for faces.
+    """A camera, or a film paced by the real clock, watched for faces and motion.
+
+    While a lost source is tried again the last detections stay, and their age tells.
 
     pictures, pictures_with_face: counts of pictures looked at since open
     """
 
     def __init__(
-        self, source: PictureSource, detector: FaceDetector, now_s: Callable[[], float]
+        self,
+        source: PictureSource,
+        detector: FaceDetector,
+        now_s: Callable[[], float],
+        care: CameraCareParams | None = None,
+        motion: Motion | None = None,
     ) -> None:
-        """Take what gives pictures, what finds faces, and the host's monotonic clock."""
-        self._source = source
-        self._detector = detector
-        self._now_s = now_s
+        """Take what gives pictures, what finds faces, and the host's monotonic clock.
+
+        motion: called in the camera's thread with every picture
+        """
+        self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
+        self._camera = CameraWatch(
+            source, detector, now_s, care or CameraCareParams(), motion, self._events.append
+        )
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest: Detections | None = None
@@ -43,7 +59,8 @@ class CameraThread:
         """
         if self._thread is not None:
             raise CameraError("the camera thread runs already: close() it before opening it anew")
-        self._source.open()
+        self._events.clear()
+        self._camera.open()
         self._stop.clear()
         self._newest, self._failure = None, None
         self.pictures = self.pictures_with_face = 0
@@ -54,17 +71,18 @@ class CameraThread:
         """Give what the newest picture showed, or None before the first.
 
         Raises:
-            drivers.errors.CameraError: the thread has ended by a fault.
+            drivers.errors.CameraError: the source is gone for good, or looking has failed.
         """
-        failure = self._failure
-        if isinstance(failure, CameraError):
-            raise CameraError(str(failure)) from failure
-        if failure is not None:
-            raise CameraError(
-                f"looking at pictures failed ({type(failure).__name__}: "
-                f"{' '.join(str(failure).split())}): start anew, and report it if it comes back"
-            ) from failure
+        if self._failure is not None:
+            raise failed(self._failure) from self._failure
         return self._newest
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call, one line each."""
+        told = []
+        while self._events:
+            told.append(self._events.popleft())
+        return tuple(told)
 
     def close(self) -> None:
         """Stop looking and free the source; safe to call twice."""
@@ -77,20 +95,12 @@ class CameraThread:
     def _watch(self) -> None:
         """Look at one picture after another until told to stop."""
         try:
-            while (shot := self._source.take(self._now_s, self._stop)) is not None:
-                self._look(shot)
+            while (found := self._camera.next(self._stop)) is not None:
+                self.pictures += 1
+                self.pictures_with_face += bool(found.faces)
+                self._newest = found
         except Exception as failure:  # handed to the loop by latest()
             self._failure = failure
         finally:
             # Freed by the thread that reads it: never under a picture being fetched.
-            self._source.close()
-
-    def _look(self, shot: Shot) -> None:
-        """Find faces and leave the result in the slot."""
-        faces = self._detector.find(shot.picture)
-        height, width = shot.picture.shape[:2]
-        self.pictures += 1
-        self.pictures_with_face += bool(faces)
-        self._newest = Detections(
-            shot.captured_s, shot.number, width, height, faces, picture=shot.picture
-        )
+            self._camera.close()

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import cv2
-import numpy as np
 
 from drivers.errors import CameraError
+from drivers.film_times import SAMPLE, FilmTimes, at_a_rate, by_table, rising
+from drivers.picture_source import bgr
 from drivers.quiet_opencv import quiet_opencv
 from drivers.types import Picture
 
@@ -15,16 +16,16 @@ _STILL_RATE_HZ, _ASSUMED_RATE_HZ = 10.0, 25.0
 _RATES_HZ = (0.5, 1000.0)
 # A container may promise a few pictures too many without being damaged.
 _LEAST_COMPLETE = 0.95
+_MOST_TIMES = 20_000  # pictures of an uneven film whose times are read at the start
 
 
 class Reel(Protocol):
     """An open film or still.
 
-    rate_hz: pictures a second; note: what had to be assumed, or ""
+    times: when its pictures are due, and what had to be assumed for it
     """
 
-    rate_hz: float
-    note: str
+    times: FilmTimes
 
     def picture(self, number: int) -> Picture:
         """Give a picture, counted through all repeats, not before the last one given."""
@@ -67,15 +68,18 @@ def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
 class _Still:
     """One picture that is always there."""
 
-    rate_hz, note = _STILL_RATE_HZ, ""
+    times = FilmTimes(_STILL_RATE_HZ)
 
     def __init__(self, path: Path) -> None:
         """Decode the picture."""
-        with quiet_opencv():
-            picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        try:
+            with quiet_opencv():
+                picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        except cv2.error as error:
+            raise CameraError(f"{path} is too large a picture: scale it down") from error
         if picture is None:
             raise CameraError(f"{path} is a damaged picture: copy or save it anew")
-        self._picture = _frozen(picture)
+        self._picture = _frozen(picture, path)
         self._last = 1
 
     def picture(self, number: int) -> Picture:
@@ -95,8 +99,18 @@ class _Film:
         """Open the film and see whether its last picture is there."""
         self._path = path
         self._capture = _open_film(path)
-        self.rate_hz, self.note = usable_rate_hz(self._capture.get(cv2.CAP_PROP_FPS))
-        _check_complete(path, self._capture)
+        stated = usable_rate_hz(self._capture.get(cv2.CAP_PROP_FPS))
+        first_s = _times_s(self._capture, SAMPLE)
+        if not first_s:
+            raise CameraError(f"{path} holds no picture that can be read: use another file")
+        times = at_a_rate(*stated, rising(first_s))
+        if times is None:
+            times = by_table(rising(first_s + _times_s(self._capture, _MOST_TIMES)))
+        elif times.rate_hz == stated[0]:
+            # The number of pictures stated is often the length times the rate: where the
+            # rate is wrong, so is that.
+            _check_complete(path, self._capture)
+        self.times = times
         self._rewind()
         self._number, self._index = 0, 0  # last picture reached, and its place in this showing
         self._length: int | None = None  # known after the first showing
@@ -111,7 +125,7 @@ class _Film:
             found, picture = self._capture.retrieve()
             if not found:
                 raise CameraError(f"picture {self._index} of {self._path} is damaged: copy it anew")
-            self._seen = number, _frozen(picture)
+            self._seen = number, _frozen(picture, self._path)
         return self._seen[1]
 
     def close(self) -> None:
@@ -147,10 +161,18 @@ def _open_film(path: Path) -> cv2.VideoCapture:
     return capture
 
 
+def _times_s(capture: cv2.VideoCapture, most: int) -> list[float]:
+    """Read on, and give the times that the pictures carry."""
+    found: list[float] = []
+    for _ in range(most):
+        if not capture.grab():
+            break
+        found.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
+    return found
+
+
 def _check_complete(path: Path, capture: cv2.VideoCapture) -> None:
-    """Refuse a film without pictures or one that ends long before the end it states."""
-    if not capture.grab():
-        raise CameraError(f"{path} holds no picture that can be read: use another file")
+    """Refuse a film that ends long before the end it states."""
     stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     if stated <= 0:  # a stream without a table of contents
         return
@@ -168,8 +190,9 @@ def _check_forward(number: int, least: int) -> None:
         raise ValueError(f"films are read forward: picture {number} wanted, {least} is the least")
 
 
-def _frozen(picture: Any) -> Picture:
+def _frozen(picture: Any, path: Path) -> Picture:
     """Take a picture as bytes that nobody writes to any more."""
-    pixels = np.asarray(picture, dtype=np.uint8)
-    pixels.setflags(write=False)
+    pixels = bgr(picture)
+    if pixels is None:
+        raise CameraError(f"{path} holds pictures of an unknown kind: convert it to mp4 or png")
     return pixels

@@ -1,10 +1,13 @@
-"""What gives pictures in real time: a camera, or a film paced by the clock."""
+"""What gives pictures in real time: a camera, a film paced by the clock, or a recording."""
 
 import threading
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
-from drivers.types import Picture
+import cv2
+import numpy as np
+
+from drivers.types import Depth, DetectedFace, Picture, PictureLens
 
 
 class Shot(NamedTuple):
@@ -12,11 +15,20 @@ class Shot(NamedTuple):
 
     captured_s: host time of the exposure (of a film: when the picture was due)
     number: counts the source's pictures from 1; skipped ones are counted too
+
+    What follows is None where the source does not give it:
+
+    depth_m: distances, aligned with the picture and of its size, NaN where unknown
+    lens: the lens of this picture, which is then without distortion
+    faces: what the camera itself has found; nobody need look again
     """
 
     captured_s: float
     number: int
     picture: Picture
+    depth_m: Depth | None = None
+    lens: PictureLens | None = None
+    faces: tuple[DetectedFace, ...] | None = None
 
 
 class PictureSource(Protocol):
@@ -38,6 +50,30 @@ class PictureSource(Protocol):
         """
         ...
 
+    def events(self) -> tuple[str, ...]:
+        """Say what a person should know and was not told yet, one line each."""
+        ...
+
     def close(self) -> None:
         """Free the device or file; safe to call twice."""
         ...
+
+
+def bgr(pixels: Any) -> Picture | None:
+    """Give what a camera or file delivered as a read-only BGR picture; None where it is none.
+
+    pixels: (h, w) or (h, w, 1) grey, (h, w, 3) BGR or (h, w, 4) BGR with alpha, 8 bits, or
+        16 of which the upper 8 are kept
+    """
+    found = np.asarray(pixels)
+    if found.dtype == np.uint16:
+        found = (found >> 8).astype(np.uint8)
+    channels = 1 if found.ndim == 2 else found.shape[2] if found.ndim == 3 else 0
+    if found.dtype != np.uint8 or not found.size or channels not in (1, 3, 4):
+        return None
+    if channels == 1:
+        found = np.asarray(cv2.cvtColor(found, cv2.COLOR_GRAY2BGR), np.uint8)
+    elif channels == 4:
+        found = np.asarray(cv2.cvtColor(found, cv2.COLOR_BGRA2BGR), np.uint8)
+    found.setflags(write=False)
+    return found

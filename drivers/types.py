@@ -15,6 +15,8 @@ Picture = NDArray[np.uint8]
 """(height, width, 3) BGR."""
 Pixels = NDArray[np.float64]
 """(n, 2) x right, y down."""
+Depth = NDArray[np.float32]
+"""(height, width) metres along the optical axis, NaN where unknown."""
 
 
 class ServoReading(NamedTuple):
@@ -136,6 +138,18 @@ class ServoBus(Protocol):
         ...
 
 
+class PictureLens(NamedTuple):
+    """A pinhole as the camera itself knows it, in pixels of the picture that it comes with.
+
+    fx_px, fy_px: focal lengths; cx_px, cy_px: where the optical axis meets the picture
+    """
+
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+
+
 @dataclass(frozen=True, slots=True)
 class DetectedFace:
     """A face in a picture.
@@ -157,6 +171,17 @@ class MovingBlob:
 
     id: identity given by the detector, stable from picture to picture
     kind: "hand", "thing", ...
+    spin_rad_s: rotation about the line of view, clockwise in the picture above 0
+    loom_1_s: growth of its image in parts of its size; above 0 it comes nearer
+
+    What follows is at its default where the detector does not measure it:
+
+    v_camera_m_s: velocity over ground (the camera's own motion is out), along the camera's
+        axes at the capture; None where only the places are known
+    depth_known: the distance was measured; else it is assumed and depth_sd_m is large
+    depth_sd_m, spin_sd_rad_s, loom_sd_1_s: standard deviations
+    box_px: x, y, width, height; centre_px: a point on it; area_px: how much of the picture
+        it covers; flow_px_s: its mean motion, the camera's own taken out
     """
 
     id: int
@@ -164,6 +189,16 @@ class MovingBlob:
     p_camera_m: tuple[float, float, float]
     radius_m: float
     spin_rad_s: float = 0.0
+    loom_1_s: float = 0.0
+    v_camera_m_s: tuple[float, float, float] | None = None
+    depth_known: bool = True
+    depth_sd_m: float = 0.0
+    spin_sd_rad_s: float = 0.0
+    loom_sd_1_s: float = 0.0
+    box_px: tuple[float, float, float, float] | None = None
+    centre_px: tuple[float, float] | None = None
+    area_px: float = 0.0
+    flow_px_s: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +207,9 @@ class Detections:
 
     captured_s: host time of the exposure; number: counts pictures from 1
     picture: the BGR picture itself where there is one (never written to after this)
+    depth_m: distances seen from where the picture was taken, where the camera measures
+        them: (height_px, width_px), NaN where unknown
+    lens: the lens where the camera tells it; such pictures are without distortion
     """
 
     captured_s: float
@@ -181,6 +219,8 @@ class Detections:
     faces: tuple[DetectedFace, ...] = ()
     blobs: tuple[MovingBlob, ...] = ()
     picture: Picture | None = None
+    depth_m: Depth | None = None
+    lens: PictureLens | None = None
 
 
 class Camera(Protocol):
@@ -200,6 +240,10 @@ class Camera(Protocol):
         Raises:
             drivers.errors.CameraError: the source has failed for good.
         """
+        ...
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call, e.g. "camera lost: trying it again"."""
         ...
 
     def close(self) -> None:

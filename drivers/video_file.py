@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from drivers.errors import CameraError
+from drivers.film_pace import FilmPace
 from drivers.film_reel import Reel, open_reel
 from drivers.picture_source import Shot
 from drivers.types import Picture
@@ -30,8 +31,8 @@ class VideoFile:
         """Name the file; nothing is opened yet."""
         self._path = Path(path).expanduser()
         self._reel: Reel | None = None
-        self._taken = 0
-        self._zero_s: float | None = None
+        self._pace = FilmPace()
+        self._untold = ""
 
     def open(self) -> None:
         """Open the file, or open it anew at film time 0.
@@ -41,31 +42,26 @@ class VideoFile:
         """
         self.close()
         self._reel = open_reel(self._path)
-        self._taken, self._zero_s = 0, None
+        self._pace = FilmPace()
+        self._untold = self._reel.times.note
 
     @property
     def rate_hz(self) -> float:
         """Pictures a second."""
-        return self._opened().rate_hz
+        return self._opened().times.rate_hz
 
     @property
     def note(self) -> str:
         """What had to be assumed about the file, in one line, or ""."""
-        return self._opened().note
+        return self._opened().times.note
 
     def due_s(self, number: int) -> float:
         """Give the film time at which a picture is due."""
-        return (number - 1) / self._opened().rate_hz
+        return self._opened().times.due_s(number)
 
     def number_at(self, film_s: float) -> int:
         """Give the number of the newest picture at a film time; below 1 before the first."""
-        number = int(film_s * self._opened().rate_hz) + 1
-        # The product may round across a due time; due_s alone decides.
-        while self.due_s(number + 1) <= film_s:
-            number += 1
-        while self.due_s(number) > film_s:
-            number -= 1
-        return number
+        return self._opened().times.number_at(film_s)
 
     def picture(self, number: int) -> Picture:
         """Read a picture by number: (height, width, 3) BGR, read-only.
@@ -75,6 +71,15 @@ class VideoFile:
             drivers.errors.CameraError: the file cannot be read any more.
         """
         return self._opened().picture(number)
+
+    def shot(self, number: int) -> Shot:
+        """Read a picture by number with the film time at which it is due.
+
+        Raises:
+            ValueError: the number is below 1 or below the last one read.
+            drivers.errors.CameraError: the file cannot be read any more.
+        """
+        return Shot(self.due_s(number), number, self.picture(number))
 
     def picture_at(self, film_s: float) -> FilmPicture:
         """Read the newest picture at a film time (0 or later, never running back).
@@ -92,15 +97,13 @@ class VideoFile:
         Raises:
             drivers.errors.CameraError: the file cannot be read any more.
         """
-        if self._zero_s is None:
-            self._zero_s = now_s()
-        wait_s = self._zero_s + self.due_s(self._taken + 1) - now_s()
-        if stop.wait(max(0.0, wait_s)):
-            return None
-        # A wait may end a shade early; the picture waited for is the least that is given.
-        number = max(self._taken + 1, self.number_at(now_s() - self._zero_s))
-        self._taken = number
-        return Shot(self._zero_s + self.due_s(number), number, self.picture(number))
+        due = self._pace.wait(self._opened().times, now_s, stop)
+        return None if due is None else Shot(due.host_s, due.number, self.picture(due.number))
+
+    def events(self) -> tuple[str, ...]:
+        """Say once what had to be assumed about the file."""
+        told, self._untold = self._untold, ""
+        return (f"{self._path.name}: {told}",) if told else ()
 
     def close(self) -> None:
         """Free the file; safe to call twice."""

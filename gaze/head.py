@@ -229,7 +229,8 @@ class Head:
         """
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         now = [plan.at(t_s - self._planned_s)[0] for plan in self._plans]
-        return (now[0], now[1], now[2])
+        # A plan made anew in full flight may swing past its goal, but not past the neck's range.
+        return self.in_range((now[0], now[1], now[2]))
 
     def _decide(
         self,
@@ -250,14 +251,26 @@ class Head:
         if eccentricity >= self.trigger_rad and late_enough:
             self._follows, self._relieves = True, False
         elif t_s - self._aside_since_s >= par.recentre_after_ms / 1e3 and not moving:
-            self._relieves = True
+            self._follows, self._relieves = False, True
         elif not moving:
             self._follows = self._relieves = False
         if self._follows:
-            self._aim(self._reaching(facing, gaze, self._stops_short(target, facing)), t_s)
+            self._follow(facing, gaze, self._stops_short(target, facing), t_s)
         elif self._relieves:
             comfort = min(radians(par.comfort_deg) / 2.0, self.trigger_rad)
-            self._aim(self._reaching(facing, gaze, comfort), t_s)
+            self._follow(facing, gaze, comfort, t_s)
+
+    def _follow(self, facing: Angles2, gaze: Angles2, short_rad: float, t_s: float) -> None:
+        """Turn towards the target, but never away from it because the interest has fallen.
+
+        Somebody who steps aside pulls most while moving; a head that then took the larger
+        offset of somebody who stands would swing back from where it has just turned to.
+        """
+        way = direction(self._goal)
+        near_enough = angle_between(way, direction(facing)) <= short_rad
+        in_reach = angle_between(way, direction(gaze)) <= self.trigger_rad
+        if not (near_enough and in_reach):
+            self._aim(self._reaching(facing, gaze, short_rad), t_s)
 
     def _stops_short(self, target: Target, facing: Angles2) -> float:
         """Give the angle by which the head stops short of the target."""

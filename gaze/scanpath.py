@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gaze.angles import add, sub
 from gaze.scanpath_dwell import LAWS, Draw, dwell_law
 from gaze.scanpath_models import (
     FaceLooks,
@@ -237,12 +238,14 @@ class Scanpath:
         look = self.looks.step(face, p_world_head_m, t_s, settled)
         self._shift += look.moved
         what = PART_NAMES[look.part] if look.part is not None else "random angles about"
+        # A lost face is waited for where it was heading, its parts with it.
+        moved = sub(target.p_world_m, face.p_world_m)
         return target._replace(
-            p_world_m=look.p_world_m,
+            p_world_m=add(look.p_world_m, moved),
             part=look.part,
             shift=target.shift + self._shift,
             why=f"{what} of {target.why}" if look.part is not None else f"{what} {target.why}",
-            centre_world_m=face.p_world_m,
+            centre_world_m=target.p_world_m,
         )
 
     def _find(self, face_id: int, percept: Percept | None) -> Face | None:

@@ -50,6 +50,7 @@ class Bodies:
     v_world_m_s: (n, 3) velocities
     w_world_rad_s: (n, 3) angular velocities
     radius_m:  (n,) half the size
+    pv_cov:    (n, 6, 6) covariance of position and velocity, None where nobody knows it
     """
 
     ids: tuple[int, ...] = ()
@@ -58,6 +59,7 @@ class Bodies:
     v_world_m_s: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     w_world_rad_s: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     radius_m: Floats = field(default_factory=lambda: np.zeros(0))
+    pv_cov: Floats | None = None
 
     def __len__(self) -> int:
         """Count the bodies."""
@@ -74,6 +76,9 @@ class Face:
     R_world_face:  face axes in the world: x out of the face, y to the owner's left, z up
     parts_world_m: the eight parts in the order of PARTS
     confidence:    0..1 of the detector
+    distance_from: what the distance rests on: "camera", its depth; "face size", that of an
+        adult or as learned of this person; "" where nobody knows
+    across_sd_m, along_sd_m: standard deviations of the place, across and along the view
     """
 
     id: int
@@ -82,6 +87,9 @@ class Face:
     R_world_face: Mat3
     parts_world_m: tuple[Vec3, ...]
     confidence: float
+    distance_from: str = ""
+    across_sd_m: float = 0.0
+    along_sd_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

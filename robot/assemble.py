@@ -2,22 +2,18 @@
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from math import radians
-from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from config.schema import Rig, load_rules, load_walk
-from drivers.camera_thread import CameraThread
+from drivers.camera_depth import depth_at
+from drivers.camera_poses import PoseRing
 from drivers.dynamixel import DynamixelBus
 from drivers.dynamixel_port import BlockingPort, BusPort
 from drivers.errors import SetupError
-from drivers.face_detector import face_detector
-from drivers.types import Camera
-from drivers.video_file import VideoFile
-from drivers.webcam import Webcam
 from gaze.attention import Attention
 from gaze.aversion import Aversion
 from gaze.bottom_up import BottomUp
@@ -31,47 +27,26 @@ from gaze.pursuit import Pursuit
 from gaze.saccade import Saccade, SaccadeParams
 from gaze.scanpath import Scanpath, ScanpathParams, row_sums_note
 from gaze.top_down import TopDown
-from gaze.types import Angles2, Mat3, Vec3
+from gaze.types import Angles2, Angles3, Mat3, Vec3
 from robot.body import Body, JointParams
+from robot.cameras import HeadPose, real_camera, scene_camera
+from robot.choice import Choice
 from robot.clock import Clock, RealClock, SimulatedClock
 from robot.emulated_rig import emulated_servos
-from robot.frames import CameraMount, CameraParams, PoseHistory, standing_still
+from robot.frames import CameraMount, CameraParams, NewestPose, PoseHistory, standing_still
 from robot.kinematics import Kinematics
 from robot.loop import LoopParams, Robot
 from robot.perception import Perception
 from robot.safety import Guard
 from robot.tracks import Tracker
 from robot.types import JOINTS, JointAngles
-from sim_mock.film_camera import FilmCamera
 from sim_mock.ports import InProcessPort
 from sim_mock.pty_bus import PtyBus
 from sim_mock.scene import Scene
-from sim_mock.scene_camera import SceneCamera, SceneCameraParams
 from sim_mock.scenes import scenes
 from sim_mock.servo_chain import ServoChain, build_chain
 
 P = TypeVar("P", ScanpathParams, SaccadeParams)
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What to run: wires or emulation, what to look at, which clock, which dice.
-
-    Exactly one of scene, video and camera is set.
-    port: serial port instead of the rig's
-    """
-
-    mock: bool
-    fast: bool
-    seed: int
-    scene: str | None = None
-    video: Path | None = None
-    camera: int | None = None
-    scanpath: str | None = None
-    saccade: str | None = None
-    rules: str | None = None
-    port: str | None = None
-    film_delay_s: float = 0.05
 
 
 class Assembly(NamedTuple):
@@ -118,12 +93,14 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
     scanpath_dice, lid_dice, camera_dice, idle_dice, aversion_dice, landing_dice = dice
     clock: Clock = SimulatedClock() if choice.fast else RealClock()
     kinematics = _kinematics(rig)
-    poses = PoseHistory(kinematics)
     camera_params, notes = _camera_params(rig, choice, kinematics)
     walk = load_walk(rig.gaze.scanpath.walk)
     note = row_sums_note(walk)
     notes = (*notes, note) if note is not None else notes
     mount = CameraMount(camera_params)
+    turns = PoseRing() if scene is None and mount.on_head else None
+    remembering = PoseHistory if choice.placed_by == "capture" else NewestPose
+    poses = remembering(kinematics, tell=_teller(kinematics, mount, turns))
     wires = _wires(rig, choice, clock)
     try:
         bus = DynamixelBus(
@@ -135,9 +112,16 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
         robot = Robot(
             body,
             kinematics,
-            _camera(rig, choice, scene, clock, mount, where, camera_dice),
+            scene_camera(rig, choice, scene, mount, where, camera_dice)
+            if scene is not None
+            else real_camera(rig, choice, clock, camera_params, turns),
             Perception(
-                mount, camera_params.horizontal_field_deg, Tracker(rig.tracks), _own_parts(rig)
+                mount,
+                camera_params.horizontal_field_deg,
+                Tracker(rig.tracks),
+                _own_parts(rig),
+                camera_params.lens,
+                depth_at,
             ),
             poses,
             _attention(rig, idle_dice),
@@ -210,11 +194,12 @@ def _camera_params(
     rig: Rig, choice: Choice, kinematics: Kinematics
 ) -> tuple[CameraParams, tuple[str, ...]]:
     """Take the rig's camera, standing still where its pictures cannot turn with the head."""
-    still = choice.video is not None or (choice.mock and choice.camera is not None)
-    if not still or rig.camera.mount == "base":
+    what = choice.eyes
+    turns = choice.video is None and choice.replay is None and not choice.mock
+    if what is None or turns or rig.camera.mount == "base":
         return rig.camera, ()
-    what = "a film" if choice.video is not None else "a webcam beside an emulated head"
-    note = f"{what} does not turn with the head: the camera counts as standing still"
+    beside = "" if choice.video or choice.replay else " beside an emulated head"
+    note = f"{what}{beside} does not turn with the head: the camera counts as standing still"
     return standing_still(rig.camera, kinematics), (note,)
 
 
@@ -242,9 +227,22 @@ def _nothing() -> None:
     return None
 
 
+def _teller(
+    kinematics: Kinematics, mount: CameraMount, turns: PoseRing | None
+) -> Callable[[float, Angles3], None] | None:
+    """Give what tells the camera's process how its camera is turned, None where nobody asks."""
+    if turns is None:
+        return None
+
+    def tell(t_s: float, head_rad: Angles3) -> None:
+        turns.remember(t_s, np.array(mount.pose(*kinematics.head_pose(head_rad))[0]))
+
+    return tell
+
+
 def _true_head(
     chain: ServoChain | None, body: Body, kinematics: Kinematics, poses: PoseHistory
-) -> Callable[[float], tuple[Mat3, Vec3]]:
+) -> HeadPose:
     """Give where the emulated head is: from the servos themselves where they are at hand."""
     if chain is None:
         return poses.head_pose
@@ -283,27 +281,6 @@ def chosen(params: P, key: str, value: str, option: str) -> P:
     if value not in choices:
         raise SetupError(f"{option} {value}: unknown; there is {', '.join(choices)}")
     return replace(params, **{key: value})  # type: ignore[arg-type]
-
-
-def _camera(
-    rig: Rig,
-    choice: Choice,
-    scene: Scene | None,
-    clock: Clock,
-    mount: CameraMount,
-    where: Callable[[float], tuple[Mat3, Vec3]],
-    rng: np.random.Generator,
-) -> Camera:
-    if scene is not None:
-        params = SceneCameraParams(horizontal_field_deg=rig.camera.horizontal_field_deg)
-        return SceneCamera(params, scene, mount, where, rng)
-    detector = face_detector(rig.detector)
-    if choice.video is not None:
-        film = VideoFile(choice.video)
-        if choice.fast:
-            return FilmCamera(film, detector, choice.film_delay_s)
-        return CameraThread(film, detector, clock.now_s)
-    return CameraThread(Webcam(choice.camera or 0), detector, clock.now_s)
 
 
 def _attention(rig: Rig, idle_dice: np.random.Generator) -> Attention:

@@ -10,7 +10,7 @@ import typer
 from config.load import load
 from config.schema import Rig, load_rig
 from drivers.errors import SetupError
-from robot import cli_emulate, cli_motion, cli_servos
+from robot import cli_emulate, cli_motion, cli_record, cli_servos
 from robot.cli_terminal import FAULT, RigArgument, clear_errors, say, signals, status
 
 app = typer.Typer(
@@ -19,7 +19,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Makes an animatronic head look at people the way people look at each other.",
 )
-for part in (cli_servos, cli_motion, cli_emulate):
+for part in (cli_servos, cli_motion, cli_record, cli_emulate):
     app.add_typer(part.app)
 
 
@@ -33,7 +33,13 @@ def run(
     ] = None,
     video: Annotated[Path | None, typer.Option(help="Look at a film or picture, looped.")] = None,
     camera: Annotated[int | None, typer.Option(help="Look through webcam N.")] = None,
-    oak: Annotated[bool, typer.Option(help="Look through an OAK-D (not available yet).")] = False,
+    oak: Annotated[bool, typer.Option(help="Look through an OAK-D camera.")] = False,
+    replay: Annotated[
+        Path | None, typer.Option(help="Look at a recording of record-camera, again and again.")
+    ] = None,
+    pixels: Annotated[
+        bool, typer.Option(help="Draw the scene and find faces and motion in the pictures.")
+    ] = False,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all dice.")] = 0,
     fast: Annotated[
@@ -89,6 +95,8 @@ def run(
             video=video,
             camera=camera,
             oak=oak,
+            replay=replay,
+            pixels=pixels,
             scanpath=scanpath,
             saccade=saccade,
             rules=rules,

@@ -1,4 +1,4 @@
-"""The command calibrate: zero, sign and range of each joint, found and written down."""
+"""The command calibrate joints: zero, sign and range of each joint, found and written down."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
@@ -24,8 +24,6 @@ from robot.single_joint import SingleJoint, Stopped
 from robot.stop_search import StopSearchParams
 from robot.types import JOINTS
 
-app = typer.Typer()
-
 
 class By(StrEnum):
     """Who turns the joint."""
@@ -41,8 +39,7 @@ class ZeroBy(StrEnum):
     person = "person"
 
 
-@app.command()
-def calibrate(
+def calibrate_joints(
     rig: RigArgument = "desk",
     joint: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="This joint (again: more); else all.")
@@ -82,7 +79,7 @@ def calibrate(
         if dry_run and clear_offset:
             raise SetupError("--dry-run and --clear-offset exclude each other: that is a write")
         if not dry_run:
-            _refuse_unwritable(rig, out)
+            refuse_unwritable(rig, out)
         how = _How(by, margin, zero, StopSearchParams(strength=strength), clear_offset)
         person = TerminalPerson(Lines(answers), stopped, yes)
         try:
@@ -153,8 +150,8 @@ def _names(asked: list[str] | None) -> tuple[str, ...]:
     return tuple(name for name in JOINTS if not asked or name in asked)
 
 
-def _refuse_unwritable(rig: str, out: Path | None) -> None:
-    """Find out before anybody turns a joint that nothing could be written.
+def refuse_unwritable(rig: str, out: Path | None) -> None:
+    """Find out before anything is calibrated that nothing could be written.
 
     Raises:
         config.load.ConfigError, drivers.errors.SetupError: why, and what to do.

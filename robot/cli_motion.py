@@ -13,7 +13,7 @@ from config.schema import Rig, load_rig
 from drivers.dynamixel import DynamixelBus
 from drivers.dynamixel_port import BlockingPort
 from drivers.errors import DriverError
-from robot import cli_calibrate, cli_monitor
+from robot import cli_calibrations, cli_monitor
 from robot.applied import PASSING, Moved, Step
 from robot.body import Body
 from robot.bus_events import drawn_together
@@ -26,7 +26,7 @@ from robot.safety import Guard
 from robot.types import JOINTS
 
 app = typer.Typer()
-app.add_typer(cli_calibrate.app)
+app.add_typer(cli_calibrations.app)
 app.add_typer(cli_monitor.app)
 
 # A number below zero is an argument, not an option.

@@ -14,13 +14,17 @@ it ends at the nearer of the two mirror poses of a flat set of points.
 """
 
 from dataclasses import dataclass
-from math import cos, hypot, isfinite, radians, sqrt, tan
+from math import cos, hypot, isfinite, radians, sqrt
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaze.types import PARTS, Mat3, Vec3
+from robot.intrinsics import Intrinsics as Intrinsics
+from robot.intrinsics import intrinsics_of_view as intrinsics_of_view
+from robot.intrinsics import project as project
+from robot.intrinsics import rays as rays_through
 
 Floats = NDArray[np.float64]
 
@@ -82,42 +86,6 @@ _SMALL_STEP, _MOST_STEPS = 1e-3, 20
 
 
 @dataclass(frozen=True, slots=True)
-class Intrinsics:
-    """A camera without distortion.
-
-    fx_px, fy_px: focal lengths; cx_px, cy_px: where the optical axis meets the picture
-    """
-
-    fx_px: float
-    fy_px: float
-    cx_px: float
-    cy_px: float
-
-    def __post_init__(self) -> None:
-        """Refuse focal lengths that are no lengths.
-
-        Raises:
-            ValueError: a focal length is not above 0.
-        """
-        if not (self.fx_px > 0.0 and self.fy_px > 0.0):
-            raise ValueError(f"focal lengths must be above 0, not {self.fx_px}, {self.fy_px}")
-
-
-def intrinsics_of_view(view_rad: float, width_px: int, height_px: int) -> Intrinsics:
-    """Give the intrinsics of square pixels with the axis in the middle of the picture.
-
-    view_rad: horizontal field of view, from edge to edge
-
-    Raises:
-        ValueError: the field of view is not between 0 and pi.
-    """
-    if not 0.0 < view_rad < np.pi:
-        raise ValueError(f"a field of view lies between 0 and pi rad, not {view_rad}")
-    focal_px = 0.5 * width_px / tan(0.5 * view_rad)
-    return Intrinsics(focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1))
-
-
-@dataclass(frozen=True, slots=True)
 class FacePose:
     """Where a face is and how it is turned.
 
@@ -141,7 +109,7 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
     points = np.asarray(landmarks_px, dtype=np.float64)
     if points.shape != (5, 2) or not np.isfinite(points).all() or not _front_seen(points):
         return None
-    rays = _rays(points, intrinsics)
+    rays = rays_through(points, intrinsics)
     R_face_camera = _facing_camera(rays)
     turned = rays @ R_face_camera.T
     seen = turned[:, :2] / turned[:, 2:]
@@ -167,15 +135,6 @@ def face_parts(pose: FacePose) -> Floats:
     return parts
 
 
-def project(points_camera_m: ArrayLike, intrinsics: Intrinsics) -> Floats:
-    """Give where points (n, 3) appear: (n, 2) pixels, nan for points not before the camera."""
-    p = np.asarray(points_camera_m, dtype=np.float64).reshape(-1, 3)
-    z = np.where(p[:, 2:] > 0.0, p[:, 2:], np.nan)
-    i = intrinsics
-    pixels: Floats = p[:, :2] / z * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
-    return pixels
-
-
 def _front_seen(points: Floats) -> bool:
     """Tell whether eyes and mouth run round the way they do on a face seen from its front.
 
@@ -190,14 +149,6 @@ def _spans(points: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
     """Give the ways from right to left eye and from the eyes' middle to the mouth's."""
     (ax, ay), (bx, by), _, (cx, cy), (dx, dy) = points.tolist()
     return (bx - ax, by - ay), (0.5 * (cx + dx - ax - bx), 0.5 * (cy + dy - ay - by))
-
-
-def _rays(points: Floats, intrinsics: Intrinsics) -> Floats:
-    """Give the directions (n, 3) through pixels, with z = 1."""
-    i = intrinsics
-    rays = np.ones((len(points), 3))
-    rays[:, :2] = (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px)
-    return rays
 
 
 def _facing_camera(rays: Floats) -> Floats:

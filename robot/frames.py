@@ -6,14 +6,48 @@ throws targets off by the head's motion in between, so poses are remembered.
 
 from bisect import bisect_left
 from collections import deque
-from dataclasses import dataclass, field
-from math import radians
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import degrees, inf, radians
 
-from gaze.angles import add, compose, rotate, rotation
+from gaze.angles import add, angles_of, compose, rotate, rotation
 from gaze.types import Angles3, HeadGeometry, Mat3, Vec3
 
 _OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 """Maps camera optical axes (x right, y down, z forward) to x forward, y left, z up."""
+
+
+_FOCAL = {"low": 10.0, "high": 100_000.0, "unit": "px"}
+_CENTRE = {"low": -10_000.0, "high": 20_000.0, "unit": "px"}
+
+
+@dataclass(frozen=True)
+class LensParams:
+    """A lens as measured, on pictures of one size."""
+
+    width_px: int = field(
+        metadata={"low": 16, "high": 16384, "unit": "px", "says": "width of those pictures"}
+    )
+    height_px: int = field(
+        metadata={"low": 16, "high": 16384, "unit": "px", "says": "height of those pictures"}
+    )
+    fx_px: float = field(metadata={**_FOCAL, "says": "focal length in pixel widths"})
+    fy_px: float = field(metadata={**_FOCAL, "says": "focal length in pixel heights"})
+    cx_px: float = field(
+        metadata={**_CENTRE, "says": "where the optical axis meets the picture, from the left"}
+    )
+    cy_px: float = field(
+        metadata={**_CENTRE, "says": "where the optical axis meets the picture, from the top"}
+    )
+    distortion: tuple[float, float, float, float, float] = field(
+        default=(0.0, 0.0, 0.0, 0.0, 0.0),
+        metadata={
+            "low": -100.0,
+            "high": 100.0,
+            "unit": "",
+            "says": "k1 k2 p1 p2 k3 as in the OpenCV manual; zeros for a lens without",
+        },
+    )
 
 
 @dataclass(frozen=True)
@@ -55,14 +89,36 @@ class CameraParams:
             "says": "horizontal field of view of the lens",
         },
     )
+    roll_deg: float = field(
+        default=0.0,
+        metadata={
+            "low": -180.0,
+            "high": 180.0,
+            "unit": "deg",
+            "says": "lens rolled, its right side down",
+        },
+    )
+    lens: LensParams | None = field(
+        default=None,
+        metadata={
+            "unit": "",
+            "says": "the lens as measured; left out, the field of view stands for it",
+        },
+    )
 
 
 class PoseHistory:
     """The head's angles of the last seconds, and its pose at any instant among them."""
 
-    def __init__(self, geometry: HeadGeometry, ticks: int = 600) -> None:
-        """Keep ``ticks`` entries."""
+    def __init__(
+        self,
+        geometry: HeadGeometry,
+        ticks: int = 600,
+        tell: Callable[[float, Angles3], None] | None = None,
+    ) -> None:
+        """Keep ``ticks`` entries; ``tell`` gets every one of them as well."""
         self._geometry = geometry
+        self._tell = tell
         self._times: deque[float] = deque(maxlen=ticks)
         self._angles: deque[Angles3] = deque(maxlen=ticks)
 
@@ -70,6 +126,8 @@ class PoseHistory:
         """Note the head's measured angles; times must grow."""
         self._times.append(t_s)
         self._angles.append(head_rad)
+        if self._tell is not None:
+            self._tell(t_s, head_rad)
 
     def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
         """Give R_world_head and p_world_head_m at an instant, interpolated between ticks.
@@ -98,6 +156,22 @@ class PoseHistory:
         )
 
 
+class NewestPose(PoseHistory):
+    """Gives the newest pose whatever the time: for comparison only, it makes heads overshoot.
+
+    This is what placing a picture by where the head is now does, instead of by where it
+    was when the picture was taken.
+    """
+
+    def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
+        """Give R_world_head and p_world_head_m as remembered last.
+
+        Raises:
+            LookupError: nothing has been remembered yet.
+        """
+        return super().head_pose(inf)
+
+
 class CameraMount:
     """Places the camera in the world."""
 
@@ -106,7 +180,9 @@ class CameraMount:
         self.on_head = params.mount == "head"
         x, y, z = params.position_mm
         self._p: Vec3 = (x / 1e3, y / 1e3, z / 1e3)
-        turn = rotation((radians(params.yaw_deg), radians(params.pitch_deg), 0.0))
+        turn = rotation(
+            (radians(params.yaw_deg), radians(params.pitch_deg), radians(params.roll_deg))
+        )
         self._R = compose(turn, _OPTICAL)
 
     def pose(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Mat3, Vec3]:
@@ -114,6 +190,25 @@ class CameraMount:
         if not self.on_head:
             return self._R, self._p
         return compose(R_world_head, self._R), add(p_world_head_m, rotate(R_world_head, self._p))
+
+
+def mounted_at(
+    params: CameraParams, R_parent_camera: Mat3, p_parent_camera_m: Vec3
+) -> CameraParams:
+    """Give the camera at another place: the inverse of what ``CameraMount`` makes of it.
+
+    R_parent_camera, p_parent_camera_m: its pose in the head, or in the world for a base mount
+    """
+    from_optical: Mat3 = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
+    yaw, pitch, roll = map(degrees, angles_of(compose(R_parent_camera, from_optical)))
+    x, y, z = p_parent_camera_m
+    return replace(
+        params,
+        position_mm=(x * 1e3, y * 1e3, z * 1e3),
+        yaw_deg=yaw,
+        pitch_deg=pitch,
+        roll_deg=roll,
+    )
 
 
 def standing_still(params: CameraParams, geometry: HeadGeometry) -> CameraParams:
@@ -125,10 +220,4 @@ def standing_still(params: CameraParams, geometry: HeadGeometry) -> CameraParams
         return params
     _, (x, y, z) = geometry.head_pose((0.0, 0.0, 0.0))
     dx, dy, dz = params.position_mm
-    return CameraParams(
-        "base",
-        (x * 1e3 + dx, y * 1e3 + dy, z * 1e3 + dz),
-        params.yaw_deg,
-        params.pitch_deg,
-        params.horizontal_field_deg,
-    )
+    return replace(params, mount="base", position_mm=(x * 1e3 + dx, y * 1e3 + dy, z * 1e3 + dz))

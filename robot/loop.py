@@ -5,15 +5,15 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, radians
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from drivers.errors import DriverError
 from drivers.types import Camera, Detections
-from gaze.attention import Attention
 from gaze.aversion import MODES, Aversion
 from gaze.lids import Lids
 from gaze.oculomotor import Oculomotor
 from gaze.scanpath import Scanpath
+from gaze.top_down import TopDown
 from gaze.types import GazeCommand, GazeState, Percept, Target
 from robot.body import Body
 from robot.clock import Clock
@@ -27,7 +27,7 @@ from robot.types import JointAngles, JointState, Verdict
 class Tick(NamedTuple):
     """Everything one tick knew and decided; wish, permitted and measured side by side.
 
-    events: what has happened on the bus, in words
+    events: what has happened on the bus and to the camera, in words
     """
 
     t_s: float
@@ -78,6 +78,23 @@ class LoopCount(NamedTuple):
     stopped_by: str
 
 
+class Chooser(Protocol):
+    """Chooses what to look at, as gaze.attention.Attention does.
+
+    top_down: the behaviours there are to choose from
+    """
+
+    top_down: TopDown
+
+    def reset(self, t_s: float) -> None:
+        """Forget everything seen."""
+        ...
+
+    def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
+        """Give the target in force at ``t_s``."""
+        ...
+
+
 class Robot:
     """All rooms of one head, wired."""
 
@@ -88,7 +105,7 @@ class Robot:
         camera: Camera,
         perception: Perception,
         poses: PoseHistory,
-        attention: Attention,
+        attention: Chooser,
         scanpath: Scanpath,
         aversion: Aversion,
         oculomotor: Oculomotor,
@@ -99,7 +116,7 @@ class Robot:
         self.body = body
         self.camera = camera
         self.perception = perception
-        self.attention = attention
+        self.attention: Chooser = attention
         self._kinematics = kinematics
         self._poses = poses
         self._scanpath = scanpath
@@ -182,7 +199,7 @@ class Robot:
         age_s = percept.age_s(t_s) if percept is not None else inf
         verdict = self._guard.check(wish, joints, age_s, t_s)
         self.body.write(verdict.command_rad)
-        events = self.body.bus.events()
+        events = (*self.body.bus.events(), *self.camera.events())
         return Tick(t_s, joints, pose, detections, percept, target, gaze, wish, verdict, events)
 
     def park(self, pose_rad: JointAngles, clock: Clock, params: LoopParams) -> bool:

@@ -12,11 +12,12 @@ from math import radians
 import numpy as np
 
 from drivers.types import BusHealth, Detections
-from gaze.angles import rotate_back, sub
+from gaze.angles import norm, rotate_back, sub
 from gaze.field_of_view import line_of_sight
 from gaze.types import PART_NAMES, Target, Vec3
 from robot.face_pose import Intrinsics, intrinsics_of_view, project
 from robot.frames import CameraMount, PoseHistory
+from robot.head_turn_residual import ResidualFigures
 from robot.loop import Tick
 from robot.page import Page
 from robot.page_picture import draw_detections, encode
@@ -36,6 +37,7 @@ class Onlooker:
         say: Callable[[str], None] | None,
         health: Callable[[], BusHealth],
         behaviour: Callable[[], str],
+        residual: Callable[[], ResidualFigures],
         ask: Callable[[str, str], None],
         mount: CameraMount,
         poses: PoseHistory,
@@ -43,12 +45,13 @@ class Onlooker:
     ) -> None:
         """Take the page, and where to write the status line (None: nowhere).
 
-        health, behaviour: give what is shown; ask: takes the choices made on the page
+        health, behaviour, residual: give what is shown; ask: takes the choices made on the page
         """
         self._page = page
         self._say = say
         self._health = health
         self._behaviour = behaviour
+        self._residual = residual
         self._ask = ask
         self._mount = mount
         self._poses = poses
@@ -83,7 +86,8 @@ class Onlooker:
             rate.note(tick.t_s, self._ticks)
             if self._page is not None:
                 words = _health_words(self._health())
-                self._page.show(snapshot(tick, rate.hz, words, self._behaviour()))
+                seeing = seeing_words(tick, self._residual())
+                self._page.show(snapshot(tick, rate.hz, words, self._behaviour(), seeing))
                 self._pass_on(self._page)
             if round_number % round(_PICTURE_S / _SNAPSHOT_S) == 0:
                 picture_number = self._show_picture(tick, picture_number)
@@ -100,7 +104,11 @@ class Onlooker:
         found = tick.detections
         if self._page is None or found is None or found.number == shown:
             return shown
-        lens = intrinsics_of_view(self._field_rad, found.width_px, found.height_px)
+        lens = (
+            Intrinsics(*found.lens)
+            if found.lens is not None
+            else intrinsics_of_view(self._field_rad, found.width_px, found.height_px)
+        )
         drawn = draw_detections(found.picture, found, self._gaze_px(tick, found, lens), lens.fx_px)
         self._page.show_picture(encode(drawn))
         return found.number
@@ -143,7 +151,7 @@ class _Rate:
             self._from = (t_s, ticks)
 
 
-def snapshot(tick: Tick, rate_hz: float, health: str, behaviour: str) -> Snapshot:
+def snapshot(tick: Tick, rate_hz: float, health: str, behaviour: str, seeing: str = "") -> Snapshot:
     """Give what the page is shown of a tick."""
     pose, percept, target = tick.pose, tick.percept, tick.target
     faces = percept.faces if percept is not None else ()
@@ -178,7 +186,31 @@ def snapshot(tick: Tick, rate_hz: float, health: str, behaviour: str) -> Snapsho
         health=health,
         behaviour=behaviour,
         pulls=target.pulls,
+        seeing=seeing,
     )
+
+
+def seeing_words(tick: Tick, residual: ResidualFigures) -> str:
+    """Say how old the picture is, how far faces are and by what, and what the head's turn leaves.
+
+    e.g. "picture 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
+    0.3 deg/s while the head turns"
+    """
+    if tick.percept is None:
+        return "no picture yet"
+    parts = [f"picture {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old"]
+    head = tick.pose.p_world_head_m
+    for face in tick.percept.faces:
+        by = f" by {face.distance_from}" if face.distance_from else ""
+        parts.append(
+            f"face {face.id} at {norm(sub(face.p_world_m, head)):.2f} m{by}, "
+            f"+- {100.0 * face.along_sd_m:.0f} cm"
+        )
+    if residual.speed_deg_s is not None:
+        parts.append(
+            f"still things seem to move {residual.speed_deg_s:.1f} deg/s while the head turns"
+        )
+    return " | ".join(parts)
 
 
 def target_name(target: Target) -> str:

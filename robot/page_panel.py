@@ -136,6 +136,7 @@ def status(snapshot: Snapshot) -> str:
         f"{_pulls(snapshot.pulls)}"
         f"{_reasons(snapshot.reasons)}"
         f"<div style='opacity:.8'>{escape(snapshot.health)}</div>"
+        f"<div style='opacity:.8'>{escape(snapshot.seeing)}</div>"
     )
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from drivers.errors import DriverError, SetupError
-from robot.assemble import Assembly, Choice
+from robot.assemble import Assembly
 from robot.behaviours import Behaviours
 from robot.bus_events import drawn_together
+from robot.choice import Choice
 from robot.clock import RealClock
 from robot.face_gaze import FaceGaze
 from robot.heatmap import heatmap
@@ -19,11 +20,6 @@ from robot.onlooker import Onlooker
 from robot.page import Page
 from robot.planner import Planner
 from robot.summary import Summary
-
-_NO_OAK = (
-    "--oak: cameras of the OAK-D family are not supported yet; "
-    "use --camera N (webcam), --video FILE or --scene NAME"
-)
 
 
 @dataclass(frozen=True)
@@ -38,6 +34,8 @@ class Wanted:
     video: Path | None = None
     camera: int | None = None
     oak: bool = False
+    replay: Path | None = None
+    pixels: bool = False
     scanpath: str | None = None
     saccade: str | None = None
     rules: str | None = None
@@ -54,9 +52,12 @@ class Wanted:
         Raises:
             drivers.errors.SetupError: the options do not fit together.
         """
-        if self.oak:
-            raise SetupError(_NO_OAK)
-        asked = [name for name in ("scene", "video", "camera") if getattr(self, name) is not None]
+        asked = [
+            name
+            for name in ("scene", "video", "camera", "oak", "replay")
+            # By identity: webcam 0 is a choice.
+            if getattr(self, name) is not None and getattr(self, name) is not False
+        ]
         if len(asked) > 1:
             options = " and ".join(f"--{name}" for name in asked)
             raise SetupError(f"{options} exclude each other: the head looks at one of them")
@@ -64,15 +65,17 @@ class Wanted:
         if not asked:
             if not self.mock:
                 raise SetupError(
-                    "nothing to look at: give --camera N, --video FILE or --scene NAME"
+                    "nothing to look at: give --oak, --camera N, --video FILE or --scene NAME"
                 )
             scene = "visitor"
         if self.port is not None and self.mock:
             raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
         if self.fast and not self.mock:
             raise SetupError("--fast needs --mock: real servos cannot be hurried")
-        if self.fast and self.camera is not None:
-            raise SetupError("--fast cannot be used with --camera: a webcam has real time")
+        if self.fast and (self.camera is not None or self.oak):
+            raise SetupError("--fast needs a scene, a film or a recording: a camera has real time")
+        if self.pixels and scene is None:
+            raise SetupError("--pixels draws a scene: it cannot be used with a film or a camera")
         if self.fast and self.seconds is None and scene is None:
             raise SetupError("--fast needs --seconds S with a film: it would never end")
         return Choice(
@@ -82,6 +85,9 @@ class Wanted:
             scene=scene,
             video=self.video,
             camera=self.camera,
+            oak=self.oak,
+            replay=self.replay,
+            pixels=self.pixels,
             scanpath=self.scanpath,
             saccade=self.saccade,
             rules=self.rules,
@@ -123,6 +129,7 @@ def _run(
         status if wanted.status_line else None,
         robot.body.bus.health,
         lambda: robot.attention.top_down.behaviour,
+        robot.perception.residual,
         robot.ask,
         made.mount,
         made.poses,
@@ -167,7 +174,7 @@ def _run(
         count = run_loop(robot, made.clock, made.loop, stop, watch)
     finally:
         wall_s = wall.now_s() - began_s
-        _leave(made, count, say)
+        leave(made, count, say)
         if not wanted.fast:
             onlooker.stop()
         if page is not None:
@@ -204,7 +211,7 @@ def _draw_heatmap(
     say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
 
 
-def _leave(made: Assembly, count: LoopCount, say: Callable[[str], None]) -> None:
+def leave(made: Assembly, count: LoopCount, say: Callable[[str], None]) -> None:
     """The one way out: park, torque off, close, and say what of it worked."""
     robot = made.robot
     how = "not parked"
@@ -249,6 +256,7 @@ def _figures(
         "overruns": count.overruns,
         "faces_seen": robot.perception.pictures_with_face,
         "pictures": robot.perception.pictures,
+        "head_turn_residual": robot.perception.residual()._asdict(),
         **ticks,
         "bus": bus,
         "stopped_by": count.stopped_by,

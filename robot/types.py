@@ -127,6 +127,7 @@ class Snapshot:
     target_name: e.g. "face 3: left eye"; why: why it won
     rate_hz: control rate of the last second; health: bus figures in words
     behaviour: the behaviour in force; pulls: what pulls the gaze, strongest first
+    seeing: age of the picture, distances and what they rest on, still things that seem to move
     """
 
     t_s: float
@@ -149,3 +150,4 @@ class Snapshot:
     health: str
     behaviour: str = ""
     pulls: tuple[Pull, ...] = ()
+    seeing: str = ""

@@ -31,6 +31,8 @@ GAP_MS = 50.0
 SPIN_S = 0.0001
 """The kernel wakes a sleeper up to so late: the rest until bytes are due is spun away."""
 
+IDLE_S = 0.5
+"""So often it is looked whether a signal came, while nothing else happens."""
 LOOK_S = 0.005
 """How often faults that end by themselves are looked at."""
 
@@ -78,11 +80,13 @@ class Server:
         self._held = self._forbidden = False
         self._typed = b""
         self._warned: int | None = None
+        self.over = False
+        """To be set by a signal: an exception alone may be swallowed where it arises."""
 
     def serve(self, commands: int | None) -> None:
         """Serve until ``commands`` ends, where the settings say so, or a signal stops it."""
         try:
-            while True:
+            while not self.over:
                 master, watch = self.terminal.master, self.terminal.watch
                 leaving = -1 if watch is None else watch.fd
                 watched = [fd for fd in (master, leaving, commands) if fd is not None and fd >= 0]
@@ -105,12 +109,12 @@ class Server:
         finally:
             self.terminal.unplug()
 
-    def _patience_s(self) -> float | None:
+    def _patience_s(self) -> float:
         """Give how long nothing needs to be done but for what arrives."""
         due_s = self.line.next_due_s()
         if due_s is not None:
             return max(0.0, due_s - SPIN_S - time.monotonic())
-        return LOOK_S if self.chain.faults.wire.any else None
+        return LOOK_S if self.chain.faults.wire.any else IDLE_S
 
     def _take_bytes(self, now_s: float) -> None:
         """Give the client's bytes to the line, and back what is answered at once."""
@@ -207,7 +211,11 @@ def run(settings: Settings, say: Callable[[str], None], heed_ctrl_c: bool) -> No
         ValueError, OSError: the settings cannot be met.
     """
 
+    servers: list[Server] = []
+
     def stop(number: int, frame: FrameType | None) -> None:
+        for server in servers:
+            server.over = True
         raise Stopped
 
     signal.signal(signal.SIGTERM, stop)
@@ -215,6 +223,7 @@ def run(settings: Settings, say: Callable[[str], None], heed_ctrl_c: bool) -> No
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)
     try:
         server = Server(settings, say)
+        servers.append(server)
         say(json.dumps({"path": server.terminal.path, "baud": settings.baud}))
         server.serve(sys.stdin.fileno() if sys.stdin is not None else None)
     except (Stopped, BrokenPipeError):

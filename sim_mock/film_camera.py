@@ -5,7 +5,9 @@ It does not blur, distort, drop or reorder pictures, and its delay is constant.
 
 from typing import Protocol
 
-from drivers.types import Detections, FaceDetector, Picture
+from drivers.camera_look import Motion, look
+from drivers.picture_source import Shot
+from drivers.types import Detections, FaceDetector
 
 
 class Film(Protocol):
@@ -19,8 +21,12 @@ class Film(Protocol):
         """Give the film time at which a picture is due."""
         ...
 
-    def picture(self, number: int) -> Picture:
-        """Read a picture; numbers never run back."""
+    def shot(self, number: int) -> Shot:
+        """Read a picture with what belongs to it; numbers never run back."""
+        ...
+
+    def events(self) -> tuple[str, ...]:
+        """Say once what a person should know of the film."""
         ...
 
     def close(self) -> None:
@@ -38,11 +44,16 @@ class FilmCamera:
     """
 
     def __init__(
-        self, video: Film, detector: FaceDetector, delay_s: float, start_s: float = 0.0
+        self,
+        video: Film,
+        detector: FaceDetector,
+        delay_s: float,
+        start_s: float = 0.0,
+        motion: Motion | None = None,
     ) -> None:
         """Take the film, what finds faces, and the time from exposure to detections.
 
-        start_s: simulated time of the first exposure
+        start_s: simulated time of the first exposure; motion: finds what moves
 
         Raises:
             ValueError: the delay is negative.
@@ -53,6 +64,7 @@ class FilmCamera:
         self._detector = detector
         self._delay_s = delay_s
         self._start_s = start_s
+        self._motion = motion
         self._newest: Detections | None = None
         self.pictures = 0
         self.pictures_with_face = 0
@@ -77,6 +89,10 @@ class FilmCamera:
             self._look(self.pictures + 1)
         return self._newest
 
+    def events(self) -> tuple[str, ...]:
+        """Say what the film had to be assumed to be."""
+        return self._video.events()
+
     def close(self) -> None:
         """Free the film; safe to call twice."""
         self._video.close()
@@ -86,12 +102,9 @@ class FilmCamera:
         return self._start_s + self._video.due_s(number)
 
     def _look(self, number: int) -> None:
-        """Find the faces of one picture."""
-        picture = self._video.picture(number)
-        faces = self._detector.find(picture)
-        height, width = picture.shape[:2]
+        """Find the faces of one picture, and what moves in it."""
+        shot = self._video.shot(number)._replace(captured_s=self._captured_s(number))
+        found = look(shot, self._detector, self._motion)
         self.pictures += 1
-        self.pictures_with_face += bool(faces)
-        self._newest = Detections(
-            self._captured_s(number), number, width, height, faces, picture=picture
-        )
+        self.pictures_with_face += bool(found.faces)
+        self._newest = found

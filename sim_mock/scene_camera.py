@@ -85,6 +85,10 @@ class SceneCamera:
             self._arrived = self._on_the_way.popleft()
         return self._arrived
 
+    def events(self) -> tuple[str, ...]:
+        """Have nothing to tell."""
+        return ()
+
     def close(self) -> None:
         """Stop; nothing is held."""
 

@@ -11,12 +11,24 @@ ROOT = Path(__file__).parents[1]
 ROOMS = ("config", "drivers", "gaze", "robot", "sim_mock")
 
 # The pure parts of the machine that a second world may also stand on.
-PURE = {"robot.clock", "robot.frames", "robot.kinematics", "robot.face_pose"}
+PURE = {
+    "robot.charuco_board",
+    "robot.clock",
+    "robot.face_pose",
+    "robot.frames",
+    "robot.intrinsics",
+    "robot.kinematics",
+}
 # Where config, the machine and the second world meet.
 TOP = {
     "robot.assemble",
+    "robot.cameras",
+    "robot.cli_record",
     "robot.cli",
+    "robot.cli_camera",
+    "robot.cli_camera_neck",
     "robot.cli_emulate",
+    "robot.cli_face",
     "robot.cli_calibrate",
     "robot.cli_motion",
     "robot.cli_wires",
@@ -30,13 +42,26 @@ TOP = {
 OWNERS = {
     "serial": ("drivers.dynamixel_port", "sim_mock.ports"),
     "dynamixel_sdk": ("drivers.dynamixel", "sim_mock.ports"),
-    "depthai": ("drivers.oak_camera",),
+    "depthai": ("drivers.oak_sdk",),
+    "mcap": ("drivers.recording_",),
     "ruamel": ("config.load", "config.save"),
     "pydantic": ("config.",),
     "pydantic_core": ("config.",),
     "typer": ("robot.cli",),
     "viser": ("robot.page_",),
-    "cv2": ("drivers.", "robot.face_pose", "robot.heatmap", "robot.page_", "sim_mock."),
+    "PIL": ("robot.charuco_page",),
+    "cv2": (
+        "drivers.",
+        "robot.camera_calibration",
+        "robot.charuco_",
+        "robot.face_pose",
+        "robot.hand_eye",
+        "robot.heatmap",
+        "robot.intrinsics",
+        "robot.page_",
+        "robot.track_filter",
+        "sim_mock.",
+    ),
 }
 
 

@@ -7,13 +7,17 @@ import cv2
 import numpy as np
 import pytest
 
+from drivers.camera_params import CameraCareParams
 from drivers.camera_thread import CameraThread
 from drivers.errors import CameraError
 from drivers.picture_source import Shot
-from drivers.types import DetectedFace
+from drivers.types import DetectedFace, MovingBlob, PictureLens
 from drivers.video_file import VideoFile
 
 PATIENCE_S = 20.0  # how long a test waits before it calls the thread stuck
+
+AT_ONCE = CameraCareParams(give_up_s=0.0)
+QUICKLY = CameraCareParams(retry_ms=1.0, longest_retry_ms=4.0, give_up_s=PATIENCE_S)
 
 FACE = DetectedFace((1.0, 2.0, 3.0, 4.0), np.zeros((5, 2)), 0.9)
 
@@ -27,6 +31,7 @@ class Source:
         self.opened = 0
         self.closed = 0
         self.fault: Exception | None = None
+        self.news: list[str] = []
         self.fails_to_open = fails_to_open
 
     def open(self) -> None:
@@ -43,6 +48,10 @@ class Source:
             raise self.fault
         self.number += 1
         return Shot(float(self.number), self.number, np.zeros((24, 32, 3), np.uint8))
+
+    def events(self) -> tuple[str, ...]:
+        told, self.news = tuple(self.news), []
+        return told
 
     def close(self) -> None:
         self.closed += 1
@@ -74,7 +83,7 @@ def source():
 
 @pytest.fixture
 def camera(source):
-    thread = CameraThread(source, EveryOther(), time.monotonic)
+    thread = CameraThread(source, EveryOther(), time.monotonic, AT_ONCE)
     thread.open()
     yield thread
     thread.close()
@@ -167,6 +176,109 @@ def test_open_again_after_a_fault(source, camera):
     source.fault = None
     camera.open()
     feed(source, camera, 1)
+
+
+def lose(source: Source) -> None:
+    source.fault = CameraError("camera gone: check its cable")
+    source.fed.release()
+
+
+def test_camera_that_comes_back_is_told_and_counts_on(source):
+    camera = CameraThread(source, EveryOther(), time.monotonic, QUICKLY)
+    camera.open()
+    feed(source, camera, 3)
+    lose(source)
+    wait_for(lambda: source.closed)
+    old = camera.latest(0.0)
+    assert (old.number, old.captured_s) == (3, 3.0)  # the old one stays; its age tells
+    assert camera.events() == ("camera lost (camera gone: check its cable): trying it again",)
+    source.fault = None
+    feed(source, camera, 1)
+    assert camera.latest(0.0).number == 4
+    assert source.opened >= 2
+    (back,) = camera.events()
+    assert back.startswith("camera back after ")
+    assert camera.events() == ()
+    camera.close()
+
+
+def test_camera_that_cannot_be_opened_anew_is_tried_until_it_can(source):
+    camera = CameraThread(source, EveryOther(), time.monotonic, QUICKLY)
+    camera.open()
+    feed(source, camera, 1)
+    source.fails_to_open = True
+    lose(source)
+    wait_for(lambda: source.closed >= 3)
+    source.fault, source.fails_to_open = None, False
+    feed(source, camera, 1)
+    camera.close()
+
+
+def test_waits_between_tries_double_up_to_the_longest(source):
+    waits: list[float] = []
+    care = CameraCareParams(retry_ms=100.0, longest_retry_ms=350.0, give_up_s=1.0)
+    clock = [0.0]
+    camera = CameraThread(source, EveryOther(), lambda: clock[0], care)
+
+    class Stop(threading.Event):
+        def wait(self, timeout=None) -> bool:
+            waits.append(timeout)
+            clock[0] += timeout
+            return self.is_set()
+
+    camera._stop = Stop()
+    camera.open()
+    lose(source)
+    source.fails_to_open = True
+    with pytest.raises(CameraError, match="plug it in"):
+        wait_for(lambda: camera.latest(0.0) is not None)
+    assert waits == pytest.approx([0.1, 0.2, 0.35, 0.35])
+    camera.close()
+
+
+def test_close_does_not_wait_for_a_lost_camera(source):
+    care = CameraCareParams(retry_ms=60_000.0, longest_retry_ms=60_000.0, give_up_s=86_400.0)
+    camera = CameraThread(source, EveryOther(), time.monotonic, care)
+    camera.open()
+    lose(source)
+    wait_for(lambda: source.closed)
+    camera.close()
+    assert not [t for t in threading.enumerate() if t.name == "camera"]
+    assert camera.latest(0.0) is None
+
+
+def test_news_of_the_source_are_handed_on(source, camera):
+    source.news = ["it states 30 and gives 15"]
+    feed(source, camera, 1)
+    wait_for(lambda: not source.news)
+    feed(source, camera, 1)
+    assert camera.events() == ("it states 30 and gives 15",)
+
+
+def test_depth_lens_motion_and_the_cameras_own_faces_come_through(source):
+    blob = MovingBlob(1, "thing", (0.0, 0.0, 2.0), 0.1)
+    depth, lens = np.full((24, 32), 2.0, np.float32), PictureLens(30.0, 30.0, 16.0, 12.0)
+    seen: list[Shot] = []
+
+    def motion(shot: Shot) -> tuple[MovingBlob, ...]:
+        seen.append(shot)
+        return (blob,)
+
+    detector = EveryOther()
+    camera = CameraThread(source, detector, time.monotonic, AT_ONCE, motion)
+    plain = source.take
+    source.take = lambda now_s, stop: (
+        shot and shot._replace(depth_m=depth, lens=lens, faces=(FACE,))
+        if (shot := plain(now_s, stop)) is not None
+        else None
+    )
+    camera.open()
+    feed(source, camera, 1)
+    found = camera.latest(0.0)
+    assert found.depth_m is depth and found.lens == lens
+    assert found.faces == (FACE,) and detector.looked == 0
+    assert found.blobs == (blob,) and seen[0].depth_m is depth
+    camera.close()
 
 
 def write_film(path, rate_hz: float):

@@ -5,10 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivers.camera_replay import CameraReplay
 from drivers.errors import CameraError
 from drivers.face_detector import face_detector
 from drivers.face_params import FaceDetectorParams
-from drivers.types import DetectedFace
+from drivers.picture_source import Shot
+from drivers.recording_write import RecordingWriter
+from drivers.types import DetectedFace, MovingBlob, PictureLens
 from drivers.video_file import VideoFile
 from sim_mock.film_camera import FilmCamera
 
@@ -35,6 +38,12 @@ class Film:
         assert not self.read or number > self.read[-1]
         self.read.append(number)
         return np.full((12, 16, 3), number % 256, np.uint8)
+
+    def shot(self, number: int) -> Shot:
+        return Shot(self.due_s(number), number, self.picture(number))
+
+    def events(self) -> tuple[str, ...]:
+        return ("the film is a fake",)
 
     def close(self) -> None:
         self.is_open = False
@@ -156,3 +165,23 @@ def test_two_runs_over_a_real_film_give_the_same_numbers():
     first = run()
     assert first == run()
     assert any(landmarks for _, _, landmarks in first)
+
+
+def test_recording_in_simulated_time_gives_depth_and_lens_and_what_moves(tmp_path):
+    writer = RecordingWriter(tmp_path / "r.mcap", {})
+    lens = PictureLens(20.0, 20.0, 8.0, 6.0)
+    for k in range(4):
+        picture, depth = np.full((12, 16, 3), k, np.uint8), np.full((12, 16), 1.0 + k, np.float32)
+        writer.write(Shot(500.0 + k / 10.0, k + 1, picture, depth, lens))
+    writer.close()
+    blob = MovingBlob(1, "thing", (0.0, 0.0, 2.0), 0.1)
+    camera = FilmCamera(
+        CameraReplay(tmp_path / "r.mcap"), EveryThird(), 0.05, 100.0, lambda shot: (blob,)
+    )
+    camera.open()
+    assert camera.latest(100.04) is None
+    seen = [camera.latest(100.06 + k / 10.0) for k in range(4)]
+    assert [found.captured_s for found in seen] == pytest.approx([100.0, 100.1, 100.2, 100.3])
+    assert [float(found.depth_m[0, 0]) for found in seen] == [1.0, 2.0, 3.0, 4.0]
+    assert all(found.lens == lens and found.blobs == (blob,) for found in seen)
+    camera.close()

@@ -1,12 +1,24 @@
 """Pose history, camera mounts and the joints' conversion to servo steps."""
 
 from math import radians
+from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from config.load import ConfigError
+from config.schema import load_rig
 from gaze.angles import rotate
 from robot.body import JointParams
-from robot.frames import CameraMount, CameraParams, PoseHistory, standing_still
+from robot.frames import (
+    CameraMount,
+    CameraParams,
+    LensParams,
+    PoseHistory,
+    mounted_at,
+    standing_still,
+)
 from robot.kinematics import GeometryParams, Kinematics
 
 KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), (-0.4, -0.4), (0.4, 0.4))
@@ -42,6 +54,65 @@ def test_camera_axes_are_optical_and_turn_with_the_head() -> None:
     assert rotate(R, (0.0, 0.0, 1.0)) == pytest.approx((0.0, -1.0, 0.0), abs=1e-12)
 
 
+def test_a_rolled_camera_has_its_right_side_down() -> None:
+    R, _ = CameraMount(CameraParams("base", (0.0, 0.0, 0.0), roll_deg=90.0)).pose(
+        *KINEMATICS.head_pose((0.0, 0.0, 0.0))
+    )
+    assert rotate(R, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0, -1.0), abs=1e-12)
+    assert rotate(R, (0.0, 0.0, 1.0)) == pytest.approx((1.0, 0.0, 0.0), abs=1e-12)
+
+
+@given(
+    angles=st.tuples(st.floats(-170, 170), st.floats(-85, 85), st.floats(-170, 170)),
+    place=st.tuples(*[st.floats(-300.0, 300.0)] * 3),
+)
+def test_a_camera_is_mounted_where_its_pose_says(
+    angles: tuple[float, float, float], place: tuple[float, float, float]
+) -> None:
+    yaw, pitch, roll = angles
+    true = CameraParams("base", place, yaw, pitch, 60.0, roll)
+    found = mounted_at(
+        CameraParams("base", horizontal_field_deg=60.0),
+        *CameraMount(true).pose(
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0)
+        ),
+    )
+    assert found.position_mm == pytest.approx(place, abs=1e-6)
+    assert (found.yaw_deg, found.pitch_deg, found.roll_deg) == pytest.approx(angles, abs=1e-6)
+
+
+_LENS = """
+camera:
+  roll_deg: 1.5
+  lens: {width_px: 640, height_px: 400, fx_px: 478.5, fy_px: 480.0, cx_px: 327.0, cy_px: 189.5,
+    distortion: [-0.11, 0.06, 0.0, 0.0, 0.0]}
+"""
+
+
+def _rig_with(tmp_path: Path, camera: str) -> str:
+    """Write the desk rig with another camera section."""
+    shipped = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
+    before, _, after = shipped.read_text(encoding="utf-8").partition("\ncamera:")
+    rest = after[after.index("\ndetector:") :]
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(f"{before}{camera}{rest}", encoding="utf-8")
+    return str(rig)
+
+
+def test_a_measured_lens_is_read_from_the_rig_file(tmp_path: Path) -> None:
+    camera = load_rig(_rig_with(tmp_path, _LENS)).camera
+    assert camera.roll_deg == 1.5
+    assert camera.lens == LensParams(
+        640, 400, 478.5, 480.0, 327.0, 189.5, (-0.11, 0.06, 0.0, 0.0, 0.0)
+    )
+    assert load_rig("desk").camera.lens is None
+
+
+def test_half_a_lens_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"camera\.lens\.fy_px"):
+        load_rig(_rig_with(tmp_path, _LENS.replace("fy_px: 480.0, ", "")))
+
+
 def test_a_film_sees_from_where_the_head_camera_rests() -> None:
     still = standing_still(CameraParams("head", (20.0, 0.0, 45.0)), KINEMATICS)
     assert still.mount == "base"
@@ -51,6 +122,9 @@ def test_a_film_sees_from_where_the_head_camera_rests() -> None:
         expected[1]
     )
     assert standing_still(still, KINEMATICS) is still
+    rolled = CameraParams(roll_deg=3.0, lens=LensParams(640, 400, 480.0, 480.0, 320.0, 200.0))
+    kept = standing_still(rolled, KINEMATICS)
+    assert (kept.roll_deg, kept.lens) == (3.0, rolled.lens)
 
 
 def test_joint_steps_and_angles_turn_back() -> None:

@@ -1,5 +1,6 @@
 """Head goal, timing and trajectory. Numbered checks are listed in docs/checks.md."""
 
+from collections.abc import Callable
 from math import degrees, radians
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from gaze.head import Head, HeadParams
 from gaze.quintic import Quintic
-from gaze.types import Target
+from gaze.types import Floats, Target
 
 NECK = ((-2.0, 2.0), (-1.0, 1.0))
 
@@ -153,3 +154,39 @@ def test_larger_head_movements_are_faster(size: float, peak: float) -> None:
         for k in range(400)
     ]
     assert np.diff(trace).max() / 0.005 == pytest.approx(peak, abs=1.5)
+
+
+def turned(params: HeadParams, yaw: float, pull: Callable[[float], float]) -> Floats:
+    """Give the head's yaws of 4 s with a face at a yaw whose pull changes; degrees."""
+    model, yaws = head(35.0, params), [0.0]
+    place = (radians(yaw), 0.0)
+    for k in range(800):
+        t = k * 0.005
+        target = Target((1, 0, 0), (0, 0, 0), t, "face", 1, pull(t), False, None, 0, "")
+        yaws.append(model.step(target, place, place, abs(place[0] - yaws[-1]), 1.0, t)[0])
+    return np.degrees(yaws)
+
+
+def test_a_head_does_not_turn_away_because_the_interest_has_fallen() -> None:
+    yaws = turned(HeadParams(), 36.0, lambda t: 1.5 if t < 0.5 else 0.5)
+    assert np.diff(yaws).min() > -1e-9
+    assert 30.0 < yaws[-1] <= 36.0
+
+
+def test_an_eye_left_aside_by_a_shift_is_relieved_all_the_same() -> None:
+    """The least interested head stops far short of the target; later it comes after the eyes."""
+    yaws = turned(HeadParams(recentre_after_ms=300.0), 50.0, lambda t: 0.2)
+    assert yaws[int(0.6 / 0.005)] < 22.0
+    assert 50.0 - yaws[-1] < 8.0
+
+
+def test_plans_made_in_full_flight_stay_in_the_neck_range() -> None:
+    model = Head(HeadParams(), radians(35.0), ((-0.9, 0.9), (-0.5, 0.5)))
+    places = np.random.default_rng(5).uniform(-1.4, 1.4, 300).tolist()
+    yaws = [0.0]
+    for k in range(12_000):
+        t = k * 0.005
+        place = (places[k // 40], 0.0)
+        target = Target((1, 0, 0), (0, 0, 0), t, "face", 1, 2.0, True, None, 0, "")
+        yaws.append(model.step(target, place, place, abs(place[0] - yaws[-1]), 1.0, t)[0])
+    assert max(map(abs, yaws)) <= 0.9

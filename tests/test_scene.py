@@ -10,7 +10,7 @@ from sim_mock.face_to_face import FaceToFace
 from sim_mock.scene import Event, Key, Scene, Thing, between, there_and_back
 from sim_mock.scenes import scenes
 
-NAMES = ("boxing", "face-to-face", "visitor")
+NAMES = ("boxing", "face-to-face", "sits-still", "steps-aside", "visitor", "walks-past")
 DT_S = 0.01
 
 

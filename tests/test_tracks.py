@@ -1,9 +1,14 @@
 """Identities and velocities from picture to picture."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from robot.tracks import Sighting, Tracker, TrackParams, blended
+from robot.track_filter import far_off
+from robot.tracks import Sighting, Track, Tracker, TrackParams, blended
 
 CAMERA = (0.0, 0.0, 0.2)
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -64,3 +69,153 @@ def test_blended_rotations_stay_rotations() -> None:
     middle = np.array(blended(IDENTITY, turned, 0.5))
     assert middle @ middle.T == pytest.approx(np.eye(3), abs=1e-12)
     assert np.degrees(np.arctan2(middle[1, 0], middle[0, 0])) == pytest.approx(45.0)
+
+
+def across(y: float, x: float = 1.5, kind: str = "face") -> Sighting:
+    return Sighting(
+        kind,
+        (x, y, 0.2),
+        IDENTITY if kind == "face" else None,
+        0.1,
+        0.0,
+        0.9,
+        across_sd_m=0.002,
+        along_sd_m=0.1,
+    )
+
+
+def test_an_identity_survives_a_second_behind_something() -> None:
+    tracker = Tracker(TrackParams())
+    for k in range(30):
+        (seen,) = tracker.step([across(0.4 * k / 30)], CAMERA, k / 30)
+    for k in range(30, 60):
+        assert tracker.step([], CAMERA, k / 30) == () or k < 40
+    (back,) = tracker.step([across(0.4 * 2.0)], CAMERA, 2.0)
+    assert back.id == seen.id
+
+
+@pytest.mark.parametrize("apart_m", [0.0, 0.1, 0.4])
+def test_people_who_cross_keep_their_identities(apart_m: float) -> None:
+    """Two walk past each other at 1 m/s each; while one hides the other, one face is found."""
+    rng, tracker = np.random.default_rng(3), Tracker(TrackParams())
+    first: dict[str, int] = {}
+    for k in range(91):
+        t = k / 30
+        left, right = 1.5 - t, t - 1.5
+        ways = [across(left + rng.normal(0, 2e-3), 1.5), across(right, 1.5 + apart_m)]
+        if abs(left - right) < 0.25:
+            ways = ways[:1]
+        tracks = tracker.step(ways, CAMERA, t)
+        if k == 10:
+            first = {"left": max(tracks, key=_y).id, "right": min(tracks, key=_y).id}
+    assert {"left": min(tracks, key=_y).id, "right": max(tracks, key=_y).id} == first
+
+
+def _y(track: Track) -> float:
+    return track.p_world_m[1]
+
+
+def test_pairs_are_the_likeliest_as_a_whole() -> None:
+    """Both have moved 0.2 m to the left: the nearest pair alone would swap them."""
+    tracker = Tracker(TrackParams())
+    first = tracker.step([face(1.0, 0.0), face(1.0, 0.3)], CAMERA, 0.0)
+    after = tracker.step([face(1.0, 0.5), face(1.0, 0.2)], CAMERA, 0.033)
+    ids = [track.id for track in first]
+    assert [track.id for track in sorted(after, key=_y)] == ids
+
+
+def test_whoever_could_be_anywhere_does_not_take_over_from_who_is_followed() -> None:
+    """Seen once and lost, somebody may be near every place; that is no reason to be there."""
+    tracker = Tracker(TrackParams())
+    tracker.step([across(-0.5, 1.0), across(0.5, 1.0)], CAMERA, 0.0)
+    for k in range(1, 30):
+        (followed, *_) = tracker.step([across(-0.5 + 0.8 * k / 30, 1.0)], CAMERA, k / 30)
+    (now,) = tracker.step([across(0.42, 1.0)], CAMERA, 1.0)
+    assert now.id == followed.id
+
+
+def test_a_distance_known_badly_is_no_reason_to_be_somebody_else() -> None:
+    tracker = Tracker(TrackParams())
+    (one,) = tracker.step([across(0.0, 3.0)], CAMERA, 0.0)
+    (same,) = tracker.step([across(0.0, 3.4)], CAMERA, 0.033)
+    assert same.id == one.id
+    exact = Sighting("thing", (3.0, 0.0, 0.2), None, 0.1, 0.0, 0.9, along_sd_m=0.01)
+    tracker = Tracker(TrackParams(gate_m=0.1))
+    (one,) = tracker.step([exact], CAMERA, 0.0)
+    moved = replace(exact, p_world_m=(4.2, 0.0, 0.2))
+    assert {track.id for track in tracker.step([moved], CAMERA, 0.033)} != {one.id}
+
+
+def test_a_sudden_step_is_followed_at_once_and_standing_stays_smooth() -> None:
+    """Quiet while nothing happens, lively when something does."""
+    rng, tracker = np.random.default_rng(1), Tracker(TrackParams())
+    lag, speeds = [], []
+    for k in range(180):
+        t = k / 30
+        y = 0.5 * min(1.0, max(0.0, (t - 4.0) / 0.5))
+        (track,) = tracker.step([across(y + rng.normal(0.0, 1e-3), 1.0)], CAMERA, t)
+        lag.append(abs(track.p_world_m[1] - y))
+        if 1.0 < t < 4.0:
+            speeds.append(track.v_world_m_s[1])
+    assert np.std(speeds) < 0.01
+    assert max(lag) < 0.02
+
+
+def test_the_covariance_tells_how_far_off_the_track_is() -> None:
+    """Normalised errors squared of a still person average to about the 3 dimensions."""
+    errors = []
+    for seed in range(40):
+        rng, tracker = np.random.default_rng(seed), Tracker(TrackParams())
+        for k in range(40):
+            noisy = across(rng.normal(0.0, 2e-3), 1.0 + rng.normal(0.0, 0.1))
+            noisy.p_world_m = (*noisy.p_world_m[:2], 0.2 + rng.normal(0.0, 2e-3))
+            (track,) = tracker.step([noisy], CAMERA, k / 30)
+        off = np.subtract(track.p_world_m, (1.0, 0.0, 0.2))
+        errors.append(far_off(off, track.cov[:3, :3]))
+    assert 1.0 < np.mean(errors) < 5.0
+
+
+def test_a_velocity_that_was_measured_is_taken_over_at_once() -> None:
+    blob = across(0.0, 2.0, "thing")
+    blob.v_world_m_s, blob.across_sd_m_s, blob.along_sd_m_s = (0.0, 1.0, 0.0), 0.05, 0.3
+    (track,) = Tracker(TrackParams()).step([blob], CAMERA, 0.0)
+    assert track.v_world_m_s == pytest.approx((0.0, 1.0, 0.0), abs=0.02)
+
+
+def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes() -> None:
+    """A child's face looks 20 % farther than it is; through a hole it stays where it is."""
+    tracker = Tracker(TrackParams())
+    by_depth = replace(across(0.0, 1.0), depth_measured=True, along_sd_m=0.01, size_depth=1.25)
+    for k in range(20):
+        (track,) = tracker.step([by_depth], CAMERA, k / 30)
+    assert track.depth_from == "camera" and track.face_size == pytest.approx(0.8)
+    by_size = across(0.0, 1.25)
+    for k in range(20, 40):
+        (track,) = tracker.step([by_size], CAMERA, k / 30)
+    assert track.depth_from == "face size"
+    assert track.p_world_m[0] == pytest.approx(1.0, abs=0.01)
+
+
+@given(
+    st.lists(
+        st.lists(
+            st.tuples(
+                st.floats(0.3, 5.0), st.floats(-3.0, 3.0), st.sampled_from(["face", "thing"])
+            ),
+            max_size=6,
+        ),
+        max_size=12,
+    ),
+    st.floats(0.001, 0.5),
+)
+def test_nothing_makes_it_give_what_is_no_number(
+    pictures: list[list[tuple[float, float, str]]], dt_s: float
+) -> None:
+    tracker, t_s = Tracker(TrackParams()), 0.0
+    for picture in pictures:
+        t_s += dt_s
+        tracks = tracker.step([face(x, y, kind) for x, y, kind in picture], CAMERA, t_s)
+        assert len({track.id for track in tracks}) == len(tracks) >= len(picture)
+        for track in tracks:
+            assert np.isfinite((track.p_world_m, track.v_world_m_s)).all()
+            assert np.linalg.eigvalsh(track.cov).min() > -1e-9

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from drivers.camera_params import WebcamParams
 from drivers.errors import CameraError
 from drivers.webcam import Webcam
 
@@ -19,6 +20,8 @@ class Capture:
     def __init__(self, stamp_ms: float = 0.0, works: bool = True) -> None:
         self.stamp_ms = stamp_ms
         self.works = works
+        self.stated_hz = 0.0
+        self.picture = None
         self.failures = 0
         self.empty = 0
         self.grabs = 0
@@ -39,10 +42,12 @@ class Capture:
         if self.empty > 0:
             self.empty -= 1
             return True, np.zeros((0, 0, 3), np.uint8)
+        if self.picture is not None:
+            return True, self.picture
         return True, np.full((4, 6, 3), self.grabs, np.uint8)
 
     def get(self, what: int) -> float:
-        return self.stamp_ms if what == cv2.CAP_PROP_POS_MSEC else 0.0
+        return {cv2.CAP_PROP_POS_MSEC: self.stamp_ms, cv2.CAP_PROP_FPS: self.stated_hz}[what]
 
     def set(self, what: int, value: float) -> bool:
         self.wishes[what] = value
@@ -156,4 +161,82 @@ def test_closed_camera_says_so(device):
     camera.close()
     assert capture.released
     with pytest.raises(CameraError, match="not open"):
+        camera.take(lambda: 1.0, GO_ON)
+
+
+def test_latency_of_the_camera_is_taken_off(device):
+    params = WebcamParams(latency_ms=35.0)
+    camera = Webcam.of(device, params)
+    camera._open_capture = lambda name: Capture(stamp_ms=49_970.0)
+    camera.open()
+    assert camera.take(lambda: 50.0, GO_ON).captured_s == pytest.approx(49.935)
+
+
+def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 60) -> list[str]:
+    """Take pictures of a camera that states one rate and gives another."""
+    capture = Capture()
+    capture.stated_hz = stated_hz
+    camera = opened(device, capture)
+    clock, told, picture = [100.0], [], [0]
+
+    def grab() -> bool:
+        # The next picture that is not over yet; missed ones are lost.
+        picture[0] = max(picture[0] + 1, int((clock[0] - 100.0) * gives_hz) + 1)
+        clock[0] = 100.0 + picture[0] / gives_hz
+        return True
+
+    capture.grab = grab
+    for _ in range(count):
+        camera.take(lambda: clock[0], GO_ON)
+        told += camera.events()
+        clock[0] += away_s
+    return told
+
+
+def test_camera_that_lies_about_its_rate_is_noticed_once(device):
+    (told,) = run(device, 30.0, 15.0, away_s=0.008)
+    assert "states 30 pictures a second and gives 15.0" in told
+    assert str(device) in told
+
+
+@pytest.mark.parametrize("gives_hz", [30.0, 27.0, 33.0])
+def test_honest_camera_is_left_alone(device, gives_hz):
+    assert run(device, 30.0, gives_hz, away_s=0.008) == []
+
+
+def test_slow_reader_is_no_fault_of_the_camera(device):
+    assert run(device, 30.0, 30.0, away_s=0.05) == []
+
+
+def test_camera_that_states_no_rate_cannot_lie(device):
+    assert run(device, 0.0, 15.0, away_s=0.0) == []
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [
+        np.full((4, 6), 7, np.uint8),
+        np.full((4, 6, 1), 7, np.uint8),
+        np.full((4, 6, 4), 7, np.uint8),
+        np.full((4, 6), 7 << 8, np.uint16),
+        np.full((4, 6, 3), 7, np.uint8),
+    ],
+)
+def test_grey_alpha_and_deep_pictures_become_colour(device, picture):
+    capture = Capture()
+    capture.picture = picture
+    shot = opened(device, capture).take(lambda: 1.0, GO_ON)
+    assert shot.picture.shape == (4, 6, 3)
+    assert shot.picture.dtype == np.uint8 and (shot.picture == 7).all()
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [np.zeros((4, 6, 2), np.uint8), np.zeros((4, 6, 3), np.float32), np.zeros(5, np.uint8)],
+)
+def test_pictures_of_no_known_kind_count_as_failures(device, picture):
+    capture = Capture()
+    camera = opened(device, capture)
+    capture.picture = picture
+    with pytest.raises(CameraError, match="no more pictures"):
         camera.take(lambda: 1.0, GO_ON)

@@ -1,0 +1,125 @@
+"""A camera's own clock in host time: the least delayed pictures tell the offset, a line the drift.
+
+Every picture arrives late by a varying time, never early; so of a handful of pictures the one
+with the smallest difference between arrival and stamp tells most about the clocks (the minimum
+filter of NTP's clock filter, RFC 5905 section 10). Crystals differ by tens of millionths: the
+drift is the median of the slopes between such best pictures (Theil 1950, Sen 1968).
+"""
+
+from collections import deque
+from statistics import median
+from typing import NamedTuple
+
+_BUCKET_S = 1.0  # one best picture is kept of each
+_BUCKETS = 60
+_LEAST_SPAN_S = 10.0  # no drift is told from less
+_MOST_DRIFT = 300e-6  # crystals are better; more is a mistake
+_JUMP_S = 0.1  # differences that leave the line by more are a clock set anew ...
+_LASTING_S = 1.0  # ... if they are late for as long as this: one picture may just be late
+
+
+class _Best(NamedTuple):
+    """The least delayed picture of its time: device time, and arrival less device time."""
+
+    device_s: float
+    difference_s: float
+
+
+class ClockBridge:
+    """Translates stamps of one device clock; each is translated once, in order.
+
+    jumps: how often the device clock was found set anew
+    """
+
+    def __init__(self, least_delay_s: float = 0.0) -> None:
+        """Take how late the least delayed picture arrives; the bridge cannot see that."""
+        self._least_delay_s = least_delay_s
+        self._best: deque[_Best] = deque(maxlen=_BUCKETS)
+        self._bucket: int | None = None
+        self._drift = 0.0
+        self._offset_s = 0.0  # of the line, at device time 0
+        self._late_since_s: float | None = None
+        self._last: tuple[float, float] | None = None  # device, host
+        self.jumps = 0
+
+    @property
+    def drift_ppm(self) -> float:
+        """Give how much faster the host's clock runs, in millionths."""
+        return self._drift * 1e6
+
+    def host_s(self, device_s: float, arrived_s: float) -> float:
+        """Give the host time of a device stamp whose picture arrived just now.
+
+        Later stamps never give earlier times, and no time lies after the arrival.
+        """
+        difference_s = arrived_s - device_s
+        if self._jumped(device_s, difference_s):
+            self._forget()
+        self._keep(device_s, difference_s)
+        host_s = device_s + self._line_s(device_s) - self._least_delay_s
+        if self._last is not None and device_s >= self._last[0]:
+            host_s = max(host_s, self._last[1])
+        host_s = min(host_s, arrived_s)
+        self._last = device_s, host_s
+        return host_s
+
+    def _line_s(self, device_s: float) -> float:
+        """Give host less device time at a device time."""
+        return self._offset_s + self._drift * device_s
+
+    def _jumped(self, device_s: float, difference_s: float) -> bool:
+        """Tell whether the clocks are no longer those of the line."""
+        if self._last is None:
+            return False
+        off_s = difference_s - self._line_s(device_s)
+        if off_s <= _JUMP_S:
+            self._late_since_s = None
+            # Nothing can arrive before it was taken: the device's clock is ahead of the line.
+            ahead = off_s < -_JUMP_S and len(self._best) > 1
+            return ahead or device_s < self._last[0] - _JUMP_S
+        arrived_s = device_s + difference_s
+        if self._late_since_s is None:
+            self._late_since_s = arrived_s
+        # A device that started anew counts from 0.
+        return device_s < self._last[0] or arrived_s - self._late_since_s > _LASTING_S
+
+    def _forget(self) -> None:
+        """Begin with another clock."""
+        self._best.clear()
+        self._bucket, self._late_since_s, self._last = None, None, None
+        self._drift, self._offset_s = 0.0, 0.0
+        self.jumps += 1
+
+    def _keep(self, device_s: float, difference_s: float) -> None:
+        """Keep a picture if it is the least delayed of its bucket, and draw the line anew."""
+        bucket = int(device_s // _BUCKET_S)
+        new = _Best(device_s, difference_s)
+        if bucket != self._bucket:
+            self._bucket = bucket
+            self._drift = self._slope()  # of whole buckets only
+            self._best.append(new)
+        elif self._above_drift(new) < self._above_drift(self._best[-1]):
+            self._best[-1] = new
+        else:
+            return
+        self._offset_s = min(self._above_drift(best) for best in self._best)
+
+    def _above_drift(self, best: _Best) -> float:
+        """Give a picture's difference with the drift since device time 0 taken out."""
+        return best.difference_s - self._drift * best.device_s
+
+    def _slope(self) -> float:
+        """Give the median slope between pictures far enough apart."""
+        best = list(self._best)
+        if len(best) < 2:
+            return self._drift
+        span_s = best[-1].device_s - best[0].device_s
+        if span_s < _LEAST_SPAN_S:
+            return self._drift
+        slopes = [
+            (b.difference_s - a.difference_s) / (b.device_s - a.device_s)
+            for i, a in enumerate(best)
+            for b in best[i + 1 :]
+            if b.device_s - a.device_s >= span_s / 2.0
+        ]
+        return max(-_MOST_DRIFT, min(_MOST_DRIFT, median(slopes)))

@@ -1,0 +1,119 @@
+"""The distance of a thing from a depth picture with holes, edges and nonsense in it."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.types import Depth
+
+_MM_PER_M = 1000.0
+# Nothing nearer is measured by any stereo camera with a baseline of a hand's breadth.
+_NEAREST_M = 0.05
+# A gap in depth by this share of the distance divides a thing from what is behind it.
+_GAP = 0.15
+_LEAST_SHARE = 0.15  # of the valid pixels; a nearer layer smaller than this is clutter
+_SIGMAS = 1.4826  # from the median of absolute deviations to a standard deviation
+_MOST_PIXELS = 4096
+
+
+class DepthReading(NamedTuple):
+    """What a depth picture says of one thing.
+
+    distance_m: None where nothing is known
+    spread_m: standard deviation of its pixels, robust; valid_share: of its pixels, 0..1
+    """
+
+    distance_m: float | None
+    spread_m: float
+    valid_share: float
+
+
+_NOTHING = DepthReading(None, 0.0, 0.0)
+
+
+def depth_at(
+    depth_m: Depth,
+    box_px: tuple[float, float, float, float] | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    shrink: float = 0.6,
+) -> DepthReading:
+    """Read the distance of what a box or a mask of the picture covers.
+
+    The nearest layer of some size is the thing; what shows beside it lies behind.
+
+    box_px: x, y, width, height; of it the middle part ``shrink`` is read, as its edges hold
+        background; mask: (height, width); both together are their common part
+    """
+    depth = np.asarray(depth_m, dtype=np.float64)
+    if depth.ndim != 2 or not depth.size or (mask is not None and mask.shape != depth.shape):
+        return _NOTHING
+    top, bottom, left, right = _window(depth.shape, box_px, shrink)
+    seen = depth[top:bottom, left:right]
+    if mask is not None:
+        seen = seen[mask[top:bottom, left:right]]
+    seen = seen.ravel()
+    if not seen.size:
+        return _NOTHING
+    step = -(-seen.size // _MOST_PIXELS)
+    seen = seen[::step]
+    valid = np.sort(seen[np.isfinite(seen) & (seen >= _NEAREST_M)])
+    if not valid.size:
+        return _NOTHING
+    layer = _nearest_layer(valid)
+    distance_m = float(np.median(layer))
+    spread_m = _SIGMAS * float(np.median(np.abs(layer - distance_m)))
+    return DepthReading(distance_m, spread_m, layer.size / seen.size)
+
+
+def metres(depth_mm: NDArray[np.uint16]) -> Depth:
+    """Turn a camera's millimetres, 0 where unknown, into read-only metres with NaN."""
+    depth = depth_mm.astype(np.float32)
+    depth[depth_mm == 0] = np.nan
+    depth /= np.float32(_MM_PER_M)
+    depth.setflags(write=False)
+    return depth
+
+
+def millimetres(depth_m: Depth) -> NDArray[np.uint16]:
+    """Turn metres into whole millimetres, 0 where unknown or beyond 65 m."""
+    with np.errstate(over="ignore"):
+        mm = np.rint(np.asarray(depth_m, dtype=np.float32) * np.float32(_MM_PER_M))
+    known = (mm > 0.0) & (mm <= np.iinfo(np.uint16).max)
+    return np.where(known, mm, np.float32(0.0)).astype(np.uint16)
+
+
+def resized(depth_m: Depth, width_px: int, height_px: int) -> Depth:
+    """Bring a depth picture to the size of its colour picture, without inventing distances."""
+    if depth_m.shape == (height_px, width_px):
+        return depth_m
+    size = width_px, height_px
+    found = np.asarray(cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST), np.float32)
+    found.setflags(write=False)
+    return found
+
+
+def _window(
+    shape: tuple[int, ...], box_px: tuple[float, float, float, float] | None, shrink: float
+) -> tuple[int, int, int, int]:
+    """Give the rows and columns to read: top, bottom, left, right."""
+    height, width = shape[0], shape[1]
+    if box_px is None or not np.isfinite(box_px).all():
+        return (0, height, 0, width) if box_px is None else (0, 0, 0, 0)
+    x, y, w, h = box_px
+    middle_x, middle_y = x + w / 2.0, y + h / 2.0
+    half_x, half_y = max(0.5, shrink * w / 2.0), max(0.5, shrink * h / 2.0)
+    top, bottom = np.clip([round(middle_y - half_y), round(middle_y + half_y)], 0, height)
+    left, right = np.clip([round(middle_x - half_x), round(middle_x + half_x)], 0, width)
+    return int(top), int(bottom), int(left), int(right)
+
+
+def _nearest_layer(valid_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the nearest run of sorted distances without a gap that is large enough to be a thing."""
+    gaps = np.flatnonzero(np.diff(valid_m) > _GAP * valid_m[:-1]) + 1
+    layers = np.split(valid_m, gaps)
+    for layer in layers:
+        if layer.size >= _LEAST_SHARE * valid_m.size:
+            return layer
+    return valid_m

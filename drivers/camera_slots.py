@@ -1,0 +1,118 @@
+"""Pictures from one process to another through shared memory: a few slots, written in turn.
+
+The reader copies a slot out and looks at its stamp before and after; a slot that was written
+meanwhile is given up. Nobody waits for anybody.
+"""
+
+from contextlib import suppress
+from multiprocessing.shared_memory import SharedMemory
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+_SLOTS = 6
+_STAMP_BYTES = 64  # one line of the processor's cache
+
+
+class Where(NamedTuple):
+    """Where an array lies.
+
+    memory: its name; slot, slot_bytes: which, and how large slots are; stamp: of this writing;
+    shape, dtype: of the array
+    """
+
+    memory: str
+    slot: int
+    slot_bytes: int
+    stamp: int
+    shape: tuple[int, ...]
+    dtype: str
+
+
+class SlotWriter:
+    """Puts arrays into slots; memory grows with them."""
+
+    def __init__(self) -> None:
+        """Begin without memory."""
+        self._memory: SharedMemory | None = None
+        self._slot_bytes = 0
+        self._stamp = 0
+
+    def put(self, array: NDArray[Any]) -> Where:
+        """Copy an array into the next slot."""
+        memory = self._room(array.nbytes)
+        self._stamp += 2  # odd while it is written
+        slot = self._stamp // 2 % _SLOTS
+        stamp, data = _views(memory, slot, self._slot_bytes)
+        stamp[0] = self._stamp - 1
+        np.copyto(data[: array.nbytes].view(array.dtype).reshape(array.shape), array)
+        stamp[0] = self._stamp
+        return Where(memory.name, slot, self._slot_bytes, self._stamp, array.shape, array.dtype.str)
+
+    def close(self) -> None:
+        """Free the memory; safe to call twice."""
+        if self._memory is not None:
+            self._memory.close()
+            self._memory.unlink()
+        self._memory = None
+
+    def _room(self, nbytes: int) -> SharedMemory:
+        """Give memory whose slots hold so many bytes."""
+        if self._memory is None or nbytes > self._slot_bytes:
+            self.close()
+            self._slot_bytes = -(-nbytes // _STAMP_BYTES) * _STAMP_BYTES
+            size = _SLOTS * (self._slot_bytes + _STAMP_BYTES)
+            self._memory = SharedMemory(create=True, size=size)
+        return self._memory
+
+
+class SlotReader:
+    """Takes arrays out of slots."""
+
+    def __init__(self) -> None:
+        """Begin without memory."""
+        self._memory: SharedMemory | None = None
+
+    def take(self, where: Where) -> NDArray[Any] | None:
+        """Copy an array out, read-only; None where its slot was written anew meanwhile."""
+        if self._memory is None or self._memory.name != where.memory:
+            self.close()
+            try:
+                self._memory = SharedMemory(where.memory)
+            except FileNotFoundError:  # the writer has gone on to larger memory
+                return None
+        stamp, data = _views(self._memory, where.slot, where.slot_bytes)
+        dtype = np.dtype(where.dtype)
+        count = int(np.prod(where.shape)) * dtype.itemsize
+        array = data[:count].view(dtype).reshape(where.shape).copy()
+        if int(stamp[0]) != where.stamp:
+            return None
+        array.setflags(write=False)
+        return array
+
+    def close(self) -> None:
+        """Let the memory go; safe to call twice."""
+        if self._memory is not None:
+            self._memory.close()
+        self._memory = None
+
+    def forget(self) -> None:
+        """Let the memory go for a writer that has died without doing so."""
+        memory = self._memory
+        self.close()
+        if memory is not None:
+            with suppress(FileNotFoundError):  # the writer has done so
+                memory.unlink()
+
+
+def _views(
+    memory: SharedMemory, slot: int, slot_bytes: int
+) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Give the stamp and the bytes of a slot."""
+    start = slot * (slot_bytes + _STAMP_BYTES)
+    buffer = memory.buf
+    assert buffer is not None  # it is open
+    stamp = np.frombuffer(buffer, np.int64, 1, start)
+    data = np.frombuffer(buffer, np.uint8, slot_bytes, start + _STAMP_BYTES)
+    return stamp, data

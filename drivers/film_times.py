@@ -1,0 +1,119 @@
+"""When each picture of a film is due: by its rate, or by a table where pictures come unevenly.
+
+What the container states is checked against the times that its pictures carry.
+"""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from statistics import median
+from typing import NamedTuple
+
+import numpy as np
+
+SAMPLE = 100
+"""So many pictures are looked at; only where these come unevenly, all are."""
+_LEAST = 8
+# Containers round times; half a picture is no rounding any more.
+_UNEVEN = 0.5
+_LIE = 0.02
+
+
+class FilmTimes(NamedTuple):
+    """Due times of a film that is repeated for ever; numbers are from 1.
+
+    rate_hz: pictures a second, the mean where they come unevenly
+    starts_s: due time of each picture of one showing, or () where the rate says it all
+    length_s: of one showing, where there is a table
+    note: what a person should know, or ""
+    """
+
+    rate_hz: float
+    starts_s: tuple[float, ...] = ()
+    length_s: float = 0.0
+    note: str = ""
+
+    def due_s(self, number: int) -> float:
+        """Give the film time at which a picture is due."""
+        if not self.starts_s:
+            return (number - 1) / self.rate_hz
+        showing, index = divmod(number - 1, len(self.starts_s))
+        return showing * self.length_s + self.starts_s[index]
+
+    def number_at(self, film_s: float) -> int:
+        """Give the number of the newest picture at a film time; below 1 before the first."""
+        if not self.starts_s:
+            number = int(film_s * self.rate_hz) + 1
+        else:
+            showing = int(film_s // self.length_s)
+            rest_s = film_s - showing * self.length_s
+            number = showing * len(self.starts_s) + bisect_right(self.starts_s, rest_s)
+        # Arithmetic may round across a due time; due_s alone decides.
+        while self.due_s(number + 1) <= film_s:
+            number += 1
+        while self.due_s(number) > film_s:
+            number -= 1
+        return number
+
+
+def even(times_s: Sequence[float], rate_hz: float) -> bool:
+    """Tell whether pictures come at a rate, but for rounding; too few are taken as even."""
+    if len(times_s) < _LEAST:
+        return True
+    off = np.asarray(times_s) - times_s[0] - np.arange(len(times_s)) / rate_hz
+    return bool(np.max(np.abs(off - np.median(off))) < _UNEVEN / rate_hz)
+
+
+def rising(times_s: Sequence[float]) -> list[float]:
+    """Give the times with those that do not rise put right; [] where few do.
+
+    The last picture of a film often carries none.
+    """
+    steps = [b - a for a, b in zip(times_s, times_s[1:], strict=False) if b > a]
+    if len(steps) < len(times_s) // 2:
+        return []
+    usual_s, right = median(steps) if steps else 0.0, list(times_s[:1])
+    for time_s in times_s[1:]:
+        right.append(time_s if time_s > right[-1] else right[-1] + usual_s)
+    return right
+
+
+def measured_rate_hz(times_s: Sequence[float]) -> float | None:
+    """Give the rate at which pictures come if they come evenly, else None."""
+    if len(times_s) < _LEAST:
+        return None
+    rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0])
+    return rate_hz if even(times_s, rate_hz) else None
+
+
+def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> FilmTimes | None:
+    """Judge by the first pictures; None where they come unevenly.
+
+    stated_hz, note: the rate to use by what the container says, and what was assumed for it
+    """
+    if even(times_s, stated_hz) and (not note or measured_rate_hz(times_s) is None):
+        return FilmTimes(stated_hz, note=note)
+    rate_hz = measured_rate_hz(times_s)
+    if rate_hz is None:
+        return None
+    if abs(rate_hz / stated_hz - 1.0) < _LIE:
+        return FilmTimes(stated_hz)
+    return FilmTimes(
+        rate_hz,
+        note=f"the film states {stated_hz:g} pictures a second and shows {rate_hz:.4g}: "
+        "the times of its pictures count",
+    )
+
+
+def by_table(times_s: Sequence[float]) -> FilmTimes:
+    """Give the times as they are; the last picture stays as long as most do."""
+    starts = tuple(t - times_s[0] for t in times_s)
+    last_s = median(b - a for a, b in zip(starts, starts[1:], strict=False))
+    length_s = starts[-1] + last_s
+    rate_hz = len(starts) / length_s
+    return FilmTimes(
+        rate_hz,
+        starts,
+        length_s,
+        f"the film's pictures come unevenly, {rate_hz:.3g} a second in the mean: "
+        "the times of its pictures count",
+    )

@@ -1,0 +1,29 @@
+"""The one place where depthai is imported: only when asked for, and quietly.
+
+depthai sends usage figures unless DEPTHAI_TELEMETRY is 0, and logs to the standard output,
+which belongs to what a person asked to be printed. Both are read at its import. Whoever
+wants its log sets DEPTHAI_LEVEL.
+"""
+
+import os
+from typing import Any
+
+from drivers.errors import CameraError
+
+
+def load_depthai() -> Any:
+    """Import depthai and give the module.
+
+    Raises:
+        drivers.errors.CameraError: it is not installed or does not start here.
+    """
+    os.environ["DEPTHAI_TELEMETRY"] = "0"
+    os.environ.setdefault("DEPTHAI_LEVEL", "off")
+    try:
+        import depthai
+    except ImportError as error:
+        raise CameraError(
+            f"depthai cannot be loaded ({' '.join(str(error).split())}): "
+            "install it anew with: pip install 'depthai>=3.12,<4'"
+        ) from error
+    return depthai

@@ -1,0 +1,142 @@
+"""The ChArUco board that cameras are calibrated with: its measures, and finding it in pictures.
+
+A chessboard whose white squares carry ArUco markers, so that every corner is known by
+number even where part of the board is outside the picture (OpenCV manual, "Detection of
+ChArUco Boards"). Board frame: origin at its upper left corner, x right, y down, z into
+the board, metres. Pixels have their centres at whole numbers.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.types import Picture
+
+Floats = NDArray[np.float64]
+
+# Markers of few and large modules can be read from farther away.
+_MARKERS = cv2.aruco.DICT_4X4_50
+_MOST_MARKERS = 50
+# Fewer corners, or corners on one line, tell neither lens nor pose.
+LEAST_CORNERS = 6
+
+
+@dataclass(frozen=True)
+class BoardParams:
+    """Measures of the board. As it is, it fits on A4 and on Letter, laid crosswise."""
+
+    columns: int = field(
+        default=7, metadata={"low": 3, "high": 20, "unit": "", "says": "squares from left to right"}
+    )
+    rows: int = field(
+        default=5, metadata={"low": 3, "high": 20, "unit": "", "says": "squares from top to bottom"}
+    )
+    square_mm: float = field(
+        default=36.0,
+        metadata={"low": 2.0, "high": 500.0, "unit": "mm", "says": "side of a square"},
+    )
+    marker_mm: float = field(
+        default=27.0,
+        metadata={"low": 1.0, "high": 500.0, "unit": "mm", "says": "side of a marker"},
+    )
+
+    def __post_init__(self) -> None:
+        """Check that the markers fit and that there are enough of them.
+
+        Raises:
+            ValueError: they do not.
+        """
+        if not 0.4 * self.square_mm <= self.marker_mm <= 0.9 * self.square_mm:
+            raise ValueError(
+                f"marker_mm {self.marker_mm} must be 0.4 to 0.9 of square_mm {self.square_mm}"
+            )
+        if self.columns * self.rows // 2 > _MOST_MARKERS:
+            raise ValueError(
+                f"{self.columns} x {self.rows} squares need more than {_MOST_MARKERS} markers"
+            )
+
+    def scaled(self, factor: float) -> "BoardParams":
+        """Give the same board as a printer made it that prints everything so much larger.
+
+        Raises:
+            ValueError: the factor is no sensible one.
+        """
+        if not 0.2 <= factor <= 5.0:
+            raise ValueError(f"a printer scales by 0.2 to 5, not by {factor}")
+        return BoardParams(
+            self.columns, self.rows, self.square_mm * factor, self.marker_mm * factor
+        )
+
+
+class SeenBoard(NamedTuple):
+    """Corners of the board found in one picture.
+
+    ids: (n,) numbers of the inner corners, row by row from 0
+    corners_px: (n, 2); corners_board_m: (n, 3), z = 0
+    """
+
+    ids: NDArray[np.int64]
+    corners_px: Floats
+    corners_board_m: Floats
+
+
+class CharucoBoard:
+    """One board: what it looks like, and where it is in a picture."""
+
+    def __init__(self, params: BoardParams | None = None) -> None:
+        """Take its measures."""
+        self.params = par = params if params is not None else BoardParams()
+        self._board = cv2.aruco.CharucoBoard(
+            (par.columns, par.rows),
+            par.square_mm / 1e3,
+            par.marker_mm / 1e3,
+            cv2.aruco.getPredefinedDictionary(_MARKERS),
+        )
+        self._detector = cv2.aruco.CharucoDetector(self._board)
+        self.corners_m: Floats = np.array(self._board.getChessboardCorners(), dtype=np.float64)
+        self.size_m = (par.columns * par.square_mm / 1e3, par.rows * par.square_mm / 1e3)
+
+    def find(self, picture: Picture) -> SeenBoard | None:
+        """Find the board's inner corners, None where too few are seen.
+
+        picture: (h, w), (h, w, 1), BGR or BGRA
+        """
+        grey = _grey(picture)
+        if grey is None:
+            return None
+        corners, ids, _, _ = self._detector.detectBoard(grey)
+        if ids is None or len(ids) < LEAST_CORNERS:
+            return None
+        numbers = np.asarray(ids, dtype=np.int64).ravel()
+        places: Floats = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
+        seen = SeenBoard(numbers, places, self.corners_m[numbers])
+        return seen if _spread(seen.corners_board_m) and np.isfinite(places).all() else None
+
+    def picture(self, px_per_mm: float) -> Picture:
+        """Draw the board itself, edge to edge, black on white.
+
+        px_per_mm: squares and marker modules are exact where their sides are whole pixels
+        """
+        par = self.params
+        width = round(par.columns * par.square_mm * px_per_mm)
+        height = round(par.rows * par.square_mm * px_per_mm)
+        return np.asarray(self._board.generateImage((width, height)), dtype=np.uint8)
+
+
+def _grey(picture: Picture) -> Picture | None:
+    """Give a grey picture, None where there is none to speak of."""
+    if picture.ndim not in (2, 3) or min(picture.shape[:2]) < 16:
+        return None
+    if picture.ndim == 2 or picture.shape[2] == 1:
+        return np.ascontiguousarray(picture.reshape(picture.shape[:2]))
+    code = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}.get(picture.shape[2])
+    return None if code is None else np.asarray(cv2.cvtColor(picture, code), dtype=np.uint8)
+
+
+def _spread(corners_m: Floats) -> bool:
+    """Tell whether corners lie in a plane, not on a line."""
+    flat = corners_m[:, :2] - corners_m[:, :2].mean(axis=0)
+    return bool(np.linalg.matrix_rank(flat, tol=1e-6) == 2)

@@ -1,0 +1,135 @@
+"""How fast still things seem to move while the head turns: what is left of a wrong time or place.
+
+A picture placed by the head's pose of another moment puts everything off by the head's
+speed times the error in time. As the head's speed changes, the world seems to move with
+it: the seen shifts against the changes of the head's speed give that time. Both figures
+are 0 for a camera whose times, mounting and lens are as the rig says.
+
+Only what stood still before a turn and is at the same place after it is believed to have
+stood still meanwhile.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from math import degrees
+from statistics import median
+from typing import NamedTuple
+
+from gaze.angles import compose, cross, dot, norm, sub, unit
+from gaze.types import Mat3, Vec3
+
+# The head turns or stands: rad/s.
+_TURNS_RAD_S, _STANDS_RAD_S = 0.35, 0.09
+# What moved slower than this before a turn, and is no farther off after it, stood still;
+# a turn that takes longer tells nothing.
+_STILL_M_S, _STILL_RAD, _LONGEST_S = 0.15, 0.02, 1.5
+_SAMPLES = 90
+_FORGET = 0.99
+
+
+class ResidualFigures(NamedTuple):
+    """The figures so far; None before anything still was seen while the head turned.
+
+    speed_deg_s: median speed at which still things seemed to move
+    late_ms: time by which pictures seem to be older than they say; below 0: younger
+    samples: how many pairs of pictures the median is of
+    """
+
+    speed_deg_s: float | None
+    late_ms: float | None
+    samples: int
+
+
+class Seen(NamedTuple):
+    """A tracked thing in one picture: where this picture alone puts it, and its speed."""
+
+    id: int
+    p_world_m: Vec3
+    speed_m_s: float
+
+
+@dataclass(slots=True)
+class _Turn:
+    """What one thing seemed to do since the head stood last.
+
+    shifts: (seen shift, shift that the head's change of speed makes in a second, seconds
+    between the pictures, whether the head was turning)
+    """
+
+    since_s: float
+    view: Vec3
+    shifts: list[tuple[Vec3, Vec3, float, bool]] = field(default_factory=list)
+
+
+class HeadTurnResidual:
+    """Gathers the figures picture by picture."""
+
+    def __init__(self) -> None:
+        """Start with nothing seen."""
+        self._speeds: deque[float] = deque(maxlen=_SAMPLES)
+        self._shift_by_turn = self._turn_by_turn = 0.0
+        self._before: tuple[float, Vec3, dict[int, Vec3]] | None = None
+        self._turns: dict[int, _Turn] = {}
+
+    def step(self, t_s: float, turn_rad_s: Vec3, p_world_eye_m: Vec3, seen: Iterable[Seen]) -> None:
+        """Take in one picture; times must grow.
+
+        turn_rad_s: angular velocity of the camera at the capture, along the world's axes
+        p_world_eye_m: where the camera was
+        """
+        seen = list(seen)
+        views = {s.id: unit(sub(s.p_world_m, p_world_eye_m)) for s in seen}
+        before, self._before = self._before, (t_s, turn_rad_s, views)
+        if before is None or t_s <= before[0]:
+            return
+        before_s, turn_before, views_before = before
+        speed = norm(turn_rad_s)
+        for id_ in views.keys() & views_before.keys() & self._turns.keys():
+            shift = sub(views[id_], views_before[id_])
+            change = cross(sub(turn_rad_s, turn_before), views[id_])
+            self._turns[id_].shifts.append((shift, change, t_s - before_s, speed > _TURNS_RAD_S))
+        if speed < _STANDS_RAD_S:
+            self._stands(t_s, views, seen)
+
+    def figures(self) -> ResidualFigures:
+        """Give the figures."""
+        if not self._speeds:
+            return ResidualFigures(None, None, 0)
+        late = self._shift_by_turn / self._turn_by_turn if self._turn_by_turn > 0.0 else 0.0
+        return ResidualFigures(
+            round(degrees(median(self._speeds)), 3), round(1e3 * late, 2), len(self._speeds)
+        )
+
+    def _stands(self, t_s: float, views: dict[int, Vec3], seen: list[Seen]) -> None:
+        """Believe what is where it was before the turn, and begin anew."""
+        for id_ in sorted(views.keys() & self._turns.keys()):
+            turn = self._turns[id_]
+            same = norm(sub(views[id_], turn.view)) < _STILL_RAD
+            if same and t_s - turn.since_s <= _LONGEST_S and any(s[3] for s in turn.shifts):
+                self._believe(turn)
+        self._turns = {s.id: _Turn(t_s, views[s.id]) for s in seen if s.speed_m_s < _STILL_M_S}
+
+    def _believe(self, turn: _Turn) -> None:
+        """Take in what one still thing seemed to do."""
+        for shift, change, dt_s, fast in turn.shifts:
+            self._shift_by_turn = _FORGET * self._shift_by_turn + dot(shift, change)
+            self._turn_by_turn = _FORGET * self._turn_by_turn + dot(change, change)
+            if fast:
+                self._speeds.append(norm(shift) / dt_s)
+
+
+def turning_rad_s(R_before: Mat3, R_after: Mat3, dt_s: float) -> Vec3:
+    """Give the angular velocity that turns one orientation into another, for small turns."""
+    R = compose(R_after, transposed(R_before))
+    half = 0.5 / dt_s
+    return ((R[2][1] - R[1][2]) * half, (R[0][2] - R[2][0]) * half, (R[1][0] - R[0][1]) * half)
+
+
+def transposed(R: Mat3) -> Mat3:
+    """Give the inverse of a rotation."""
+    return (
+        (R[0][0], R[1][0], R[2][0]),
+        (R[0][1], R[1][1], R[2][1]),
+        (R[0][2], R[1][2], R[2][2]),
+    )

@@ -1,0 +1,119 @@
+"""A camera that looks at a ChArUco board whose place is known to the millimetre.
+
+It gives pictures as a camera would: the lens distorts, edges are soft, the light falls
+off to one side, pixels have noise. Not modelled: motion blur, rolling shutter, glare,
+paper that is not flat.
+"""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import radians
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.types import Picture
+from gaze.types import Mat3, Vec3
+from robot.charuco_board import CharucoBoard
+from robot.intrinsics import Intrinsics, rays
+
+Floats = NDArray[np.float64]
+
+# Each pixel is the mean of so many by so many looks at the board.
+_LOOKS = 2
+_TEXTURE_PX_PER_MM = 2.0
+_PAPER_EDGE_MM = 12.0
+_WALL = 90.0
+
+
+@dataclass(frozen=True)
+class BoardCameraParams:
+    """How good the pictures are."""
+
+    width_px: int = field(default=640, metadata={"low": 64, "high": 4096, "unit": "px"})
+    height_px: int = field(default=400, metadata={"low": 64, "high": 4096, "unit": "px"})
+    blur_px: float = field(default=0.7, metadata={"low": 0.0, "high": 10.0, "unit": "px"})
+    noise_grey: float = field(default=3.0, metadata={"low": 0.0, "high": 60.0, "unit": ""})
+    white: float = field(default=225.0, metadata={"low": 10.0, "high": 255.0, "unit": ""})
+    black: float = field(default=28.0, metadata={"low": 0.0, "high": 200.0, "unit": ""})
+    falloff: float = field(default=0.25, metadata={"low": 0.0, "high": 0.9, "unit": ""})
+
+
+class BoardCamera:
+    """Draws the board from where a camera is."""
+
+    def __init__(
+        self,
+        params: BoardCameraParams,
+        lens: Intrinsics,
+        board: CharucoBoard,
+        rng: np.random.Generator,
+    ) -> None:
+        """Take the lens as it truly is, the board, and the dice of the noise."""
+        self.params, self.lens, self.board = params, lens, board
+        self._rng = rng
+        edge = round(_PAPER_EDGE_MM * _TEXTURE_PX_PER_MM)
+        drawn = board.picture(_TEXTURE_PX_PER_MM).astype(np.float32) / 255.0
+        grey = params.black + (params.white - params.black) * drawn
+        self._paper = cv2.copyMakeBorder(
+            grey, edge, edge, edge, edge, cv2.BORDER_CONSTANT, value=params.white
+        )
+        per_m = 1e3 * _TEXTURE_PX_PER_MM
+        # Metres on the board to pixels of the texture, whose centres are at whole numbers.
+        self._from_board = np.array(
+            [(per_m, 0.0, edge - 0.5), (0.0, per_m, edge - 0.5), (0.0, 0.0, 1.0)]
+        )
+        self._rays = _fine_rays(params.width_px, params.height_px, lens)
+        share = np.linspace(0.0, params.falloff, params.width_px, dtype=np.float32)
+        self._light = 1.0 - share[None, :]
+
+    def picture(self, R_camera_board: Mat3, p_camera_board_m: Vec3) -> Picture:
+        """Take a picture: (h, w, 3) BGR."""
+        par = self.params
+        pose = np.array(R_camera_board)
+        # Board plane to the plane z = 1, and back.
+        plane = np.stack((pose[:, 0], pose[:, 1], np.array(p_camera_board_m)), axis=1)
+        back = np.linalg.inv(plane)
+        looked = cv2.remap(
+            self._paper,
+            cv2.perspectiveTransform(self._rays, self._from_board @ back),
+            np.empty(0, np.float32),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=_WALL,
+        )
+        # Looks that run away from the board's plane would meet it behind the camera.
+        ends = self._rays[:: len(self._rays) - 1, :: self._rays.shape[1] - 1]
+        if (ends @ back[2, :2] + back[2, 2]).min() <= 0.0:
+            looked[self._rays @ back[2, :2] + back[2, 2] <= 0.0] = _WALL
+        grey = cv2.resize(looked, (par.width_px, par.height_px), interpolation=cv2.INTER_AREA)
+        if par.blur_px > 0.0:
+            grey = cv2.GaussianBlur(grey, (0, 0), par.blur_px)
+        noise = self._rng.standard_normal(grey.shape, dtype=np.float32)
+        lit = np.clip(np.rint(grey * self._light + noise * par.noise_grey), 0, 255)
+        return np.asarray(cv2.cvtColor(lit.astype(np.uint8), cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+
+
+def true_lens(width_px: int, height_px: int, horizontal_field_deg: float = 69.0) -> Intrinsics:
+    """Give a plausible lens that is not quite what its data sheet says."""
+    focal = 0.5 * width_px / np.tan(radians(0.5 * horizontal_field_deg)) * 1.03
+    return Intrinsics(
+        float(focal),
+        float(focal * 1.004),
+        0.5 * (width_px - 1) + 0.012 * width_px,
+        0.5 * (height_px - 1) - 0.015 * width_px,
+        (-0.11, 0.06, 0.0008, -0.0006, 0.0),
+    )
+
+
+@lru_cache(maxsize=4)
+def _fine_rays(width_px: int, height_px: int, lens: Intrinsics) -> NDArray[np.float32]:
+    """Give where the looks of all pixels meet the plane z = 1: (looks * h, looks * w, 2)."""
+    steps = (np.arange(_LOOKS) + 0.5) / _LOOKS - 0.5
+    x = (np.arange(width_px)[:, None] + steps).ravel()
+    y = (np.arange(height_px)[:, None] + steps).ravel()
+    grid = np.stack(np.meshgrid(x, y), axis=-1)
+    flat = rays(grid.reshape(-1, 2), lens)[:, :2].astype(np.float32)
+    flat.setflags(write=False)
+    return flat.reshape(grid.shape)

@@ -1,0 +1,182 @@
+"""A picture in the making: flat pieces of the world drawn as a camera sees them.
+
+Whatever is drawn later covers what was drawn before, so the farthest comes first. The lens
+does not distort. World frame, metres; camera frame optical, x right, y down, z forward.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gaze.types import Mat3, Vec3
+from robot.intrinsics import Intrinsics
+
+Floats = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+"""Blue, green, red."""
+
+# Nearer than this nothing is drawn: a lens does not see its own cap.
+_NEAREST_M = 0.03
+# OpenCV draws polygons to a part of a pixel: 1/16.
+_SHIFT = 4
+
+
+class Sheet(NamedTuple):
+    """A flat textured piece: from a corner along two edges; texture rows go along ``down_m``."""
+
+    corner_m: Vec3
+    right_m: Vec3
+    down_m: Vec3
+    texture: Bytes
+
+
+class Picture3d:
+    """What one camera sees from one place: colours and distances along its axis.
+
+    picture: (h, w, 3) BGR; depth_m: (h, w) float32, infinite where nothing was drawn
+    """
+
+    def __init__(
+        self, width_px: int, height_px: int, lens: Intrinsics, R_world_camera: Mat3, p_m: Vec3
+    ) -> None:
+        """Begin with an empty picture."""
+        self.picture: Bytes = np.zeros((height_px, width_px, 3), np.uint8)
+        self.depth_m = np.full((height_px, width_px), np.inf, np.float32)
+        self.lens = lens
+        self.R_world_camera = np.array(R_world_camera)
+        self.p_m = np.array(p_m)
+
+    def seen(self, points_world_m: ArrayLike) -> Floats:
+        """Bring points (n, 3) into the camera frame."""
+        points = np.asarray(points_world_m, dtype=np.float64).reshape(-1, 3)
+        seen: Floats = (points - self.p_m) @ self.R_world_camera
+        return seen
+
+    def polygon(self, points_world_m: ArrayLike, colour: Colour) -> None:
+        """Fill a polygon (n, 3) with a colour; distances stay as they are."""
+        points = self.seen(points_world_m)
+        if points[:, 2].min() > _NEAREST_M:
+            fixed = np.rint((self._pixels(points)) * (1 << _SHIFT)).astype(np.int32)
+            cv2.fillPoly(self.picture, [fixed], colour, cv2.LINE_AA, _SHIFT)
+
+    def sheet(self, sheet: Sheet) -> None:
+        """Draw a textured sheet; texture with a fourth channel is opaque by that."""
+        right, down, corner = (
+            self.R_world_camera.T @ np.array(v) - offset
+            for v, offset in (
+                (sheet.right_m, 0.0),
+                (sheet.down_m, 0.0),
+                (sheet.corner_m, self.R_world_camera.T @ self.p_m),
+            )
+        )
+        corners = np.array([corner, corner + right, corner + right + down, corner + down])
+        outline = _before_lens(corners)
+        if len(outline) < 3:
+            return
+        pixels = self._pixels(outline)
+        window = self._window(pixels)
+        if window is None:
+            return
+        left, top, width, height = window
+        moved = self.lens.matrix - np.array([(0, 0, left), (0, 0, top), (0, 0, 0)])
+        rows, columns = sheet.texture.shape[:2]
+        scaled = np.stack((right / columns, down / rows, corner), axis=1)
+        # The middle of a texture's first pixel lies half a pixel within the sheet.
+        scaled[:, 2] += 0.5 * (scaled[:, 0] + scaled[:, 1])
+        drawn = cv2.warpPerspective(
+            sheet.texture,
+            moved @ scaled,
+            (width, height),
+            flags=cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+        mask = np.zeros((height, width), np.uint8)
+        fixed = np.rint((pixels - (left, top)) * (1 << _SHIFT)).astype(np.int32)
+        cv2.fillConvexPoly(mask, fixed, 255, cv2.LINE_AA, _SHIFT)
+        if drawn.shape[2] == 4:
+            mask = np.minimum(mask, drawn[:, :, 3])
+        self._blend(window, np.asarray(drawn[:, :, :3], np.uint8), np.asarray(mask, np.uint8))
+        normal = np.cross(right, down)
+        self._deepen(window, np.asarray(mask, np.uint8), normal / float(normal @ corner))
+
+    def ellipsoid_depth(self, centre_m: Vec3, R_world_body: Floats, half_m: Vec3) -> None:
+        """Set the distances of an ellipsoid's front where it is seen; colours stay."""
+        A = self.R_world_camera.T @ R_world_body / np.array(half_m)
+        centre = self.seen(centre_m)[0]
+        reach = float(max(half_m))
+        if centre[2] - reach < _NEAREST_M:
+            return
+        box = centre + reach * np.array([(-1, -1, -1), (1, 1, -1), (-1, 1, -1), (1, -1, -1)])
+        window = self._window(self._pixels(box))
+        if window is None:
+            return
+        left, top, width, height = window
+        ray = self._rays(window)
+        # |A^T (t ray - centre)| = 1, the nearer solution.
+        d, c = ray @ A, A.T @ centre
+        dd, dc = (d * d).sum(axis=2), d @ c
+        root = dc * dc - dd * (float(c @ c) - 1.0)
+        t = (dc - np.sqrt(np.maximum(root, 0.0))) / dd
+        part = self.depth_m[top : top + height, left : left + width]
+        np.copyto(part, t.astype(np.float32), where=(root > 0.0) & (t < part))
+
+    def _pixels(self, points: Floats) -> Floats:
+        """Project points of the camera frame that are before the lens."""
+        i = self.lens
+        pixels: Floats = points[:, :2] / points[:, 2:] * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
+        return pixels
+
+    def _window(self, pixels: Floats) -> tuple[int, int, int, int] | None:
+        """Give x, y, width, height of the part of the picture that points span."""
+        height, width = self.depth_m.shape
+        low = np.floor(np.clip(pixels.min(axis=0), -2.0, 1e6)).astype(int)
+        high = np.ceil(np.clip(pixels.max(axis=0), -2.0, 1e6)).astype(int) + 1
+        left, top = max(0, int(low[0])), max(0, int(low[1]))
+        right, bottom = min(width, int(high[0])), min(height, int(high[1]))
+        if right - left < 1 or bottom - top < 1:
+            return None
+        return left, top, right - left, bottom - top
+
+    def _rays(self, window: tuple[int, int, int, int]) -> Floats:
+        """Give the directions of a window's pixels, z = 1: (h, w, 3)."""
+        left, top, width, height = window
+        i = self.lens
+        x = (np.arange(left, left + width) - i.cx_px) / i.fx_px
+        y = (np.arange(top, top + height) - i.cy_px) / i.fy_px
+        ray = np.ones((height, width, 3))
+        ray[:, :, 0], ray[:, :, 1] = x[None, :], y[:, None]
+        return ray
+
+    def _blend(self, window: tuple[int, int, int, int], drawn: Bytes, mask: Bytes) -> None:
+        """Lay what was drawn over the picture as far as the mask is opaque."""
+        left, top, width, height = window
+        part = self.picture[top : top + height, left : left + width]
+        cv2.copyTo(drawn, np.where(mask == 255, mask, np.uint8(0)), part)
+        y, x = np.nonzero((mask > 0) & (mask < 255))
+        share = mask[y, x, None].astype(np.float32) / 255.0
+        part[y, x] = np.rint(part[y, x] * (1.0 - share) + drawn[y, x] * share).astype(np.uint8)
+
+    def _deepen(self, window: tuple[int, int, int, int], mask: Bytes, inverse: Floats) -> None:
+        """Set the distances of a plane in which 1 / z = inverse . ray."""
+        left, top, width, height = window
+        i = self.lens
+        x = (np.arange(left, left + width, dtype=np.float32) - i.cx_px) / i.fx_px
+        y = (np.arange(top, top + height, dtype=np.float32) - i.cy_px) / i.fy_px
+        over_z = (inverse[0] * x)[None, :] + (inverse[1] * y + inverse[2])[:, None]
+        z = (1.0 / np.maximum(over_z, 1e-3)).astype(np.float32)
+        part = self.depth_m[top : top + height, left : left + width]
+        np.copyto(part, z, where=mask > 127)
+
+
+def _before_lens(corners: Floats) -> Floats:
+    """Cut a convex polygon (n, 3) of the camera frame off at the nearest distance."""
+    kept: list[Floats] = []
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if a[2] >= _NEAREST_M:
+            kept.append(a)
+        if (a[2] >= _NEAREST_M) != (b[2] >= _NEAREST_M):
+            kept.append(a + (_NEAREST_M - a[2]) / (b[2] - a[2]) * (b - a))
+    return np.array(kept).reshape(-1, 3)

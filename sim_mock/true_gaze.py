@@ -1,0 +1,38 @@
+"""Where the gaze is against where the person truly is: what only a simulated world can tell."""
+
+from gaze.angles import add, angle_between, rotate, rotation, scale, sub, unit, yaw_pitch
+from gaze.field_of_view import line_of_sight
+from gaze.types import Angles2, GazeState, Vec3
+from robot.face_pose import PARTS_FACE_M
+from sim_mock.scene import Person
+
+
+def true_part(person: Person, part: str | None) -> Vec3:
+    """Give where a part of a person's face truly is; None: the tip of the nose."""
+    if part is None:
+        return person.p_world_face_m
+    R = rotation((*person.face_yaw_pitch_rad, 0.0))
+    return add(person.p_world_face_m, rotate(R, PARTS_FACE_M[part]))
+
+
+def gaze_angles(pose: GazeState) -> Angles2:
+    """Give yaw and pitch in the world of the mean of both measured lines of sight."""
+    return yaw_pitch(_cyclopean(pose))
+
+
+def angles_of_place(p_world_m: Vec3, pose: GazeState) -> Angles2:
+    """Give yaw and pitch in the world from the middle of the eyes to a place."""
+    return yaw_pitch(sub(p_world_m, _middle(pose)))
+
+
+def gaze_off_rad(p_world_m: Vec3, pose: GazeState) -> float:
+    """Give the angle between the measured gaze and a place, from the middle of the eyes."""
+    return angle_between(_cyclopean(pose), sub(p_world_m, _middle(pose)))
+
+
+def _cyclopean(pose: GazeState) -> Vec3:
+    return unit(add(line_of_sight(pose, True), line_of_sight(pose, False)))
+
+
+def _middle(pose: GazeState) -> Vec3:
+    return scale(add(pose.p_world_eye_left_m, pose.p_world_eye_right_m), 0.5)

@@ -1,0 +1,123 @@
+"""Distances come out of depth pictures with holes, edges, zeros and nonsense."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from drivers.camera_depth import depth_at, metres, millimetres, resized
+
+BOX = (20.0, 10.0, 40.0, 40.0)
+
+
+def scene(thing_m: float = 1.2, wall_m: float = 3.0) -> np.ndarray:
+    """A round thing in the box before a wall, with noise of a centimetre."""
+    y, x = np.mgrid[0:60, 0:80]
+    depth = np.where((x - 40) ** 2 + (y - 30) ** 2 < 18**2, thing_m, wall_m)
+    return (depth + np.random.default_rng(0).normal(0.0, 0.01, depth.shape)).astype(np.float32)
+
+
+def test_distance_and_spread_of_a_whole_thing():
+    found = depth_at(scene(), BOX)
+    assert found.distance_m == pytest.approx(1.2, abs=0.003)
+    assert found.spread_m == pytest.approx(0.01, abs=0.002)
+    assert found.valid_share == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("hole", [np.nan, 0.0, np.inf, -1.0])
+def test_holes_do_not_count(hole):
+    depth = scene()
+    depth[np.random.default_rng(1).random(depth.shape) < 0.6] = hole
+    found = depth_at(depth, BOX)
+    assert found.distance_m == pytest.approx(1.2, abs=0.005)
+    assert found.valid_share == pytest.approx(0.4, abs=0.06)
+
+
+def test_background_beside_the_thing_is_left_out():
+    found = depth_at(scene(), (5.0, 0.0, 70.0, 60.0), shrink=1.0)  # most of it is wall
+    assert found.distance_m == pytest.approx(1.2, abs=0.005)
+    assert found.spread_m < 0.03
+
+
+def test_specks_before_the_thing_are_left_out():
+    depth = scene()
+    depth[25:29, 35:39] = 0.4
+    assert depth_at(depth, BOX).distance_m == pytest.approx(1.2, abs=0.005)
+
+
+def test_mask_says_which_pixels():
+    depth = scene()
+    mask = depth > 2.0
+    assert depth_at(depth, mask=mask).distance_m == pytest.approx(3.0, abs=0.005)
+    assert depth_at(depth, mask=np.zeros_like(mask)).distance_m is None
+
+
+@pytest.mark.parametrize("nothing", [0.0, np.nan, np.inf])
+def test_picture_without_any_distance_gives_none(nothing):
+    found = depth_at(np.full((60, 80), nothing, np.float32), BOX)
+    assert found == (None, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "box",
+    [
+        (500.0, 10.0, 5.0, 5.0),
+        (-90.0, 0.0, 5.0, 5.0),
+        (np.nan, 0.0, 1.0, 1.0),
+        (0.0, 0.0, -5.0, 2.0),
+    ],
+)
+def test_box_beside_the_picture_or_none_at_all_never_fails(box):
+    found = depth_at(scene(), box)
+    assert found.distance_m is None or np.isfinite(found.distance_m)
+
+
+def test_mask_of_another_size_gives_none():
+    assert depth_at(scene(), mask=np.ones((3, 3), bool)).distance_m is None
+
+
+def test_thin_box_still_reads_a_pixel():
+    assert depth_at(scene(), (40.0, 30.0, 1.0, 1.0)).distance_m == pytest.approx(1.2, abs=0.05)
+
+
+def test_one_pixel_picture():
+    assert depth_at(np.full((1, 1), 2.0, np.float32), (0.0, 0.0, 1.0, 1.0)).distance_m == 2.0
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    arrays(
+        np.float32, st.tuples(st.integers(1, 8), st.integers(1, 8)), elements=st.floats(width=32)
+    ),
+    st.tuples(*[st.floats(-20.0, 20.0)] * 4),
+)
+def test_whatever_the_picture_the_answer_is_a_distance_in_it_or_none(depth, box):
+    found = depth_at(depth, box)
+    if found.distance_m is not None:
+        low, high = depth[np.isfinite(depth)].min(), depth[np.isfinite(depth)].max()
+        assert low <= found.distance_m <= high
+    assert 0.0 <= found.valid_share <= 1.0
+    assert np.isfinite(found.spread_m)
+
+
+def test_millimetres_there_and_back_are_exact():
+    mm = np.arange(65536, dtype=np.uint16).reshape(256, 256)
+    depth = metres(mm)
+    assert np.isnan(depth[0, 0]) and depth[3, 232] == np.float32(1.0)
+    assert not depth.flags.writeable
+    assert np.array_equal(millimetres(depth), mm)
+
+
+def test_distances_too_far_or_unknown_become_zero():
+    odd = np.array([[70.0, -1.0, np.nan, np.inf, 0.0, 1.0]], np.float32)
+    assert millimetres(odd).tolist() == [[0, 0, 0, 0, 0, 1000]]
+
+
+def test_resizing_invents_no_distance():
+    depth = np.array([[1.0, 3.0], [np.nan, 3.0]], np.float32)
+    big = resized(depth, 8, 4)
+    assert big.shape == (4, 8)
+    assert set(big[np.isfinite(big)].tolist()) == {1.0, 3.0}
+    assert np.isnan(big).sum() == 8
+    assert resized(depth, 2, 2) is depth

@@ -1,0 +1,234 @@
+"""calibrate face as it is typed: keys, scripts, what is written and what is not."""
+
+import os
+import pty
+import select
+import signal
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from config.save import save_rig
+from config.schema import load_rig
+from drivers.errors import SetupError
+from robot import cli_face
+from robot.cli_calibrations import app
+from robot.cli_keys import key_and_count, keys_of
+from robot.face_pose import PARTS_FACE_M
+
+ROOT = Path(__file__).parents[1]
+DESK = ROOT / "config" / "rigs" / "desk.yaml"
+
+
+def run(*words: str) -> Any:
+    return CliRunner().invoke(app, ["face", *words])
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Path:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(DESK.read_text("utf-8"), encoding="utf-8")
+    return mine
+
+
+def script(tmp_path: Path, *lines: str) -> tuple[str, str]:
+    file = tmp_path / "answers"
+    file.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    return "--answers", str(file)
+
+
+# --- what is written
+
+
+def test_the_offsets_steered_to_are_in_the_rig_file(rig: Path, tmp_path: Path) -> None:
+    before = rig.read_text("utf-8")
+    answers = script(
+        tmp_path,
+        "left 2", "up", "",  # nose: step 5
+        "+", "down", "enter",  # left eye: step 10
+        "skip",
+        "-", "-", "-", "right 3", "enter",  # mouth: step 1
+        "back", "down 2", "",  # mouth again, from there
+        "end", "y",
+    )  # fmt: skip
+    done = run(str(rig), "--mock", *answers)
+    assert done.exit_code == 0, done.stderr
+    moved = {"N": (10.0, 5.0), "LE": (0.0, -10.0), "M": (-3.0, -2.0)}
+    found = load_rig(str(rig)).face_parts_mm
+    assert set(found) == set(moved)
+    for part, (left, up) in moved.items():
+        x, y, z = (v * 1e3 for v in PARTS_FACE_M[part])
+        assert found[part] == pytest.approx((x, y + left, z + up), abs=0.06)
+    (backup,) = tmp_path.glob("mine.yaml.bak-*")
+    assert backup.read_text("utf-8") == before
+    assert "# The desk rig" in rig.read_text("utf-8")
+    assert "face_parts_mm.N: (not in the file) -> [0.0, 10.0, 5.0]" in done.stderr
+    assert "parked, torque off" in done.stderr and "your left eye: steer" in done.stderr
+
+
+def test_it_begins_where_the_rig_has_the_part(rig: Path, tmp_path: Path) -> None:
+    save_rig(rig, {"face_parts_mm.N": (-2.0, 5.0, 0.0)}, datetime(2026, 1, 1))
+    done = run(str(rig), "--mock", "--yes", *script(tmp_path, "left", "", "q"))
+    assert done.exit_code == 0, done.stderr
+    assert load_rig(str(rig)).face_parts_mm["N"] == (-2.0, 10.0, 0.0)
+
+
+def test_all_eight_parts_on_somebody_who_walks_about(rig: Path, tmp_path: Path) -> None:
+    words = ("--mock", "--yes", "--scene", "face-to-face")
+    done = run(str(rig), *words, *script(tmp_path, *8 * ("up", "")))
+    assert done.exit_code == 0, done.stderr
+    found = load_rig(str(rig)).face_parts_mm
+    assert all(found[c][2] == pytest.approx(p[2] * 1e3 + 5.0) for c, p in PARTS_FACE_M.items())
+    assert "stopped by the last part" in done.stderr
+
+
+@pytest.mark.parametrize("lines", [("skip", "q"), ("", "q", "n")], ids=str)
+def test_nothing_chosen_or_a_no_writes_nothing(
+    rig: Path, tmp_path: Path, lines: tuple[str, ...]
+) -> None:
+    before = rig.read_bytes()
+    done = run(str(rig), "--mock", *script(tmp_path, *lines))
+    assert done.exit_code == 0 and "nothing" in done.stderr
+    assert rig.read_bytes() == before and not list(tmp_path.glob("*.bak-*"))
+
+
+def test_a_shipped_rig_is_copied_not_written(tmp_path: Path) -> None:
+    refused = run("desk", "--mock")
+    assert refused.exit_code == 2 and "desk.yaml" in refused.stderr
+    assert "head turns" not in refused.stderr
+    out = tmp_path / "copy.yaml"
+    done = run("desk", "--mock", "--yes", "--out", str(out), *script(tmp_path, "up", "", "q"))
+    assert done.exit_code == 0, done.stderr
+    assert load_rig(str(out)).face_parts_mm["N"] == (0.0, 0.0, 5.0)
+
+
+# --- what cannot be
+
+
+@pytest.mark.parametrize(
+    ("words", "lines", "says"),
+    [
+        ((), ("left", "sideways"), "'sideways' is no key: left, right, up"),
+        ((), ("left", ""), "no key left"),
+        ((), ("", "q"), "no answer left to: write these 1"),
+        (("--scene", "nowhere"), ("q",), "unknown; scenes: boxing"),
+        (("--camera", "0", "--video", "x.png"), ("q",), "exclude each other"),
+        (("--port", "/dev/null"), ("q",), "exclude each other"),
+    ],
+)
+def test_what_is_wrong_is_said_and_nothing_written(
+    rig: Path, tmp_path: Path, words: tuple[str, ...], lines: tuple[str, ...], says: str
+) -> None:
+    before = rig.read_bytes()
+    done = run(str(rig), "--mock", *words, *script(tmp_path, *lines))
+    assert done.exit_code == 2 and says in done.stderr, done.stderr
+    assert rig.read_bytes() == before
+
+
+def test_nothing_to_look_at_is_said(rig: Path) -> None:
+    done = run(str(rig))
+    assert done.exit_code == 2 and "nothing to look at: give " in done.stderr
+
+
+def test_without_a_face_it_says_so_and_a_script_ends(
+    rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cli_face, "_SCRIPT_WAITS_S", 2.0)
+    wall = tmp_path / "wall.png"
+    cv2.imwrite(str(wall), np.full((120, 160, 3), 128, np.uint8))
+    words = ("--mock", "--video", str(wall))
+    done = run(str(rig), *words, *script(tmp_path, "left", "", "q"))
+    assert done.exit_code == 2, done.stderr
+    assert "no face is seen: sit before the camera" in done.stderr
+    assert "no face is seen for 2 s" in done.stderr and "torque off" in done.stderr
+
+
+# --- keys
+
+
+def test_what_a_terminal_sends_for_keys() -> None:
+    keys, rest = keys_of("\x1b[A\x1b[B\x1bOC\x1b[1;5Dwasd+-=\rnb\x1b[3~\x1bOPQ\x1b[")
+    assert keys == [
+        "up", "down", "right", "left", "up", "left", "down", "right", "larger", "smaller",
+        "larger", "enter", "skip", "back", "end",
+    ]  # fmt: skip
+    assert rest == "\x1b["
+
+
+@given(st.lists(st.sampled_from(["\x1b[A", "\x1bOB", "w", "\n", "\x1b[1;2C", "x"])), st.data())
+def test_keys_are_the_same_however_the_bytes_are_cut(sent: list[str], data: st.DataObject) -> None:
+    text = "".join(sent)
+    cut = data.draw(st.integers(0, len(text)))
+    first, rest = keys_of(text[:cut])
+    second, left = keys_of(rest + text[cut:])
+    assert first + second == keys_of(text)[0] and left == ""
+
+
+@given(st.text(st.sampled_from("\x1b[O;0123ABw~ \x00é"), max_size=40))
+def test_no_bytes_are_lost_or_stop_it(text: str) -> None:
+    _, rest = keys_of(text)
+    assert text.endswith(rest) and len(rest) <= len(text)
+
+
+def test_lines_of_a_script() -> None:
+    assert key_and_count(" Left 12 ") == ("left", 12)
+    assert key_and_count("") == ("enter", 1)
+    for line in ("left -1", "left x", "left 0", "left 100000", "hop"):
+        with pytest.raises(SetupError, match="is no key"):
+            key_and_count(line)
+
+
+# --- on a terminal
+
+
+def typed(rig: Path, *keys: bytes) -> tuple[int, str]:
+    """Run the command on a pseudo-terminal; each key is sent when the last one has shown."""
+    pid, fd = pty.fork()
+    if pid == 0:
+        os.chdir(ROOT)
+        code = "from robot.cli import main; main()"
+        os.execv(
+            sys.executable,
+            [sys.executable, "-c", code, "calibrate", "face", str(rig), "--mock", "--yes"],
+        )
+    waits = [b"1/8 the tip of your nose: 0 mm", b"5 mm left", b"2/8 your left eye"]
+    out, sent, end_s = b"", 0, time.monotonic() + 40.0
+    while time.monotonic() < end_s:
+        if sent < len(keys) and waits[sent] in out:
+            os.write(fd, keys[sent])
+            sent += 1
+        if select.select([fd], [], [], 0.2)[0]:
+            try:
+                data = os.read(fd, 4096)
+            except OSError:  # Linux says so when the other side has closed
+                break
+            if not data:
+                break
+            out += data
+    else:
+        os.kill(pid, signal.SIGKILL)
+    _, how = os.waitpid(pid, 0)
+    os.close(fd)
+    return os.waitstatus_to_exitcode(how), out.decode()
+
+
+def test_keys_typed_move_the_gaze_and_are_written(rig: Path) -> None:
+    code, said = typed(rig, b"\x1b[D", b"\r", b"q")
+    assert code == 0, said
+    assert load_rig(str(rig)).face_parts_mm == {"N": (0.0, 5.0, 0.0)}
+
+
+def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
+    before = rig.read_bytes()
+    code, said = typed(rig, b"\x1b[D", b"\r", b"\x03")
+    assert code == 1 and "stopped by SIGINT: parked, torque off" in said
+    assert "nothing written" in said and rig.read_bytes() == before

@@ -1,0 +1,58 @@
+"""What people type to record a camera, and what they read."""
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from drivers.recording_read import Recording
+from robot.cli_record import app
+
+
+@pytest.fixture
+def film(tmp_path):
+    path = tmp_path / "film.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 50.0, (64, 48))
+    for k in range(10):
+        writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
+    writer.release()
+    return path
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def test_film_is_recorded_and_can_be_read(film, tmp_path):
+    out = tmp_path / "seen.mcap"
+    done = run(out, "--video", film, "--seconds", 0.1)
+    assert done.exit_code == 0, done.output
+    recording = Recording(out)
+    assert recording.note == ""
+    assert f"{len(recording.times_s)} pictures (" in done.output
+    assert recording.shot(0).picture.shape == (48, 64, 3)
+
+
+def test_existing_file_is_kept(film, tmp_path):
+    out = tmp_path / "seen.mcap"
+    out.write_text("precious")
+    done = run(out, "--video", film, "--seconds", 0)
+    assert (done.exit_code, out.read_text()) == (2, "precious")
+    assert "is there already" in done.output
+    assert run(out, "--video", film, "--seconds", 0, "--force", "--jpeg", 80).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "sources", [[], ["--oak", "--camera", "0"], ["--camera", "0", "--video", "x"]]
+)
+def test_one_source_must_be_named(tmp_path, sources):
+    done = run(tmp_path / "seen.mcap", *sources)
+    assert done.exit_code == 2
+    assert "one of --oak, --camera N and --video FILE" in done.output
+
+
+def test_absent_camera_leaves_no_file(tmp_path):
+    out = tmp_path / "seen.mcap"
+    done = run(out, "--camera", 9871)
+    assert done.exit_code == 2 and "no camera at /dev/video9871" in done.output
+    assert not out.exists()

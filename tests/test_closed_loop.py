@@ -1,0 +1,165 @@
+"""The whole loop through pixels: drawn, seen, placed, looked at, with the camera on the head.
+
+Pictures are 60 ms late and come 30 times a second; the saccade's own latency is the rig's.
+"""
+
+from math import degrees
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from config.schema import load_rig
+from robot.assemble import assemble, gaze_parts
+from robot.choice import Choice
+from robot.frames import NewestPose, PoseHistory
+from robot.loop import Tick, run
+from sim_mock.pixel_camera import PixelCameraParams
+from sim_mock.steps_aside import STEP_AT_S, STEP_S
+from sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
+from sim_mock.walks_past import HALF_WAY_M, WALK_M_S
+
+RIG = load_rig("desk")
+ARRIVED_S = STEP_AT_S + STEP_S
+Column = NDArray[np.float64]
+PlacedBy = Literal["capture", "newest"]
+
+
+class Seen(NamedTuple):
+    """One run, a row a tick; degrees, seconds from the scene's beginning.
+
+    off_deg: gaze off the true face part; gaze_deg, face_deg: yaws of gaze and of that part
+    head_deg, facing_deg: the head's yaw, and that which would point it at the face
+    jumps: in a saccade; captured_s: of the picture the tick went by
+    """
+
+    t_s: Column
+    off_deg: Column
+    gaze_deg: Column
+    face_deg: Column
+    head_deg: Column
+    facing_deg: Column
+    jumps: Column
+    captured_s: Column
+    on_face: Column
+
+
+def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen:
+    """Run a drawn scene and compare the measured gaze with the true place of the face part."""
+    made = assemble(RIG, Choice(True, True, 0, scene, pixels=True, placed_by=placed_by))
+    kinematics, _ = gaze_parts(RIG, 0)
+    assert made.scene is not None
+    people = made.scene.people
+    rows: list[tuple[float, ...]] = []
+    start_s: list[float] = []
+
+    def watch(tick: Tick) -> None:
+        start_s[:] = start_s or [tick.t_s]
+        t_s, pose = tick.t_s - start_s[0], tick.pose
+        person = people(t_s)[0]
+        part = true_part(person, tick.target.part)
+        rows.append(
+            (
+                t_s,
+                degrees(gaze_off_rad(part, pose)),
+                degrees(gaze_angles(pose)[0]),
+                degrees(angles_of_place(part, pose)[0]),
+                degrees(pose.head_rad[0]),
+                degrees(kinematics.facing(person.p_world_face_m)[0]),
+                tick.gaze.phase == "saccade",
+                tick.percept.captured_s - start_s[0] if tick.percept else -1.0,
+                tick.target.kind == "face",
+            )
+        )
+
+    made.robot.start(made.clock)
+    try:
+        count = run(
+            made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch
+        )
+    finally:
+        made.robot.stop()
+        made.close()
+    assert count.stopped_by == "over"
+    return Seen(*np.array(rows, float).T)
+
+
+@pytest.fixture(scope="module")
+def step() -> Seen:
+    """Give somebody who steps aside, pictures placed by the pose at their capture."""
+    return watched("steps-aside", ARRIVED_S + 1.6)
+
+
+@pytest.fixture(scope="module")
+def step_by_newest() -> Seen:
+    """Give the same, pictures placed by the newest pose."""
+    return watched("steps-aside", ARRIVED_S + 1.0, "newest")
+
+
+@pytest.fixture(scope="module")
+def walk() -> Seen:
+    """Give somebody who walks past."""
+    return watched("walks-past", 1.0 + 2.0 * HALF_WAY_M / WALK_M_S)
+
+
+def overshoot_deg(seen: Seen) -> float:
+    """Give how far the head's yaw goes past where it would face the person who has arrived."""
+    after = seen.t_s > STEP_AT_S
+    return float(seen.head_deg[after].max() - seen.facing_deg[-1])
+
+
+def test_the_step_is_of_40_deg_and_the_loop_sees_it_late(step: Seen) -> None:
+    before = step.facing_deg[step.t_s < STEP_AT_S].max()
+    assert 37.0 < step.facing_deg[-1] - before < 41.0
+    late_s = (step.t_s - step.captured_s)[step.captured_s > 0.0]
+    assert late_s.min() >= PixelCameraParams().latency_ms / 1e3 - 1e-6
+    assert late_s.max() < 0.06 + 1.0 / 30.0 + 0.0101
+
+
+def test_eyes_are_on_the_face_a_quarter_second_after_the_picture_of_its_arrival(step: Seen) -> None:
+    shown_s = step.t_s[step.captured_s >= ARRIVED_S][0]
+    there_s = step.t_s[(step.t_s >= ARRIVED_S) & (step.off_deg < 1.0)][0]
+    assert there_s - shown_s <= 0.25 + RIG.gaze.oculomotor.latency_ms / 1e3
+    # and not by chance in passing: they stay, but for the saccades between its parts
+    later = (step.t_s > shown_s + 0.25) & (step.jumps == 0.0)
+    assert np.percentile(step.off_deg[later], 95) < 1.5
+
+
+def test_the_head_arrives_without_overshoot(step: Seen) -> None:
+    assert overshoot_deg(step) < 1.0
+    assert step.head_deg.max() - step.head_deg[-1] < 1.0  # nor does it swing back
+    assert step.facing_deg[-1] - step.head_deg[-1] < 10.0  # it did turn
+
+
+def test_the_gaze_rests_on_the_true_face_part_after_a_second(step: Seen) -> None:
+    rests = (step.t_s > ARRIVED_S + 1.0) & (step.jumps == 0.0)
+    assert np.count_nonzero(rests) > 60
+    assert np.percentile(step.off_deg[rests], 95) < 1.0
+
+
+def test_by_the_newest_pose_head_and_eyes_overshoot(step: Seen, step_by_newest: Seen) -> None:
+    assert overshoot_deg(step_by_newest) > overshoot_deg(step) + 1.5
+    settled = ARRIVED_S + 0.25
+    off = [np.median(seen.off_deg[seen.t_s > settled][:100]) for seen in (step, step_by_newest)]
+    assert off[1] > 2.0 * off[0]
+
+
+def test_somebody_who_walks_past_is_followed(walk: Seen) -> None:
+    walks = walk.t_s > 1.0 + 0.25
+    assert walk.on_face[walks].all()
+    assert np.percentile(walk.off_deg[walks & (walk.jumps == 0.0)], 95) < 2.0
+    travel = walk.gaze_deg[-1] - walk.gaze_deg[walks][0]
+    assert travel > 50.0
+
+
+def test_the_newest_pose_is_given_whatever_the_time() -> None:
+    kinematics, _ = gaze_parts(RIG, 0)
+    now, then = NewestPose(kinematics), PoseHistory(kinematics)
+    for poses in (now, then):
+        poses.remember(0.0, (0.0, 0.0, 0.0))
+        poses.remember(0.1, (0.4, 0.0, 0.0))
+    assert now.head_pose(0.0) == now.head_pose(0.05) == then.head_pose(0.1)
+    assert then.head_pose(0.0) != then.head_pose(0.1)
+    with pytest.raises(LookupError):
+        NewestPose(kinematics).head_pose(0.0)

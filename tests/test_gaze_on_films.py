@@ -1,0 +1,164 @@
+"""People walk in a square, too far off for faces: the gaze is on what moves.
+
+Judged by a mask that knows nothing of flow: what differs from the median of the film's
+pictures, and what lies within a degree of it.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import radians
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from config.schema import load_rig
+from gaze.angles import add, angle_between, norm, scale, sub
+from gaze.types import Vec3
+from robot.assemble import Assembly, assemble
+from robot.choice import Choice
+from robot.intrinsics import intrinsics_of_lens, project
+from robot.loop import Tick, run
+from robot.summary import cyclopean
+
+FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
+SECONDS, BEGIN_S, RATE_HZ = 24.0, 1.0, 10.0
+WIDTH, HEIGHT = 768, 576
+SHRINK = 2
+DIFFERS = 25  # grey levels
+STILL_RAD_S = radians(40.0)  # as an eye tracker tells fixations
+GLANCE_S = 0.1
+
+
+@dataclass
+class Fixation:
+    """One fixation: seconds, what was looked at, and whether its pictures show motion there."""
+
+    seconds: float
+    names: set[str]
+    on: list[bool]
+
+
+@pytest.fixture(scope="module")
+def ticks() -> tuple[Assembly, list[Tick]]:
+    """Run the rig in simulated time; half its rate, and no search for faces of few pixels."""
+    if not FILM.exists():
+        pytest.skip(f"no film at {FILM}")
+    rig = load_rig("desk")
+    rig = replace(
+        rig,
+        loop=replace(rig.loop, rate_hz=100.0),
+        detector=replace(rig.detector, min_face_px=60),
+    )
+    made = assemble(rig, Choice(mock=True, fast=True, seed=0, video=FILM))
+    seen: list[Tick] = []
+    made.robot.start(made.clock)
+    try:
+        run(
+            made.robot,
+            made.clock,
+            made.loop,
+            lambda seconds: "seconds" if seconds >= SECONDS else None,
+            lambda tick: seen.append(tick._replace(detections=None)),  # pictures are large
+        )
+    finally:
+        made.robot.stop()
+        made.close()
+    return made, seen
+
+
+@pytest.fixture(scope="module")
+def masks() -> list[NDArray[np.uint8]]:
+    """Give what moves in each picture."""
+    if not FILM.exists():
+        pytest.skip(f"no film at {FILM}")
+    return moving_masks()
+
+
+@pytest.fixture(scope="module")
+def fixations(ticks: tuple[Assembly, list[Tick]], masks: list[NDArray[np.uint8]]) -> list[Fixation]:
+    """Give all fixations but those of the first second, when nothing has been seen to move."""
+    made, seen = ticks
+    found: dict[int, Fixation] = {}
+    for before, tick in pairwise(seen):
+        dt_s = tick.t_s - before.t_s
+        fast = angle_between(cyclopean(before), cyclopean(tick)) > STILL_RAD_S * dt_s
+        if tick.gaze.phase == "saccade" or fast or tick.t_s < BEGIN_S:
+            continue
+        fixation = found.setdefault(tick.gaze.fixations, Fixation(0.0, set(), []))
+        fixation.seconds += dt_s
+        fixation.names.add(f"{tick.target.kind} {tick.target.id}")
+        number = int(tick.t_s * RATE_HZ + 1e-6)
+        if tick.t_s - number / RATE_HZ < dt_s:  # a picture is taken now
+            x, y = (round(c / SHRINK) for c in in_picture(made, gaze_point(tick)))
+            mask = masks[number]
+            inside = 0 <= x < mask.shape[1] and 0 <= y < mask.shape[0]
+            fixation.on.append(inside and bool(mask[y, x]))
+    return list(found.values())
+
+
+def gaze_point(tick: Tick) -> Vec3:
+    """Give where the measured eyes look, as far away as what they look at."""
+    left, right = tick.pose.p_world_eye_left_m, tick.pose.p_world_eye_right_m
+    eye = scale(add(left, right), 0.5)
+    return add(eye, scale(cyclopean(tick), norm(sub(tick.target.p_world_m, eye))))
+
+
+def in_picture(made: Assembly, point: Vec3) -> tuple[float, float]:
+    """Give where the film shows a point of the world: its camera stands still."""
+    ahead = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    R, p = made.mount.pose(ahead, (0.0, 0.0, 0.0))
+    lens = intrinsics_of_lens(None, radians(made.horizontal_field_deg), WIDTH, HEIGHT)
+    seen = np.array(R).T @ np.array(sub(point, p))
+    x, y = project(seen[None], lens)[0].tolist()
+    return x, y
+
+
+def moving_masks() -> list[NDArray[np.uint8]]:
+    """Give for each picture, made smaller, what differs from the median of them all."""
+    film = cv2.VideoCapture(str(FILM))
+    size = WIDTH // SHRINK, HEIGHT // SHRINK
+    pictures = []
+    for _ in range(int(SECONDS * RATE_HZ) + 1):
+        good, picture = film.read()
+        assert good and picture.shape == (HEIGHT, WIDTH, 3)
+        pictures.append(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    film.release()
+    ground = np.median(np.stack(pictures[::8]), axis=0).astype(np.uint8)
+    speck, degree = np.ones((3, 3), np.uint8), np.ones((11, 11), np.uint8)
+    masks = []
+    for picture in pictures:
+        differs = (cv2.absdiff(picture, ground).max(axis=2) > DIFFERS).astype(np.uint8)
+        opened = cv2.morphologyEx(differs, cv2.MORPH_OPEN, speck)
+        masks.append(cv2.dilate(opened, degree).astype(np.uint8))
+    return masks
+
+
+def test_the_mask_is_no_easy_target(masks: list[NDArray[np.uint8]]) -> None:
+    """Most of the picture is empty, and it does not simply lie where people look at rest."""
+    share = np.mean(masks, axis=0)
+    assert 0.01 < share.mean() < 0.1
+    assert share[HEIGHT // SHRINK // 2, WIDTH // SHRINK // 2] < 0.5
+
+
+def test_the_gaze_lies_on_what_moves(fixations: list[Fixation]) -> None:
+    shown = [fixation for fixation in fixations if fixation.on]
+    good = [2 * sum(fixation.on) >= len(fixation.on) for fixation in shown]
+    assert len(good) >= 30
+    assert np.mean(good) >= 0.9, f"{sum(good)} of {len(good)} fixations"
+
+
+def test_the_gaze_shifts_between_people_as_they_come_and_go(fixations: list[Fixation]) -> None:
+    names = {name for fixation in fixations for name in fixation.names}
+    assert len([name for name in names if name.startswith("thing")]) >= 6
+    lasted = [fixation.seconds for fixation in fixations if fixation.seconds > GLANCE_S]
+    assert 0.2 <= np.median(lasted) <= 1.0
+    assert max(lasted) < 6.0
+
+
+def test_nobody_else_is_looked_for_while_people_walk(ticks: tuple[Assembly, list[Tick]]) -> None:
+    """No idle glances: from the second picture on something moves."""
+    kinds = [tick.target.kind for tick in ticks[1] if tick.t_s >= BEGIN_S]
+    assert kinds.count("thing") >= 0.95 * len(kinds)

@@ -1,0 +1,105 @@
+"""The lens model: pixels to directions and back, other sizes of picture, and what perception
+makes of it."""
+
+from math import radians
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.types import DetectedFace, Detections
+from robot.face_pose import LANDMARKS_FACE_M
+from robot.frames import CameraMount, CameraParams, LensParams, PoseHistory
+from robot.intrinsics import (
+    Intrinsics,
+    fits,
+    intrinsics_of_lens,
+    intrinsics_of_view,
+    project,
+    rays,
+    undistorted,
+)
+from robot.kinematics import GeometryParams, Kinematics
+from robot.perception import Perception
+from robot.tracks import Tracker, TrackParams
+
+BENT = Intrinsics(480.0, 482.0, 327.0, 190.0, (-0.25, 0.09, 0.002, -0.001, -0.01))
+LENS = LensParams(640, 400, 480.0, 482.0, 327.0, 190.0, BENT.distortion)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    x=st.floats(0.0, 639.0),
+    y=st.floats(0.0, 399.0),
+    k1=st.floats(-0.28, 0.3),
+    p=st.floats(-0.003, 0.003),
+)
+def test_a_pixel_comes_back_through_its_ray(x: float, y: float, k1: float, p: float) -> None:
+    lens = Intrinsics(480.0, 482.0, 327.0, 190.0, (k1, 0.05, p, -p, 0.0))
+    found = project(rays([(x, y)], lens) * 2.5, lens)
+    assert found[0] == pytest.approx((x, y), abs=1e-4)
+
+
+def test_points_are_projected_as_opencv_does() -> None:
+    points = np.random.default_rng(0).uniform((-0.5, -0.3, 0.8), (0.5, 0.3, 2.0), (50, 3))
+    theirs, _ = cv2.projectPoints(
+        points, np.zeros(3), np.zeros(3), BENT.matrix, np.array(BENT.distortion)
+    )
+    assert np.allclose(project(points, BENT), theirs[:, 0], atol=1e-9)
+
+
+def test_what_is_behind_the_camera_has_no_pixel() -> None:
+    assert np.isnan(project([(0.1, 0.1, -1.0), (0.1, 0.1, 0.0)], BENT)).all()
+
+
+def test_straight_lines_are_straight_again() -> None:
+    line = np.stack((np.linspace(-0.5, 0.5, 9), np.full(9, 0.25), np.ones(9)), axis=1)
+    seen = project(line, BENT)
+    assert np.ptp(seen[:, 1]) > 3.0  # it was bent
+    assert np.ptp(undistorted(seen, BENT)[:, 1]) < 1e-4
+
+
+def test_no_points_are_no_rays() -> None:
+    assert rays(np.zeros((0, 2)), BENT).shape == (0, 3)
+
+
+@pytest.mark.parametrize("distortion", [(0.0,) * 4, (0.0, 0.0, 0.0, 0.0, float("nan"))])
+def test_distortion_that_is_none_is_refused(distortion: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match="five finite numbers"):
+        Intrinsics(1.0, 1.0, 0.0, 0.0, distortion)  # type: ignore[arg-type]
+
+
+def test_a_picture_of_half_the_size_shows_the_same_directions() -> None:
+    half = BENT.scaled(0.5, 0.5)
+    # The middle of a block of 2 x 2 pixels becomes the middle of one pixel.
+    assert rays([(100.0, 60.0)], half)[0] == pytest.approx(rays([(200.5, 120.5)], BENT)[0])
+
+
+def test_a_measured_lens_serves_every_picture_of_its_shape() -> None:
+    view = radians(69.0)
+    assert intrinsics_of_lens(LENS, view, 640, 400) == BENT
+    assert intrinsics_of_lens(LENS, view, 1280, 800) == BENT.scaled(2.0, 2.0)
+    assert intrinsics_of_lens(LENS, view, 640, 480) == intrinsics_of_view(view, 640, 480)
+    assert intrinsics_of_lens(None, view, 640, 400) == intrinsics_of_view(view, 640, 400)
+    assert not fits(LENS, 0, 0)
+
+
+def test_a_face_is_placed_through_the_lens_as_measured() -> None:
+    where = np.array([0.34, -0.16, 0.9])  # far out in the picture, where the lens bends most
+    frontal = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
+    landmarks = project(LANDMARKS_FACE_M @ frontal.T + where, BENT)
+    found = Detections(0.0, 1, 640, 400, (DetectedFace((0.0, 0.0, 9.0, 9.0), landmarks, 0.9),))
+    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), (-0.4, -0.4), (0.4, 0.4))
+    poses = PoseHistory(kinematics)
+    poses.remember(0.0, (0.0, 0.0, 0.0))
+    mount = CameraMount(CameraParams("base", (0.0, 0.0, 0.0)))
+    off = []
+    for lens in (LENS, None):
+        percept = Perception(mount, 67.4, Tracker(TrackParams()), lens=lens).see(found, poses)
+        assert percept is not None
+        x, y, z = percept.faces[0].p_world_m
+        off.append(np.linalg.norm(np.array((-y, -z, x)) - where))
+    assert off[0] < 0.02
+    assert off[1] > 2.0 * off[0]

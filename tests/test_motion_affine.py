@@ -1,0 +1,134 @@
+"""Slide, growth and spin of a moving patch, against known truth."""
+
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from drivers.motion_affine import affine_rest, flow_map, patch_motion
+from drivers.motion_detector import MotionDetector
+from drivers.motion_params import MotionParams
+from drivers.types import MovingBlob
+
+WIDTH, HEIGHT, FOCAL, DT_S = 320, 240, 233.0, 1 / 30
+LENS = SimpleNamespace(fx_px=FOCAL, fy_px=FOCAL, cx_px=(WIDTH - 1) / 2, cy_px=(HEIGHT - 1) / 2)
+
+
+def textured(seed: int, size: int) -> NDArray[np.float64]:
+    rng = np.random.default_rng(seed)
+    out = np.zeros((size, size))
+    for sigma in (1.2, 4.0, 12.0):
+        grain = cv2.GaussianBlur(rng.standard_normal((size, size)), (0, 0), sigma)
+        out += grain / grain.std()
+    return np.clip(128 + 50 * out / out.std(), 0, 255)
+
+
+GROUND, DISC = textured(1, 400)[:HEIGHT, :WIDTH], textured(2, 400)
+
+
+def seen(
+    radius: float, slide: tuple[float, float], spin: float, loom: float, count: int = 7
+) -> list[MovingBlob]:
+    """Move a textured disc over textured ground; give what was found of it, picture by picture.
+
+    slide px/s, spin rad/s clockwise, loom 1/s
+    """
+    rng = np.random.default_rng(4)
+    detector = MotionDetector(MotionParams())
+    cover = cv2.circle(np.zeros((400, 400)), (200, 200), round(radius), 1.0, -1)
+    out = []
+    for k in range(count):
+        t_s = (k - count / 2) * DT_S
+        growth, angle = np.exp(loom * t_s), spin * t_s
+        A = growth * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        centre = np.array([160.0, 120.0]) + np.array(slide) * t_s
+        H = np.column_stack((A, centre - A @ (200.0, 200.0)))
+        mask = cv2.warpAffine(cover, H, (WIDTH, HEIGHT))
+        picture = GROUND * (1 - mask) + cv2.warpAffine(DISC, H, (WIDTH, HEIGHT)) * mask
+        picture += rng.normal(0, 2, picture.shape)
+        grey = np.clip(picture, 0, 255).astype(np.uint8)
+        out += detector.find(grey, k * DT_S, LENS, np.eye(3))[:1]
+    assert len(out) >= count - 3
+    return out
+
+
+@pytest.mark.parametrize("radius", [60, 20])
+@pytest.mark.parametrize("slide", [(60.0, 0.0), (120.0, -40.0), (-200.0, 30.0)])
+def test_slide_within_5_per_cent(radius: float, slide: tuple[float, float]) -> None:
+    blobs = seen(radius, slide, 0.0, 0.0)
+    speed = np.hypot(*slide)
+    for blob in blobs:
+        assert np.hypot(*np.subtract(blob.flow_px_s, slide)) < 0.05 * speed
+        assert abs(blob.spin_rad_s) < 0.15 and abs(blob.loom_1_s) < 0.15
+        assert blob.v_camera_m_s is not None
+        z = blob.p_camera_m[2]
+        assert blob.v_camera_m_s[:2] == pytest.approx(
+            np.array(slide) * z / FOCAL, abs=0.06 * z * speed / FOCAL
+        )
+
+
+@pytest.mark.parametrize("radius", [60, 40, 20])
+@pytest.mark.parametrize("spin", [2.0, -5.0, 10.0])
+def test_spin_within_10_per_cent(radius: float, spin: float) -> None:
+    blobs = seen(radius, (0.0, 0.0), spin, 0.0)
+    assert np.median([blob.spin_rad_s for blob in blobs]) == pytest.approx(spin, rel=0.1)
+    assert abs(np.median([blob.loom_1_s for blob in blobs])) < 0.2
+
+
+@pytest.mark.parametrize("radius", [60, 40])
+@pytest.mark.parametrize("loom", [0.5, 1.5, -1.0, 3.0])
+def test_loom_within_10_per_cent(radius: float, loom: float) -> None:
+    blobs = seen(radius, (0.0, 0.0), 0.0, loom)
+    assert np.median([blob.loom_1_s for blob in blobs]) == pytest.approx(loom, rel=0.1)
+    speeds = [blob.v_camera_m_s[2] for blob in blobs if blob.v_camera_m_s is not None]
+    assert np.median(speeds) == pytest.approx(-2.0 * loom, rel=0.1)  # nearer: z shrinks
+
+
+def test_all_three_at_once() -> None:
+    blobs = seen(40, (60.0, 20.0), 3.0, 1.0)
+    assert np.median([b.spin_rad_s for b in blobs]) == pytest.approx(3.0, rel=0.1)
+    assert np.median([b.loom_1_s for b in blobs]) == pytest.approx(1.0, rel=0.1)
+    flow = np.median([b.flow_px_s for b in blobs], axis=0)
+    assert flow == pytest.approx((60.0, 20.0), abs=0.05 * 63.0)
+
+
+@given(
+    spin=st.floats(-1.0, 1.0),
+    growth=st.floats(-0.5, 0.5),
+    slide=st.tuples(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0)),
+    outliers=st.integers(0, 30),
+)
+def test_a_map_is_taken_apart_again(
+    spin: float, growth: float, slide: tuple[float, float], outliers: int
+) -> None:
+    rng = np.random.default_rng(0)
+    places = rng.uniform(0.0, 60.0, (200, 2))
+    centre = np.array([30.0, 30.0])
+    c, s = np.cos(spin), np.sin(spin)
+    forward = np.exp(growth) * np.array([[c, -s], [s, c]])
+    before = (places - centre - slide) @ np.linalg.inv(forward).T + centre
+    flow = places - before
+    flow[:outliers] += 5.0
+    motion = patch_motion(*flow_map(places, flow, centre, 200.0))
+    assert motion.spin_rad == pytest.approx(spin, abs=0.02)
+    assert motion.growth == pytest.approx(growth, abs=0.02)
+
+
+def test_points_in_a_row_tell_a_slide_only() -> None:
+    places = np.column_stack((np.arange(20.0), np.zeros(20)))
+    back, rest = flow_map(places, np.tile((2.0, 1.0), (20, 1)), places.mean(axis=0), 20.0)
+    motion = patch_motion(back, rest)
+    assert motion.slide_px == pytest.approx((2.0, 1.0), abs=0.01)
+    assert motion.spin_rad == 0.0 and motion.growth == 0.0 and motion.spin_sd == np.inf
+
+
+def test_what_one_map_explains_leaves_nothing() -> None:
+    places = np.random.default_rng(1).uniform(0.0, 60.0, (100, 2))
+    flow = places @ np.array([[0.1, -0.2], [0.2, 0.1]]) + 3.0
+    assert affine_rest(places, flow) < 1e-9
+    flow[:50] += 4.0
+    assert affine_rest(places, flow) > 1.0

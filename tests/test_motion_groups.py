@@ -1,0 +1,116 @@
+"""Moving pixels to things, and things to numbers that last."""
+
+import numpy as np
+import pytest
+
+from drivers.motion_groups import gathered
+from drivers.motion_params import MotionParams
+from drivers.motion_things import Things
+from drivers.motion_tracks import Follow, MotionTracks
+
+SHAPE = (240, 320)
+Box = tuple[int, int, int, int]
+
+
+def things(*boxes: tuple[Box, tuple[float, float]]) -> Things:
+    """Make boxes (x, y, width, height) that move as one each."""
+    flow = np.zeros((*SHAPE, 2), dtype=np.float32)
+    mask = np.zeros(SHAPE, dtype=np.bool_)
+    for (x, y, width, height), motion in boxes:
+        flow[y : y + height, x : x + width] = motion
+        mask[y : y + height, x : x + width] = True
+    return Things(flow, mask, 0.25)
+
+
+def boxes(given: Things, **changed: float) -> list[Box]:
+    return [group.box for group in gathered(given, MotionParams(**changed))]  # type: ignore[arg-type]
+
+
+def test_apart_is_two_and_near_is_one() -> None:
+    far = things(((10, 10, 30, 40), (2, 0)), ((80, 10, 20, 40), (2, 0)))
+    assert boxes(far) == [(10, 10, 30, 40), (80, 10, 20, 40)]
+    near = things(((10, 10, 30, 40), (2, 0)), ((43, 10, 20, 40), (2, 0)))
+    assert boxes(near) == [(10, 10, 53, 40)]
+
+
+def test_people_who_pass_are_two_and_who_walk_together_are_one() -> None:
+    passing = things(((50, 50, 30, 60), (3, 0)), ((80, 50, 30, 60), (-3, 0)))
+    assert sorted(boxes(passing)) == [(50, 50, 30, 60), (80, 50, 30, 60)]
+    together = things(((50, 50, 30, 60), (3, 0)), ((80, 50, 30, 60), (2.5, 0.3)))
+    assert boxes(together) == [(50, 50, 60, 60)]
+
+
+def test_three_in_a_row_part_too() -> None:
+    row = things(
+        ((50, 50, 30, 60), (3, 0)), ((80, 50, 30, 60), (-3, 0)), ((110, 50, 30, 60), (0, 4))
+    )
+    assert len(boxes(row)) == 3
+
+
+def test_what_turns_or_grows_is_one() -> None:
+    given = things(((50, 50, 80, 80), (1, 0)))
+    y, x = np.mgrid[0:240, 0:320] - 90.0
+    for flow in (np.dstack((-0.2 * y, 0.2 * x)), np.dstack((0.2 * x, 0.2 * y))):
+        one = given._replace(flow=flow.astype(np.float32))
+        assert boxes(one) == [(50, 50, 80, 80)]
+
+
+def test_specks_are_nothing_and_the_largest_come_first() -> None:
+    given = things(*(((10 + 40 * k, 10, 5 + 3 * k, 10 + 3 * k), (2, 0)) for k in range(7)))
+    found = boxes(given, max_blobs=4)
+    assert [box[0] for box in found] == [250, 210, 170, 130]
+    assert boxes(things(((10, 10, 6, 6), (2, 0)))) == []
+    assert boxes(things(((10, 10, 6, 6), (2, 0))), min_area_share=0.0003) == [(10, 10, 6, 6)]
+
+
+def test_nothing_is_nothing() -> None:
+    assert boxes(things()) == []
+
+
+def follow(
+    tracks: MotionTracks, k: int, *places: tuple[float, float], v: tuple[float, float] = (0, 0)
+) -> list[Follow]:
+    return tracks.step(
+        [np.array(place, dtype=float) for place in places],
+        [np.array(v, dtype=float)] * len(places),
+        [30.0] * len(places),
+        np.eye(3),
+        k * 0.1,
+        0.1,
+    )
+
+
+def test_who_keeps_moving_keeps_the_number_and_two_are_not_mixed_up() -> None:
+    tracks = MotionTracks(MotionParams())
+    first = [f.id for f in follow(tracks, 0, (50, 50), (200, 50), v=(100, 0))]
+    for k in range(1, 6):
+        found = follow(tracks, k, (200 + 10 * k, 50), (50 + 10 * k, 50), v=(100, 0))
+        assert [f.id for f in found] == first[::-1]
+        assert all(tracks.told(f) for f in found)
+
+
+def test_first_sight_is_not_told_yet_and_a_flicker_never() -> None:
+    tracks = MotionTracks(MotionParams(confirm_pictures=3))
+    for k in range(6):
+        found = follow(tracks, k, (50, 50), *(((200, 50),) if k % 2 == 0 else ()))
+        assert tracks.told(found[0]) == (k >= 2)
+        assert not any(tracks.told(f) for f in found[1:])
+
+
+@pytest.mark.parametrize(("gap", "same"), [(4, True), (8, False)])
+def test_who_pauses_is_remembered_for_a_while(gap: int, same: bool) -> None:
+    tracks = MotionTracks(MotionParams(forget_ms=500.0))
+    (one,) = follow(tracks, 0, (50, 50))
+    for k in range(1, gap):
+        assert follow(tracks, k) == []
+    (other,) = follow(tracks, gap, (52, 50))
+    assert (one.id == other.id) == same
+
+
+def test_the_camera_s_turn_moves_what_is_expected() -> None:
+    tracks = MotionTracks(MotionParams())
+    (one,) = follow(tracks, 0, (50, 50))
+    H = np.array([[1.0, 0.0, 120.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    tracks.pass_over(H, 0.1, 0.1)
+    (other,) = follow(tracks, 2, (170, 50))
+    assert one.id == other.id

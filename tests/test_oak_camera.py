@@ -1,0 +1,253 @@
+"""The OAK source over depthai's own host-only pipeline: the code and messages of the device."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from datetime import timedelta
+
+import cv2
+import numpy as np
+import pytest
+
+from drivers.errors import CameraError
+from drivers.oak_camera import OakSource
+from drivers.oak_nodes import Outputs, device_nodes, read_archive
+from drivers.oak_params import OakParams
+from drivers.oak_sdk import load_depthai
+
+GO_ON = threading.Event()
+PARAMS = OakParams(width_px=320, height_px=240, rate_hz=60.0, silence_ms=3000.0)
+LENGTH = 30
+# Eyes, nose, corners of the mouth, in shares of the picture.
+POINTS = ((0.45, 0.4), (0.55, 0.4), (0.5, 0.5), (0.46, 0.6), (0.54, 0.6))
+
+
+@pytest.fixture(scope="module")
+def dai():
+    return load_depthai()
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    path = tmp_path_factory.mktemp("oak") / "film.mp4"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 60.0, (320, 240))
+    for k in range(LENGTH):
+        writer.write(np.full((240, 320, 3), 8 * k, np.uint8))
+    writer.release()
+    return path
+
+
+def host_nodes(film, loop=True, depth=True, faces=False, lens=None, device_clock=None):
+    """Make what stands for device_nodes: a replayed film and nodes that answer each picture."""
+
+    def nodes(dai, pipeline, params) -> Outputs:
+        class Answer(dai.node.ThreadedHostNode):
+            """Sends what ``make`` makes of every picture."""
+
+            def __init__(self) -> None:
+                super().__init__()
+                self.input = self.createInput()
+                self.out = self.createOutput()
+                self.make = None
+
+            def run(self) -> None:
+                while self.isRunning():
+                    self.out.send(self.make(self.input.get()))
+
+        def answer(make, source):
+            node = pipeline.create(Answer)
+            node.make = make
+            source.link(node.input)
+            return node.out
+
+        def stamped(message, frame):
+            message.setTimestamp(frame.getTimestamp())
+            message.setTimestampDevice(frame.getTimestampDevice())
+            message.setSequenceNum(frame.getSequenceNum())
+            return message
+
+        def looked_through(frame):
+            if lens is not None:
+                transformation = frame.getTransformation()
+                transformation.setIntrinsicMatrix(lens)
+                frame.setTransformation(transformation)
+            if device_clock is not None:
+                frame.setTimestampDevice(device_clock(frame.getTimestampDevice()))
+            return frame
+
+        def depth_mm(frame):
+            mm = np.zeros((120, 160), np.uint16)  # half the size, as a camera may give it
+            mm[:, 80:] = 1000 + frame.getSequenceNum()
+            found = dai.ImgFrame()
+            found.setType(dai.ImgFrame.Type.RAW16)
+            found.setWidth(160)
+            found.setHeight(120)
+            found.setData(mm.view(np.uint8).ravel())
+            return stamped(found, frame)
+
+        def found_faces(frame):
+            detections = []
+            for scale, confidence, points in ((0.1, 0.99, POINTS), (0.3, 0.8, POINTS)):
+                box = dai.RotatedRect(dai.Point2f(0.5, 0.5), dai.Size2f(scale, scale), 0.0)
+                face = dai.ImgDetection(box, confidence, 0)
+                face.setKeypoints([dai.Keypoint(x, y, 0.0) for x, y in points])
+                detections.append(face)
+            box = dai.RotatedRect(dai.Point2f(0.2, 0.2), dai.Size2f(0.1, 0.1), 0.0)
+            detections.append(dai.ImgDetection(box, 0.95, 0))  # without landmarks
+            detections.append(dai.ImgDetection(box, 0.1, 0))  # unsure
+            message = dai.ImgDetections()
+            message.detections = detections
+            message.setTransformation(frame.getTransformation())
+            return stamped(message, frame)
+
+        replay = pipeline.create(dai.node.ReplayVideo)
+        replay.setReplayVideoFile(film)
+        replay.setOutFrameType(dai.ImgFrame.Type.NV12)
+        replay.setFps(params.rate_hz)
+        replay.setLoop(loop)
+        colour = answer(looked_through, replay.out)
+        return Outputs(
+            colour,
+            answer(depth_mm, colour) if depth else None,
+            answer(found_faces, colour) if faces else None,
+        )
+
+    return nodes
+
+
+def opened(nodes, params=PARAMS) -> OakSource:
+    source = OakSource(params, nodes, on_device=False)
+    source.open()
+    return source
+
+
+def take(source, count):
+    shots = [source.take(time.monotonic, GO_ON) for _ in range(count)]
+    source.close()
+    return shots
+
+
+def test_colour_depth_and_times_of_one_instant(film):
+    shots = take(opened(host_nodes(film)), 12)
+    assert [shot.number for shot in shots] == list(range(1, 13))
+    for shot in shots:
+        assert shot.picture.shape == (240, 320, 3)
+        assert not shot.picture.flags.writeable
+        assert shot.depth_m.shape == (240, 320) and shot.depth_m.dtype == np.float32
+        assert np.isnan(shot.depth_m[:, :160]).all()
+        # Depth and picture are of the same instant: both carry the film's number.
+        number = round(float(shot.depth_m[0, 319]) * 1000.0) - 1000
+        shade = round(float(shot.picture.mean()) / 8.0)
+        assert abs(shade - number % LENGTH) <= 1
+        assert shot.lens is None and shot.faces is None
+
+
+def test_times_are_of_the_hosts_clock_and_rise(film):
+    before_s = time.monotonic()
+    shots = take(opened(host_nodes(film)), 8)
+    times = [shot.captured_s for shot in shots]
+    assert before_s - 0.5 < times[0] and times[-1] <= time.monotonic()
+    assert all(later > earlier for earlier, later in zip(times, times[1:], strict=False))
+
+
+def test_device_clock_is_translated_whatever_it_shows(film):
+    def ahead(stamp):
+        return stamp + timedelta(hours=7)
+
+    before_s = time.monotonic()
+    shots = take(opened(host_nodes(film, depth=False, device_clock=ahead)), 8)
+    assert all(before_s - 0.5 < shot.captured_s <= time.monotonic() for shot in shots)
+
+
+def test_lens_that_the_camera_knows_comes_along(film):
+    matrix = [[300.0, 0.0, 159.5], [0.0, 301.0, 119.5], [0.0, 0.0, 1.0]]
+    (shot,) = take(opened(host_nodes(film, depth=False, lens=matrix)), 1)
+    assert shot.lens == pytest.approx((300.0, 301.0, 159.5, 119.5))
+    assert shot.depth_m is None
+
+
+def test_faces_found_on_the_camera_come_in_pixels_the_largest_first(film):
+    (shot,) = take(opened(host_nodes(film, depth=False, faces=True)), 1)
+    big, small = shot.faces
+    assert big.confidence == pytest.approx(0.8) and small.confidence == pytest.approx(0.99)
+    assert big.box_px == pytest.approx((111.5, 83.5, 96.0, 72.0), abs=0.01)
+    expected = np.array(POINTS) * (320.0, 240.0) - 0.5
+    assert big.landmarks_px == pytest.approx(expected, abs=0.01)
+
+
+def test_stream_that_ends_is_a_lost_camera(film):
+    source = opened(host_nodes(film, loop=False))
+    with pytest.raises(CameraError, match="OAK camera was lost .*: check its cable"):
+        for _ in range(2 * LENGTH):
+            source.take(time.monotonic, GO_ON)
+    source.close()
+    source.open()
+    assert source.take(time.monotonic, GO_ON).number == 1
+    source.close()
+
+
+def test_camera_without_pictures_counts_as_lost(film):
+    def silent(dai, pipeline, params) -> Outputs:
+        class Nothing(dai.node.ThreadedHostNode):
+            def __init__(self) -> None:
+                super().__init__()
+                self.out = self.createOutput()
+                self.input = self.createInput()
+
+            def run(self) -> None:
+                return None
+
+        return Outputs(pipeline.create(Nothing).out)
+
+    source = opened(silent, OakParams(silence_ms=150.0))
+    with pytest.raises(CameraError, match="no picture for 0.15 s"):
+        source.take(time.monotonic, GO_ON)
+    stop = threading.Event()
+    stop.set()
+    assert source.take(time.monotonic, stop) is None
+    source.close()
+
+
+def test_closed_source_says_so_and_closes_twice(film):
+    source = opened(host_nodes(film))
+    source.close()
+    source.close()
+    with pytest.raises(CameraError, match="not open"):
+        source.take(time.monotonic, GO_ON)
+
+
+def test_nodes_of_the_device_need_one(dai):
+    source = OakSource(PARAMS, device_nodes, on_device=False)
+    with pytest.raises(CameraError, match="cannot be started .*host only"):
+        source.open()
+
+
+def test_face_model_must_be_an_archive(dai, tmp_path):
+    with pytest.raises(CameraError, match=r"no face model at .*nope\.tar\.xz"):
+        read_archive(dai, str(tmp_path / "nope.tar.xz"))
+    bad = tmp_path / "bad.tar.xz"
+    bad.write_text("this is no archive")
+    with pytest.raises(CameraError, match="is no NNArchive"):
+        read_archive(dai, str(bad))
+
+
+def test_depthai_is_loaded_without_telemetry_and_without_a_word():
+    code = (
+        "import sys, drivers.oak_camera\n"
+        "assert 'depthai' not in sys.modules\n"
+        "from drivers.oak_sdk import load_depthai; load_depthai()\n"
+        "import os; assert os.environ['DEPTHAI_TELEMETRY'] == '0'"
+    )
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("DEPTHAI")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+
+
+def test_depthai_that_is_not_there_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "depthai", None)
+    with pytest.raises(CameraError, match="pip install 'depthai"):
+        load_depthai()

@@ -1,0 +1,257 @@
+"""From detections to a percept: distances, whose motion is whose, what the head's turn leaves."""
+
+from dataclasses import replace
+from math import radians
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from drivers.types import DetectedFace, Detections, MovingBlob
+from gaze.angles import rotation
+from gaze.types import Angles3, Mat3, Percept, Vec3
+from robot.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
+from robot.frames import CameraMount, CameraParams, PoseHistory
+from robot.head_turn_residual import HeadTurnResidual, Seen, turning_rad_s
+from robot.intrinsics import intrinsics_of_view, project
+from robot.perception import Perception
+from robot.sightings import Box, Reading
+from robot.tracks import Tracker, TrackParams
+
+WIDTH, HEIGHT = 640, 400
+LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)
+# A face that looks into the camera: its axes in the camera frame.
+FRONTAL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
+STILL = CameraMount(CameraParams(mount="base", position_mm=(0.0, 0.0, 0.0)))
+
+
+class Neck:
+    """A head that turns about the origin."""
+
+    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
+        return rotation(head_rad), (0.0, 0.0, 0.0)
+
+    def facing(self, p_world_m: Vec3) -> tuple[float, float]:
+        raise NotImplementedError
+
+    def eyes_on(self, p: Vec3, R: Mat3, p_head: Vec3) -> tuple[Any, Any]:
+        raise NotImplementedError
+
+
+def standing() -> PoseHistory:
+    poses = PoseHistory(Neck())
+    poses.remember(0.0, (0.0, 0.0, 0.0))
+    return poses
+
+
+def face_at(p_camera_m: Vec3, size: float = 1.0) -> DetectedFace:
+    points = project(size * LANDMARKS_FACE_M @ FRONTAL.T + p_camera_m, LENS)
+    (x, y), (right, bottom) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return DetectedFace((x, y, right - x, bottom - y), points, 0.9)
+
+
+def picture(number: int, **found: Any) -> Detections:
+    return Detections(number / 30, number, WIDTH, HEIGHT, **found)
+
+
+def seen(perception: Perception, number: int, **found: Any) -> Percept:
+    percept = perception.see(picture(number, **found), standing())
+    assert percept is not None
+    return percept
+
+
+def middle_of(depth_m: NDArray[Any], box: Box) -> Reading:
+    x, y, width, height = (round(v) for v in box)
+    part = depth_m[y : y + height, x : x + width]
+    known = part[np.isfinite(part)]
+    if known.size == 0:
+        return None, 0.0, 0.0
+    return float(np.median(known)), float(known.std()), known.size / part.size
+
+
+def depth_of(face_m: float, wall_m: float = 3.0) -> NDArray[np.float32]:
+    """Give a wall and before it, in the middle, a face's surface 2.5 cm behind its nose."""
+    depth = np.full((HEIGHT, WIDTH), wall_m, np.float32)
+    depth[140:260, 260:380] = face_m + 0.0248
+    return depth
+
+
+def test_a_face_is_as_far_as_the_camera_measures_and_says_so() -> None:
+    """A child's face of 0.8 at 0.8 m has the picture of an adult's at 1 m."""
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()), depth_at=middle_of)
+    child = face_at((0.0, 0.0, 0.8), size=0.8)
+    (face,) = seen(perception, 1, faces=(child,), depth_m=depth_of(0.8)).faces
+    assert face.distance_from == "camera"
+    assert face.p_world_m == pytest.approx((0.8, 0.0, 0.0), abs=0.01)
+    assert face.across_sd_m < 0.005 and 0.0 < face.along_sd_m < 0.02
+    # Its parts are where a face of that size has them.
+    left_eye = np.subtract(face.parts_world_m[2], face.p_world_m)
+    assert left_eye[1] == pytest.approx(-0.8 * PARTS_FACE_M["LE"][1], abs=0.002)
+
+
+def test_without_depth_its_size_tells_and_the_doubt_is_shown() -> None:
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()), depth_at=middle_of)
+    (face,) = seen(perception, 1, faces=(face_at((0.0, 0.0, 1.0)),)).faces
+    assert face.distance_from == "face size"
+    assert face.p_world_m[0] == pytest.approx(1.0, abs=0.02)
+    assert face.along_sd_m > 0.05 > 0.01 > face.across_sd_m
+
+
+@pytest.mark.parametrize(
+    "depth_m",
+    [
+        np.full((HEIGHT, WIDTH), np.nan, np.float32),
+        np.zeros((HEIGHT, WIDTH), np.float32),
+        np.full((HEIGHT, WIDTH), 9.0, np.float32),
+        np.where(np.arange(WIDTH) % 2, np.float32(0.4), np.float32(2.0)) * np.ones((HEIGHT, 1)),
+    ],
+    ids=["holes", "zeros", "something far behind", "two surfaces"],
+)
+def test_depth_that_is_not_the_faces_is_not_taken(depth_m: NDArray[Any]) -> None:
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()), depth_at=middle_of)
+    found = seen(perception, 1, faces=(face_at((0.0, 0.0, 1.0)),), depth_m=depth_m)
+    assert found.faces[0].distance_from == "face size"
+    assert found.faces[0].p_world_m[0] == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_hole_of_a_second_does_not_move_the_child() -> None:
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()), depth_at=middle_of)
+    child = face_at((0.0, 0.0, 0.8), size=0.8)
+    for number in range(1, 60):
+        depth = depth_of(0.8) if number < 30 else None
+        (face,) = seen(perception, number, faces=(child,), depth_m=depth).faces
+    assert face.distance_from == "face size"
+    assert face.p_world_m[0] == pytest.approx(0.8, abs=0.01)
+
+
+def test_bodies_carry_the_covariance_of_place_and_velocity() -> None:
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()))
+    blob = MovingBlob(1, "hand", (0.3, 0.0, 0.8), 0.05)
+    bodies = seen(perception, 1, faces=(face_at((0.0, 0.0, 1.0)),), blobs=(blob,)).bodies
+    assert bodies.pv_cov is not None and bodies.pv_cov.shape == (2, 6, 6)
+    face = bodies.pv_cov[0]
+    assert face[0, 0] > 100.0 * face[1, 1] > 0.0  # along the view and across it
+    assert seen(perception, 2).bodies.pv_cov is not None
+
+
+def blob_at(p: Vec3, v: Vec3, known: bool = True, **more: Any) -> MovingBlob:
+    made = MovingBlob(
+        1, "thing", p, 0.2, v_camera_m_s=v, depth_known=known, depth_sd_m=0.05 if known else 1.0
+    )
+    return replace(made, box_px=(0.0, 0.0, 10.0, 10.0), **more)
+
+
+def walking(blob: MovingBlob, v_m_s: float = 0.5) -> Percept:
+    """Give what is seen of a face that has been walking to the right for a second."""
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()))
+    for number in range(1, 31):
+        x = -0.25 + v_m_s * number / 30
+        blobs = (blob,) if number == 30 else ()
+        percept = seen(perception, number, faces=(face_at((x, 0.0, 1.5)),), blobs=blobs)
+    return percept
+
+
+@pytest.mark.parametrize(
+    ("blob", "own"),
+    [
+        (blob_at((0.25, 0.5, 1.5), (0.5, 0.0, 0.0)), True),
+        (blob_at((0.33, 0.67, 2.0), (0.67, 0.0, 0.0), known=False), True),
+        (blob_at((0.26, 0.02, 1.5), (-0.4, 0.4, 0.0)), True),
+        (blob_at((0.25, 0.3, 1.5), (-0.8, 0.6, 0.0)), False),
+        (blob_at((0.25, 0.8, 2.4), (0.5, 0.0, 0.0)), False),
+        (blob_at((0.95, 0.5, 1.5), (0.5, 0.0, 0.0)), False),
+        (blob_at((0.25, -0.5, 1.5), (0.5, 0.0, 0.0)), False),
+        (replace(blob_at((0.25, 0.5, 1.5), (0.5, 0.0, 0.0)), kind="hand"), False),
+    ],
+    ids=["trunk", "trunk, distance unknown", "on the head", "waving arm", "far behind", "beside",
+         "above", "a hand that is known as one"],
+)  # fmt: skip
+def test_a_persons_own_motion_is_no_second_body(blob: MovingBlob, own: bool) -> None:
+    percept = walking(blob)
+    assert len(percept.faces) == 1
+    assert ("face", blob.kind)[: 1 if own else 2] == percept.bodies.kinds
+
+
+def test_a_head_that_rolls_spins_as_a_body() -> None:
+    """Clockwise in the picture is about the line of view, away from the camera."""
+    percept = walking(blob_at((0.26, 0.02, 1.5), (0.0, 0.0, 0.0), spin_rad_s=2.0))
+    w = percept.bodies.w_world_rad_s[0]
+    assert np.linalg.norm(w) == pytest.approx(2.0) and w[0] > 1.9
+
+
+def test_velocity_from_flow_is_there_with_the_first_picture() -> None:
+    percept = walking(blob_at((0.9, 0.0, 2.0), (0.0, 0.0, -1.5), loom_sd_1_s=0.05))
+    assert percept.bodies.v_world_m_s[1] == pytest.approx((-1.5, 0.0, 0.0), abs=0.2)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_what_is_no_number_is_not_taken_in(bad: float) -> None:
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()))
+    blobs = (
+        MovingBlob(1, "thing", (bad, 0.0, 1.0), 0.1),
+        MovingBlob(2, "thing", (0.0, 0.0, 1.0), bad),
+        blob_at((0.5, 0.0, 1.0), (bad, 0.0, 0.0), loom_sd_1_s=bad),
+        replace(blob_at((-0.5, 0.0, 1.0), (0.1, 0.0, 0.0)), spin_rad_s=bad, depth_sd_m=bad),
+    )
+    wrong = replace(face_at((0.0, 0.0, 1.0)), landmarks_px=np.full((5, 2), bad))
+    bodies = seen(perception, 1, faces=(wrong,), blobs=blobs).bodies
+    assert bodies.kinds == ("thing", "thing")
+    assert bodies.pv_cov is not None
+    for values in (bodies.p_world_m, bodies.v_world_m_s, bodies.w_world_rad_s, bodies.pv_cov):
+        assert np.isfinite(values).all()
+
+
+def turning_head(late_s: float, moves: bool = False) -> HeadTurnResidual:
+    """Let a head turn there and back before something still, with pictures that lie in time."""
+    residual = HeadTurnResidual()
+    rng = np.random.default_rng(0)
+
+    def yaw(t_s: float) -> float:
+        return 0.4 * np.sin(2.0 * t_s) ** 3
+
+    for k in range(150):
+        t = k / 30
+        turn = turning_rad_s(
+            rotation((yaw(t - 0.015), 0, 0)), rotation((yaw(t + 0.015), 0, 0)), 0.03
+        )
+        # Placed by the pose at t though it was taken earlier.
+        off = yaw(t) - yaw(t - late_s) + rng.normal(0.0, 2e-4) + (0.5 * t if moves else 0.0)
+        place = (2.0 * np.cos(off), 2.0 * np.sin(off), 0.1)
+        residual.step(t, turn, (0.0, 0.0, 0.0), [Seen(7, place, 0.0)])
+    return residual
+
+
+@pytest.mark.parametrize("late_s", [-0.02, 0.0, 0.015, 0.06])
+def test_the_residual_tells_by_how_much_times_are_wrong(late_s: float) -> None:
+    figures = turning_head(late_s).figures()
+    assert figures.late_ms == pytest.approx(1e3 * late_s, abs=2.0)
+    assert figures.samples > 20 and figures.speed_deg_s is not None
+    if late_s == 0.0:
+        assert figures.speed_deg_s < 1.0
+    if late_s == 0.06:
+        assert figures.speed_deg_s > 3.0
+
+
+def test_what_moves_itself_is_not_taken_for_a_wrong_time() -> None:
+    assert turning_head(0.0, moves=True).figures() == (None, None, 0)
+    assert Perception(STILL, 69.0, Tracker(TrackParams())).residual() == (None, None, 0)
+
+
+def test_perception_tells_its_residual() -> None:
+    """A head that turns before a still face, with times that are right."""
+    mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
+    perception, poses = Perception(mount, 69.0, Tracker(TrackParams())), PoseHistory(Neck())
+    taken = []
+    for tick in range(800):
+        t = tick / 200
+        yaw = 0.25 * np.sin(3.0 * t) ** 3
+        poses.remember(t, (yaw, 0.0, 0.0))
+        if tick % 7 == 0:
+            c, s = np.cos(-yaw), np.sin(-yaw)
+            taken.append(Detections(t, len(taken) + 1, WIDTH, HEIGHT, (face_at((-s, 0.0, c)),)))
+        if taken and t - taken[-1].captured_s > 0.025:
+            perception.see(taken[-1], poses)
+    figures = perception.residual()
+    assert figures.samples > 10 and figures.late_ms is not None and figures.speed_deg_s is not None
+    assert abs(figures.late_ms) < 1.0 and figures.speed_deg_s < 0.5

@@ -1,0 +1,337 @@
+"""The camera that draws: true geometry, faces that the real detector finds, and honest times."""
+
+from collections.abc import Callable
+from math import radians
+
+import numpy as np
+import pytest
+
+from drivers.face_mtcnn import MtcnnDetector
+from drivers.face_params import FaceDetectorParams
+from drivers.types import DetectedFace, Picture
+from gaze.angles import angle_between, rotation, sub
+from gaze.types import Angles3, Mat3, Vec3
+from robot.face_pose import LANDMARKS_FACE_M, face_pose
+from robot.frames import CameraMount, CameraParams, PoseHistory
+from robot.intrinsics import intrinsics_of_view, project
+from robot.perception import Perception
+from robot.tracks import Tracker, TrackParams
+from sim_mock.drawn_person import LOOKS, draw_body, draw_head, draw_person, draw_thing
+from sim_mock.drawn_picture import Picture3d, Sheet
+from sim_mock.drawn_room import draw_room
+from sim_mock.pixel_camera import Exposure, PixelCamera, PixelCameraParams, draw_scene, smeared
+from sim_mock.scene import Event, Person, Thing
+
+WIDTH, HEIGHT = 640, 400
+LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)
+MOUNT = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
+AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def mtcnn() -> MtcnnDetector:
+    return MtcnnDetector(FaceDetectorParams())
+
+
+class Nobody:
+    """A detector that finds nothing."""
+
+    def find(self, picture: Picture) -> tuple[DetectedFace, ...]:
+        return ()
+
+
+class Still:
+    """A scene in which nothing moves but by a given function of the time."""
+
+    name = "still"
+    round_s = 10.0
+    behaviours = ()
+
+    def __init__(
+        self, *people: Vec3, things: tuple[Thing, ...] = (), v: Vec3 = (0.0, 0.0, 0.0)
+    ) -> None:
+        self._people, self._things, self._v = people, things, v
+
+    def people(self, t_s: float) -> tuple[Person, ...]:
+        places = [tuple(a + t_s * b for a, b in zip(p, self._v, strict=True)) for p in self._people]
+        return tuple(
+            Person(p, (float(np.arctan2(-p[1], -p[0])), 0.0), None)  # type: ignore[arg-type]
+            for p in places
+        )
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        return self._things
+
+    def behaviour(self, t_s: float) -> str | None:
+        return None
+
+    def events(self) -> tuple[Event, ...]:
+        return ()
+
+
+def canvas_at(head_rad: Angles3 = (0.0, 0.0, 0.0), p_m: Vec3 = (0.0, 0.0, 0.0)) -> Picture3d:
+    R, p = MOUNT.pose(rotation(head_rad), p_m)
+    return Picture3d(WIDTH, HEIGHT, LENS, R, p)
+
+
+def level(_: float) -> tuple[Mat3, Vec3]:
+    return AHEAD, (0.0, 0.0, 0.0)
+
+
+def camera(
+    scene: Still,
+    detector: MtcnnDetector | Nobody,
+    head: Callable[[float], tuple[Mat3, Vec3]] = level,
+    seed: int = 0,
+    **params: float,
+) -> PixelCamera:
+    rng = np.random.default_rng(seed)
+    return PixelCamera(PixelCameraParams(**params), scene, MOUNT, head, detector, rng)
+
+
+@pytest.mark.parametrize("yaw_deg", [-40.0, 0.0, 25.0])
+def test_a_point_of_the_world_is_drawn_where_a_camera_sees_it(yaw_deg: float) -> None:
+    canvas = canvas_at((radians(yaw_deg), radians(5.0), radians(-8.0)), (0.1, -0.2, 0.3))
+    c, s = np.cos(radians(yaw_deg)), np.sin(radians(yaw_deg))
+    middle = np.array((0.1 + 2.0 * c, -0.2 + 2.0 * s, 0.4))
+    red = np.zeros((9, 9, 3), np.uint8)
+    red[:] = (0, 0, 255)
+    right, down = np.array((s, -c, 0.0)) * 0.2, np.array((0.0, 0.0, -0.2))
+    corner = middle - 0.5 * (right + down)
+    canvas.sheet(Sheet(tuple(corner), tuple(right), tuple(down), red))  # type: ignore[arg-type]
+    y, x = np.nonzero(canvas.picture[:, :, 2] > 127)
+    expected = project(canvas.seen(middle), LENS)[0]
+    assert (x.mean(), y.mean()) == pytest.approx(tuple(expected), abs=0.6)
+    seen_m = canvas.depth_m[round(expected[1]), round(expected[0])]
+    assert seen_m == pytest.approx(canvas.seen(middle)[0, 2], abs=0.01)
+    assert np.isinf(canvas.depth_m[0, 0])
+
+
+@pytest.mark.parametrize("yaw_deg", [0.0, 60.0, 120.0, 180.0, -75.0])
+def test_the_room_fills_every_picture_and_has_something_on_its_walls(yaw_deg: float) -> None:
+    canvas = canvas_at((radians(yaw_deg), radians(20.0), 0.0))
+    draw_room(canvas)
+    assert np.isfinite(canvas.depth_m).all() and canvas.depth_m.min() > 0.5
+    assert canvas.depth_m.max() < 8.0
+    assert canvas.picture.std() > 10.0 and (canvas.picture.max(axis=2) > 0).all()
+
+
+def test_the_room_stays_where_it_is_when_the_head_turns() -> None:
+    """A piece of the wall is at the place that its direction tells, in both pictures."""
+    before, after = canvas_at(), canvas_at((radians(6.0), radians(-3.0), 0.0))
+    for canvas in (before, after):
+        draw_room(canvas)
+    x, y = np.meshgrid(np.arange(200, 440, 7), np.arange(120, 280, 7))
+    rays = np.stack(((x - LENS.cx_px) / LENS.fx_px, (y - LENS.cy_px) / LENS.fy_px, 1 + 0 * x), -1)
+    directions = rays.reshape(-1, 3) @ before.R_world_camera.T
+    there = np.rint(project(directions @ after.R_world_camera, LENS)).astype(int)
+    was = before.picture[y.ravel(), x.ravel()].astype(float)
+    now = after.picture[there[:, 1], there[:, 0]].astype(float)
+    assert np.abs(was - now).mean() < 4.0 < 10.0 < np.abs(was - was[::-1]).mean()
+
+
+def test_whoever_is_behind_or_in_the_lens_is_not_drawn() -> None:
+    canvas = canvas_at()
+    for x in (-1.0, -0.05, 0.0, 0.02):
+        draw_person(canvas, Person((x, 0.0, 0.0), (0.0, 0.0), None), 0)
+    draw_thing(canvas, Thing(1, "thing", (-1.0, 0.0, 0.0), 0.1))
+    assert np.isfinite(canvas.depth_m).mean() < 0.5  # at most a shoulder
+    empty = canvas_at()
+    draw_person(empty, Person((-1.0, 0.0, 0.0), (0.0, 0.0), None), 0)
+    assert not empty.picture.any()
+
+
+def test_the_nearer_covers_the_farther() -> None:
+    canvas = canvas_at()
+    near, far = Thing(1, "thing", (1.0, 0.0, 0.0), 0.1), Thing(2, "thing", (2.0, 0.0, 0.0), 0.3)
+    draw_scene(canvas, Still(things=(near, far)), 0.0)
+    assert canvas.depth_m[200, 320] == pytest.approx(1.0, abs=0.01)
+    assert canvas.depth_m[200 - 55, 320] == pytest.approx(2.0, abs=0.02)
+
+
+def face_drawn(away_m: float, roll_deg: float, who: int) -> tuple[Picture, Picture3d, np.ndarray]:
+    """Draw a face that looks at the camera, rolled, before the room; with its true landmarks."""
+    canvas = canvas_at()
+    draw_room(canvas)
+    place = (away_m, 0.05 * away_m, 0.03)
+    R = np.array(rotation((np.pi, 0.0, radians(roll_deg))))
+    draw_body(canvas, place, LOOKS[who], who)
+    draw_head(canvas, place, R, LOOKS[who])
+    noise = np.random.default_rng(0).normal(0.0, 3.0, canvas.picture.shape)
+    picture = np.clip(canvas.picture + noise, 0.0, 255.0).astype(np.uint8)
+    return picture, canvas, project(canvas.seen(LANDMARKS_FACE_M @ R.T + place), LENS)
+
+
+@pytest.mark.parametrize("roll_deg", [-20.0, -10.0, 0.0, 10.0, 20.0])
+def test_a_real_detector_finds_drawn_faces_where_they_are(
+    mtcnn: MtcnnDetector, roll_deg: float
+) -> None:
+    """At ten distances: landmarks within a part of the distance between the eyes."""
+    errors, directions = [], []
+    for number, away_m in enumerate(np.geomspace(0.45, 2.2, 10).tolist()):
+        picture, canvas, true = face_drawn(away_m, roll_deg, number % len(LOOKS))
+        found = mtcnn.find(picture)
+        assert len(found) == 1, away_m
+        eyes_px = np.linalg.norm(true[1] - true[0])
+        errors.append(np.linalg.norm(found[0].landmarks_px - true, axis=1).mean() / eyes_px)
+        pose = face_pose(found[0].landmarks_px, LENS)
+        assert pose is not None
+        nose = canvas.seen((away_m, 0.05 * away_m, 0.03))[0]
+        directions.append(angle_between(pose.p_camera_m, tuple(nose)))  # type: ignore[arg-type]
+        assert np.linalg.norm(pose.p_camera_m) == pytest.approx(np.linalg.norm(nose), rel=0.12)
+    assert np.mean(errors) < 0.07 and max(errors) < 0.12
+    assert np.degrees(np.mean(directions)) < 0.4
+
+
+def test_nobody_is_found_in_the_empty_room(mtcnn: MtcnnDetector) -> None:
+    for yaw_deg in (-50.0, 0.0, 50.0, 160.0):
+        canvas = canvas_at((radians(yaw_deg), 0.0, 0.0))
+        draw_room(canvas)
+        assert mtcnn.find(canvas.picture) == ()
+
+
+def test_pictures_come_late_at_their_rate_and_a_late_look_skips_some() -> None:
+    made = camera(Still(), Nobody(), width_px=64, height_px=40, latency_ms=60.0, rate_hz=30.0)
+    arrivals = {}
+    for now_s in np.arange(5.0, 6.0, 0.005).tolist():
+        found = made.latest(now_s)
+        if found is not None and found.number not in arrivals:
+            arrivals[found.number] = now_s - found.captured_s
+    assert len(arrivals) in (28, 29)
+    assert min(arrivals.values()) >= 0.06 - 1e-9 and max(arrivals.values()) < 0.066
+    made.latest(7.0)
+    late = made.latest(7.1)
+    assert late is not None and late.number > 55
+    assert made.events() == ()
+
+
+def test_the_same_dice_give_the_same_bytes() -> None:
+    """Noise is drawn once a camera and in order; other dice give another picture."""
+
+    def shot(seed: int) -> bytes:
+        found = camera(Still((1.0, 0.0, 0.0)), Nobody(), seed=seed, latency_ms=0.0).latest(0.0)
+        assert found is not None and found.picture is not None
+        return found.picture.tobytes()
+
+    assert shot(1) == shot(1) != shot(2)
+
+
+def test_depth_has_the_noise_of_stereo_and_holes_at_edges() -> None:
+    scene = Still((1.0, 0.0, 0.0))
+    found = camera(scene, Nobody(), latency_ms=0.0, depth=True).latest(0.0)
+    assert found is not None and found.depth_m is not None
+    depth = found.depth_m
+    assert depth.dtype == np.float32 and depth.shape == (HEIGHT, WIDTH)
+    holes = np.isnan(depth)
+    assert 0.002 < holes.mean() < 0.2
+    face, wall = depth[185:215, 305:335], depth[60:100, 60:200]
+    assert np.nanmedian(face) == pytest.approx(1.02, abs=0.02) and not np.isnan(face).any()
+    assert np.nanstd(wall - np.nanmedian(wall)) > 3.0 * np.nanstd(face - np.nanmedian(face))
+    assert camera(scene, Nobody(), latency_ms=0.0).latest(0.0).depth_m is None  # type: ignore[union-attr]
+
+
+def test_a_turn_during_the_exposure_smears_along_the_turn() -> None:
+    dot = np.zeros((41, 41, 3), np.uint8)
+    dot[20, 20] = 200
+    assert smeared(dot, (0.3, 0.2)) is dot
+    long = smeared(dot, (8.0, 0.0)).astype(float)[:, :, 0]
+    y, x = np.nonzero(long > 5.0)
+    assert set(y.tolist()) == {20} and np.ptp(x) in (7, 8)
+    assert x.mean() == pytest.approx(20.0) and long.sum() == pytest.approx(200.0, rel=0.1)
+
+    def sharpness(turn_deg_s: float) -> float:
+        def head(t_s: float) -> tuple[Mat3, Vec3]:
+            return rotation((radians(turn_deg_s) * t_s, 0.0, 0.0)), (0.0, 0.0, 0.0)
+
+        made = camera(Still(), Nobody(), head, latency_ms=0.0, noise_grey=0.0, exposure_ms=10.0)
+        for now_s in np.arange(0.0, 0.04, 0.005).tolist():
+            found = made.latest(now_s)
+        assert found is not None and found.picture is not None and found.number == 2
+        return float(np.abs(np.diff(found.picture[60:300].astype(float), axis=1)).mean())
+
+    assert sharpness(200.0) < 0.6 * sharpness(0.0)
+
+
+def test_what_finds_motion_gets_the_picture_with_its_pose_and_depth() -> None:
+    shots: list[Exposure] = []
+
+    def find(shot: Exposure, lens: object) -> tuple[()]:
+        shots.append(shot)
+        return ()
+
+    rng = np.random.default_rng(0)
+    params = PixelCameraParams(depth=True, width_px=64, height_px=40)
+    made = PixelCamera(params, Still(), MOUNT, level, Nobody(), rng, find)
+    for now_s in np.arange(0.0, 0.2, 0.005).tolist():
+        made.latest(now_s)
+    assert [shot.number for shot in shots] == list(range(1, 7))
+    assert shots[0].R_world_camera == MOUNT.pose(AHEAD, (0.0, 0.0, 0.0))[0]
+    assert shots[0].depth_m is not None and shots[0].picture.shape == (40, 64, 3)
+
+
+class Neck:
+    """A head that turns about the origin."""
+
+    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
+        return rotation(head_rad), (0.0, 0.0, 0.0)
+
+    def facing(self, p_world_m: Vec3) -> tuple[float, float]:
+        raise NotImplementedError
+
+    def eyes_on(self, p: Vec3, R: Mat3, p_head: Vec3) -> tuple[tuple[float, float], ...]:
+        raise NotImplementedError
+
+
+def watched(mtcnn: MtcnnDetector, scene: Still, seconds: float, placed_s: float = 0.0) -> list:
+    """Let a head turn there and back before a scene; give percepts with the time of each.
+
+    placed_s: pictures are said to be taken so much later than they were
+    """
+    poses = PoseHistory(Neck())  # type: ignore[arg-type]
+    perception = Perception(MOUNT, 69.0, Tracker(TrackParams()))
+
+    def head(t_s: float) -> tuple[Mat3, Vec3]:
+        return rotation((0.3 * np.sin(2.5 * t_s), 0.05, 0.0)), (0.0, 0.0, 0.0)
+
+    made = camera(scene, mtcnn, head)
+    percepts = []
+    for tick in range(int(seconds * 200)):
+        t = tick / 200
+        poses.remember(t - placed_s, (0.3 * np.sin(2.5 * t), 0.05, 0.0))
+        found = made.latest(t)
+        number = perception.pictures
+        percept = perception.see(found, poses)
+        if percept is not None and perception.pictures > number:
+            percepts.append(percept)
+    return percepts
+
+
+def test_a_person_stands_still_in_the_world_while_the_head_turns(mtcnn: MtcnnDetector) -> None:
+    place = (1.2, 0.1, 0.1)
+    percepts = watched(mtcnn, Still(place), 1.6)
+    assert {face.id for percept in percepts for face in percept.faces} == {1}
+    errors = [angle_between(p.faces[0].p_world_m, place) for p in percepts[3:] if p.faces]
+    assert len(errors) > 40
+    assert np.degrees(np.percentile(errors, 95)) < 0.6
+    wrong = watched(mtcnn, Still(place), 1.6, placed_s=-0.06)
+    off = [angle_between(p.faces[0].p_world_m, place) for p in wrong[3:] if p.faces]
+    assert np.degrees(np.percentile(off, 95)) > 2.0
+
+
+def test_people_who_pass_each_other_keep_their_identities_through_pixels(
+    mtcnn: MtcnnDetector,
+) -> None:
+    class Passing(Still):
+        def people(self, t_s: float) -> tuple[Person, ...]:
+            left = Person((1.3, 0.5 - 0.5 * t_s, 0.1), (np.pi, 0.0), None)
+            right = Person((1.9, 0.7 * t_s - 0.7, 0.16), (np.pi, 0.0), None)
+            return left, right
+
+    percepts = watched(mtcnn, Passing(), 2.0)
+    first, last = percepts[5].faces, percepts[-1].faces
+    assert len(first) == len(last) == 2
+    nearer = [min(faces, key=lambda face: face.p_world_m[0]).id for faces in (first, last)]
+    farther = [max(faces, key=lambda face: face.p_world_m[0]).id for faces in (first, last)]
+    assert nearer[0] == nearer[1] != farther[0] == farther[1]
+    eye_to_nearer = sub(min(last, key=lambda face: face.p_world_m[0]).p_world_m, (0.0, 0.0, 0.0))
+    assert np.degrees(np.arctan2(eye_to_nearer[1], eye_to_nearer[0])) < -10.0

@@ -1,0 +1,237 @@
+"""A camera that stops giving pictures: hold, search, come to rest, and begin again."""
+
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import degrees, radians
+
+import numpy as np
+import pytest
+
+from config.schema import Rig, load_rig
+from drivers.types import Camera, Detections
+from gaze.angles import angle_between, sub
+from gaze.types import Vec3
+from robot import assemble as assembling
+from robot.assemble import Assembly, assemble
+from robot.choice import Choice
+from robot.loop import Tick, run
+from robot.types import JOINTS
+from sim_mock.scene import Event, Person, Thing
+
+GONE_S, BACK_S, END_S = 2.0, 9.0, 12.0
+LOST, FOUND = "camera lost: trying it again", "camera back after 7.0 s"
+NECK = slice(JOINTS.index("neck_yaw"), JOINTS.index("neck_roll") + 1)
+
+
+class Passer:
+    """A scene: somebody who walks from one side to the other, and on."""
+
+    name = "passer"
+    round_s = 100.0
+    behaviours: tuple[str, ...] = ()
+
+    def people(self, t_s: float) -> tuple[Person, ...]:
+        y = 0.8 - 0.25 * t_s
+        return (Person((1.2, y, 0.2), (float(np.arctan2(-y, -1.2)), 0.0), None),)
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        return ()
+
+    def behaviour(self, t_s: float) -> str | None:
+        return None
+
+    def events(self) -> tuple[Event, ...]:
+        return ()
+
+
+class BackAndForth(Passer):
+    """A scene: somebody who is aside and steps to and fro in it."""
+
+    def people(self, t_s: float) -> tuple[Person, ...]:
+        y = 0.35 + 0.1 * float(np.sin(2.0 * t_s))
+        return (Person((1.2, y, 0.2), (float(np.arctan2(-y, -1.2)), 0.0), None),)
+
+
+@dataclass
+class Unplugged:
+    """A camera that gives nothing new for a while, as one whose cable is out."""
+
+    camera: Camera
+    newest: Detections | None = None
+    told: list[str] = field(default_factory=list)
+    now_s: float = 0.0
+
+    def open(self) -> None:
+        self.camera.open()
+
+    def latest(self, now_s: float) -> Detections | None:
+        self.now_s = now_s
+        found = self.camera.latest(now_s)
+        if found is not None and not GONE_S <= found.captured_s < BACK_S:
+            self.newest = found
+        return self.newest
+
+    def events(self) -> tuple[str, ...]:
+        for at_s, line in ((GONE_S, LOST), (BACK_S, FOUND)):
+            if self.now_s >= at_s and line not in self.told:
+                self.told.append(line)
+                return (line,)
+        return ()
+
+    def close(self) -> None:
+        self.camera.close()
+
+
+def watched(scene: Passer, patch: pytest.MonkeyPatch) -> tuple[Rig, list[Tick]]:
+    """Run the rig before a scene, its camera unplugged for a while."""
+    patch.setattr(assembling, "scenes", lambda: {scene.name: scene})
+    rig = load_rig("desk")
+    rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
+    made: Assembly = assemble(rig, Choice(mock=True, fast=True, seed=3, scene=scene.name))
+    made.robot.camera = Unplugged(made.robot.camera)
+    ticks: list[Tick] = []
+    made.robot.start(made.clock)
+    try:
+        run(
+            made.robot,
+            made.clock,
+            made.loop,
+            lambda seconds: "seconds" if seconds >= END_S else None,
+            ticks.append,
+        )
+    finally:
+        made.robot.stop()
+        made.close()
+    return rig, ticks
+
+
+@pytest.fixture(scope="module")
+def run_of_passer() -> tuple[Rig, list[Tick]]:
+    with pytest.MonkeyPatch.context() as patch:
+        return watched(Passer(), patch)
+
+
+@pytest.fixture(scope="module")
+def run_of_someone_aside() -> tuple[Rig, list[Tick]]:
+    with pytest.MonkeyPatch.context() as patch:
+        return watched(BackAndForth(), patch)
+
+
+RUNS = pytest.mark.parametrize("name", ["run_of_passer", "run_of_someone_aside"])
+
+
+def between(ticks: list[Tick], start_s: float, end_s: float) -> list[Tick]:
+    chosen = [tick for tick in ticks if start_s <= tick.t_s < end_s]
+    assert chosen
+    return chosen
+
+
+def last_picture_s(ticks: list[Tick]) -> float:
+    percepts = [tick.percept for tick in ticks if tick.t_s < BACK_S and tick.percept]
+    return max(percept.captured_s for percept in percepts)
+
+
+def phases(rig: Rig, ticks: list[Tick]) -> tuple[float, float, float]:
+    """Give when the last picture is stale, when the search begins and when it ends."""
+    stale_s = last_picture_s(ticks) + rig.gaze.attention.stale_ms / 1e3
+    search_s = stale_s + rig.gaze.idle.hold_ms / 1e3
+    return stale_s, search_s, search_s + rig.gaze.idle.search_ms / 1e3
+
+
+@RUNS
+def test_hold_then_search_then_rest(name: str, request: pytest.FixtureRequest) -> None:
+    rig, ticks = request.getfixturevalue(name)
+    stale_s, search_s, over_s = phases(rig, ticks)
+    assert over_s < BACK_S - 1.0
+    slack = 0.02
+    before = between(ticks, GONE_S, stale_s - slack)
+    assert {tick.target.kind for tick in before} == {"face"}
+    assert all("lost" not in tick.target.why for tick in before)
+    held = between(ticks, stale_s + slack, search_s - slack)
+    assert all(tick.target.why.endswith("lost, waiting") for tick in held)
+    assert len({tick.target.centre_world_m for tick in held}) == 1  # its parts are looked at
+    assert {tick.target.v_world_m_s for tick in held} == {(0.0, 0.0, 0.0)}
+    searching = between(ticks, search_s + slack, over_s - slack)
+    assert {tick.target.kind for tick in searching} == {"search"}
+    assert len({tick.target.id for tick in searching}) >= 3
+    after = between(ticks, over_s + slack, BACK_S)
+    assert after[0].target.kind == "rest"
+    assert {tick.target.kind for tick in after} <= {"rest", "glance"}
+
+
+@RUNS
+def test_the_neck_does_not_move_on_a_stale_picture(
+    name: str, request: pytest.FixtureRequest
+) -> None:
+    """From the guard's age on it stands, whatever search and rest wish."""
+    rig, ticks = request.getfixturevalue(name)
+    blind_s = last_picture_s(ticks) + rig.guard.stale_picture_ms / 1e3
+    blind = between(ticks, blind_s + 0.02, BACK_S)
+    commands = {tick.verdict.command_rad[NECK] for tick in blind}
+    assert len(commands) == 1
+    assert all("neck_yaw: stale picture" in tick.verdict.reasons for tick in blind)
+    wishes = [degrees(tick.wish_rad[NECK][0]) for tick in blind]
+    assert max(wishes) - min(wishes) > 3.0  # it would have moved
+    eyes = [degrees(tick.joints.position_rad[0]) for tick in blind]
+    assert max(eyes) - min(eyes) > 3.0  # the eyes do search
+
+
+@RUNS
+def test_until_then_the_neck_goes_no_farther_than_to_where_somebody_was_lost(
+    name: str, request: pytest.FixtureRequest
+) -> None:
+    rig, ticks = request.getfixturevalue(name)
+    stale_s, search_s, _ = phases(rig, ticks)
+    held = between(ticks, stale_s + 0.02, search_s - 0.02)
+    centre = held[0].target.centre_world_m
+    assert centre is not None
+    there = np.arctan2(centre[1], centre[0])
+    yaws = np.array([tick.pose.head_rad[0] for tick in held])
+    assert abs(yaws[-1] - there) <= abs(yaws[0] - there) + radians(0.5)
+    assert np.abs(yaws - there).max() < radians(40.0)
+    assert np.ptp(yaws) < abs(yaws[0] - there) + radians(1.5)
+
+
+def test_who_was_walking_is_waited_for_ahead_not_where_the_last_picture_showed_them(
+    run_of_passer: tuple[Rig, list[Tick]],
+) -> None:
+    rig, ticks = run_of_passer
+    stale_s, search_s, _ = phases(rig, ticks)
+    held = between(ticks, stale_s + 0.02, search_s - 0.02)
+    percept, centre = held[0].percept, held[0].target.centre_world_m
+    assert percept is not None and centre is not None
+    shown, v = percept.faces[0].p_world_m, percept.faces[0].v_world_m_s
+    coasted_s = rig.gaze.idle.coast_ms / 1e3
+    assert v[1] == pytest.approx(-0.25, abs=0.08)
+    assert centre[1] - shown[1] == pytest.approx(v[1] * coasted_s, abs=1e-6)
+
+
+def test_losing_the_camera_and_having_it_back_is_told_once(
+    run_of_passer: tuple[Rig, list[Tick]],
+) -> None:
+    _, ticks = run_of_passer
+    told = [(tick.t_s, line) for tick in ticks for line in tick.events if "camera" in line]
+    assert [line for _, line in told] == [LOST, FOUND]
+    assert told[0][0] == pytest.approx(GONE_S, abs=0.02)
+    assert told[1][0] == pytest.approx(BACK_S, abs=0.02)
+
+
+def test_it_goes_on_with_the_first_new_pictures(
+    run_of_someone_aside: tuple[Rig, list[Tick]],
+) -> None:
+    """Without a restart, without a jerk, and with the eyes back on the face."""
+    rig, ticks = run_of_someone_aside
+    back = between(ticks, BACK_S + 0.5, END_S)
+    assert {tick.target.kind for tick in back} == {"face"}
+    last = back[-1]
+    assert angle_between(look(last), sub(last.target.p_world_m, last.pose.p_world_head_m)) < 0.05
+    fastest = max(
+        abs(b.verdict.command_rad[NECK][0] - a.verdict.command_rad[NECK][0]) / (b.t_s - a.t_s)
+        for a, b in pairwise(between(ticks, BACK_S, END_S))
+    )
+    assert 0.0 < fastest <= radians(rig.joints["neck_yaw"].max_speed_deg_s) + 1e-6
+
+
+def look(tick: Tick) -> Vec3:
+    """Give where the eyes are meant to look, from the head."""
+    return sub(tick.gaze.gaze_point_world_m, tick.pose.p_world_head_m)

@@ -1,0 +1,84 @@
+"""A head that turns in a still room sees nobody move: drawn pictures through the whole chain."""
+
+from dataclasses import replace
+from math import degrees, radians
+
+import numpy as np
+import pytest
+
+from config.schema import load_rig
+from robot import assemble as assembling
+from robot.assemble import assemble
+from robot.choice import Choice
+from robot.loop import Tick, run
+from sim_mock.scene import Event, Person, Thing
+
+SECONDS = 3.0
+
+
+class Room:
+    """A scene: a room, and a ball that flies through it if asked for."""
+
+    name = "room"
+    round_s = 100.0
+    behaviours: tuple[str, ...] = ()
+
+    def __init__(self, ball: bool) -> None:
+        self._ball = ball
+
+    def people(self, t_s: float) -> tuple[Person, ...]:
+        return ()
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        place = (1.5, 0.5 * float(np.sin(2.0 * t_s)), 0.25)
+        return (Thing(1, "ball", place, 0.1),) if self._ball else ()
+
+    def behaviour(self, t_s: float) -> str | None:
+        return None
+
+    def events(self) -> tuple[Event, ...]:
+        return ()
+
+
+def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]:
+    """Run a rig that hardly rests between glances around, with all of the head in each."""
+    patch.setattr(assembling, "scenes", lambda: {room.name: room})
+    rig = load_rig("desk")
+    idle = replace(rig.gaze.idle, rest_ms=400.0, glance_ms=500.0, rest_pull=1.0)
+    rig = replace(
+        rig,
+        loop=replace(rig.loop, rate_hz=100.0),
+        gaze=replace(rig.gaze, idle=idle),
+        detector=replace(rig.detector, work_width_px=128),
+    )
+    made = assemble(rig, Choice(mock=True, fast=True, seed=1, scene=room.name, pixels=True))
+    ticks: list[Tick] = []
+    made.robot.start(made.clock)
+    try:
+        run(
+            made.robot,
+            made.clock,
+            made.loop,
+            lambda s: "seconds" if s >= seconds else None,
+            lambda tick: ticks.append(tick),
+        )
+    finally:
+        made.robot.stop()
+        made.close()
+    return ticks
+
+
+def test_nothing_in_a_still_room_becomes_a_target(monkeypatch: pytest.MonkeyPatch) -> None:
+    ticks = watched(Room(ball=False), monkeypatch, SECONDS)
+    yaws = np.array([tick.pose.head_rad[0] for tick in ticks])
+    rates = np.array([tick.pose.head_rate_rad_s[0] for tick in ticks])
+    assert np.ptp(yaws) > radians(15.0), f"the head turned {degrees(np.ptp(yaws)):.1f} deg only"
+    assert np.abs(rates).max() > radians(30.0)
+    assert ticks[-1].percept is not None  # pictures came through
+    assert {tick.target.kind for tick in ticks} <= {"rest", "glance"}
+
+
+def test_what_moves_in_the_same_room_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So the silence before is not that of a detector that finds nothing."""
+    ticks = watched(Room(ball=True), monkeypatch, 1.5)
+    assert "thing" in {tick.target.kind for tick in ticks}
