@@ -13,7 +13,7 @@ run: $(VENV)/.installed
 	$(BIN)/gazerig run --mock
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist loadgroup
 
 check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
@@ -27,6 +27,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_emulator.py
 	$(BIN)/python tests/bench/bench_motion.py
 	$(BIN)/python tests/bench/bench_camera.py
+	$(BIN)/python tests/bench/bench_latency.py
 
 figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/make_figures.py

@@ -16,6 +16,8 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import NamedTuple
 
+import cv2
+
 from drivers.camera_look import Motion
 from drivers.camera_params import CameraCareParams
 from drivers.camera_slots import SlotReader, SlotWriter, Where
@@ -201,6 +203,9 @@ def _run(
     # Ctrl-C reaches all processes of a terminal; it is the loop's to end this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
+    # One processor stays the loop's: with all of them in OpenCV's hands the loop is later, and
+    # no more pictures are looked at.
+    cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
     try:
         motion = parts.motion() if parts.motion is not None else None
         camera = CameraWatch(parts.source(), parts.detector(), now_s, care, motion, pipe.send)

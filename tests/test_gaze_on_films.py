@@ -23,6 +23,9 @@ from robot.intrinsics import intrinsics_of_lens, project
 from robot.loop import Tick, run
 from robot.summary import cyclopean
 
+# One worker runs them all: what they share takes seconds to make.
+pytestmark = pytest.mark.xdist_group("gaze_on_films")
+
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
 SECONDS, BEGIN_S, RATE_HZ = 24.0, 1.0, 10.0
 WIDTH, HEIGHT = 768, 576
@@ -50,7 +53,7 @@ def ticks() -> tuple[Assembly, list[Tick]]:
     rig = replace(
         rig,
         loop=replace(rig.loop, rate_hz=100.0),
-        detector=replace(rig.detector, min_face_px=60),
+        detector=replace(rig.detector, min_face_px=60, work_width_px=128),
     )
     made = assemble(rig, Choice(mock=True, fast=True, seed=0, video=FILM))
     seen: list[Tick] = []

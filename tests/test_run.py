@@ -39,6 +39,7 @@ def visitor() -> dict[str, Any]:
     return figures("--seconds", "44", "--seed", "1")
 
 
+@pytest.mark.xdist_group("visitor")
 def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
     promised = {
         "seconds", "wall_seconds", "ticks", "overruns", "faces_seen", "pictures", "fixations",
@@ -51,6 +52,7 @@ def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
     assert visitor["ticks"] == pytest.approx(44 * 200, abs=2)
 
 
+@pytest.mark.xdist_group("visitor")
 def test_the_head_looks_at_the_visitor(visitor: dict[str, Any]) -> None:
     share = visitor["target_share"]
     nobody = sum(share.get(kind, 0.0) for kind in ("rest", "search", "glance"))
@@ -63,13 +65,12 @@ def test_the_head_looks_at_the_visitor(visitor: dict[str, Any]) -> None:
     assert 5 <= visitor["blinks"] <= 40
 
 
-def test_e59_same_seed_same_bytes_in_another_process(visitor: dict[str, Any]) -> None:
-    again = figures("--seconds", "44", "--seed", "1")
-    for run in (visitor, again):
-        assert run.pop("wall_seconds", None) is not None or run is visitor
-    assert again == {k: v for k, v in visitor.items() if k != "wall_seconds"}
+def test_e59_same_seed_same_bytes_in_another_process() -> None:
+    one, again = (figures("--seconds", "14", "--seed", "1") for _ in range(2))
+    assert one.pop("wall_seconds") > 0.0 and again.pop("wall_seconds") > 0.0
+    assert again == one
     assert re.fullmatch(r"[0-9a-f]{64}", again["bus"]["tx_sha256"])
-    other = figures("--seconds", "5", "--seed", "2")
+    other = figures("--seconds", "14", "--seed", "2")
     assert other["bus"]["tx_sha256"] != again["bus"]["tx_sha256"]
 
 
@@ -98,8 +99,8 @@ def photo(path: Path) -> Path:
 
 def test_a_photo_is_looked_at_and_gives_the_same_bytes_twice(tmp_path: Path) -> None:
     picture = photo(tmp_path / "photo.png")
-    runs = [figures("--video", str(picture), "--seconds", "6") for _ in range(2)]
-    assert runs[0]["faces_seen"] == runs[0]["pictures"] >= 50
+    runs = [figures("--video", str(picture), "--seconds", "4") for _ in range(2)]
+    assert runs[0]["faces_seen"] == runs[0]["pictures"] >= 35
     assert runs[0]["target_share"]["face"] > 0.9
     assert runs[0]["bus"] == runs[1]["bus"]
 
@@ -108,7 +109,10 @@ def test_a_photo_is_looked_at_and_gives_the_same_bytes_twice(tmp_path: Path) -> 
 @pytest.mark.parametrize("network", ["mtcnn", "yunet"])
 def test_a_film_of_two_talking_people(network: str, tmp_path: Path) -> None:
     rig = tmp_path / "rig.yaml"
+    # Faces are what is asked about: motion is left out, and half the rate will do.
     text = DESK.read_text(encoding="utf-8")
+    text = text.replace("  enabled: true  # look", "  enabled: false  # look")
+    text = text.replace("rate_hz: 200.0  # Hz, 20", "rate_hz: 100.0  # Hz, 20")
     if network == "yunet":
         (model,) = MODELS.glob("*.onnx")
         text = re.sub(r"kind: mtcnn", "kind: yunet", text)
