@@ -195,7 +195,9 @@ def _ended(pipeline: Any) -> Callable[[], None] | None:
     def end() -> None:
         if pipeline.isRunning():
             pipeline.stop()
-            pipeline.wait()
+        # Also where the stream has ended by itself: left to its destructor, the wait for its
+        # threads would keep the interpreter's lock that nodes written in Python need to end.
+        pipeline.wait()
 
     return end
 

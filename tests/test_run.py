@@ -132,7 +132,10 @@ def test_signals_park_and_switch_torque_off() -> None:
             stderr=subprocess.PIPE,
             text=True,
         )
-        time.sleep(5.0)
+        # What start-up set on the servos is told once torque is on.
+        assert process.stderr is not None
+        assert any("Indirect Addresses set" in line for line in iter(process.stderr.readline, ""))
+        time.sleep(3.0)
         process.send_signal(number)
         out, err = process.communicate(timeout=30)
         assert process.returncode == 0, err
