@@ -202,6 +202,23 @@ class Body:
         """Give the joint angles of servo positions in the order of JOINTS."""
         return tuple(joint.angle_rad(step) for joint, step in zip(self._joints, steps, strict=True))
 
+    def let_go(self) -> None:
+        """Torque off at once; the bus stays open and readings go on.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        self.bus.release()
+
+    def take_hold(self) -> JointAngles:
+        """Torque on again where the joints are; give the goals in force.
+
+        Raises:
+            drivers.errors.SetupError: a servo does not answer, refuses or has latched a fault.
+            drivers.errors.BusLost: the port is gone.
+        """
+        return self.angles(self.bus.engage())
+
     def stop(self) -> None:
         """Torque off and close the bus."""
         try:

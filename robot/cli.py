@@ -1,6 +1,7 @@
 """The command ``gazerig``: what people type, and what they read on the terminal."""
 
 import json
+import logging
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -9,18 +10,39 @@ import typer
 
 from config.load import load
 from config.schema import Rig, load_rig
+from drivers.dynamixel_ports import serial_ports
 from drivers.errors import SetupError
 from robot import cli_emulate, cli_motion, cli_record, cli_servos
-from robot.cli_terminal import FAULT, RigArgument, clear_errors, say, signals, status
+from robot.cli_examples import add_examples, complete_scene, complete_shipped
+from robot.cli_start import next_steps
+from robot.cli_terminal import (
+    DEBUG_LOGGER,
+    FAULT,
+    RigArgument,
+    clear_errors,
+    say,
+    signals,
+    status,
+)
 
 app = typer.Typer(
-    add_completion=False,
-    no_args_is_help=True,
+    invoke_without_command=True,
     pretty_exceptions_enable=False,
-    help="Makes an animatronic head look at people the way people look at each other.",
 )
 for part in (cli_servos, cli_motion, cli_record, cli_emulate):
     app.add_typer(part.app)
+
+
+@app.callback()
+def begin(
+    context: typer.Context,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show where an error comes from, with any command.")
+    ] = False,
+) -> None:
+    """Makes an animatronic head look at people the way people look at each other."""
+    if context.invoked_subcommand is None:
+        print(next_steps(serial_ports(), rig_files(), False))
 
 
 @app.command()
@@ -29,7 +51,11 @@ def run(
     mock: Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")] = False,
     port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
     scene: Annotated[
-        str | None, typer.Option(help="Look at a simulated scene (default with --mock: visitor).")
+        str | None,
+        typer.Option(
+            help="Look at a simulated scene (default with --mock: visitor).",
+            autocompletion=complete_scene,
+        ),
     ] = None,
     video: Annotated[Path | None, typer.Option(help="Look at a film or picture, looped.")] = None,
     camera: Annotated[int | None, typer.Option(help="Look through webcam N.")] = None,
@@ -46,14 +72,25 @@ def run(
         bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock).")
     ] = False,
     profile: Annotated[
-        str | None, typer.Option(help="Style of gaze: robot, or literal mitake, nakamoto.")
+        str | None,
+        typer.Option(
+            help="Style of gaze: robot, or literal mitake, nakamoto.",
+            autocompletion=complete_shipped("profiles"),
+        ),
     ] = None,
     character: Annotated[
         str | None,
-        typer.Option(help="A character laid over the rig: shy, bold, sleepy, strong_boxer ..."),
+        typer.Option(
+            help="A character laid over the rig: shy, bold, sleepy, strong_boxer ...",
+            autocompletion=complete_shipped("characters"),
+        ),
     ] = None,
     rules: Annotated[
-        str | None, typer.Option(help="Rule set instead of the rig's: boxing, conversation.")
+        str | None,
+        typer.Option(
+            help="Rule set instead of the rig's: boxing, conversation.",
+            autocompletion=complete_shipped("rules"),
+        ),
     ] = None,
     behaviour: Annotated[
         str | None, typer.Option(help="Behaviour in force at the start, one of the rig's rules.")
@@ -161,9 +198,36 @@ def schema(
             out.write_text(text, encoding="utf-8")
 
 
+add_examples(app)
+
+
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line: an error is one line, and with --debug also where it comes from."""
+    words = sys.argv[1:]
+    if "--debug" in words:  # wherever people put it
+        words = [word for word in words if word != "--debug"]
+        logging.getLogger(DEBUG_LOGGER).setLevel(logging.DEBUG)
+    try:
+        app(words)
+    except Exception as error:
+        if logging.getLogger(DEBUG_LOGGER).isEnabledFor(logging.DEBUG):
+            raise
+        what = " ".join(str(error).split()) or "no words"
+        print(
+            f"unexpected: {type(error).__name__}: {what}; say it again with --debug and report "
+            "what it shows",
+            file=sys.stderr,
+        )
+        sys.exit(FAULT)
+
+
+def rig_files() -> list[Path]:
+    """Give the YAML files of this folder that look like rigs."""
+    return [
+        path
+        for path in Path(".").glob("*.yaml")
+        if path.is_file() and "joints:" in path.read_text(encoding="utf-8", errors="replace")
+    ]
 
 
 def _host_port(text: str) -> tuple[str, int]:

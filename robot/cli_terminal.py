@@ -1,16 +1,19 @@
 """The terminal: lines for people, one status line, clear errors, and Ctrl-C as a wish to stop."""
 
 import contextlib
+import logging
 import shutil
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
 import typer
 
-from config.load import ConfigError
+from config.load import ConfigError, shipped_names
 from drivers.errors import DriverError, SetupError
 
 BAD_INPUT = 2
@@ -18,8 +21,23 @@ BAD_INPUT = 2
 FAULT = 1
 """Exit code: something failed while running."""
 
+DEBUG_LOGGER = "gazerig"
+"""At level DEBUG errors also show where they come from."""
+
+
+def complete_rig(incomplete: str) -> list[str]:
+    """Complete a rig: a shipped name, or a YAML file here."""
+    here = sorted(str(path) for path in Path(".").glob("*.yaml"))
+    return [name for name in (*shipped_names("rigs"), *here) if name.startswith(incomplete)]
+
+
 RigArgument = Annotated[
-    str, typer.Argument(metavar="RIG", help="A rig's YAML file, or the name of a shipped rig.")
+    str,
+    typer.Argument(
+        metavar="RIG",
+        help="A rig's YAML file, or the name of a shipped rig.",
+        autocompletion=complete_rig,
+    ),
 ]
 
 
@@ -29,14 +47,23 @@ def clear_errors() -> Iterator[None]:
     try:
         yield
     except (ConfigError, SetupError) as error:
+        _show_origin()
         print(error, file=sys.stderr)
         raise typer.Exit(BAD_INPUT) from None
     except DriverError as error:
+        _show_origin()
         print(error, file=sys.stderr)
         raise typer.Exit(FAULT) from None
     except OSError as error:
+        _show_origin()
         print(f"{error.filename or 'file'}: {error.strerror or error}", file=sys.stderr)
         raise typer.Exit(BAD_INPUT) from None
+
+
+def _show_origin() -> None:
+    """With --debug, show where the error at hand comes from."""
+    if logging.getLogger(DEBUG_LOGGER).isEnabledFor(logging.DEBUG):
+        traceback.print_exc()
 
 
 @contextlib.contextmanager

@@ -7,27 +7,30 @@ from dataclasses import dataclass, field
 from math import inf, radians
 from typing import NamedTuple, Protocol
 
-from drivers.errors import DriverError
+from drivers.errors import DriverError, ServoFault, SetupError
 from drivers.types import Camera, Detections
 from gaze.aversion import MODES, Aversion
 from gaze.lids import Lids
 from gaze.oculomotor import Oculomotor
 from gaze.scanpath import Scanpath
 from gaze.top_down import TopDown
-from gaze.types import GazeCommand, GazeState, Percept, Target
+from gaze.types import GazeCommand, GazeState, Percept, Target, Vec3
 from robot.body import Body
 from robot.clock import Clock
 from robot.frames import PoseHistory
 from robot.kinematics import Kinematics
+from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune, check
 from robot.perception import Perception
 from robot.safety import Guard
-from robot.types import JointAngles, JointState, Verdict
+from robot.types import JOINTS, JointAngles, JointState, Verdict
 
 
 class Tick(NamedTuple):
     """Everything one tick knew and decided; wish, permitted and measured side by side.
 
     events: what has happened on the bus and to the camera, in words
+    orders: what people asked for, obeyed at the beginning of this tick
+    stopped: why somebody stopped the robot, "" while it moves
     """
 
     t_s: float
@@ -40,6 +43,8 @@ class Tick(NamedTuple):
     wish_rad: JointAngles
     verdict: Verdict
     events: tuple[str, ...] = ()
+    orders: tuple[Order, ...] = ()
+    stopped: str = ""
 
 
 @dataclass(frozen=True)
@@ -125,7 +130,32 @@ class Robot:
         self._lids = lids
         self._guard = guard
         self._settled = True
-        self._asked: deque[tuple[str, str]] = deque()
+        self._orders: deque[Order] = deque()
+        self._looked_at: Vec3 | None = None
+        self._puppet_shifts = 0
+        self._jogged: JointAngles = ()
+        self._last: JointAngles = ()
+        self.stopped = ""
+        self.tune: Callable[[Tune, float], tuple[str, ...]] = _not_tunable
+        self._told: list[str] = []
+
+    def order(self, order: Order) -> None:
+        """Ask for something, from the next tick on; may be called from any thread.
+
+        Raises:
+            ValueError: it cannot be done; the message lists what there is.
+        """
+        check(order)
+        if isinstance(order, Ask):
+            menus = self.menus()
+            if order.menu not in menus:
+                raise ValueError(
+                    f"nothing called {order.menu!r} to choose; there is {', '.join(menus)}"
+                )
+            if order.choice not in menus[order.menu]:
+                there = ", ".join(menus[order.menu])
+                raise ValueError(f"no {order.menu} {order.choice!r}; there is {there}")
+        self._orders.append(order)
 
     def ask(self, menu: str, choice: str) -> None:
         """Ask for a behaviour, a mode of conversation or a wink, from the next tick on.
@@ -135,12 +165,7 @@ class Robot:
         Raises:
             ValueError: there is no such menu or choice; the message lists what there is.
         """
-        menus = self.menus()
-        if menu not in menus:
-            raise ValueError(f"nothing called {menu!r} to choose; there is {', '.join(menus)}")
-        if choice not in menus[menu]:
-            raise ValueError(f"no {menu} {choice!r}; there is {', '.join(menus[menu])}")
-        self._asked.append((menu, choice))
+        self.order(Ask(menu, choice))
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Give what ``ask`` takes: menu -> choices, the present one first."""
@@ -177,6 +202,7 @@ class Robot:
         self._scanpath.reset(t_s)
         self._aversion.reset(t_s)
         self._oculomotor.reset(t_s, pose)
+        self._last = goals
 
     def tick(self, t_s: float, dt_s: float) -> Tick:
         """Read, see, choose, plan, guard, write.
@@ -184,23 +210,33 @@ class Robot:
         Raises:
             drivers.errors.DriverError: bus or camera are gone.
         """
-        self._obey(t_s)
+        orders = self._obey(t_s)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
         self._poses.remember(t_s, pose.head_rad)
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
-        target = self.attention.choose(percept, pose, t_s)
+        target = self._led(self.attention.choose(percept, pose, t_s), t_s)
         target = self._scanpath.wander(target, percept, t_s, self._settled, pose.p_world_head_m)
         target = self._aversion.step(target, pose.p_world_head_m, t_s)
         gaze = self._oculomotor.step(target, pose, t_s, dt_s)
         self._settled = gaze.phase != "saccade"
-        wish = self._kinematics.inverse(gaze)
-        age_s = percept.age_s(t_s) if percept is not None else inf
-        verdict = self._guard.check(wish, joints, age_s, t_s)
-        self.body.write(verdict.command_rad)
-        events = (*self.body.bus.events(), *self.camera.events())
-        return Tick(t_s, joints, pose, detections, percept, target, gaze, wish, verdict, events)
+        wish = self._jogged or self._kinematics.inverse(gaze)
+        if self.stopped:
+            verdict = _at_rest(joints, wish, self.stopped)
+        else:
+            # What a person chose to look at is there whatever the camera shows.
+            led = bool(self._jogged) or self._looked_at is not None
+            age_s = 0.0 if led else percept.age_s(t_s) if percept is not None else inf
+            verdict = self._guard.check(wish, joints, age_s, t_s)
+            self.body.write(verdict.command_rad)
+        self._last = verdict.command_rad
+        events = (*self._told, *self.body.bus.events(), *self.camera.events())
+        self._told.clear()
+        return Tick(
+            t_s, joints, pose, detections, percept, target, gaze, wish, verdict, events, orders,
+            self.stopped,
+        )  # fmt: skip
 
     def park(self, pose_rad: JointAngles, clock: Clock, params: LoopParams) -> bool:
         """Move slowly to the parking pose; tell whether it was reached in time."""
@@ -224,18 +260,98 @@ class Robot:
         finally:
             self.camera.close()
 
-    def _obey(self, t_s: float) -> None:
+    def _obey(self, t_s: float) -> tuple[Order, ...]:
         """Put in force what was asked for."""
-        while self._asked:
-            menu, choice = self._asked.popleft()
-            if menu == "behaviour":
-                self.attention.top_down.behave(choice)
-            elif menu == "conversation":
-                mode = next(mode for mode in MODES if mode == choice)
-                self._aversion.converse(mode, t_s)
-                self._lids.mode("rest" if mode == "none" else "conversation")
-            else:
-                LID_COMMANDS[choice](self._lids, t_s)
+        if not self._orders:
+            return ()
+        obeyed: list[Order] = []
+        while self._orders:
+            order = self._orders.popleft()
+            match order:
+                case Ask(menu, choice):
+                    self._choose(menu, choice, t_s)
+                case LookAt(p_world_m):
+                    self._looked_at = p_world_m
+                    self._puppet_shifts += 1
+                    self._jog((), t_s)
+                case Jog(angles_rad):
+                    self._jog(angles_rad, t_s)
+                case Stop(why):
+                    self._halt(why)
+                case Resume():
+                    self._resume(t_s)
+                case Tune():
+                    self._told += self.tune(order, t_s)
+            obeyed.append(order)
+        return tuple(obeyed)
+
+    def _choose(self, menu: str, choice: str, t_s: float) -> None:
+        if menu == "behaviour":
+            self.attention.top_down.behave(choice)
+        elif menu == "conversation":
+            mode = next(mode for mode in MODES if mode == choice)
+            self._aversion.converse(mode, t_s)
+            self._lids.mode("rest" if mode == "none" else "conversation")
+        else:
+            LID_COMMANDS[choice](self._lids, t_s)
+
+    def _led(self, target: Target, t_s: float) -> Target:
+        """Put the point that a person chose in the place of what attention did."""
+        if self._looked_at is None:
+            return target
+        return Target(
+            self._looked_at, (0.0, 0.0, 0.0), t_s, "puppet", -1, 1.0, True, None,
+            target.shift + self._puppet_shifts, "somebody chose this point", None, target.pulls,
+        )  # fmt: skip
+
+    def _jog(self, angles_rad: tuple[tuple[str, float], ...], t_s: float) -> None:
+        """Hold all joints but those given; without any, let the models lead again."""
+        if not angles_rad:
+            if self._jogged:
+                joints = self.body.read(t_s)
+                self._oculomotor.reset(t_s, self._kinematics.forward(joints))
+                self._guard.go_gently()
+            self._jogged = ()
+            return
+        angles = dict(zip(JOINTS, self._jogged or self._last, strict=True))
+        angles.update(angles_rad)
+        self._jogged = tuple(angles[name] for name in JOINTS)
+        # A slider can be torn from end to end in no time.
+        self._guard.go_gently()
+
+    def _halt(self, why: str) -> None:
+        """Take the torque off at once."""
+        if not self.stopped:
+            self._told.append(f"stopped: {why}; torque off")
+        self.stopped = why or "stopped"
+        self._jogged, self._looked_at = (), None
+        self.body.let_go()
+
+    def _resume(self, t_s: float) -> None:
+        """Put the torque on where the joints are; a servo that refuses leaves it off."""
+        if not self.stopped:
+            return
+        try:
+            goals = self.body.take_hold()
+        except (SetupError, ServoFault) as error:
+            self._told.append(f"still stopped: {error}")
+            return
+        self.stopped = ""
+        self._told.append("torque on again: going on slowly")
+        self._guard.reset(t_s, goals)
+        self._oculomotor.reset(t_s, self._kinematics.forward(self.body.read(t_s)))
+
+
+def _at_rest(joints: JointState, wish_rad: JointAngles, why: str) -> Verdict:
+    """Say that nothing is sent, as somebody stopped the robot."""
+    reason = f"all: stopped ({why})"
+    each = ("stopped",) * len(JOINTS)
+    return Verdict(joints.position_rad, "limp", (reason,), wish_rad, each, (reason,))
+
+
+def _not_tunable(order: Tune, t_s: float) -> tuple[str, ...]:
+    """Refuse: nobody has said how."""
+    return ("this robot's parameters cannot be changed while it runs",)
 
 
 def _first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -271,7 +387,7 @@ def run(
         except DriverError as error:
             return LoopCount(ticks, overruns, f"fault: {error}")
         watch(tick)
-        if tick.verdict.level == "limp":
+        if tick.verdict.level == "limp" and not tick.stopped:
             return LoopCount(ticks, overruns, f"fault: {'; '.join(tick.verdict.gravest)}")
         last_s = t_s
         ticks += 1

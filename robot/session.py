@@ -216,7 +216,9 @@ def leave(made: Assembly, count: LoopCount, say: Callable[[str], None]) -> None:
     robot = made.robot
     how = "not parked"
     try:
-        if robot.park(made.park_rad, made.clock, made.loop):
+        if robot.stopped:
+            how = "not parked, as it was stopped"
+        elif robot.park(made.park_rad, made.clock, made.loop):
             how = "parked"
     except (DriverError, KeyboardInterrupt) as error:
         how = f"not parked ({error or 'interrupted'})"

@@ -1,0 +1,110 @@
+"""Examples for every command's help, and the names a shell completes."""
+
+from collections.abc import Callable, Iterable
+
+import typer
+
+from config.load import shipped_names
+from sim_mock.scenes import scenes
+
+EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
+    "run": (
+        ("run --mock", "no hardware: a visitor comes, the page shows what the head does"),
+        ("run my.yaml --oak", "the real rig looks through its OAK-D"),
+        ("run --mock --video party.mp4", "an emulated rig before a film"),
+        ("run --mock --fast --seconds 60 --seed 7 --summary -", "figures of a simulated minute"),
+        ("run my.yaml --oak --record evening.mcap", "keep every tick, to replay and judge"),
+    ),
+    "check": (("check my.yaml", "all faults of a file at once; no servo is touched"),),
+    "schema": (("schema rig.schema.json", "let an editor complete and check rig files"),),
+    "scan": (
+        ("scan", "ports, and the servos on the only one"),
+        ("scan --port /dev/ttyUSB0", "servos on this port at every baud rate"),
+    ),
+    "doctor": (
+        ("doctor my.yaml", "port, servos and settings against the file, with cures"),
+        ("doctor my.yaml --mock", "see what it looks like without hardware"),
+    ),
+    "setup": (("setup my.yaml", "give new servos their ids, one at a time"),),
+    "reboot": (("reboot my.yaml", "clear latched errors of all servos"),),
+    "jog": (("jog neck_yaw 20 --rig my.yaml", "turn the neck 20 deg to the left, slowly"),),
+    "home": (("home my.yaml", "all joints to 0 deg, then torque off"),),
+    "look-at": (("look-at 1 0.2 0.3 --rig my.yaml", "1 m ahead, 20 cm left, 30 cm up"),),
+    "calibrate": (
+        ("calibrate joints my.yaml", "find zeros and ends of all joints"),
+        ("calibrate board board.pdf", "print the board for the next one"),
+        ("calibrate camera my.yaml", "the lens, and where the camera sits"),
+        ("calibrate face my.yaml --oak", "steer the gaze onto your own eyes and mouth"),
+    ),
+    "monitor": (("monitor my.yaml", "watch temperatures, loads and positions"),),
+    "record-camera": (
+        ("record-camera seen.mcap --oak", "keep pictures, depth and times of a camera"),
+    ),
+    "emulate": (("emulate --servos 1-9:xl330-m077", "servos on a pseudo-terminal"),),
+    "fit-scanpath": (
+        ("fit-scanpath gaze.csv --parts boxes.yaml", "a walk from an eye tracker's samples"),
+    ),
+    "get": (
+        ("get", "every parameter of the running rig"),
+        ("get gaze.saccade", "those of the saccades"),
+        ("get --differs", "what differs from the defaults"),
+    ),
+    "set": (("set gaze.saccade.top_speed_deg_s 400", "at the next tick; not yet in the file"),),
+    "save": (("save my.yaml", "keep what was set, comments and order stay"),),
+    "revert": (("revert", "back to what the file says"),),
+    "stop": (("stop", "torque off at once; the program goes on"),),
+    "resume": (("resume", "torque on again, slowly on"),),
+    "character": (("character shy", "lay a character over the running rig"),),
+    "look": (
+        ("look 1 0.2 0.3", "the running head looks there"),
+        ("look free", "and freely again"),
+    ),
+    "replay": (
+        ("replay evening.mcap", "on the page, with a time slider"),
+        ("replay evening.mcap --rerun", "the same people, with today's code and settings"),
+    ),
+    "export": (
+        ("export evening.mcap --csv gaze.csv", "columns that eye-tracking tools read"),
+        ("export evening.mcap --bids study", "a BIDS data set"),
+    ),
+    "report": (
+        ("report evening.mcap", "how human was the gaze? one HTML file and pictures"),
+        ("report --scene face-to-face --seconds 120", "the same of a simulated scene"),
+    ),
+    "compare": (("compare shy.mcap bold.mcap", "two recordings side by side"),),
+}
+"""Command -> examples, each with what it is for."""
+
+
+def add_examples(app: typer.Typer) -> None:
+    """Put the examples under the help of every command of an app and of its parts."""
+    for command in app.registered_commands:
+        name = command.name or _dashed(command.callback)
+        if name in EXAMPLES:
+            command.epilog = epilog(EXAMPLES[name])
+    for group in app.registered_groups:
+        part = group.typer_instance
+        if part is None:
+            continue
+        if part.info.name in EXAMPLES:
+            part.info.epilog = epilog(EXAMPLES[part.info.name])
+        add_examples(part)
+
+
+def epilog(examples: Iterable[tuple[str, str]]) -> str:
+    """Write examples as lines that help keeps apart."""
+    return "\n\n".join(f"gazerig {words}   ({what})" for words, what in examples)
+
+
+def complete_shipped(kind: str) -> Callable[[str], list[str]]:
+    """Give what completes the names of a kind of shipped file, e.g. "characters"."""
+    return lambda incomplete: [name for name in shipped_names(kind) if name.startswith(incomplete)]
+
+
+def complete_scene(incomplete: str) -> list[str]:
+    """Complete a simulated scene."""
+    return [name for name in sorted(scenes()) if name.startswith(incomplete)]
+
+
+def _dashed(callback: object) -> str:
+    return str(getattr(callback, "__name__", "")).replace("_", "-")

@@ -1,0 +1,1 @@
+"""Recordings of runs: every tick with what it knew and decided, in one file."""

@@ -1,0 +1,1 @@
+"""A report on how human the gaze was: figures, pass bands and their sources."""
