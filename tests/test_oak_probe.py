@@ -170,6 +170,8 @@ class Rig:
             def setSyncThreshold(self, threshold):  # noqa: N802
                 assert threshold > timedelta(0)
 
+        rig.waited = False
+
         class Pipeline:
             def __init__(self, device) -> None:
                 assert device is rig.device
@@ -183,6 +185,9 @@ class Rig:
 
             def isRunning(self):  # noqa: N802
                 return False
+
+            def wait(self):
+                rig.waited = True
 
         self.dai = SimpleNamespace(
             **vars(sdk([info()])),
@@ -241,7 +246,7 @@ def test_camera_that_does_not_start_is_freed_and_named():
     with pytest.raises(CameraError, match="X_LINK_DEVICE_ALREADY_IN_USE somewhere.*unplug") as it:
         rig.source().open()
     assert "\n" not in str(it.value)
-    assert rig.device.closed == 1
+    assert rig.waited and rig.device.closed == 1
 
 
 def take(rig, source, clock, *messages):
