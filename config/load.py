@@ -134,6 +134,22 @@ def load(
     root = whole[0]
     for layer in whole[1:]:
         root = _merged(root, layer)
+    outcome = weighed(into, root, checks)
+    value, found = outcome
+    faults += found
+    if faults or value is None:
+        order = [str(file) for file in files]
+        raise ConfigError(sorted(faults, key=lambda f: (order.index(f.file), f.line or 0)))
+    return value
+
+
+def weighed(
+    into: type[T], root: Entry, checks: Sequence[Callable[[T], Iterable[tuple[str, str]]]] = ()
+) -> tuple[T | None, list[Fault]]:
+    """Turn merged entries into a frozen dataclass; give it, where it can be made, and every fault.
+
+    What checks find is a fault as well, so a value may come with some.
+    """
     value, errors = judge(into, root.plain())
     complaints = [complaint(into, error) for error in errors]
     if value is not None:
@@ -143,11 +159,7 @@ def load(
         complaints += [
             _contradiction(root, *found) for found in _certain(root, into, wrong, checks)
         ]
-    faults += [_placed(root, one) for one in complaints]
-    if faults or value is None:
-        order = [str(file) for file in files]
-        raise ConfigError(sorted(faults, key=lambda f: (order.index(f.file), f.line or 0)))
-    return value
+    return value, [_placed(root, one) for one in complaints]
 
 
 def read_yaml(path: Path) -> Document:

@@ -194,14 +194,25 @@ def load_rig(name_or_path: str, character: str | None = None, profile: str | Non
     Raises:
         config.load.ConfigError: with every fault.
     """
-    rules = (_joint_names, _servo_ids, _models, _lid_ranges, _park_ranges, _part_names, _collisions)
+    layers = layers_of(name_or_path, character, profile)
+    return load(layers[-1], Rig, defaults=layers[:-1], checks=RULES)
+
+
+def layers_of(
+    name_or_path: str, character: str | None = None, profile: str | None = None
+) -> list[Path]:
+    """List the files that ``load_rig`` lays one over the other, the rig's own first.
+
+    Raises:
+        config.load.ConfigError: none of that name is shipped, or the rig cannot be read.
+    """
     layers = [_find("rigs", name_or_path)]
     named = profile or read_yaml(layers[0]).data.get("profile")
     if isinstance(named, str):
         layers.append(_find("profiles", named))
     if character is not None:
         layers.append(_find("characters", character))
-    return load(layers[-1], Rig, defaults=layers[:-1], checks=rules)
+    return layers
 
 
 def load_rules(name_or_path: str) -> TopDownParams:
@@ -294,3 +305,7 @@ def _part_names(rig: Rig) -> Iterable[tuple[str, str]]:
     for code in rig.face_parts_mm:
         if code not in PARTS:
             yield f"face_parts_mm.{code}", f"unknown face part; parts are {', '.join(PARTS)}"
+
+
+RULES = (_joint_names, _servo_ids, _models, _lid_ranges, _park_ranges, _part_names, _collisions)
+"""What no single section of a rig can know."""

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
+from select import select
 from typing import NamedTuple
 
 import cv2
@@ -49,6 +50,13 @@ class _Found(NamedTuple):
     detections: Detections  # without picture and depth
     picture: Where | None
     depth: Where | None
+
+
+class _Retune(NamedTuple):
+    """How to look from now on; None: as before. All must be picklable."""
+
+    detector: Callable[[], FaceDetector] | None
+    motion: Callable[[Motion | None], Motion | None] | None
 
 
 class _Ended(NamedTuple):
@@ -126,6 +134,26 @@ class CameraProcess:
         if self._failure:
             raise CameraError(self._failure)
         return self._newest
+
+    def retune(
+        self,
+        detector: Callable[[], FaceDetector] | None,
+        motion: Callable[[Motion | None], Motion | None] | None,
+    ) -> bool:
+        """Let the process look otherwise from one of the next pictures on.
+
+        Never waits; tells whether the process has room for the word. A detector that cannot
+        be made there is told of as an event, and the old one goes on.
+
+        detector: makes another one; motion: gives what finds motion from what did; None: as is
+        """
+        if self._pipe is None or not select([], [self._pipe], [], 0.0)[1]:
+            return False
+        try:
+            self._pipe.send(_Retune(detector, motion))
+        except OSError:  # it has ended, which ``latest`` tells
+            return False
+        return True
 
     def events(self) -> tuple[str, ...]:
         """Say what has happened since the last call, one line each."""
@@ -214,12 +242,14 @@ def _run(
         pipe.send(error)
         return
     stop = threading.Event()
+    words: deque[_Retune] = deque()
     pipe.send(None)
-    threading.Thread(target=_heed, args=(pipe, stop), daemon=True).start()
+    threading.Thread(target=_heed, args=(pipe, stop, words), daemon=True).start()
     slots = SlotWriter(), SlotWriter()
     try:
         while (found := camera.next(stop)) is not None:
             pipe.send(_told(found, slots))
+            _retune(camera, words, pipe)
     except OSError:  # nobody listens any more
         pass
     except Exception as failure:
@@ -240,8 +270,24 @@ def _told(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> _Found:
     )
 
 
-def _heed(pipe: Connection, stop: threading.Event) -> None:
-    """Wait for the word to stop, or for the other side to be gone."""
+def _heed(pipe: Connection, stop: threading.Event, words: deque[_Retune]) -> None:
+    """Pass words on until the one to stop comes, or the other side is gone."""
     with suppress(EOFError, OSError):
-        pipe.recv()
+        while isinstance(word := pipe.recv(), _Retune):
+            words.append(word)
     stop.set()
+
+
+def _retune(camera: CameraWatch, words: deque[_Retune], pipe: Connection) -> None:
+    """Look otherwise, as asked for; of several detectors only the last is made."""
+    detector: Callable[[], FaceDetector] | None = None
+    while words:
+        word = words.popleft()
+        detector = word.detector or detector
+        camera.retune(None, word.motion)
+    if detector is None:
+        return
+    try:
+        camera.retune(detector, None)
+    except SetupError as error:
+        pipe.send(f"the detector stays as it was: {error}")

@@ -63,6 +63,23 @@ class CameraWatch:
             self._tell(line)
         return found
 
+    def retune(
+        self,
+        detector: Callable[[], FaceDetector] | None,
+        motion: Callable[[Motion | None], Motion | None] | None,
+    ) -> None:
+        """Look otherwise from the next picture on.
+
+        detector: makes another one; motion: gives what finds motion from what did; None: as is
+
+        Raises:
+            drivers.errors.SetupError: the detector cannot be made; the old one goes on.
+        """
+        if motion is not None:
+            self._motion = motion(self._motion)
+        if detector is not None:
+            self._detector = detector()
+
     def close(self) -> None:
         """Free the source; safe to call twice."""
         self._source.close()

@@ -48,7 +48,7 @@ class DynamixelBus:
         self, port: BusPort, setups: Sequence[ServoSetup], params: DynamixelParams
     ) -> None:
         self._port = port
-        self._setups = tuple(setups)
+        self._setups = self._wanted = tuple(setups)
         self._params = params
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
@@ -70,7 +70,7 @@ class DynamixelBus:
 
     def _assemble(self, block: IndirectBlock | None, fast: bool) -> None:
         """Make the parts, with a clean sheet, for what the servos can do."""
-        by_id = {setup.id: setup for setup in self._setups}
+        by_id = self._by_id = {setup.id: setup for setup in self._setups}
         self._fast, self._block = fast, block
         self._link = Reconnect()
         self._roll = Roll(self._ids)
@@ -103,6 +103,7 @@ class DynamixelBus:
             drivers.errors.PortError: the port cannot be opened.
             drivers.errors.ServoMissing: servos are absent, of another model or refuse.
         """
+        self._take_wanted()
         where, baud = self._port.port_name, self._params.baud
         if not self._port.setBaudRate(baud):
             raise PortError(f"{where} cannot run at {baud} bit/s: choose 57600 or 1000000")
@@ -154,6 +155,7 @@ class DynamixelBus:
             drivers.errors.ServoFault: a servo has latched an error or lost its zero.
         """
         try:
+            self._take_wanted()
             # A servo may have restarted since it was prepared.
             self._fitting.fit(self._ids)
             goals, outside = self._revival.take_on(self._ids)
@@ -180,6 +182,29 @@ class DynamixelBus:
             self._line.send(self._goals.packet(goals))
         except BusLost as lost:
             self._lose(lost)
+
+    def retune(self, setups: Sequence[ServoSetup]) -> None:
+        """Set the servos up so when the torque comes on the next time; the same ids and models.
+
+        Ranges and speeds are in the servos' EEPROM, which they only write without torque,
+        so under torque everything stays as it is.
+
+        Raises:
+            ValueError: these are other servos.
+        """
+        same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
+        if not same:
+            raise ValueError("other servos need another bus: ids and models must stay")
+        self._wanted = tuple(setups)
+
+    def _take_wanted(self) -> None:
+        """Put in force what was asked for since the torque was on last."""
+        if self._wanted == self._setups:
+            return
+        self._setups = self._wanted
+        self._limits = tuple((setup.min_steps, setup.max_steps) for setup in self._setups)
+        self._by_id.update({setup.id: setup for setup in self._setups})
+        self._fitting.want(self._setups)
 
     def faults(self) -> tuple[str, ...]:
         """Name every fault that servos suffer from now, e.g. "neck_yaw (servo 7): overload"."""

@@ -65,10 +65,14 @@ class Fitting:
     ) -> None:
         self._line = line
         self._registers = registers
-        self._setups = {setup.id: setup for setup in setups}
-        self._wanted = {setup.id: wanted_settings(setup) for setup in setups}
+        self.want(setups)
         self._block = block
         self._journal = journal
+
+    def want(self, setups: Sequence[ServoSetup]) -> None:
+        """Say what servos should be like from the next fitting on."""
+        self._setups = {setup.id: setup for setup in setups}
+        self._wanted = {setup.id: wanted_settings(setup) for setup in setups}
 
     def fit(self, ids: Sequence[int]) -> None:
         """Bring servos into position mode with their limits, speeds and gains.

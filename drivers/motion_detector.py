@@ -65,6 +65,13 @@ class MotionDetector:
         self._before: SmallPicture | None = None
         self.report = MotionReport()
 
+    def retune(self, params: MotionParams) -> None:
+        """Look more or less finely from the next picture on; what is followed stays."""
+        if (params.preset, params.finest_level) != (self._params.preset, self._params.finest_level):
+            self._search = FlowSearch(params.preset, params.finest_level)
+        self._params = params
+        self._tracks.retune(params)
+
     @property
     def before_s(self) -> float | None:
         """Give the capture time of the picture that the next one will be compared with."""

@@ -48,6 +48,10 @@ class MotionTracks:
         self._follows: list[Follow] = []
         self._next_id = 1
 
+    def retune(self, params: MotionParams) -> None:
+        """Take other times; what is followed stays."""
+        self._params = params
+
     def step(
         self,
         centres: list[Floats],

@@ -125,6 +125,10 @@ class ServoBus(Protocol):
         """Say what has happened since the last call, e.g. "servo 3 restarted: set up anew"."""
         ...
 
+    def retune(self, setups: Sequence[ServoSetup]) -> None:
+        """Set the servos up so when the torque comes on the next time; the same ids and models."""
+        ...
+
     def release(self) -> None:
         """Torque off on every servo; never raises for a servo that does not answer."""
         ...

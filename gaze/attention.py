@@ -102,6 +102,11 @@ class Attention:
         self._habituation = Habituation(params.habituation)
         self.reset(0.0)
 
+    def retune(self, params: AttentionParams) -> None:
+        """Take another hysteresis; the target in force and all interest stay."""
+        self._params = params
+        self._habituation.retune(params.habituation)
+
     def reset(self, t_s: float) -> None:
         """Forget everything seen."""
         for model in (self._bottom_up, self.top_down, self._idle, self._habituation):

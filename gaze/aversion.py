@@ -115,8 +115,14 @@ class Aversion:
 
     def __init__(self, params: AversionParams, rng: np.random.Generator) -> None:
         """Take times, angles and dice; nothing happens before ``converse``."""
-        par = self._params = params
         self._rng = rng
+        self.retune(params)
+        self._mode: AversionMode = "none"
+        self.reset(0.0)
+
+    def retune(self, params: AversionParams) -> None:
+        """Take other times and angles, from the next look on."""
+        par = self._params = params
         self._times: dict[AversionMode, tuple[float, float, float, float]] = {
             "talk": (
                 par.talk_mutual_s,
@@ -137,8 +143,6 @@ class Aversion:
                 par.think_away_sd_s,
             ),
         }
-        self._mode: AversionMode = "none"
-        self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Forget whom it looked at; the mode stays."""

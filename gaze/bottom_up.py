@@ -177,6 +177,10 @@ class BottomUp:
         self._params = params
         self.reset(0.0)
 
+    def retune(self, params: BottomUpParams) -> None:
+        """Take other weights; what is known of the bodies stays."""
+        self._params = params
+
     def reset(self, t_s: float) -> None:
         """Forget all bodies."""
         self._ids: tuple[int, ...] = ()

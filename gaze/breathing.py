@@ -12,6 +12,7 @@ from gaze.saccade import min_jerk
 from gaze.types import Angles3
 
 _STILL: Angles3 = (0.0, 0.0, 0.0)
+_GLIDE_S = 1.0  # time in which a breath that is retuned falls into its new depth
 
 
 @dataclass(frozen=True)
@@ -47,17 +48,41 @@ class Breathing:
 
     def __init__(self, params: BreathingParams) -> None:
         """Take depth and pace."""
+        self._take(params)
+        self.reset(0.0)
+
+    def _take(self, params: BreathingParams) -> None:
         self._pitch_rad = radians(params.pitch_deg)
         self._roll_rad = radians(params.roll_deg)
         self._rate_hz = params.rate_hz
-        self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Begin to breathe: the sway grows from nothing within the first breath."""
-        self._start_s = t_s
+        self._start_s = self._t_s = self._retuned_s = t_s
+        self._shown = self._left = _STILL
+
+    def retune(self, params: BreathingParams) -> None:
+        """Take another depth and pace, the breath under way going on from where it is."""
+        breaths = (self._t_s - self._start_s) * self._rate_hz
+        self._take(params)
+        self._start_s = self._t_s - breaths / self._rate_hz
+        pitch, roll = self._sway(self._t_s)[1:]
+        self._left = (0.0, self._shown[1] - pitch, self._shown[2] - roll)
+        self._retuned_s = self._t_s
 
     def step(self, t_s: float) -> Angles3:
         """Give the (yaw, pitch, roll) to add to the head's; yaw is always 0."""
+        self._t_s = t_s
+        self._shown = self._sway(t_s)
+        if self._left != _STILL:  # what a retune has left over, going within a second
+            kept = 1.0 - min_jerk((t_s - self._retuned_s) / _GLIDE_S)
+            _, pitch, roll = self._shown
+            self._shown = (0.0, pitch + kept * self._left[1], roll + kept * self._left[2])
+            if kept == 0.0:
+                self._left = _STILL
+        return self._shown
+
+    def _sway(self, t_s: float) -> Angles3:
         breaths = (t_s - self._start_s) * self._rate_hz
         if breaths <= 0.0 or (self._pitch_rad == 0.0 and self._roll_rad == 0.0):
             return _STILL

@@ -58,6 +58,10 @@ class FieldOfView:
 
     def __init__(self, params: FieldOfViewParams) -> None:
         """Take the limits in degrees."""
+        self.retune(params)
+
+    def retune(self, params: FieldOfViewParams) -> None:
+        """Take other limits."""
         self._temporal = np.radians(params.temporal_deg)
         self._nasal = np.radians(params.nasal_deg)
         self._up = np.radians(params.up_deg)

@@ -17,15 +17,15 @@ class Flight:
 
     def __init__(self, saccade: Saccade, start: Vec3, end: Vec3, eye: Vec3, onset_s: float) -> None:
         """Take both points, the centre between the eyes, and the time of onset."""
-        self._saccade, self._start, self._end = saccade, start, end
+        self._profile, self._start, self._end = saccade.profile, start, end
         self._start_way, self._end_way = unit(sub(start, eye)), unit(sub(end, eye))
         self.onset_s = onset_s
         self.amplitude_rad = angle_between(self._start_way, self._end_way)
-        self.ends_s = onset_s + saccade.duration_s(self.amplitude_rad)
+        self.ends_s = onset_s + self._profile.duration_s(self.amplitude_rad)
 
     def at(self, eye: Vec3, t_s: float) -> Vec3:
         """Give the gaze point, seen from where the eyes are now."""
-        done = self._saccade.displacement_rad(self.amplitude_rad, t_s - self.onset_s)
+        done = self._profile.displacement_rad(self.amplitude_rad, t_s - self.onset_s)
         share = done / self.amplitude_rad if self.amplitude_rad > 0.0 else 1.0
         a, b = sub(self._start, eye), sub(self._end, eye)
         near_a, near_b = 1.0 / norm(a), 1.0 / norm(b)

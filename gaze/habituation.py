@@ -94,6 +94,10 @@ class Habituation:
         self._params = params
         self.reset(0.0)
 
+    def retune(self, params: HabituationParams) -> None:
+        """Take other rates; the interest that is left and the places left stay."""
+        self._params = params
+
     def reset(self, t_s: float) -> None:
         """Find everything interesting again."""
         # Only those below full interest are kept: the ones attended in the last 1/rise_1_s

@@ -168,6 +168,13 @@ class Head:
         self, params: HeadParams, eye_limit_rad: float, neck_limit_rad: tuple[Angles2, Angles2]
     ) -> None:
         """Take the smallest eye limit and the neck's ((yaw low, high), (pitch low, high))."""
+        self.retune(params, eye_limit_rad, neck_limit_rad)
+        self.reset(0.0, (0.0, 0.0, 0.0))
+
+    def retune(
+        self, params: HeadParams, eye_limit_rad: float, neck_limit_rad: tuple[Angles2, Angles2]
+    ) -> None:
+        """Take other constants and ranges; a movement under way goes on as it was planned."""
         self._params = params
         self._neck = neck_limit_rad
         reachable = eye_limit_rad - radians(params.eye_margin_deg)
@@ -175,7 +182,6 @@ class Head:
         # to the target, and a trigger beyond the eye's limit never fires.
         printed = radians(params.largest_offset_deg)
         self.trigger_rad = printed if params.literal_reach else max(0.0, min(printed, reachable))
-        self.reset(0.0, (0.0, 0.0, 0.0))
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
         """Stand still where the head is."""

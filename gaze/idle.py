@@ -175,14 +175,18 @@ class Idle:
 
     def __init__(self, params: IdleParams, rng: np.random.Generator | None = None) -> None:
         """Take times, ranges and dice; without dice it only waits and then rests."""
-        self._params = params
         self._rng = rng
+        self._take(params)
+        self.reset(0.0)
+
+    def _take(self, params: IdleParams) -> None:
+        self._params = params
         self._eye: Vec3 = (0.0, 0.0, params.rest_height_m)
         self._rest: Vec3 = (params.rest_distance_m, 0.0, params.rest_height_m)
-        self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Forget what was looked at."""
+        self._t_s = t_s
         self._last: Target | None = None
         self._lost = False
         self._now = self._resting(t_s)
@@ -190,12 +194,30 @@ class Idle:
         self._count = 0
         self._gone: Target | None = None
 
+    def retune(self, params: IdleParams) -> None:
+        """Take other times and places; what is under way goes on, for a time in the new measure."""
+        before = self._params
+        self._take(params)
+        since_s, left_s = self._now.at_s, self._until_s - self._now.at_s
+        if self._now.kind == "rest":
+            self._now = self._resting(since_s)
+            left_s *= params.rest_ms / before.rest_ms
+        elif self._now.kind == "glance":
+            left_s *= params.glance_ms / before.glance_ms
+        elif self._now.kind != "search":
+            # A lost target is waited for.
+            left_s += (params.hold_ms - before.hold_ms) / 1e3
+            self._search_until_s = since_s + left_s + params.search_ms / 1e3
+        if self._lost:  # else the clock of what there was before somebody came has run out
+            self._until_s = max(since_s + left_s, self._t_s)
+
     def remember(self, target: Target) -> None:
         """Note a target that is in sight."""
         self._last, self._lost = target, False
 
     def step(self, t_s: float) -> Target:
         """Give where to look with nothing in sight: wait, search, rest, glance."""
+        self._t_s = t_s
         if not self._lost:
             self._lose(t_s)
         while t_s >= self._until_s:

@@ -10,7 +10,7 @@ it is the event that the text before it describes. Opening 0 is shut, 1 is fully
 
 from dataclasses import dataclass, field
 from math import degrees, exp, inf, log, sqrt
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ Side = Literal["left", "right"]
 LidMode = Literal["rest", "conversation"]
 
 _DROOP_S = 1.0  # time in which lids sink or rise when the sleepiness changes
+_GLIDE_S = 0.3  # and when what they do at rest is retuned
 
 
 @dataclass(frozen=True)
@@ -192,12 +193,32 @@ class LidParams:
     )
 
 
+class _Shape(NamedTuple):
+    """Times of a blink or wink; one under way keeps those that it began with."""
+
+    close_s: float
+    hold_s: float
+    open_s: float
+    wink_hold_s: float
+
+    @property
+    def blink_s(self) -> float:
+        """Give the length of a blink of somebody awake."""
+        return self.close_s + self.hold_s + self.open_s
+
+    @property
+    def wink_s(self) -> float:
+        """Give the length of a wink."""
+        return self.close_s + self.wink_hold_s + self.open_s
+
+
 class Lids:
     """Opening of both lids as a function of time, with its own dice."""
 
     def __init__(self, params: LidParams, rng: np.random.Generator) -> None:
         """Take rates, shapes and dice."""
         self._params = params
+        self._shape = _shape(params)
         self._rng = rng
         self._mode: LidMode = "rest"
         self.reset(0.0)
@@ -212,7 +233,29 @@ class Lids:
         self._winks_s: dict[Side, float] = {"left": -inf, "right": -inf}
         level = self._params.sleepy_level
         self._droop_from, self._droop_to, self._droop_since_s = level, level, t_s
+        self._shape = self._wanted_shape = _shape(self._params)
+        self._pitch_deg = self._shown = self._left = 0.0
+        self._retuned_s = t_s
         self._next_s = t_s + self._interval_s()
+
+    def retune(self, params: LidParams) -> None:
+        """Take other rates and shapes; a blink under way ends as it began, lids glide.
+
+        The pause under way becomes longer or shorter as the mean pause does.
+        """
+        before_per_min = self._per_min()
+        before, self._params = self._params, params
+        per_min = self._per_min()
+        if per_min != before_per_min:
+            if per_min and before_per_min:
+                self._next_s = self._t_s + (self._next_s - self._t_s) * before_per_min / per_min
+            else:
+                self._redraw = True
+        self._fit_shape()
+        if params.sleepy_level != before.sleepy_level:
+            self.sleepy(params.sleepy_level)
+        self._left = self._shown - self._opening(self._t_s)
+        self._retuned_s = self._t_s
 
     def mode(self, name: LidMode) -> None:
         """Blink as often as people do at "rest" or in "conversation", from the next step on.
@@ -256,14 +299,16 @@ class Lids:
         shift_rad: size of a gaze shift that begins in this very tick, else None
         """
         self._t_s = t_s
+        if self._shape != self._wanted_shape:
+            self._fit_shape()
         if self._redraw:
             self._redraw, self._next_s = False, t_s + self._interval_s()
         if self._due(t_s, shift_rad):
             self._blink(t_s)
         blink = self._depth * self.closure((t_s - self._onset_s) / self._slow)
         left, right = (max(blink, self._winked(t_s - at_s)) for at_s in self._winks_s.values())
-        opening = self._level_opening(degrees(eye_pitch_rad))
-        opening *= 1.0 - self._params.sleepy_droop * self._sleepiness(t_s)
+        self._pitch_deg = degrees(eye_pitch_rad)
+        opening = self._shown = self._glided(self._opening(t_s), t_s)
         return opening * (1.0 - left), opening * (1.0 - right), blink > 0.0
 
     def closure(self, since_onset_s: float, hold_s: float | None = None) -> float:
@@ -271,9 +316,8 @@ class Lids:
 
         hold_s: time shut, of a blink where not given
         """
-        par = self._params
-        close, opening = par.close_ms / 1e3, par.open_ms / 1e3
-        hold = par.hold_ms / 1e3 if hold_s is None else hold_s
+        close, hold, opening, _ = self._shape
+        hold = hold if hold_s is None else hold_s
         if since_onset_s <= 0.0 or since_onset_s >= close + hold + opening:
             return 0.0
         if since_onset_s < close:
@@ -284,6 +328,28 @@ class Lids:
         # runs fast at first.
         s = (since_onset_s - close - hold) / opening
         return 1.0 - min_jerk(1.0 - (1.0 - s) ** 1.4)
+
+    def _opening(self, t_s: float) -> float:
+        """Give the opening that goes with gaze and sleepiness, without blinks."""
+        opening = self._level_opening(self._pitch_deg)
+        return opening * (1.0 - self._params.sleepy_droop * self._sleepiness(t_s))
+
+    def _glided(self, opening: float, t_s: float) -> float:
+        """Add what a retune has left over, which goes within a moment."""
+        if self._left == 0.0:
+            return opening
+        kept = 1.0 - min_jerk((t_s - self._retuned_s) / _GLIDE_S)
+        if kept == 0.0:
+            self._left = 0.0
+        return min(1.0, max(0.0, opening + kept * self._left))
+
+    def _fit_shape(self) -> None:
+        """Take the shape that is wanted, unless a blink or wink is under way."""
+        self._wanted_shape = _shape(self._params)
+        at_s = self._t_s
+        blinking = at_s - self._onset_s < self._length_s()
+        if not blinking and not any(self._under_way(w, at_s) for w in self._winks_s.values()):
+            self._shape = self._wanted_shape
 
     def _level_opening(self, eye_pitch_deg: float) -> float:
         """Give the opening that goes with a vertical gaze (Becker & Fuchs 1988)."""
@@ -326,12 +392,11 @@ class Lids:
         self._next_s = t_s + self._length_s() + pause_s
 
     def _winked(self, since_onset_s: float) -> float:
-        return self.closure(since_onset_s, self._params.wink_hold_ms / 1e3)
+        return self.closure(since_onset_s, self._shape.wink_hold_s)
 
     def _under_way(self, wink_s: float, t_s: float) -> bool:
         """Tell whether the wink that began at ``wink_s`` is not over."""
-        par = self._params
-        return wink_s <= t_s < wink_s + (par.close_ms + par.wink_hold_ms + par.open_ms) / 1e3
+        return wink_s <= t_s < wink_s + self._shape.wink_s
 
     def _sleepiness(self, t_s: float) -> float:
         way = min_jerk((t_s - self._droop_since_s) / _DROOP_S)
@@ -339,13 +404,16 @@ class Lids:
 
     def _length_s(self) -> float:
         """Give the length of the blink under way, of an awake one before the first."""
+        return self._slow * self._shape.blink_s
+
+    def _per_min(self) -> float:
         par = self._params
-        return self._slow * (par.close_ms + par.hold_ms + par.open_ms) / 1e3
+        return par.blinks_per_min if self._mode == "rest" else par.conversation_per_min
 
     def _interval_s(self) -> float:
         """Draw the pause from the end of a blink until the next spontaneous one."""
         par = self._params
-        per_min = par.blinks_per_min if self._mode == "rest" else par.conversation_per_min
+        per_min = self._per_min()
         if per_min == 0.0:
             return inf
         shortest = par.shortest_interval_ms / 1e3
@@ -359,3 +427,12 @@ class Lids:
         # the whole pause has those asked for.
         sigma2 = log(1.0 + (par.interval_cv * between / mean) ** 2)
         return shortest + mean * exp(sqrt(sigma2) * self._rng.standard_normal() - 0.5 * sigma2)
+
+
+def _shape(params: LidParams) -> _Shape:
+    return _Shape(
+        params.close_ms / 1e3,
+        params.hold_ms / 1e3,
+        params.open_ms / 1e3,
+        params.wink_hold_ms / 1e3,
+    )

@@ -137,20 +137,32 @@ class Oculomotor:
         Raises:
             ValueError: the landing is to scatter and there are no dice.
         """
-        self._scatter = (params.landing_along, params.landing_across)
-        if any(self._scatter) and rng is None:
-            raise ValueError("landing_along and landing_across need dice: give rng")
-        self._params = params
+        self._rng = rng
+        self._rule = ShiftRule(params, False)
+        self.retune(params, eye_limits)
         self._geometry = geometry
-        self._eye_limits = eye_limits
         self._saccade = saccade
         self._pursuit = pursuit
         self._head = head
         self._lids = lids
         self._breathing = breathing
-        self._rng = rng
-        self._rule = ShiftRule(params, any(self._scatter))
         self._started = False
+
+    def retune(
+        self,
+        params: OculomotorParams,
+        eye_limits: tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]],
+    ) -> None:
+        """Take other thresholds, times and ranges; a saccade under way goes on to its end.
+
+        Raises:
+            ValueError: the landing is to scatter and there are no dice.
+        """
+        scatter = (params.landing_along, params.landing_across)
+        if any(scatter) and self._rng is None:
+            raise ValueError("landing_along and landing_across need dice: give rng")
+        self._params, self._scatter, self._eye_limits = params, scatter, eye_limits
+        self._rule.retune(params, any(scatter))
 
     def reset(self, t_s: float, state: GazeState) -> None:
         """Begin where head and eyes are."""

@@ -105,6 +105,10 @@ class Pursuit:
 
     def __init__(self, params: PursuitParams) -> None:
         """Take gains and limits."""
+        self.retune(params)
+
+    def retune(self, params: PursuitParams) -> None:
+        """Take other gains and limits."""
         self._params = params
         self._max_rad_s = radians(params.max_speed_deg_s)
         self._reject_rad_s = radians(params.reject_deg_s)

@@ -257,7 +257,16 @@ class Saccade:
 
     def __init__(self, params: SaccadeParams) -> None:
         """Take the profile and its constants."""
+        self.retune(params)
+
+    def retune(self, params: SaccadeParams) -> None:
+        """Take another profile or other constants, from the next saccade on."""
         self._profile = _profile(params)
+
+    @property
+    def profile(self) -> Profile:
+        """Give the profile in force, which a saccade under way keeps to its end."""
+        return self._profile
 
     def duration_s(self, amplitude_rad: float) -> float:
         """Give the time from onset to landing."""

@@ -208,8 +208,18 @@ class Scanpath:
 
     def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
         """Take the model that ``params`` names, the measured walk and the dice."""
+        self._rng = rng
         self.looks = _looks(params, walk, rng)
         self.reset(0.0)
+
+    def retune(self, params: ScanpathParams, walk: Walk) -> None:
+        """Take another model, walk or tempo; the part looked at and its dwell go on.
+
+        A model that does not know that part begins with its own first look.
+        """
+        before, self.looks = self.looks, _looks(params, walk, self._rng)
+        if not self.looks.go_on(before):
+            self._shift += 1
 
     def reset(self, t_s: float) -> None:
         """Forget the face; the next one is entered anew."""

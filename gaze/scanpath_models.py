@@ -35,6 +35,15 @@ class FaceLooks(Protocol):
         """Begin anew: another face is looked at."""
         ...
 
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Give the part looked at, None where it is none, and when that look ends, if known."""
+        ...
+
+    def go_on(self, before: "FaceLooks") -> bool:
+        """Take over the look of another way; tell whether this way knows such a look."""
+        ...
+
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
         """Give what to look at; ``settled``: the gaze has arrived at the last look."""
         ...
@@ -67,6 +76,19 @@ class MarkovWalk:
         """Go to the start part."""
         self._part = self._start
         self._until_s: float | None = None
+
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Give the part looked at and when its dwell ends, None before the gaze is there."""
+        return self._parts[self._part], self._until_s
+
+    def go_on(self, before: FaceLooks) -> bool:
+        """Take over the part looked at and its dwell; tell whether it is one of these."""
+        part, until_s = before.dwell
+        if part not in self._parts:
+            return False
+        self._part, self._until_s = self._parts.index(part), until_s
+        return True
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
         """Start the dwell on arrival; after it draw until another part comes."""
@@ -117,6 +139,19 @@ class SimpleCycle:
         self._at = 0
         self._until_s: float | None = None
 
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Give the part looked at and when its time is over, None before the gaze is there."""
+        return self._parts[self._at], self._until_s
+
+    def go_on(self, before: FaceLooks) -> bool:
+        """Take over the part looked at and its dwell; tell whether it is one of these."""
+        part, until_s = before.dwell
+        if part not in self._parts:
+            return False
+        self._at, self._until_s = self._parts.index(part), until_s
+        return True
+
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
         """Start the time on arrival, go on when it is over."""
         moved = False
@@ -135,6 +170,15 @@ class FaceTracking:
 
     def enter(self) -> None:
         """Do nothing: there is nothing to remember."""
+
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Give the nose, for ever."""
+        return "N", None
+
+    def go_on(self, before: FaceLooks) -> bool:
+        """Tell whether the nose was looked at before."""
+        return before.dwell[0] == "N"
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
         """Give the centre."""
@@ -160,6 +204,20 @@ class RandomAngles:
         """Draw the first angles at once."""
         self._offset_rad: Angles2 = self._angles()
         self._until_s: float | None = None
+
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Give no part, and when the interval is over."""
+        return None, self._until_s
+
+    def go_on(self, before: FaceLooks) -> bool:
+        """Take over angles and interval of another such way, as far as both are allowed."""
+        if not isinstance(before, RandomAngles):
+            return False
+        most, (yaw, pitch) = self._angle_rad, before._offset_rad
+        self._offset_rad = (min(max(yaw, -most), most), min(max(pitch, -most), most))
+        self._until_s = before._until_s
+        return True
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
         """Jump when the interval is over."""

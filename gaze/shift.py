@@ -100,6 +100,11 @@ class ShiftRule:
 
     def __init__(self, params: ShiftParams, scatters: bool) -> None:
         """Take thresholds and times, and whether landings scatter and are corrected."""
+        self.retune(params, scatters)
+        self.reset(0.0)
+
+    def retune(self, params: ShiftParams, scatters: bool) -> None:
+        """Take other thresholds and times; an event that waits for its saccade still does."""
         self._scatters = scatters
         self._smallest_rad = radians(params.smallest_shift_deg)
         self._saccade_rad = radians(params.saccade_deg)
@@ -108,7 +113,6 @@ class ShiftRule:
         self._refractory_s = params.refractory_ms / 1e3
         self._correct_s = params.correct_after_ms / 1e3
         self._smooth_s = (params.crossing_least_ms / 1e3, params.crossing_most_ms / 1e3)
-        self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Begin with no event and well rested."""

@@ -137,7 +137,17 @@ class TopDown:
     def __init__(self, params: TopDownParams) -> None:
         """Take the rule set."""
         self._params = params
+        self.behaviour = params.behaviour
         self.reset(0.0)
+
+    def retune(self, params: TopDownParams) -> None:
+        """Take other rules; the behaviour in force stays unless its rule is gone.
+
+        Another behaviour of the start is in force at once: what was asked for is its rule.
+        """
+        before, self._params = self._params, params
+        if params.behaviour != before.behaviour or self.behaviour not in params.rules:
+            self.behaviour = params.behaviour
 
     @property
     def behaviours(self) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """Real or simulated parts to one robot: the only room that sees config and sim_mock."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import fields, replace
 from math import radians
 from typing import NamedTuple, TypeVar
@@ -27,8 +27,8 @@ from gaze.pursuit import Pursuit
 from gaze.saccade import Saccade, SaccadeParams
 from gaze.scanpath import Scanpath, ScanpathParams, row_sums_note
 from gaze.top_down import TopDown
-from gaze.types import Angles2, Angles3, Mat3, Vec3
-from robot.body import Body, JointParams
+from gaze.types import Angles3, Mat3, Vec3
+from robot.body import Body
 from robot.cameras import HeadPose, real_camera, scene_camera
 from robot.choice import Choice
 from robot.clock import Clock, RealClock, SimulatedClock
@@ -37,7 +37,18 @@ from robot.frames import CameraMount, CameraParams, NewestPose, PoseHistory, sta
 from robot.kinematics import Kinematics
 from robot.loop import LoopParams, Robot
 from robot.perception import Perception
+from robot.retune import (
+    Parts,
+    Placed,
+    Retuner,
+    eye_limits,
+    head_limits,
+    lid_angles,
+    limits,
+    own_parts,
+)
 from robot.safety import Guard
+from robot.snapshot import ShownRig
 from robot.tracks import Tracker
 from robot.types import JOINTS, JointAngles
 from sim_mock.ports import InProcessPort
@@ -54,19 +65,49 @@ class Assembly(NamedTuple):
 
     sent_digest: gives the SHA-256 of all bytes sent to the emulated bus, None elsewhere
     close: ends what was started for it; notes: what a person should know
+    retuner: holds the rig in force and puts changes into the running parts
     """
 
     robot: Robot
     clock: Clock
-    loop: LoopParams
-    park_rad: JointAngles
     mount: CameraMount
     poses: PoseHistory
-    horizontal_field_deg: float
     scene: Scene | None
     sent_digest: Callable[[], str | None]
     close: Callable[[], None]
     notes: tuple[str, ...]
+    retuner: Retuner
+
+    def shown(self) -> ShownRig:
+        """Give how the rig is built now, as far as people are shown it."""
+        rig, parts = self.retuner.rig, self.retuner.parts
+        return ShownRig(
+            parts.kinematics,
+            limits(rig.joints),
+            rig.guard.health,
+            self.mount,
+            radians(self.horizontal_field_deg),
+            rig.gaze.field_of_view,
+        )
+
+    def camera(self) -> CameraParams:
+        """Give lens and place of the camera as they are believed now."""
+        return self.retuner.camera
+
+    @property
+    def loop(self) -> LoopParams:
+        """Give the rate and the time for parking in force now."""
+        return self.retuner.loop
+
+    @property
+    def park_rad(self) -> JointAngles:
+        """Give the pose before torque goes off, as it is now."""
+        return self.retuner.park_rad
+
+    @property
+    def horizontal_field_deg(self) -> float:
+        """Give the camera's field of view as it is believed now."""
+        return self.retuner.horizontal_field_deg
 
 
 class _Wires(NamedTuple):
@@ -85,9 +126,7 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
         config.load.ConfigError: the profile or walk that the rig names is at fault.
         drivers.errors.SetupError: a film or model file cannot be used.
     """
-    if choice.rules is not None:
-        gaze = replace(rig.gaze, top_down=load_rules(choice.rules))
-        rig = replace(rig, gaze=gaze)
+    rig = _as_chosen(rig, choice)
     scene = _scene(rig, choice.scene) if choice.scene is not None else None
     dice = [np.random.default_rng(child) for child in np.random.SeedSequence(choice.seed).spawn(6)]
     scanpath_dice, lid_dice, camera_dice, idle_dice, aversion_dice, landing_dice = dice
@@ -108,46 +147,78 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
         )
         body = Body(bus, rig.joints)
         lids = Lids(rig.gaze.lids, lid_dice)
-        where = _true_head(wires.chain, body, kinematics, poses)
-        robot = Robot(
-            body,
-            kinematics,
-            scene_camera(rig, choice, scene, mount, where, camera_dice)
+        where = _true_head(wires.chain, rig, poses)
+        tracker = Tracker(rig.tracks)
+        moves = _movers(rig)
+        decides = _deciders(rig, idle_dice)
+        parts = Parts(
+            body=body,
+            guard=Guard(rig.guard, limits(rig.joints), body.reach),
+            kinematics=kinematics,
+            camera=scene_camera(rig, choice, scene, mount, where, camera_dice)
             if scene is not None
             else real_camera(rig, choice, clock, camera_params, turns),
-            Perception(
+            mount=mount,
+            perception=Perception(
                 mount,
                 camera_params.horizontal_field_deg,
-                Tracker(rig.tracks),
-                _own_parts(rig),
+                tracker,
+                own_parts(rig),
                 camera_params.lens,
                 depth_at,
             ),
-            poses,
-            _attention(rig, idle_dice),
-            Scanpath(_scanpath_params(rig, choice), walk, scanpath_dice),
-            Aversion(rig.gaze.aversion, aversion_dice),
-            _oculomotor(rig, choice, kinematics, lids, landing_dice),
-            lids,
-            Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS)),
+            tracker=tracker,
+            attention=Attention(rig.gaze.attention, *decides),
+            field_of_view=decides.field_of_view,
+            bottom_up=decides.bottom_up,
+            top_down=decides.top_down,
+            idle=decides.idle,
+            scanpath=Scanpath(rig.gaze.scanpath, walk, scanpath_dice),
+            aversion=Aversion(rig.gaze.aversion, aversion_dice),
+            oculomotor=_oculomotor(rig, kinematics, moves, lids, landing_dice),
+            saccade=moves.saccade,
+            pursuit=moves.pursuit,
+            head=moves.head,
+            breathing=moves.breathing,
+            lids=lids,
         )
+        robot = _robot(parts, poses)
     except BaseException:
         wires.close()
         raise
-    park = tuple(radians(rig.park_deg.get(name, 0.0)) for name in JOINTS)
-    return Assembly(
-        robot,
-        clock,
-        rig.loop,
-        park,
-        mount,
+    placed = Placed(lambda rig: _camera_params(rig, choice, kinematics)[0], camera_params.mount)
+    retuner = robot.tune = Retuner(parts, rig, placed)
+    return Assembly(robot, clock, mount, poses, scene, wires.digest, wires.close, notes, retuner)
+
+
+def _robot(parts: Parts, poses: PoseHistory) -> Robot:
+    return Robot(
+        parts.body,
+        parts.kinematics,
+        parts.camera,
+        parts.perception,
         poses,
-        camera_params.horizontal_field_deg,
-        scene,
-        wires.digest,
-        wires.close,
-        notes,
+        parts.attention,
+        parts.scanpath,
+        parts.aversion,
+        parts.oculomotor,
+        parts.lids,
+        parts.guard,
     )
+
+
+def _as_chosen(rig: Rig, choice: Choice) -> Rig:
+    """Give the rig with what the command line says otherwise."""
+    gaze = rig.gaze
+    if choice.rules is not None:
+        gaze = replace(gaze, top_down=load_rules(choice.rules))
+    if choice.scanpath is not None:
+        scanpath = chosen(gaze.scanpath, "model", choice.scanpath, "--scanpath")
+        gaze = replace(gaze, scanpath=scanpath)
+    if choice.saccade is not None:
+        saccade = chosen(gaze.saccade, "profile", choice.saccade, "--saccade")
+        gaze = replace(gaze, saccade=saccade)
+    return replace(rig, gaze=gaze)
 
 
 def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
@@ -156,9 +227,8 @@ def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
     kinematics = _kinematics(rig)
-    choice = Choice(mock=False, fast=False, seed=seed)
     lids = Lids(rig.gaze.lids, lid_dice)
-    return kinematics, _oculomotor(rig, choice, kinematics, lids, landing_dice)
+    return kinematics, _oculomotor(rig, kinematics, _movers(rig), lids, landing_dice)
 
 
 def _scene(rig: Rig, name: str) -> Scene:
@@ -176,18 +246,8 @@ def _scene(rig: Rig, name: str) -> Scene:
     return scene
 
 
-def _own_parts(rig: Rig) -> dict[str, Vec3]:
-    """Give the rig's own places of face parts in metres."""
-    return {code: (x / 1e3, y / 1e3, z / 1e3) for code, (x, y, z) in rig.face_parts_mm.items()}
-
-
 def _kinematics(rig: Rig) -> Kinematics:
-    lids = rig.lid_joints
-    return Kinematics(
-        rig.geometry,
-        (radians(lids.left_shut_deg), radians(lids.right_shut_deg)),
-        (radians(lids.left_open_deg), radians(lids.right_open_deg)),
-    )
+    return Kinematics(rig.geometry, *lid_angles(rig))
 
 
 def _camera_params(
@@ -240,34 +300,21 @@ def _teller(
     return tell
 
 
-def _true_head(
-    chain: ServoChain | None, body: Body, kinematics: Kinematics, poses: PoseHistory
-) -> HeadPose:
-    """Give where the emulated head is: from the servos themselves where they are at hand."""
+def _true_head(chain: ServoChain | None, rig: Rig, poses: PoseHistory) -> HeadPose:
+    """Give where the emulated head is: from the servos themselves where they are at hand.
+
+    It is built as the rig says now, whatever is believed of it later.
+    """
     if chain is None:
         return poses.head_pose
+    kinematics, joints = _kinematics(rig), [rig.joints[name] for name in JOINTS]
 
     def now(_: float) -> tuple[Mat3, Vec3]:
-        q = body.angles(list(chain.positions_steps()))
+        steps = zip(joints, chain.positions_steps(), strict=True)
+        q = [joint.angle_rad(step) for joint, step in steps]
         return kinematics.head_pose((q[6], q[7], q[8]))
 
     return now
-
-
-def _scanpath_params(rig: Rig, choice: Choice) -> ScanpathParams:
-    """Take the rig's scanpath, or another model by name."""
-    params = rig.gaze.scanpath
-    if choice.scanpath is None:
-        return params
-    return chosen(params, "model", choice.scanpath, "--scanpath")
-
-
-def _saccade_params(rig: Rig, choice: Choice) -> SaccadeParams:
-    """Take the rig's saccades, or another profile by name."""
-    params = rig.gaze.saccade
-    if choice.saccade is None:
-        return params
-    return chosen(params, "profile", choice.saccade, "--saccade")
 
 
 def chosen(params: P, key: str, value: str, option: str) -> P:
@@ -283,10 +330,18 @@ def chosen(params: P, key: str, value: str, option: str) -> P:
     return replace(params, **{key: value})  # type: ignore[arg-type]
 
 
-def _attention(rig: Rig, idle_dice: np.random.Generator) -> Attention:
+class _Deciders(NamedTuple):
+    """What attention decides between."""
+
+    field_of_view: FieldOfView
+    bottom_up: BottomUp
+    top_down: TopDown
+    idle: Idle
+
+
+def _deciders(rig: Rig, idle_dice: np.random.Generator) -> _Deciders:
     gaze = rig.gaze
-    return Attention(
-        gaze.attention,
+    return _Deciders(
         FieldOfView(gaze.field_of_view),
         BottomUp(gaze.bottom_up),
         TopDown(gaze.top_down),
@@ -294,41 +349,41 @@ def _attention(rig: Rig, idle_dice: np.random.Generator) -> Attention:
     )
 
 
+class _Movers(NamedTuple):
+    """What moves eyes and head."""
+
+    saccade: Saccade
+    pursuit: Pursuit
+    head: Head
+    breathing: Breathing
+
+
+def _movers(rig: Rig) -> _Movers:
+    gaze = rig.gaze
+    return _Movers(
+        Saccade(gaze.saccade),
+        Pursuit(gaze.pursuit),
+        Head(gaze.head, *head_limits(rig)),
+        Breathing(gaze.breathing),
+    )
+
+
 def _oculomotor(
     rig: Rig,
-    choice: Choice,
     kinematics: Kinematics,
+    moves: _Movers,
     lids: Lids,
     landing_dice: np.random.Generator,
 ) -> Oculomotor:
     """Compose the models with the narrower of the rig's and the profile's ranges."""
-    gaze, joints, ranges = rig.gaze, rig.joints, rig.ranges
-    eyes = tuple(
-        (
-            _range(joints, f"{side}_eye_pan", ranges.eye_yaw_deg),
-            _range(joints, f"{side}_eye_tilt", ranges.eye_pitch_deg),
-        )
-        for side in ("left", "right")
-    )
-    neck = (
-        _range(joints, "neck_yaw", ranges.neck_yaw_deg),
-        _range(joints, "neck_pitch", 180.0),
-    )
-    smallest = min(abs(end) for eye in eyes for span in eye for end in span)
     return Oculomotor(
-        gaze.oculomotor,
+        rig.gaze.oculomotor,
         kinematics,
-        (eyes[0], eyes[1]),
-        Saccade(_saccade_params(rig, choice)),
-        Pursuit(gaze.pursuit),
-        Head(gaze.head, smallest, neck),
+        eye_limits(rig),
+        moves.saccade,
+        moves.pursuit,
+        moves.head,
         lids,
-        Breathing(gaze.breathing),
+        moves.breathing,
         landing_dice,
     )
-
-
-def _range(joints: Mapping[str, JointParams], name: str, most_deg: float) -> Angles2:
-    """Give a joint's range within +-most_deg, in radians."""
-    joint = joints[name]
-    return radians(max(joint.min_deg, -most_deg)), radians(min(joint.max_deg, most_deg))

@@ -144,13 +144,39 @@ class Body:
     def __init__(self, bus: ServoBus, joints: Mapping[str, JointParams]) -> None:
         """Take the bus, made with the setups in the order of JOINTS, and the joints."""
         self.bus = bus
-        self._joints = tuple(joints[name] for name in JOINTS)
-        self._scale = tuple(
-            1.0 / (joint.sign * joint.ratio * _STEPS_PER_RAD) for joint in self._joints
-        )
-        self._zero = tuple(joint.zero_step for joint in self._joints)
+        self._set_up = tuple(joints[name] for name in JOINTS)
+        self._take(self._set_up)
         # Before the first answer: the centre, of an age that says so.
         self._last = [ServoReading(zero, 0.0, 0.0, -inf, False) for zero in self._zero]
+
+    def _take(self, joints: tuple[JointParams, ...]) -> None:
+        self._joints = joints
+        self._scale = tuple(1.0 / (j.sign * j.ratio * _STEPS_PER_RAD) for j in joints)
+        self._zero = tuple(joint.zero_step for joint in joints)
+
+    def retune(self, joints: Mapping[str, JointParams]) -> dict[int, tuple[float, float]]:
+        """Count angles otherwise from now on; the servos are set up anew when torque comes on.
+
+        Gives, for each joint whose angles are other ones now, (factor, offset in radians):
+        what was x is factor x + offset.
+        """
+        before = self._joints
+        self._take(tuple(joints[name] for name in JOINTS))
+        self.bus.retune(
+            [joint.setup(name) for name, joint in zip(JOINTS, self._joints, strict=True)]
+        )
+        return {
+            i: (
+                now.angle_rad(old.steps(1.0)) - now.angle_rad(old.steps(0.0)),
+                now.angle_rad(old.steps(0.0)),
+            )
+            for i, (old, now) in enumerate(zip(before, self._joints, strict=True))
+            if not _counts_alike(old, now)
+        }
+
+    def reach(self) -> tuple[JointLimit, ...]:
+        """Give the ranges and speeds that servos keep to as they were set up, as angles of now."""
+        return tuple(map(_as_set_up, self._set_up, self._joints))
 
     def start(self) -> JointAngles:
         """Open the bus and switch torque on where the joints are; give the goals in force.
@@ -160,7 +186,7 @@ class Body:
         """
         self.bus.open()
         try:
-            return self.angles(self.bus.engage())
+            return self.take_hold()
         except BaseException:
             self.stop()
             raise
@@ -217,7 +243,9 @@ class Body:
             drivers.errors.SetupError: a servo does not answer, refuses or has latched a fault.
             drivers.errors.BusLost: the port is gone.
         """
-        return self.angles(self.bus.engage())
+        goals = self.bus.engage()
+        self._set_up = self._joints
+        return self.angles(goals)
 
     def stop(self) -> None:
         """Torque off and close the bus."""
@@ -225,3 +253,18 @@ class Body:
             self.bus.release()
         finally:
             self.bus.close()
+
+
+def _counts_alike(one: JointParams, other: JointParams) -> bool:
+    """Tell whether both make the same angle of the same step."""
+    return (one.sign, one.ratio, one.zero_step) == (other.sign, other.ratio, other.zero_step)
+
+
+def _as_set_up(set_up: JointParams, now: JointParams) -> JointLimit:
+    """Give the limits of a servo that was set up with other parameters than are in force."""
+    limit = set_up.limit()
+    if _counts_alike(set_up, now):
+        return limit
+    ends = sorted(now.angle_rad(set_up.steps(end)) for end in (limit.low_rad, limit.high_rad))
+    speed = limit.speed_rad_s * set_up.ratio / now.ratio
+    return limit._replace(low_rad=ends[0], high_rad=ends[1], speed_rad_s=speed)

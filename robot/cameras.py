@@ -7,12 +7,13 @@ from math import radians
 import numpy as np
 
 from config.schema import Rig
-from drivers.camera_look import Motion
 from drivers.camera_poses import PoseRing
 from drivers.camera_process import CameraParts, CameraProcess
 from drivers.camera_replay import CameraReplay
+from drivers.errors import SetupError
 from drivers.face_detector import face_detector
 from drivers.motion_detector import MotionDetector, turned_between
+from drivers.motion_params import MotionParams
 from drivers.oak_camera import OakSource
 from drivers.picture_source import PictureSource
 from drivers.types import Camera, MovingBlob
@@ -23,7 +24,7 @@ from robot.choice import Choice
 from robot.clock import Clock
 from robot.frames import CameraMount, CameraParams
 from robot.intrinsics import Intrinsics
-from robot.motion_finder import motion_finder
+from robot.motion_finder import motion_finder, retuned
 from sim_mock.film_camera import FilmCamera
 from sim_mock.pixel_camera import Exposure, PixelCamera, PixelCameraParams
 from sim_mock.scene import Scene
@@ -47,7 +48,7 @@ def scene_camera(
         params = SceneCameraParams(horizontal_field_deg=field_deg)
         return SceneCamera(params, scene, mount, where, rng)
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
-    motion = _motion_of_drawn(rig, mount) if rig.motion.enabled else None
+    motion = _MotionOfDrawn(rig.motion)
     return PixelCamera(drawn, scene, mount, where, face_detector(rig.detector), rng, motion)
 
 
@@ -64,15 +65,38 @@ def real_camera(
     """
     detector = partial(face_detector, rig.detector)
     field_rad = radians(placed.horizontal_field_deg)
-    motion: Callable[[], Motion] | None = None
-    if rig.motion.enabled:
-        motion = partial(motion_finder, rig.motion, placed.lens, field_rad, turns)
+    motion = partial(motion_finder, rig.motion, placed.lens, field_rad, turns)
     if choice.fast:
-        film = _film(choice)
-        found = motion() if motion is not None else None
-        return FilmCamera(film, detector(), choice.film_delay_s, motion=found)
+        return FilmCamera(_film(choice), detector(), choice.film_delay_s, motion=motion())
     parts = CameraParts(_source(rig, choice), detector, motion)
     return CameraProcess(parts, clock.now_s, rig.camera_care)
+
+
+def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams) -> str:
+    """Let the camera of a running rig look otherwise; say what of it cannot be done.
+
+    placed: where it sits, with the lens that is to be believed
+    """
+    detector = partial(face_detector, after.detector) if after.detector != before.detector else None
+    seen_through = after.camera.lens, after.camera.horizontal_field_deg
+    before_through = before.camera.lens, before.camera.horizontal_field_deg
+    moves = after.motion != before.motion or seen_through != before_through
+    if detector is None and not moves:
+        return ""
+    field_rad = radians(placed.horizontal_field_deg)
+    try:
+        match camera:
+            case CameraProcess() | FilmCamera():
+                motion = partial(retuned, after.motion, placed.lens, field_rad)
+                done = camera.retune(detector, motion if moves else None)
+            case PixelCamera():
+                drawn = partial(_retuned_drawn, after.motion)
+                done = camera.retune(detector, drawn if moves else None)
+            case _:
+                return ""  # it makes up what a detector would find
+    except SetupError as error:
+        return f"the detector stays as it was: {error}"
+    return "" if done else "the camera's process is busy and looks as before: set it once more"
 
 
 def _film(choice: Choice) -> VideoFile | CameraReplay:
@@ -94,18 +118,39 @@ def _path(choice: Choice) -> str:
     return str(choice.video)
 
 
-def _motion_of_drawn(
-    rig: Rig, mount: CameraMount
-) -> Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]:
-    """Find what moves in drawn pictures; they know how the camera was turned."""
-    detector = MotionDetector(rig.motion)
-    before: list[Mat3] = []
+class _MotionOfDrawn:
+    """Finds what moves in drawn pictures, which know how the camera was turned."""
 
-    def find(shot: Exposure, lens: Intrinsics) -> tuple[MovingBlob, ...]:
+    def __init__(self, params: MotionParams) -> None:
+        """Take how to look."""
+        self._enabled = params.enabled
+        self._detector = MotionDetector(params)
+        self._before: Mat3 | None = None
+
+    def retune(self, params: MotionParams) -> None:
+        """Look otherwise from the next picture on; what is followed stays."""
+        self._enabled = params.enabled
+        self._detector.retune(params)
+        if not params.enabled:
+            self._detector.forget()
+
+    def __call__(self, shot: Exposure, lens: Intrinsics) -> tuple[MovingBlob, ...]:
+        """Find what has moved since the picture before; nothing while not enabled."""
+        before, self._before = self._before, shot.R_world_camera
+        if not self._enabled:
+            return ()
         turned = (
-            turned_between(np.array(shot.R_world_camera), np.array(before[0])) if before else None
+            turned_between(np.array(shot.R_world_camera), np.array(before))
+            if before is not None and self._detector.before_s is not None
+            else None
         )
-        before[:] = [shot.R_world_camera]
-        return detector.find(shot.picture, shot.captured_s, lens, turned, shot.depth_m)
+        return self._detector.find(shot.picture, shot.captured_s, lens, turned, shot.depth_m)
 
+
+FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
+
+
+def _retuned_drawn(params: MotionParams, find: FindMotion | None) -> FindMotion | None:
+    if isinstance(find, _MotionOfDrawn):
+        find.retune(params)
     return find

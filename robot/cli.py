@@ -11,9 +11,17 @@ import typer
 from config.load import load
 from config.schema import Rig, load_rig
 from drivers.dynamixel_ports import serial_ports
-from drivers.errors import SetupError
-from robot import cli_emulate, cli_motion, cli_record, cli_servos
-from robot.cli_examples import add_examples, complete_scene, complete_shipped
+from robot import (
+    cli_emulate,
+    cli_motion,
+    cli_record,
+    cli_replay,
+    cli_report,
+    cli_run,
+    cli_servos,
+    cli_tune,
+)
+from robot.cli_examples import add_examples
 from robot.cli_start import next_steps
 from robot.cli_terminal import (
     DEBUG_LOGGER,
@@ -21,15 +29,23 @@ from robot.cli_terminal import (
     RigArgument,
     clear_errors,
     say,
-    signals,
-    status,
 )
+from robot.remote import running
 
 app = typer.Typer(
     invoke_without_command=True,
     pretty_exceptions_enable=False,
 )
-for part in (cli_servos, cli_motion, cli_record, cli_emulate):
+for part in (
+    cli_run,
+    cli_servos,
+    cli_motion,
+    cli_tune,
+    cli_record,
+    cli_replay,
+    cli_report,
+    cli_emulate,
+):
     app.add_typer(part.app)
 
 
@@ -42,118 +58,7 @@ def begin(
 ) -> None:
     """Makes an animatronic head look at people the way people look at each other."""
     if context.invoked_subcommand is None:
-        print(next_steps(serial_ports(), rig_files(), False))
-
-
-@app.command()
-def run(
-    rig: RigArgument = "desk",
-    mock: Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")] = False,
-    port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
-    scene: Annotated[
-        str | None,
-        typer.Option(
-            help="Look at a simulated scene (default with --mock: visitor).",
-            autocompletion=complete_scene,
-        ),
-    ] = None,
-    video: Annotated[Path | None, typer.Option(help="Look at a film or picture, looped.")] = None,
-    camera: Annotated[int | None, typer.Option(help="Look through webcam N.")] = None,
-    oak: Annotated[bool, typer.Option(help="Look through an OAK-D camera.")] = False,
-    replay: Annotated[
-        Path | None, typer.Option(help="Look at a recording of record-camera, again and again.")
-    ] = None,
-    pixels: Annotated[
-        bool, typer.Option(help="Draw the scene and find faces and motion in the pictures.")
-    ] = False,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all dice.")] = 0,
-    fast: Annotated[
-        bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock).")
-    ] = False,
-    profile: Annotated[
-        str | None,
-        typer.Option(
-            help="Style of gaze: robot, or literal mitake, nakamoto.",
-            autocompletion=complete_shipped("profiles"),
-        ),
-    ] = None,
-    character: Annotated[
-        str | None,
-        typer.Option(
-            help="A character laid over the rig: shy, bold, sleepy, strong_boxer ...",
-            autocompletion=complete_shipped("characters"),
-        ),
-    ] = None,
-    rules: Annotated[
-        str | None,
-        typer.Option(
-            help="Rule set instead of the rig's: boxing, conversation.",
-            autocompletion=complete_shipped("rules"),
-        ),
-    ] = None,
-    behaviour: Annotated[
-        str | None, typer.Option(help="Behaviour in force at the start, one of the rig's rules.")
-    ] = None,
-    conversation: Annotated[
-        str | None, typer.Option(help="Looking away as in: talk, listen, think; none (default).")
-    ] = None,
-    scanpath: Annotated[
-        str | None, typer.Option(help="Face scanpath: markov, simple, face_tracking, random.")
-    ] = None,
-    saccade: Annotated[
-        str | None, typer.Option(help="Saccades: min_jerk, main_sequence, literal_frame.")
-    ] = None,
-    page: Annotated[str, typer.Option(help="Where the live page is served.")] = "127.0.0.1:8080",
-    no_page: Annotated[bool, typer.Option(help="Without the live page.")] = False,
-    heatmap: Annotated[
-        Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
-    ] = None,
-    heatmap_face: Annotated[
-        Path | None, typer.Option(help="Picture of a face to lay the heat map over.")
-    ] = None,
-    summary: Annotated[
-        str | None, typer.Option(help="Write figures as JSON to this file; - prints them.")
-    ] = None,
-) -> None:
-    """Run the head: gazerig run --mock, then open the page it names."""
-    with clear_errors():
-        # Vision and emulator are heavy; `check` and `--help` do without them.
-        from robot import session
-        from robot.assemble import assemble
-
-        address = _host_port(page)
-        wanted = session.Wanted(
-            mock=mock,
-            fast=fast,
-            seed=seed,
-            seconds=seconds,
-            scene=scene,
-            video=video,
-            camera=camera,
-            oak=oak,
-            replay=replay,
-            pixels=pixels,
-            scanpath=scanpath,
-            saccade=saccade,
-            rules=rules,
-            port=port,
-            asked=tuple(
-                (menu, choice)
-                for menu, choice in (("behaviour", behaviour), ("conversation", conversation))
-                if choice is not None
-            ),
-            heatmap=heatmap,
-            heatmap_face=heatmap_face,
-            page=None if no_page or fast else address,
-            status_line=not fast and sys.stderr.isatty(),
-        )
-        made = assemble(load_rig(rig, character, profile), wanted.choice())
-        with signals() as stopped:
-            figures = session.run(made, wanted, stopped, say, status)
-        _write_summary(figures, summary)
-    if str(figures["stopped_by"]).startswith("fault"):
-        raise typer.Exit(FAULT)
+        print(next_steps(serial_ports(), rig_files(), bool(running())))
 
 
 @app.command("fit-scanpath")
@@ -228,20 +133,3 @@ def rig_files() -> list[Path]:
         for path in Path(".").glob("*.yaml")
         if path.is_file() and "joints:" in path.read_text(encoding="utf-8", errors="replace")
     ]
-
-
-def _host_port(text: str) -> tuple[str, int]:
-    host, _, port = text.rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise SetupError(f"--page {text}: not HOST:PORT, for example 127.0.0.1:8080")
-    return host, int(port)
-
-
-def _write_summary(figures: dict[str, object], where: str | None) -> None:
-    if where is None:
-        return
-    text = json.dumps(figures, indent=2) + "\n"
-    if where == "-":
-        print(text, end="")
-    else:
-        Path(where).write_text(text, encoding="utf-8")

@@ -49,7 +49,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("get gaze.saccade", "those of the saccades"),
         ("get --differs", "what differs from the defaults"),
     ),
-    "set": (("set gaze.saccade.top_speed_deg_s 400", "at the next tick; not yet in the file"),),
+    "set": (("set gaze.saccade.max_speed_deg_s 400", "at the next tick; not yet in the file"),),
     "save": (("save my.yaml", "keep what was set, comments and order stay"),),
     "revert": (("revert", "back to what the file says"),),
     "stop": (("stop", "torque off at once; the program goes on"),),
@@ -64,8 +64,8 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("replay evening.mcap --rerun", "the same people, with today's code and settings"),
     ),
     "export": (
-        ("export evening.mcap --csv gaze.csv", "columns that eye-tracking tools read"),
-        ("export evening.mcap --bids study", "a BIDS data set"),
+        ("export evening.mcap --csv --out gaze", "columns that eye-tracking tools read"),
+        ("export evening.mcap --bids --out study", "a BIDS data set"),
     ),
     "report": (
         ("report evening.mcap", "how human was the gaze? one HTML file and pictures"),

@@ -177,6 +177,10 @@ class CameraMount:
 
     def __init__(self, params: CameraParams) -> None:
         """Take where it sits."""
+        self.retune(params)
+
+    def retune(self, params: CameraParams) -> None:
+        """Take another place."""
         self.on_head = params.mount == "head"
         x, y, z = params.position_mm
         self._p: Vec3 = (x / 1e3, y / 1e3, z / 1e3)

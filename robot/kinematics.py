@@ -59,6 +59,10 @@ class Kinematics:
         self, params: GeometryParams, lid_shut_rad: Angles2, lid_open_rad: Angles2
     ) -> None:
         """Take the measures, and the (left, right) lid joint angles shut and open."""
+        self.retune(params, lid_shut_rad, lid_open_rad)
+
+    def retune(self, params: GeometryParams, lid_shut_rad: Angles2, lid_open_rad: Angles2) -> None:
+        """Take other measures and lid angles."""
         self._pivot: Vec3 = (0.0, 0.0, params.pitch_axis_height_mm / 1e3)
         self._arm: Vec3 = (params.eyes_ahead_mm / 1e3, 0.0, params.eyes_above_mm / 1e3)
         self._half = params.interocular_mm / 2e3

@@ -239,12 +239,19 @@ class Robot:
         )  # fmt: skip
 
     def park(self, pose_rad: JointAngles, clock: Clock, params: LoopParams) -> bool:
-        """Move slowly to the parking pose; tell whether it was reached in time."""
+        """Move slowly to the parking pose; tell whether it was reached in time.
+
+        Somebody's stop ends it: the torque is off then. Other orders wait for nothing any more.
+        """
         self._guard.go_gently()
         start_s = clock.now_s()
         for slot in range(1, int(params.park_s * params.rate_hz) + 1):
             clock.sleep_until(start_s + slot / params.rate_hz)
             t_s = clock.now_s()
+            while self._orders:
+                if isinstance(order := self._orders.popleft(), Stop):
+                    self._halt(order.why)
+                    return False
             joints = self.body.read(t_s)
             # Parking goes home whatever the camera shows.
             self.body.write(self._guard.check(pose_rad, joints, 0.0, t_s).command_rad)
@@ -362,7 +369,7 @@ def _first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
 def run(
     robot: Robot,
     clock: Clock,
-    params: LoopParams,
+    params: LoopParams | Callable[[], LoopParams],
     stop: Callable[[float], str | None],
     watch: Callable[[Tick], None],
 ) -> LoopCount:
@@ -370,14 +377,22 @@ def run(
 
     A tick that takes too long costs the slots it overran: they are counted and
     skipped, never caught up in a burst.
+
+    params: a function where the rate may change while running; slots of another rate begin
+        at the last tick's
     """
-    period = 1.0 / params.rate_hz
-    start_s = clock.now_s()
-    last_s = start_s
+    now = params if callable(params) else lambda: params
+    start_s = slots_s = last_s = clock.now_s()
+    rate_hz = now().rate_hz
+    period = 1.0 / rate_hz
     slot, ticks, overruns = 0, 0, 0
     while True:
+        if now().rate_hz != rate_hz:
+            slots_s += slot * period
+            rate_hz, slot = now().rate_hz, 0
+            period = 1.0 / rate_hz
         slot += 1
-        clock.sleep_until(start_s + slot * period)
+        clock.sleep_until(slots_s + slot * period)
         t_s = clock.now_s()
         reason = stop(t_s - start_s)
         if reason is not None:
@@ -391,7 +406,7 @@ def run(
             return LoopCount(ticks, overruns, f"fault: {'; '.join(tick.verdict.gravest)}")
         last_s = t_s
         ticks += 1
-        late = int((clock.now_s() - start_s) / period) - slot
+        late = int((clock.now_s() - slots_s) / period) - slot
         if late > 0:
             overruns += late
             slot += late

@@ -8,6 +8,7 @@ or browser delays nobody but itself.
 import threading
 from collections.abc import Callable
 from math import radians
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,12 +19,28 @@ from robot.frames import CameraMount, PoseHistory
 from robot.head_turn_residual import ResidualFigures
 from robot.loop import Tick
 from robot.page import Page
-from robot.page_picture import draw_detections, encode
-from robot.snapshot import health_words, seeing_words, snapshot, target_name, verdict_words
+from robot.page_feed import TuningFeed
+from robot.page_picture import draw_detections, encode, ground
+from robot.snapshot import (
+    Said,
+    Snapshots,
+    health_words,
+    seeing_words,
+    target_name,
+    verdict_words,
+)
 
 _SNAPSHOT_S = 0.04
 _PICTURE_S = 0.1
 _LINE_S = 0.2
+
+
+class InForce(NamedTuple):
+    """What people have chosen from the menus."""
+
+    behaviour: str
+    conversation: str
+    character: str
 
 
 class Onlooker:
@@ -33,27 +50,36 @@ class Onlooker:
         self,
         page: Page | None,
         say: Callable[[str], None] | None,
+        snapshots: Snapshots,
         health: Callable[[], BusHealth],
-        behaviour: Callable[[], str],
+        in_force: Callable[[], InForce],
         residual: Callable[[], ResidualFigures],
-        ask: Callable[[str, str], None],
         mount: CameraMount,
         poses: PoseHistory,
-        horizontal_field_deg: float,
+        horizontal_field_deg: Callable[[], float],
+        feed: TuningFeed | None = None,
+        tell: Callable[[str], None] | None = None,
     ) -> None:
         """Take the page, and where to write the status line (None: nowhere).
 
-        health, behaviour, residual: give what is shown; ask: takes the choices made on the page
+        snapshots: makes what the page shows
+        health, in_force, residual, horizontal_field_deg: give what is so now
+        feed: tells the page what can be tuned
+        tell: writes a line that stays, such as the page's address; None: into the status line
         """
         self._page = page
         self._say = say
+        self._snapshots = snapshots
         self._health = health
-        self._behaviour = behaviour
+        self._in_force = in_force
         self._residual = residual
-        self._ask = ask
+        self._feed = feed
+        self._tell = tell
         self._mount = mount
         self._poses = poses
-        self._field_rad = radians(horizontal_field_deg)
+        self._field_deg = horizontal_field_deg
+        self.depth = False
+        self._url_told = False
         self._slot: Tick | None = None
         self._ticks = 0
         self._over = threading.Event()
@@ -67,6 +93,8 @@ class Onlooker:
         """Leave the newest tick; called by the loop."""
         self._slot = tick
         self._ticks += 1
+        if self._page is not None:
+            self._snapshots.note(tick)
 
     def stop(self) -> None:
         """Stop looking."""
@@ -83,19 +111,32 @@ class Onlooker:
             round_number += 1
             rate.note(tick.t_s, self._ticks)
             if self._page is not None:
-                words = health_words(self._health())
-                seeing = seeing_words(tick, self._residual())
-                self._page.show(snapshot(tick, rate.hz, words, self._behaviour(), seeing))
-                self._pass_on(self._page)
+                shot = self._snapshots.take(self._said(tick))
+                if shot is not None:
+                    self._page.show(shot)
+                self._tell_of(self._page)
             if round_number % round(_PICTURE_S / _SNAPSHOT_S) == 0:
                 picture_number = self._show_picture(tick, picture_number)
             if self._say is not None and round_number % round(_LINE_S / _SNAPSHOT_S) == 0:
                 self._say(self._line(tick, rate.hz))
 
-    def _pass_on(self, page: Page) -> None:
-        """Hand the choices made on the page to the robot."""
-        while (asked := page.asked()) is not None:
-            self._ask(*asked)
+    def _said(self, tick: Tick) -> Said:
+        """Gather what the tick itself does not tell."""
+        now = self._in_force()
+        words, seeing = health_words(self._health()), seeing_words(tick, self._residual())
+        return Said(words, now.behaviour, seeing, now.character, now.conversation)
+
+    def _tell_of(self, page: Page) -> None:
+        """Keep the page told of what can be tuned, and the person at the rig of the page."""
+        if self._feed is not None:
+            self._feed.step()
+        if self._tell is None:
+            return
+        if not self._url_told and (url := page.url()) is not None:
+            self._url_told = True
+            self._tell(f"the page is at {url}")
+        while (note := page.notice()) is not None:
+            self._tell(note)
 
     def _show_picture(self, tick: Tick, shown: int) -> int:
         """Send the camera picture unless it was sent already; give its number."""
@@ -105,9 +146,11 @@ class Onlooker:
         lens = (
             Intrinsics(*found.lens)
             if found.lens is not None
-            else intrinsics_of_view(self._field_rad, found.width_px, found.height_px)
+            else intrinsics_of_view(radians(self._field_deg()), found.width_px, found.height_px)
         )
-        drawn = draw_detections(found.picture, found, self._gaze_px(tick, found, lens), lens.fx_px)
+        drawn = draw_detections(
+            ground(found, self.depth), found, self._gaze_px(tick, found, lens), lens.fx_px
+        )
         self._page.show_picture(encode(drawn))
         return found.number
 

@@ -4,8 +4,9 @@ import numpy as np
 import viser
 
 from gaze.types import PARTS, Floats, Vec3
-from robot.page_head import FLOOR_M, Colour, quaternion
+from robot.page_head import FLOOR_M, Colour
 from robot.page_mesh import Mesh, cap, disc, ellipsoid, ring
+from robot.page_place import put, quaternion
 from robot.types import SeenBody, SeenFace, Snapshot
 
 FIXATED_WITHIN_M = 0.02
@@ -38,7 +39,7 @@ class _Shade:
         )
 
     def below(self, p_world_m: Vec3) -> None:
-        self._spot.position = (p_world_m[0], p_world_m[1], FLOOR_M + 0.001)
+        put(self._spot, (p_world_m[0], p_world_m[1], FLOOR_M + 0.001))
 
     def remove(self) -> None:
         self._spot.remove()
@@ -89,16 +90,15 @@ class _FaceView:
 
     def show(self, face: SeenFace, p_world_target_m: Vec3) -> None:
         """Move the face and put the halo around the part that is looked at."""
-        self._frame.position = face.p_world_m
-        self._frame.wxyz = quaternion(face.R_world_face)
+        put(self._frame, face.p_world_m, quaternion(face.R_world_face))
         self._shade.below(face.p_world_m)
         parts_m = _parts_in_face(face)
-        for handle, p_m in zip(self._parts, parts_m, strict=True):
-            handle.position = p_m
+        for handle, p_m in zip(self._parts, parts_m.tolist(), strict=True):
+            put(handle, p_m)
         looked_at = fixated_part(face, p_world_target_m)
         self._halo.visible = looked_at is not None
         if looked_at is not None:
-            self._halo.position = parts_m[looked_at] + (0.006, 0.0, 0.0)
+            put(self._halo, parts_m[looked_at] + (0.006, 0.0, 0.0))
 
     def remove(self) -> None:
         self._frame.remove()
@@ -117,10 +117,10 @@ class _BodyView:
 
     def show(self, body: SeenBody) -> None:
         """Move the ball."""
-        self._frame.position = body.p_world_m
+        put(self._frame, body.p_world_m)
         self._shade.below(body.p_world_m)
-        self._ball.scale = body.radius_m
-        self._label.position = (0.0, 0.0, body.radius_m + 0.02)
+        self._ball.scale = round(body.radius_m, 3)
+        put(self._label, (0.0, 0.0, body.radius_m + 0.02))
         self._label.text = body.kind
 
     def remove(self) -> None:
@@ -159,7 +159,7 @@ class PeopleView:
             if body.id not in self._bodies:
                 self._bodies[body.id] = _BodyView(self._scene, body)
             self._bodies[body.id].show(body)
-        self._target.position = snapshot.p_world_target_m
+        put(self._target, snapshot.p_world_target_m)
         self._label.text = snapshot.target_name
 
 

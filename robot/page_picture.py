@@ -5,9 +5,11 @@ from typing import cast
 import cv2
 import numpy as np
 
-from drivers.types import DetectedFace, Detections, MovingBlob, Picture
+from drivers.types import Depth, DetectedFace, Detections, MovingBlob, Picture
 
 PICTURE_WIDTH_PX = 320
+NEAREST_M, FARTHEST_M = 0.3, 6.0
+"""Ends of the colour scale of the depth picture: an arm's reach and the end of a room."""
 
 _JPEG_QUALITY = 80
 _FACE = (120, 220, 90)  # BGR
@@ -15,6 +17,7 @@ _LANDMARK = (255, 255, 255)
 _BLOB = (255, 170, 60)
 _GAZE = (40, 130, 255)
 _DARK_GROUND = 38
+_SCALE_PX = 12
 
 Point = tuple[int, int]
 
@@ -41,6 +44,52 @@ def draw_detections(
     if gaze_px is not None:
         _draw_gaze(drawn, _pixel(gaze_px[0], gaze_px[1], scale))
     return drawn
+
+
+def ground(detections: Detections, depth: bool) -> Picture | None:
+    """Give what ``draw_detections`` is to draw on: the picture, or the depth as asked for.
+
+    A camera that measures no depth gives its picture with words that say so.
+    """
+    if not depth:
+        return detections.picture
+    if detections.depth_m is not None:
+        return depth_picture(detections.depth_m)
+    scale = min(1.0, PICTURE_WIDTH_PX / detections.width_px)
+    drawn = _small(detections.picture, detections, scale)
+    _write(drawn, "this camera measures no depth", (6, drawn.shape[0] - 8), _LANDMARK)
+    return drawn
+
+
+def depth_picture(depth_m: Depth) -> Picture:
+    """Give distances as colours, at most PICTURE_WIDTH_PX wide, with their scale at the foot.
+
+    depth_m: (height, width), NaN where unknown, which is shown dark. Red is NEAREST_M or less,
+    blue FARTHEST_M or more; equal ratios of distance are equal steps of colour.
+    """
+    scale = min(1.0, PICTURE_WIDTH_PX / depth_m.shape[1])
+    size = (max(1, round(depth_m.shape[1] * scale)), max(1, round(depth_m.shape[0] * scale)))
+    # Not averaged: between a hand and the wall behind it there is nothing.
+    small = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
+    known = np.isfinite(small)
+    metres = np.clip(np.where(known, small, FARTHEST_M), NEAREST_M, FARTHEST_M)
+    share = np.log(FARTHEST_M / metres) / np.log(FARTHEST_M / NEAREST_M)
+    drawn = cv2.applyColorMap((255.0 * share).astype(np.uint8), cv2.COLORMAP_TURBO)
+    drawn[~known] = _DARK_GROUND
+    _draw_scale(drawn)
+    return np.asarray(drawn, np.uint8)
+
+
+def _draw_scale(drawn: Picture) -> None:
+    height, width = drawn.shape[:2]
+    ramp = np.linspace(255, 0, width).astype(np.uint8)[None].repeat(_SCALE_PX, axis=0)
+    foot = drawn[max(0, height - _SCALE_PX) :]
+    foot[:] = cv2.applyColorMap(ramp, cv2.COLORMAP_TURBO)[: len(foot)]
+    for words, x in ((f"{NEAREST_M:g} m", 3), (f"{FARTHEST_M:g} m", width - 26)):
+        cv2.putText(
+            drawn, words, (x, height - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, (255, 255, 255), 1,
+            cv2.LINE_AA,
+        )  # fmt: skip
 
 
 def encode(picture: Picture) -> bytes:

@@ -2,28 +2,48 @@
 
 Started by ``robot.page.Page`` as ``python -m robot.page_view FD PARENT HOST PORT``. It
 ends when the other side of the socket closes. Nothing is fetched from anywhere: the
-page's script comes from the viser package and all shapes are made here.
+page's script comes from the viser package and all shapes are made here. Browsers come in
+by ``robot.page_door``; what people do there goes to the rig over the same socket.
 """
 
-import contextlib
 import errno
 import json
 import os
+import secrets
 import select
 import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from math import atan
 from typing import NamedTuple
 
 import viser
 
-from robot.page import ASK, CHOICES, MESSAGE_BYTES, NOTICE, PICTURE, SNAPSHOT, URL, unpack
+from robot.page import (
+    CHOICES,
+    EVERYBODY,
+    KNOBS,
+    NOTICE,
+    PICTURE,
+    REPLAY,
+    SNAPSHOT,
+    URL,
+    VALUES,
+    WORDS,
+    unpack,
+)
+from robot.page_controls import ControlsView
+from robot.page_door import Door
+from robot.page_ear import MESSAGE_BYTES
 from robot.page_head import FLOOR_M, HeadView
+from robot.page_layers import LayersView
 from robot.page_panel import PanelView
 from robot.page_people import PeopleView
+from robot.page_replay import ReplayView
+from robot.page_server import open_server
+from robot.page_tell import Teller
 from robot.types import Snapshot
 
 _FRAME_S = 0.04
@@ -31,14 +51,13 @@ _SILENT_AFTER_S = 1.0
 _PORTS_TRIED = 100
 _PORTS = 65536
 _NICENESS = 5  # the control loop comes first where both want the same core
-_LOOPBACK = ("127.0.0.1", "::1", "localhost")
-_EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+_EVERYWHERE = ("0.0.0.0", "::")
 
 _HALF_WIDTH = 0.84  # tangent of half the horizontal field of view: 80 deg
 _FOV_STEP_RAD = 0.01
 # Name of the view: where the camera is and what it looks at.
 VIEWS = {
-    "both": ((0.72, -0.74, 0.38), (0.52, 0.0, 0.145)),
+    "both": ((0.86, -1.62, 0.66), (0.50, 0.0, 0.10)),
     "rig": ((0.34, -0.11, 0.19), (0.0, 0.0, 0.11)),
     "over its shoulder": ((-0.52, 0.22, 0.42), (0.60, 0.0, 0.16)),
 }
@@ -47,19 +66,20 @@ VIEWS = {
 class News(NamedTuple):
     """What was waiting on the socket: all snapshots, the last picture, whether it has closed.
 
-    choices: menus to put on the page, None where none came
+    others: what must not be lost or passed over, as (kind, what its JSON holds), oldest first
     """
 
     snapshots: tuple[Snapshot, ...]
     jpeg: bytes | None
     ended: bool
-    choices: Mapping[str, Sequence[str]] | None = None
+    others: tuple[tuple[bytes, object], ...] = ()
 
 
 def drain(feed: socket.socket) -> News:
     """Take everything that waits, without waiting for more."""
     snapshots: list[Snapshot] = []
-    jpeg, choices, ended = None, None, False
+    others: list[tuple[bytes, object]] = []
+    jpeg, ended = None, False
     while not ended:
         try:
             message = feed.recv(MESSAGE_BYTES, socket.MSG_DONTWAIT)
@@ -68,13 +88,14 @@ def drain(feed: socket.socket) -> News:
         except ConnectionResetError:
             message = b""
         ended = not message
-        if message[:1] == SNAPSHOT:
+        kind, body = message[:1], message[1:]
+        if kind == SNAPSHOT:
             snapshots.append(unpack(message))
-        elif message[:1] == PICTURE:
-            jpeg = message[1:]
-        elif message[:1] == CHOICES:
-            choices = json.loads(message[1:])
-    return News(tuple(snapshots), jpeg, ended, choices)
+        elif kind == PICTURE:
+            jpeg = body
+        elif kind in (CHOICES, KNOBS, VALUES, WORDS, REPLAY):
+            others.append((kind, json.loads(body)))
+    return News(tuple(snapshots), jpeg, ended, tuple(others))
 
 
 def free_port(host: str, port: int) -> int:
@@ -99,22 +120,38 @@ def free_port(host: str, port: int) -> int:
 
 
 class View:
-    """Scene and panel of one server."""
+    """Scene and panels of one server."""
 
-    def __init__(self, server: viser.ViserServer, ask: Callable[[str, str], None]) -> None:
-        """Build the empty room; ``ask`` is told of every choice a spectator makes."""
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        teller: Teller,
+        tell: Callable[[Mapping[str, object]], None],
+    ) -> None:
+        """Build the empty room.
+
+        teller: takes what people do to the rig; tell: shows what the stop button must know
+        """
         self._server = server
-        self._ask = ask
+        self._teller = teller
+        self._tell = tell
         server.initial_camera.position, server.initial_camera.look_at = VIEWS["both"]
         server.on_client_connect(_greet)
         _furnish(server)
         self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
         self._panel = PanelView(server.gui)
+        self._layers = LayersView(server.scene)
+        self._panel.depth = self._ask_depth
+        self._controls = ControlsView(server, teller)
+        self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
         self._jpeg: bytes | None = None
         self._drawn = False
         self._add_views()
+
+    def _ask_depth(self, on: bool) -> None:
+        self._teller.ask({"show": {"depth": on}}, EVERYBODY)
 
     def _add_views(self) -> None:
         buttons = self._server.gui.add_button_group("view", tuple(VIEWS), order=9)
@@ -125,30 +162,64 @@ class View:
                 camera = event.client.camera
                 camera.position, camera.look_at = VIEWS[event.target.value]
 
-    def _add_menu(self, name: str, choices: Sequence[str]) -> None:
-        menu = self._server.gui.add_dropdown(name, tuple(choices), order=8)
-
-        @menu.on_update
-        def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
-            self._ask(name, event.target.value)
-
     def show(self, news: News) -> None:
         """Draw the newest of what came; without a spectator it is kept until one comes."""
-        for name, choices in (news.choices or {}).items():
-            self._add_menu(name, choices)
+        for kind, data in news.others:
+            self._take(kind, data)
         self._panel.note(news.snapshots)
         if news.snapshots:
             self._newest = news.snapshots[-1]
+            self._tell(self._stop_state())
         self._jpeg = news.jpeg or self._jpeg
         if self._server.get_clients() or not self._drawn:
             with self._server.atomic():  # a browser never sees half of a snapshot
                 self._draw()
 
+    def _stop_state(self) -> dict[str, object]:
+        """Give what the stop button must know: a recording can neither be stopped nor resumed."""
+        if self._replay is not None:
+            return {"recording": True}
+        return {"stopped": self._newest.stopped if self._newest else "", "silent": False}
+
+    def _take(self, kind: bytes, data: object) -> None:
+        """Take what the rig says beside snapshots and pictures."""
+        if kind == WORDS and isinstance(data, list):
+            who, words = data
+            self._controls.answered(who, words)
+        elif kind == KNOBS and isinstance(data, list):
+            self._controls.knobs(data)
+        elif isinstance(data, dict):
+            if kind == CHOICES:
+                self._controls.offer(data)
+            elif kind == VALUES:
+                self._controls.values(data)
+            elif kind == REPLAY:
+                self._show_replay(data)
+
+    def _show_replay(self, state: Mapping[str, object]) -> None:
+        if self._replay is None:
+            duration_s = state.get("duration_s")
+            assert isinstance(duration_s, int | float)  # the rig's side writes it first
+            self._controls.leave()
+            self._tell({"recording": True})
+            self._replay = ReplayView(
+                self._server.gui,
+                self._ask_replay,
+                float(duration_s),
+            )
+        self._replay.show(state)
+
+    def _ask_replay(self, client: int, asked: Mapping[str, object]) -> None:
+        self._teller.ask(asked, str(client))
+
     def _draw(self) -> None:
         if self._newest is not None:
             self._head.show(self._newest)
             self._people.show(self._newest)
+            self._layers.show(self._newest, self._panel.layers)
             self._panel.show(self._newest)
+            if self._replay is None:
+                self._controls.show(self._newest)
             self._drawn = True
         if self._jpeg is not None:
             self._panel.show_picture(self._jpeg)
@@ -159,6 +230,7 @@ class View:
         self.show(News((), None, ended=False))
         if self._drawn:
             self._panel.silent()
+            self._tell({"stopped": "", "silent": True})
 
 
 def _greet(client: viser.ClientHandle) -> None:
@@ -194,24 +266,37 @@ def _furnish(server: viser.ViserServer) -> None:
     )
 
 
-def serve(host: str, port: int) -> tuple[viser.ViserServer, str, str | None]:
-    """Open the server on the first free port; give it with its URL and what there is to say.
+class Served(NamedTuple):
+    """A page that can be reached: the server behind the door, the door, and where it is.
+
+    words: what there is to say to the person in front of the rig, None for nothing
+    """
+
+    server: viser.ViserServer
+    door: Door
+    url: str
+    words: str | None
+
+
+def serve(host: str, port: int, teller: Teller) -> Served:
+    """Open the page's server, and its door on the first free port.
 
     Raises:
         OSError: see ``free_port``.
     """
-    server = viser.ViserServer(
-        host=host, port=free_port(host, port), label="gazerig", verbose=False
-    )
-    bound = server.get_port()  # another program may have been quicker: this is what it got
+    open_port = free_port(host, port)
+    secret = secrets.token_urlsafe(24)
+    server = open_server(secret)
+    door = Door(host, open_port, server.get_port(), secret, teller.hand_on)
+    door.open()
     words = []
-    if port not in (0, bound):  # 0 asks for any port
-        words.append(f"port {port} is busy, using {bound}")
-    if host not in _LOOPBACK:
-        words.append("everyone on the network can see the page and its camera picture")
-    name = _EVERYWHERE.get(host, host)
-    url = f"http://[{name}]:{bound}" if ":" in name else f"http://{name}:{bound}"
-    return server, url, "; ".join(words) or None
+    if port not in (0, open_port):  # 0 asks for any port
+        words.append(f"port {port} is busy, using {open_port}")
+    name = socket.gethostname() if host in _EVERYWHERE else host
+    url = f"http://[{name}]:{open_port}" if ":" in name else f"http://{name}:{open_port}"
+    if door.token is not None:
+        words.append(f"the page opens only at {url}/?token={door.token} (shown this once)")
+    return Served(server, door, url, "; ".join(words) or None)
 
 
 def watch(feed: socket.socket, view: View, parent: int) -> None:
@@ -232,12 +317,6 @@ def watch(feed: socket.socket, view: View, parent: int) -> None:
             view.silent()
 
 
-def tell(feed: socket.socket, menu: str, choice: str) -> None:
-    """Hand a choice to the rig; a rig that is gone ends the page by itself."""
-    with contextlib.suppress(OSError):
-        feed.send(ASK + json.dumps((menu, choice)).encode())
-
-
 def main(arguments: list[str]) -> int:
     """Run the page; give the process's exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -246,17 +325,19 @@ def main(arguments: list[str]) -> int:
     # Not closed by hand: its end tells the other side to read this process's last words,
     # and those of an exception are written only after a ``with`` has been left.
     feed = socket.socket(fileno=int(fd))
+    teller = Teller(feed)
     try:
-        server, url, words = serve(host, int(port))
+        served = serve(host, int(port), teller)
     except OSError as error:
         sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
         return 1
-    if words is not None:
-        feed.send(NOTICE + words.encode())
-    view = View(server, lambda menu, choice: tell(feed, menu, choice))
-    feed.send(URL + url.encode())
+    if served.words is not None:
+        feed.send(NOTICE + served.words.encode())
+    view = View(served.server, teller, served.door.tell)
+    feed.send(URL + served.url.encode())
     watch(feed, view, int(parent))
-    server.stop()
+    served.door.close()
+    served.server.stop()
     return 0
 
 

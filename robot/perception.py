@@ -49,23 +49,32 @@ class Perception:
         lens: as measured, used for pictures of the shape it was measured on
         depth_at: reads depth pictures; without it, distances come from the size of faces
         """
-        own = parts_face_m or {}
-        # A measured part is where it was measured; a canonical one is stretched with the face.
-        self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
         self._mount = mount
-        self._field_rad = radians(horizontal_field_deg)
-        self._measured = lens
-        self._size_px = (0, 0)
+        self.retune(horizontal_field_deg, parts_face_m, lens)
         self._tracker = tracker
         self._depth_at = depth_at
         self._tracks: tuple[Track, ...] = ()
         self._p_camera: Vec3 = (0.0, 0.0, 0.0)
         self._residual = HeadTurnResidual()
-        self._intrinsics: Intrinsics | None = None
         self._percept: Percept | None = None
         self._number = 0
         self.pictures = 0
         self.pictures_with_face = 0
+
+    def retune(
+        self,
+        horizontal_field_deg: float,
+        parts_face_m: Mapping[str, Vec3] | None,
+        lens: LensParams | None,
+    ) -> None:
+        """Take another field of view, parts and lens, from the next picture on."""
+        own = parts_face_m or {}
+        # A measured part is where it was measured; a canonical one is stretched with the face.
+        self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
+        self._field_rad = radians(horizontal_field_deg)
+        self._measured = lens
+        self._size_px = (0, 0)
+        self._intrinsics: Intrinsics | None = None
 
     def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:
         """Give the percept of the newest picture, None before the first."""

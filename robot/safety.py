@@ -6,6 +6,7 @@ which joints collide. What is hot, overloaded, short of voltage or stuck slows d
 stops, each joint by itself. Radians.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import isfinite, radians
 from typing import Literal, NamedTuple
@@ -111,32 +112,132 @@ class _Hold(NamedTuple):
 class Guard:
     """Checks every command, one tick after the other."""
 
-    def __init__(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
+    def __init__(
+        self,
+        params: GuardParams,
+        limits: tuple[JointLimit, ...],
+        reach: Callable[[], tuple[JointLimit, ...]] | None = None,
+    ) -> None:
         """Take one limit a joint, in the order of JOINTS.
+
+        reach: gives the ranges and speeds that the servos themselves keep to, which hold
+            beside limits that are changed; None: all
 
         Raises:
             ValueError: a collision leaves no pose inside the limits.
         """
-        self._params = params
-        self._gentle_speed = radians(params.gentle_speed_deg_s)
-        self._gentle_accel = radians(params.gentle_accel_deg_s2)
-        self._limits = limits
+        self._take(params)
+        self._wanted, self._reach = limits, reach
         self._neck = tuple(name.startswith("neck") for name in JOINTS)
-        self._motion = Motion(limits)
+        self._motion = Motion(self._within_reach())
+        self._limits = self._motion.limits
+        self._waiting: set[int] = set()
+        self._outside: set[int] = set()
         self._health = Health(params.health, limits)
         self._stuck = Stuck(params.stuck, len(limits))
         self._collisions = Collisions(params.collisions, params.collision_margin_deg, limits)
         self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
 
+    def _take(self, params: GuardParams) -> None:
+        self._params = params
+        self._gentle_speed = radians(params.gentle_speed_deg_s)
+        self._gentle_accel = radians(params.gentle_accel_deg_s2)
+
+    def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
+        """Take other limits without a jump; what has been counted and found stays.
+
+        A joint that moves so that it cannot keep its new limit comes to rest under the old
+        one first. A joint that is outside its new range then is led inside slowly.
+
+        Raises:
+            ValueError: a collision leaves no pose inside the limits; nothing has changed.
+        """
+        collisions = Collisions(params.collisions, params.collision_margin_deg, limits)
+        collisions.go_on(self._collisions)
+        self._collisions = collisions
+        self._take(params)
+        self._health.retune(params.health)
+        self._stuck.retune(params.stuck)
+        self._wanted = limits
+        self._waiting = {
+            i for i, limit in enumerate(self._within_reach()) if limit != self._limits[i]
+        }
+        for i in range(len(limits)):
+            self._motion.let_be(i)  # walls of a collision that is gone
+
+    def recount(self, i: int, factor: float, offset_rad: float) -> None:
+        """Count a joint's angles otherwise, as its zero, sign or ratio was changed.
+
+        Where the joint is sent does not change; where it should be may, so it goes slowly.
+        What was x is factor x + offset_rad from now on.
+        """
+        self._motion.recount(i, factor, offset_rad)
+        self._stuck.forget(i)
+        self._retreat[i] = None
+        self._slow_down(i)
+
+    def _within_reach(self) -> tuple[JointLimit, ...]:
+        """Give the limits in force, once joints have come to rest: those that servos keep."""
+        if self._reach is None:
+            return self._wanted
+        pairs = zip(self._wanted, self._reach(), strict=True)
+        return tuple(
+            wanted._replace(
+                low_rad=min(max(wanted.low_rad, reach.low_rad), reach.high_rad),
+                high_rad=max(min(wanted.high_rad, reach.high_rad), reach.low_rad),
+                speed_rad_s=min(wanted.speed_rad_s, reach.speed_rad_s),
+            )
+            for wanted, reach in pairs
+        )
+
+    def _begin(self, i: int, angle_rad: float) -> None:
+        """Begin with one joint at a goal that is in force on the bus, at rest."""
+        low, high = self._limits[i][:2]
+        if self._reach is not None:
+            reach = self._reach()[i]
+            low, high = min(low, reach.low_rad), max(high, reach.high_rad)
+        self._motion.restart(i, min(max(angle_rad, low), high))
+        self._note_outside(i)
+
+    def _note_outside(self, i: int) -> None:
+        """See whether a joint has to be led into its range."""
+        limit, now = self._limits[i], self._motion.command[i]
+        if limit.low_rad - _ROUNDING_RAD <= now <= limit.high_rad + _ROUNDING_RAD:
+            self._outside.discard(i)
+        else:
+            self._outside.add(i)
+        self._motion.let_be(i)
+
+    def _change(self) -> None:
+        """Go on with what a retune has begun."""
+        if self._waiting:
+            self._adopt()
+        for i in sorted(self._outside):
+            self._note_outside(i)
+
+    def _adopt(self) -> None:
+        """Put new limits in force for the joints that can keep them."""
+        limits = self._within_reach()
+        for i in sorted(self._waiting):
+            # Walls were put up for the old acceleration.
+            free = not self._collisions and self._motion.keeps(i, limits[i])
+            if self._motion.speed[i] == 0.0 or free:
+                self._motion.take(i, limits[i])
+                self._waiting.discard(i)
+                self._note_outside(i)
+
     def reset(self, t_s: float, command_rad: JointAngles) -> None:
         """Begin from the goals that are in force on the bus, at rest, gently."""
         self._t_s = t_s
+        for i, limit in enumerate(self._within_reach()):
+            self._limits[i] = limit
+        self._waiting.clear()
         self._held = [False] * len(self._limits)
         self._retrying = [False] * len(self._limits)
         self._retreat: list[float | None] = [None] * len(self._limits)
         self._health.reset()
         for i, angle in enumerate(command_rad):
-            self._motion.restart(i, angle)
+            self._begin(i, angle)
             self._stuck.forget(i)
         self.go_gently()
 
@@ -144,6 +245,11 @@ class Guard:
         """Move slowly for a while, and each joint until it has once met its wish."""
         self._gentle = [True] * len(self._limits)
         self._gentle_until_s = [self._t_s + self._params.gentle_ms / 1e3] * len(self._limits)
+
+    @property
+    def limits(self) -> tuple[JointLimit, ...]:
+        """Give the limits in force, which new ones take the place of once joints keep them."""
+        return tuple(self._limits)
 
     @property
     def gentle(self) -> bool:
@@ -164,6 +270,8 @@ class Guard:
         if not (since_s > 0.0 and isfinite(since_s)):
             return self._standstill(wish_rad)
         self._t_s = t_s
+        if self._waiting or self._outside:
+            self._change()
         dt_s = min(since_s, _LONGEST_TICK_S)
         self._health.step(joints, dt_s)
         if self._collisions:
@@ -217,6 +325,8 @@ class Guard:
             or True in self._held
             or self._collisions.exits
             or self._collisions.still
+            or self._waiting
+            or self._outside
             or False in joints.torque
             or any(joints.fault)
         )
@@ -230,6 +340,8 @@ class Guard:
             or self._health.held[i]
             or i in self._collisions.exits
             or i in self._collisions.still
+            or i in self._waiting
+            or i in self._outside
             or (joints.torque and not joints.torque[i])
             or (joints.fault and joints.fault[i])
         )
@@ -238,7 +350,7 @@ class Guard:
         """Begin where the bus has put the goals of joints whose torque came on anew."""
         for i, (angle, anew) in enumerate(zip(joints.position_rad, joints.rearmed, strict=True)):
             if anew and isfinite(angle):
-                self._motion.restart(i, angle)
+                self._begin(i, angle)
                 self._stuck.forget(i)
                 self._retreat[i] = None
                 self._slow_down(i)
@@ -291,10 +403,16 @@ class Guard:
 
     def _outer_hold(self, i: int, wish: float, unseen: bool) -> _Hold | None:
         """Say what else keeps a joint from its wish."""
+        if i in self._waiting:
+            return _Hold("new limits")
         if i in self._collisions.exits:
             return _Hold("self-collision", self._collisions.exits[i], slowly=True, again="slowly")
         if i in self._collisions.still:
             return _Hold("self-collision", again="slowly")
+        if i in self._outside:
+            limit = self._limits[i]
+            end = limit.low_rad if self._motion.command[i] < limit.low_rad else limit.high_rad
+            return _Hold("outside its new range", end, True, "slowly")
         if not isfinite(wish):
             return _Hold("not finite")
         return _Hold("stale picture") if unseen else None

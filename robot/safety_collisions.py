@@ -97,6 +97,11 @@ class Collisions:
         self.exits: dict[int, float] = {}
         self.still: set[int] = set()
 
+    def go_on(self, before: "Collisions") -> None:
+        """Leave the pairs that were watched before to the same keepers."""
+        kept = dict(zip(before._pairs, before._keeper, strict=True))
+        self._keeper = [kept.get(pair, 0) for pair in self._pairs]
+
     def __bool__(self) -> bool:
         """Tell whether there is any pair to watch."""
         return bool(self._pairs)
@@ -110,8 +115,8 @@ class Collisions:
         position: as measured
         held: joints that cannot be sent anywhere
         """
-        for i, limit in enumerate(motion.limits):
-            motion.low[i], motion.high[i] = limit.low_rad, limit.high_rad
+        for i in range(len(motion.limits)):
+            motion.let_be(i)
         self.exits.clear()
         self.still.clear()
         inside = []

@@ -103,11 +103,14 @@ class Health:
 
     def __init__(self, params: HealthParams, limits: tuple[JointLimit, ...]) -> None:
         """Find all joints well."""
-        self._params = params
         self._limits = limits
+        self._take(params)
+        self.reset()
+
+    def _take(self, params: HealthParams) -> None:
+        self._params = params
         self._full = (1.0 - params.lasting_load**2) * params.overload_ms / 1e3
         self._outside_full_s = params.voltage_ms / 1e3
-        self.reset()
 
     def reset(self) -> None:
         """Find all joints well until they say otherwise."""
@@ -123,6 +126,14 @@ class Health:
         self._overloaded = [False] * count
         self._no_volts = [False] * count
         self._seen: tuple[_Column, _Column] = ((), ())
+
+    def retune(self, params: HealthParams) -> None:
+        """Bear more or less; the heat that has been counted stays."""
+        self._take(params)
+        self._heated = [min(heat, self._full) for heat in self._heated]
+        self._outside_s = [min(s, self._outside_full_s) for s in self._outside_s]
+        self._seen = ((), ())  # what the servos said last is judged anew
+        self._counting = True
 
     def step(self, joints: JointState, dt_s: float) -> None:
         """Take what the servos tell; what they do not tell strains nothing."""

@@ -37,7 +37,7 @@ class Motion:
 
     def __init__(self, limits: tuple[JointLimit, ...]) -> None:
         """Begin in the middle of every range."""
-        self.limits = limits
+        self.limits = list(limits)
         self.command = [0.5 * (limit.low_rad + limit.high_rad) for limit in limits]
         self.speed = [0.0] * len(limits)
         self.low = [limit.low_rad for limit in limits]
@@ -45,11 +45,41 @@ class Motion:
         self._wished = list(self.command)
 
     def restart(self, i: int, angle_rad: float) -> None:
-        """Begin anew from an angle, clipped into the range, at rest."""
-        limit = self.limits[i]
-        self.command[i] = min(max(angle_rad, limit.low_rad), limit.high_rad)
-        self._wished[i] = self.command[i]
+        """Begin anew from an angle, at rest."""
+        self.command[i] = self._wished[i] = angle_rad
         self.speed[i] = 0.0
+
+    def recount(self, i: int, factor: float, offset_rad: float) -> None:
+        """Count a joint's angles otherwise: what was x is factor x + offset from now on."""
+        low, high, speed, accel = self.limits[i][:4]
+        ends = sorted(factor * end + offset_rad for end in (low, high))
+        size = abs(factor)
+        self.limits[i] = self.limits[i]._replace(
+            low_rad=ends[0],
+            high_rad=ends[1],
+            speed_rad_s=size * speed,
+            accel_rad_s2=size * accel,
+        )
+        self.command[i] = self._wished[i] = factor * self.command[i] + offset_rad
+        self.speed[i] *= factor
+        self.let_be(i)
+
+    def take(self, i: int, limit: JointLimit) -> None:
+        """Put another limit in force."""
+        self.limits[i] = limit
+        self._wished[i] = self.command[i]
+        self.let_be(i)
+
+    def keeps(self, i: int, limit: JointLimit) -> bool:
+        """Tell whether a joint that moves as it does keeps another limit as well."""
+        p, v = self.command[i], self.speed[i]
+        room = limit.high_rad - p if v > 0.0 else p - limit.low_rad
+        return abs(v) <= limit.speed_rad_s and v * v <= 2.0 * limit.accel_rad_s2 * max(0.0, room)
+
+    def let_be(self, i: int) -> None:
+        """Let a joint be where it is: its range holds it, and the way back into it."""
+        limit, now = self.limits[i], self.command[i]
+        self.low[i], self.high[i] = min(limit.low_rad, now), max(limit.high_rad, now)
 
     def keeps_below(self, i: int, wall_rad: float) -> bool:
         """Tell whether a joint is below a wall and can stop there."""

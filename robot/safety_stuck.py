@@ -83,15 +83,19 @@ class Stuck:
 
     def __init__(self, params: StuckParams, count: int) -> None:
         """Find all joints well."""
+        self.retune(params)
+        self.watched = [0] * count
+        self._since_s = [0.0] * count
+        self._anchor_rad = [0.0] * count
+        self._until_s = [nan] * count
+
+    def retune(self, params: StuckParams) -> None:
+        """Watch otherwise; joints that wait to try again still do."""
         self._stuck_s = params.stuck_ms / 1e3
         self._retry_s = params.retry_ms / 1e3
         self._moved_rad = radians(params.moved_deg)
         self.far_rad = radians(params.stuck_deg)
         self.lead_rad = radians(params.retry_deg)
-        self.watched = [0] * count
-        self._since_s = [0.0] * count
-        self._anchor_rad = [0.0] * count
-        self._until_s = [nan] * count
 
     def forget(self, i: int) -> None:
         """Find a joint well: it rests on its command."""

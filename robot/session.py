@@ -8,6 +8,7 @@ import numpy as np
 
 from drivers.errors import DriverError, SetupError
 from robot.assemble import Assembly
+from robot.audience import Audience, Told, Wished
 from robot.behaviours import Behaviours
 from robot.bus_events import drawn_together
 from robot.choice import Choice
@@ -16,8 +17,6 @@ from robot.face_gaze import FaceGaze
 from robot.heatmap import heatmap
 from robot.loop import LoopCount, Robot, Tick
 from robot.loop import run as run_loop
-from robot.onlooker import Onlooker
-from robot.page import Page
 from robot.planner import Planner
 from robot.summary import Summary
 
@@ -43,8 +42,7 @@ class Wanted:
     asked: tuple[tuple[str, str], ...] = ()
     heatmap: Path | None = None
     heatmap_face: Path | None = None
-    page: tuple[str, int] | None = None
-    status_line: bool = False
+    watched: Wished = Wished()
 
     def choice(self) -> Choice:
         """Give what to assemble.
@@ -101,16 +99,18 @@ def run(
     stopped: Callable[[], str | None],
     say: Callable[[str], None],
     status: Callable[[str], None],
+    told: Told | None = None,
 ) -> dict[str, object]:
     """Run until the time is over, a signal comes or something fails; give the figures.
 
     stopped: gives the name of a signal that has come; say, status: write a line, and
     rewrite the status line
+    told: what tuning and recording need, None where there is neither
     Raises:
         drivers.errors.SetupError: before anything moved.
     """
     try:
-        return _run(made, wanted, stopped, say, status)
+        return _run(made, wanted, stopped, say, status, told)
     finally:
         made.close()
 
@@ -121,25 +121,15 @@ def _run(
     stopped: Callable[[], str | None],
     say: Callable[[str], None],
     status: Callable[[str], None],
+    told: Told | None,
 ) -> dict[str, object]:
     robot, wall = made.robot, RealClock()
-    page = Page(*wanted.page) if wanted.page is not None else None
-    onlooker = Onlooker(
-        page,
-        status if wanted.status_line else None,
-        robot.body.bus.health,
-        lambda: robot.attention.top_down.behaviour,
-        robot.perception.residual,
-        robot.ask,
-        made.mount,
-        made.poses,
-        made.horizontal_field_deg,
-    )
+    audience = Audience(made, wanted.watched, told, wanted.fast, say, status)
     summary = Summary()
     scene = made.scene
     score = Behaviours(scene.events(), scene.round_s) if scene is not None else None
     face_gaze = FaceGaze() if wanted.heatmap is not None else None
-    watchers = [summary.note, onlooker.note]
+    watchers = [summary.note, audience.note]
     if scene is not None and score is not None:
         planner = Planner(scene.behaviour, robot.ask)
         watchers += [lambda tick: planner.note(tick.t_s), score.note]
@@ -150,7 +140,7 @@ def _run(
     def watch(tick: Tick) -> None:
         for note in watchers:
             note(tick)
-        for event in drawn_together(tick.events):
+        for event in (*drawn_together(tick.events), *audience.events()):
             say(f"{tick.t_s - start_s:.2f} s: {event}")
 
     longest_s = _longest_s(made, wanted)
@@ -161,24 +151,18 @@ def _run(
 
     began_s = wall.now_s()
     count = LoopCount(0, 0, "fault: unexpected error")
+    audience.open_files()
     robot.start(made.clock)
     start_s = made.clock.now_s()
     for note in (*made.notes, *drawn_together(robot.body.bus.events())):
         say(note)
     try:
-        if page is not None:
-            page.open()
-            page.offer(robot.menus())
-        if not wanted.fast:
-            onlooker.start()
-        count = run_loop(robot, made.clock, made.loop, stop, watch)
+        audience.open()
+        count = run_loop(robot, made.clock, lambda: made.loop, audience.timed(stop), watch)
     finally:
         wall_s = wall.now_s() - began_s
         leave(made, count, say)
-        if not wanted.fast:
-            onlooker.stop()
-        if page is not None:
-            page.close()
+        audience.close(count)
     if face_gaze is not None and wanted.heatmap is not None:
         _draw_heatmap(face_gaze, wanted.heatmap, wanted.heatmap_face, say)
     return _figures(made, summary, score, count, wall_s)

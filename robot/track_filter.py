@@ -55,6 +55,10 @@ class TrackFilter:
         cov = _PLACE.T @ cov_m2 @ _PLACE + speed_sd_m_s**2 * _OF_VELOCITY
         self._keep(np.array((*p_m, 0.0, 0.0, 0.0)), cov)
 
+    def retune(self, noise: Restlessness) -> None:
+        """Believe in another restlessness; place and velocity stay."""
+        self._noise = noise
+
     def predict(self, dt_s: float, seen: bool = True) -> None:
         """Go on by a time; what is not seen slows down."""
         if dt_s <= 0.0:

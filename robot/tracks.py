@@ -213,12 +213,19 @@ class Tracker:
     def __init__(self, params: TrackParams) -> None:
         """Take what is believed of motions."""
         get_ready()
+        self._tracks: list[Track] = []
+        self._next_id = 1
+        self.retune(params)
+
+    def retune(self, params: TrackParams) -> None:
+        """Believe otherwise from now on; all tracks stay."""
         self._params = params
         lively = params.lively_accel_m_s2
         self._of_faces = Restlessness(params.quiet_accel_m_s2, lively)
         self._of_things = Restlessness(params.things_accel_m_s2, lively)
-        self._tracks: list[Track] = []
-        self._next_id = 1
+        for track in self._tracks:
+            is_face = track.sighting.R_world_face is not None
+            track.filter.retune(self._of_faces if is_face else self._of_things)
 
     def step(
         self, sightings: list[Sighting], p_world_camera_m: Vec3, t_s: float

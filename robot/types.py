@@ -98,12 +98,16 @@ class Verdict(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SeenFace:
-    """A face as the page draws it: identity, centre, axes and the eight parts, world frame."""
+    """A face as the page draws it: identity, centre, axes and the eight parts, world frame.
+
+    v_world_m_s: velocity of the centre; places are those at the picture's capture
+    """
 
     id: int
     p_world_m: Vec3
     R_world_face: Mat3
     parts_world_m: tuple[Vec3, ...]
+    v_world_m_s: Vec3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,11 +120,118 @@ class SeenBody:
     radius_m: float
 
 
+class Ghost(NamedTuple):
+    """Where the wish would have head and eyes: the names and frames are those of Snapshot."""
+
+    R_world_head: Mat3
+    p_world_head_m: Vec3
+    p_world_eyes_m: tuple[Vec3, Vec3]
+    gaze_world: tuple[Vec3, Vec3]
+    lids: tuple[float, float]
+
+
+class SeenCamera(NamedTuple):
+    """Where the camera is (optical axes: x right, y down, z forward) and what it covers.
+
+    horizontal_rad: field of view from side to side; aspect: the picture's width over height
+    """
+
+    R_world_camera: Mat3
+    p_world_camera_m: Vec3
+    horizontal_rad: float
+    aspect: float
+
+
+class Trail(NamedTuple):
+    """The joints of one tick: wished, permitted and measured."""
+
+    t_s: float
+    wish_rad: JointAngles
+    permitted_rad: JointAngles
+    measured_rad: JointAngles
+
+
+class ServoLimits(NamedTuple):
+    """From where one servo's figures are no longer good, each a value a joint.
+
+    warm_c, hot_c: the guard slows the joint down, and stops it
+    low_v, high_v: the guard slows the joint down outside
+    heavy: share of the stall torque that may last
+    """
+
+    warm_c: tuple[float, ...]
+    hot_c: tuple[float, ...]
+    low_v: tuple[float, ...]
+    high_v: tuple[float, ...]
+    heavy: tuple[float, ...]
+
+
+class Servos(NamedTuple):
+    """What the servos say of themselves, each a value a joint; empty where nothing is known.
+
+    temperature_c, voltage_v: None before the first reading; load: signed, -1..1
+    fault: latched errors in words; age_s: since the last answer
+    unanswered: ticks without an answer since the start, empty where nobody counts
+    """
+
+    temperature_c: tuple[float | None, ...] = ()
+    voltage_v: tuple[float | None, ...] = ()
+    load: tuple[float, ...] = ()
+    torque: tuple[bool, ...] = ()
+    fault: tuple[str, ...] = ()
+    age_s: tuple[float, ...] = ()
+    unanswered: tuple[int, ...] = ()
+    limits: ServoLimits | None = None
+
+
+class Timing(NamedTuple):
+    """How the loop keeps its time, over the last ``over_s`` seconds.
+
+    p50_ms, p99_ms, worst_ms: how far the time between two ticks is off its slots
+    overruns: slots skipped in these seconds; overruns_ever: since the start
+    """
+
+    rate_hz: float
+    p50_ms: float
+    p99_ms: float
+    worst_ms: float
+    overruns: int
+    overruns_ever: int
+    over_s: float
+
+
+class SeenSaccade(NamedTuple):
+    """A jump of the eyes, as measured."""
+
+    onset_s: float
+    duration_s: float
+    amplitude_deg: float
+    peak_deg_s: float
+
+
+class SeenFixation(NamedTuple):
+    """A rest of the eyes; part: face part code where it lay on a face."""
+
+    start_s: float
+    duration_s: float
+    part: str | None
+
+
+class SeenBlink(NamedTuple):
+    """A blink."""
+
+    start_s: float
+    duration_s: float
+
+
+SeenEvent = SeenSaccade | SeenFixation | SeenBlink
+
+
 @dataclass(frozen=True, slots=True)
 class Snapshot:
     """One frozen look at the running rig, for people to watch.
 
-    measured_rad, wish_rad: joint angles in the order of JOINTS
+    measured_rad, wish_rad, permitted_rad: joint angles in the order of JOINTS
     R_world_head, p_world_head_m: measured head frame
     p_world_eyes_m: left and right eye centres; gaze_world: their unit lines of sight
     lids: left and right opening 0..1, measured
@@ -128,6 +239,15 @@ class Snapshot:
     rate_hz: control rate of the last second; health: bus figures in words
     behaviour: the behaviour in force; pulls: what pulls the gaze, strongest first
     seeing: age of the picture, distances and what they rest on, still things that seem to move
+    target_kind, target_id, target_part: the target as in gaze.types.Target
+    character, conversation: those in force, "" where nobody says
+    stopped: why somebody stopped the robot, "" while it moves
+    picture_age_s: None before the first picture
+    ghost: where the wish would have head and eyes; camera: where the camera is
+    field_deg: what an eye can see, towards temple, nose, above and below
+    servos, timing: health of servos and loop
+    worst: the guard's gravest level since the last snapshot
+    trail, events: joints, and eye movements that ended, since the last snapshot, oldest first
     """
 
     t_s: float
@@ -151,3 +271,19 @@ class Snapshot:
     behaviour: str = ""
     pulls: tuple[Pull, ...] = ()
     seeing: str = ""
+    permitted_rad: JointAngles = ()
+    target_kind: str = ""
+    target_id: int = -1
+    target_part: str | None = None
+    character: str = ""
+    conversation: str = ""
+    stopped: str = ""
+    picture_age_s: float | None = None
+    ghost: Ghost | None = None
+    camera: SeenCamera | None = None
+    field_deg: tuple[float, float, float, float] | None = None
+    servos: Servos = Servos()
+    timing: Timing | None = None
+    worst: Level = "ok"
+    trail: tuple[Trail, ...] = ()
+    events: tuple[SeenEvent, ...] = ()

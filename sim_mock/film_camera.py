@@ -3,6 +3,7 @@
 It does not blur, distort, drop or reorder pictures, and its delay is constant.
 """
 
+from collections.abc import Callable
 from typing import Protocol
 
 from drivers.camera_look import Motion, look
@@ -88,6 +89,24 @@ class FilmCamera:
         while self._captured_s(self.pictures + 1) + self._delay_s <= now_s:
             self._look(self.pictures + 1)
         return self._newest
+
+    def retune(
+        self,
+        detector: Callable[[], FaceDetector] | None,
+        motion: Callable[[Motion | None], Motion | None] | None,
+    ) -> bool:
+        """Look otherwise from the next picture on; always possible.
+
+        detector: makes another one; motion: gives what finds motion from what did; None: as is
+
+        Raises:
+            drivers.errors.SetupError: the detector cannot be made; the old one goes on.
+        """
+        if motion is not None:
+            self._motion = motion(self._motion)
+        if detector is not None:
+            self._detector = detector()
+        return True
 
     def events(self) -> tuple[str, ...]:
         """Say what the film had to be assumed to be."""

@@ -126,6 +126,24 @@ class PixelCamera:
             self._arrived = self._on_the_way.popleft()
         return self._arrived
 
+    def retune(
+        self,
+        detector: Callable[[], FaceDetector] | None,
+        motion: Callable[[FindMotion | None], FindMotion | None] | None,
+    ) -> bool:
+        """Look otherwise from the next picture on; always possible.
+
+        detector: makes another one; motion: gives what finds motion from what did; None: as is
+
+        Raises:
+            drivers.errors.SetupError: the detector cannot be made; the old one goes on.
+        """
+        if motion is not None:
+            self._find_motion = motion(self._find_motion)
+        if detector is not None:
+            self._detector = detector()
+        return True
+
     def events(self) -> tuple[str, ...]:
         """Say what has happened since the last call: nothing ever does."""
         return ()

@@ -36,6 +36,8 @@ TOP = {
     "robot.cli_monitor",
     "robot.cli_servos",
     "robot.cli_terminal",
+    "robot.cli_examples",
+    "robot.cli_run",
     "robot.cli_tune",
     "robot.cli_replay",
     "robot.cli_report",

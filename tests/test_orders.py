@@ -160,6 +160,19 @@ def test_a_run_that_ends_stopped_does_not_park(running: Running) -> None:
     assert said == ["stopped by seconds: not parked, as it was stopped, torque off"]
 
 
+def test_a_stop_while_parking_is_obeyed_at_once(running: Running) -> None:
+    robot, made = running.made.robot, running.made
+    robot.order(Jog((("neck_yaw", radians(50.0)),)))
+    running.go(2.0)
+    began_s = made.clock.now_s()
+    robot.order(LookAt(None))
+    robot.order(Stop("a hand"))
+    assert not robot.park(made.park_rad, made.clock, made.loop)
+    assert made.clock.now_s() - began_s < 0.011
+    joints = robot.body.read(made.clock.now_s())
+    assert not any(joints.torque) and degrees(joints.position_rad[YAW]) > 45.0
+
+
 def test_two_stops_are_one_and_a_resume_of_nothing_is_nothing(running: Running) -> None:
     running.order(Resume())
     assert not any("torque" in e for tick in running.go(0.1) for e in tick.events)

@@ -169,7 +169,7 @@ class Browser:
         self.asked_for: list[str] = []
         with urllib.request.urlopen(f"http://127.0.0.1:{debugging_port}/json/list") as answer:
             tab = next(t for t in json.load(answer) if t["type"] == "page")
-        self._socket = connect(tab["webSocketDebuggerUrl"], max_size=None)
+        self._socket = connect(tab["webSocketDebuggerUrl"], max_size=None, ping_interval=None)
         self._ask("Network.enable")
         shape = {"width": self.width_px, "height": height_px, "deviceScaleFactor": 1}
         self._ask("Emulation.setDeviceMetricsOverride", **shape, mobile=False)
@@ -210,7 +210,7 @@ CHROMIUM_FLAGS = (
     *("--disable-sync", "--disable-background-networking", "--disable-component-update"),
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars"),
     # No name resolves: a page that needed anything from elsewhere would stay empty.
-    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE 127.0.0.2",
     "--remote-debugging-port=0",
 )
 

@@ -1,18 +1,30 @@
 """What the page is made of: shapes, words, traces, and the picture with what was found."""
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
 from drivers.types import DetectedFace, Detections, MovingBlob
+from gaze.angles import rotation
 from robot.page import MESSAGE_BYTES
 from robot.page_mesh import Mesh, cap, ellipsoid, lid, ring, turned
-from robot.page_panel import Traces, status
 from robot.page_people import fixated_part
-from robot.page_picture import PICTURE_WIDTH_PX, draw_detections, encode
-from robot.types import SeenFace, Snapshot
+from robot.page_picture import (
+    FARTHEST_M,
+    NEAREST_M,
+    PICTURE_WIDTH_PX,
+    depth_picture,
+    draw_detections,
+    encode,
+    ground,
+)
+from robot.page_place import along, quaternion, turned_up, upright_along
+from robot.page_status import drawn_together, status
+from robot.page_traces import GROUPS, MOST_POINTS, Traces, mean_deg
+from robot.types import JOINTS, SeenFace, Snapshot, Trail
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -53,28 +65,93 @@ def camera_picture() -> tuple[np.ndarray, Detections]:
 
 
 def test_status_tells_target_reason_and_guard_and_runs_no_markup() -> None:
-    words = status(snapshot(reasons=tuple(f"joint {n}: too fast" for n in range(6))))
+    words = status(snapshot(reasons=tuple(f"joint {n}: too <fast>" for n in range(6))))
     for word in ("face &lt;3&gt;", "pursue", "guard: limited", "200 Hz", "3 lost"):
         assert word in words
     assert "the rule &#x27;person&#x27; pulls" in words
-    assert "joint 3: too fast" in words
-    assert "joint 4" not in words
-    assert "and 2 more" in words
-    assert "too fast" not in status(snapshot())
+    assert "too &lt;fast&gt; (joint 0, +5)" in words
+    assert "too" not in status(snapshot())
 
 
-def test_traces_keep_ten_seconds_and_start_anew_with_the_clock() -> None:
+def test_equal_reasons_are_said_once() -> None:
+    assert drawn_together(("a: hot", "b: too fast", "c: too fast")) == "hot (a), too fast (b, +1)"
+    assert drawn_together(()) == ""
+
+
+def test_a_short_limit_moves_nothing_on_the_page() -> None:
+    limited = status(snapshot(reasons=tuple(f"joint {n}: too fast" for n in range(9))))
+    assert limited.count("<div") == status(snapshot()).count("<div")
+
+
+def test_what_holds_says_why_joint_by_joint() -> None:
+    held = status(
+        replace(snapshot(reasons=tuple(f"joint {n}: hot" for n in range(6))), level="hold")
+    )
+    assert "joint 3: hot" in held and "joint 4" not in held and "and 2 more" in held
+
+
+def test_what_stands_still_shouts() -> None:
+    stopped = status(replace(snapshot(), stopped="somebody pressed <STOP>"))
+    assert "STOPPED: somebody pressed &lt;STOP&gt;; torque is off" in stopped
+    held = status(replace(snapshot(reasons=("neck_yaw: hot",)), level="hold"))
+    assert "font-weight:700'>guard: hold" in held and "neck_yaw: hot" in held
+    assert "font-weight:700" not in status(snapshot())
+    assert "the picture is 2.5 s old" in status(replace(snapshot(), picture_age_s=2.5))
+    assert "s old" not in status(replace(snapshot(), picture_age_s=0.08))
+
+
+def moving(t_s: float, slope_deg: float = 1.0) -> Snapshot:
+    """All joints at t degrees as wished, half as permitted, a quarter as measured."""
+    angles = [(slope_deg * math.radians(t_s) * share,) * len(JOINTS) for share in (1.0, 0.5, 0.25)]
+    return replace(snapshot(t_s), trail=(Trail(t_s, *angles),))
+
+
+def test_traces_keep_half_a_minute_and_start_anew_with_the_clock() -> None:
     traces = Traces()
-    for tick in range(1500):
-        traces.add(snapshot(0.01 * tick, (0.1, 0.0, 0.3, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0)))
-    ago_s, eye_deg, head_deg = traces.columns()
-    assert 990 <= len(ago_s) <= 1010
-    assert ago_s[0] == pytest.approx(-10.0, abs=0.02)
+    for tick in range(4500):
+        traces.add(moving(0.01 * tick))
+    ago_s, angles_deg = traces.table(30.0)
+    assert ago_s[0] == pytest.approx(-30.0, abs=0.1)
     assert ago_s[-1] == 0.0
-    assert np.allclose(eye_deg, math.degrees(0.2))
-    assert np.allclose(head_deg, math.degrees(0.2))
-    traces.add(snapshot(0.0))
-    assert len(traces.columns()[0]) == 1
+    assert MOST_POINTS / 2 < len(ago_s) <= MOST_POINTS
+    assert np.allclose(angles_deg[:, 0, 3], 44.99 + ago_s)
+    assert np.allclose(angles_deg[-1, :, 0], (44.99, 22.495, 11.2475))
+    assert traces.table(3.0)[0][0] == pytest.approx(-3.0, abs=0.011)
+    traces.add(moving(0.0))
+    assert len(traces.table(30.0)[0]) == 1
+
+
+def test_a_group_is_the_mean_of_its_joints() -> None:
+    angles_deg = np.zeros((2, 3, len(JOINTS)))
+    angles_deg[:, 2, JOINTS.index("left_eye_pan")] = 4.0
+    angles_deg[:, 2, JOINTS.index("right_eye_pan")] = 2.0
+    assert mean_deg(angles_deg, GROUPS["yaw"][0]).tolist() == [[0.0, 0.0, 3.0]] * 2
+    named = {name for groups in GROUPS.values() for group in groups for name in group.joints}
+    assert named == set(JOINTS)
+
+
+def turn(q: tuple[float, float, float, float], v: tuple[float, float, float]) -> np.ndarray:
+    """Turn a vector by a quaternion, the long way."""
+    w, x, y, z = q
+    R = np.array((
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    ))  # fmt: skip
+    return R @ np.array(v)
+
+
+def test_turns_lay_axes_where_they_should() -> None:
+    dice = np.random.default_rng(3)
+    for _ in range(50):
+        x, y, z = (v := dice.normal(size=3)) / np.linalg.norm(v)
+        assert np.allclose(turn(along((x, y, z)), (1.0, 0.0, 0.0)), (x, y, z))
+        assert turn(along((x, y, z)), (0.0, 1.0, 0.0))[2] == pytest.approx(0.0, abs=1e-12)
+        assert np.allclose(turn(upright_along((x, y, z)), (0.0, 0.0, 1.0)), (x, y, z))
+        R = rotation(tuple(dice.uniform(-3.0, 3.0, 3)))
+        for axis in AHEAD:
+            assert np.allclose(turn(quaternion(R), axis), np.array(R) @ axis, atol=1e-7)
+    assert np.allclose(turn(turned_up(0.3), (1.0, 0.0, 0.0)), (math.cos(0.3), 0.0, math.sin(0.3)))
 
 
 def test_the_part_on_the_target_is_the_fixated_one() -> None:
@@ -135,3 +212,26 @@ def test_encoded_picture_is_a_jpeg_that_fits_a_message() -> None:
     jpeg = encode(noise)
     assert len(jpeg) < MESSAGE_BYTES
     assert cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR).shape == noise.shape
+
+
+def test_depth_is_shown_in_colours_near_red_far_blue_unknown_dark() -> None:
+    depth_m = np.full((480, 640), 1.0, np.float32)
+    depth_m[:, :160], depth_m[:, 160:320], depth_m[:, 480:] = NEAREST_M / 2, np.nan, 2 * FARTHEST_M
+    drawn = depth_picture(depth_m)
+    assert drawn.shape == (240, PICTURE_WIDTH_PX, 3)
+    near, unknown, middle, far = (drawn[100, x].astype(int) for x in (40, 120, 200, 300))
+    assert near[2] > near[0] + 60 and far[0] > far[2] - 5
+    assert len(set(unknown.tolist())) == 1 and unknown[0] < 60
+    assert not np.array_equal(middle, near) and not np.array_equal(middle, far)
+
+
+def test_depth_is_drawn_on_only_where_it_is_wanted_and_there() -> None:
+    picture, found = camera_picture()
+    assert ground(found, depth=False) is picture
+    told = ground(found, depth=True)
+    assert told is not None and told.shape == (240, PICTURE_WIDTH_PX, 3)
+    assert (np.abs(told.astype(int) - 90).max(axis=2) > 60)[215:].any()  # words at the foot
+    assert not (np.abs(told.astype(int) - 90).max(axis=2) > 60)[:200].any()
+    deep = replace(found, depth_m=np.full((480, 640), 1.0, np.float32))
+    shown = ground(deep, depth=True)
+    assert shown is not None and len(np.unique(shown[:200].reshape(-1, 3), axis=0)) == 1

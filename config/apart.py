@@ -1,0 +1,75 @@
+"""Reading and writing rig files in a process of its own, beside a running control loop.
+
+Reading a rig takes 130 ms of pure Python. In another thread of the loop's process that made
+ticks last up to 90 ms instead of 1, as every answer of a servo was waited for behind the
+interpreter lock; in another process it costs the loop nothing that could be measured.
+"""
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+from config.load import ConfigError, Fault
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_LONGEST_S = 30.0
+_ROOT = str(Path(__file__).parents[1])
+_CHILD = "import sys; sys.path.insert(0, sys.argv[1]); from config.apart import serve; serve()"
+
+
+def apart(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
+    """Call ``work``, a function of a module, in another process and give what it gives.
+
+    ``apart(load_rig, "my.yaml", "shy")`` blocks for half a second and leaves this process's
+    interpreter free. Paths mean the same there; values are copied both ways.
+
+    Raises:
+        config.load.ConfigError: as ``work`` does, or the process failed.
+    """
+    # A session of its own: Ctrl-C is for this process, which ends it in order.
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _CHILD, _ROOT],
+            input=pickle.dumps((work, words, named)),
+            capture_output=True,
+            start_new_session=True,
+            timeout=_LONGEST_S,
+        )
+    except subprocess.TimeoutExpired:
+        raise _failed(work, f"took more than {_LONGEST_S:g} s; is the disk well?") from None
+    except OSError as error:
+        raise _failed(work, f"cannot be started: {error.strerror}") from None
+    if done.returncode:
+        last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        raise _failed(work, f"ended by itself: {' '.join(last) or done.returncode}")
+    value, faults = pickle.loads(done.stdout)
+    if faults:
+        raise ConfigError(faults)
+    result: T = value
+    return result
+
+
+def serve() -> None:
+    """Be that other process: one call from standard input, what it gave to standard output."""
+    os.nice(5)  # whoever waits for servos goes first
+    work, words, named = pickle.load(sys.stdin.buffer)
+    pickle.dump(_outcome(work, words, named), sys.stdout.buffer)
+
+
+def _outcome(
+    work: Callable[..., Any], words: tuple[Any, ...], named: dict[str, Any]
+) -> tuple[Any, tuple[Fault, ...]]:
+    try:
+        return work(*words, **named), ()
+    except ConfigError as error:
+        return None, error.faults
+
+
+def _failed(work: Callable[..., Any], rule: str) -> ConfigError:
+    return ConfigError([Fault(f"process for {work.__name__}", None, "", "", rule)])

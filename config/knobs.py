@@ -1,0 +1,301 @@
+"""Every parameter of a rig as a knob: what it is, what it may be, what it would be else.
+
+A key is the dotted path of the YAML. A rig is changed by keys as a file would change it:
+what is wrong is said in the same words, and nothing is changed then. Pure.
+"""
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple
+
+from config.bounds import Form, Shape, shapes_of
+from config.export import closest, shown
+from config.load import ConfigError, Entry, Fault, weighed
+from config.schema import RULES, Rig
+from gaze.types import PARTS
+from robot.orders import Value
+from robot.types import JOINTS
+
+NEXT_TICK = "next tick"
+NEXT_START = "next start"
+
+_AT_OPENING = "the camera is opened with it"
+_AT_START: dict[str, str] = {
+    "name": "it only names the rig",
+    "profile": "its file is laid over the rig's when that is read",
+    "bus.*": "the servo bus is opened with it",
+    "joints.*.id": "the servos are looked for with it when the bus is opened",
+    "joints.*.model": "the servos are looked for with it when the bus is opened",
+    "joints.*.firmware_min": "the servos are looked for with it when the bus is opened",
+    "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
+    "joints.*.strength": "servos are set up while their torque is off; a stop and a resume will do",
+    "camera.mount": "who looks at the pictures must know from the first whether they turn",
+    "webcam.*": _AT_OPENING,
+    "oak.*": _AT_OPENING,
+    "camera_care.*": _AT_OPENING,
+}
+_UNLISTED: dict[str, tuple[str, ...]] = {"park_deg": JOINTS, "face_parts_mm": PARTS}
+"""Entries that a file may leave out."""
+_LEFT_OUT: dict[str, Value] = {"park_deg": 0.0}
+"""What a left-out entry stands for; None where no value of its own does."""
+
+
+class Knob(NamedTuple):
+    """One parameter.
+
+    key: dotted path in the YAML; group: the path above it, "" at the top
+    unit, says, low, high, choices: as declared beside the value; of a list they hold for items
+    kind: number, whole, bool, text, choice, list or mapping
+    default: its value in the rig of defaults
+    live: "next tick", or "next start: " and why a running rig cannot take it
+    optional: null may stand here
+    length: number of items of a list, None where it is free; items: kind of its items
+    """
+
+    key: str
+    group: str
+    unit: str
+    says: str
+    low: float | None
+    high: float | None
+    choices: tuple[Value, ...]
+    kind: Form
+    default: Value
+    live: str
+    optional: bool = False
+    length: int | None = None
+    items: Form | None = None
+
+
+def knobs(rig: Rig, defaults: Rig) -> tuple[Knob, ...]:
+    """List the parameters of a rig in the order of its file."""
+    return tuple(
+        _knob(key, shape, _at(defaults, key)) for key, shape, _ in _leaves(_ROOT, plain(rig), ())
+    )
+
+
+def value_of(rig: Rig, key: str) -> Value:
+    """Give the value at a dotted key; of a group, a mapping.
+
+    Raises:
+        config.load.ConfigError: there is no such key; the message says which there are.
+    """
+    value: Any = plain(rig)
+    for done, step in enumerate(steps := key.split(".")):
+        if isinstance(value, dict) and step in value:
+            value = value[step]
+            continue
+        over = ".".join(steps[:done])
+        if over in _UNLISTED and step in _UNLISTED[over] and done == len(steps) - 1:
+            return _LEFT_OUT.get(over)
+        names = tuple(value) if isinstance(value, dict) else ()
+        near = closest(step, names) or ";"
+        there = f"there is {', '.join(names)}" if names else f"{over} has no keys"
+        raise ConfigError([Fault("", None, key, "", f"unknown key {shown(step)}{near} {there}")])
+    held: Value = value
+    return held
+
+
+def values(rig: Rig) -> dict[str, Value]:
+    """Give key -> value of every knob."""
+    return {".".join(path): value for path, _, value in _flat(rig)}
+
+
+def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
+    """Give the rig with other values at dotted keys, every rule checked.
+
+    A mapping is laid over what is there, as a file's layer is. None takes an entry out of a
+    mapping whose entries cannot be null.
+
+    Raises:
+        config.load.ConfigError: with every fault, in the words of loading a file.
+    """
+    data, faults = plain(rig), []
+    for key, value in changes.items():
+        faults += _put(data, key, _frozen(value))
+    outcome = weighed(Rig, _entries(data), RULES)
+    made, found = outcome
+    faults += [dataclasses.replace(fault, line=None) for fault in found]
+    if faults or made is None:
+        raise ConfigError(faults)
+    return made
+
+
+def differences(before: Rig, after: Rig) -> dict[str, Value]:
+    """Give the changes that turn one rig into another: ``changed(before, ...) == after``.
+
+    Where a mapping lost an entry, that entry's value is None.
+    """
+    return dict(_differing(_ROOT, plain(before), plain(after), ()))
+
+
+def flattened(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
+    """Give changes with mappings written out as their single keys, as a file holds them."""
+    out: dict[str, Value] = {}
+    for key, value in changes.items():
+        if isinstance(value, Mapping) and _is_group(rig, key):
+            out |= flattened(rig, {f"{key}.{step}": item for step, item in value.items()})
+        else:
+            out[key] = value
+    return out
+
+
+def plain(value: Any) -> Any:
+    """Give frozen values as dicts, tuples and scalars."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = shapes_of(type(value))
+        return {name: plain(getattr(value, name)) for name in fields}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(plain(item) for item in value)
+    return value
+
+
+_ROOT = Shape("params", params=Rig)
+
+
+def _leaves(shape: Shape, value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Shape, Value]]:
+    """Walk down to where values stand, with what may stand there."""
+    key = ".".join(path)
+    if shape.params is not None and value is not None:
+        for name, field in shapes_of(shape.params).items():
+            yield from _leaves(field, value.get(name), (*path, name))
+    elif shape.form == "mapping" and shape.inner is not None:
+        inner = dataclasses.replace(shape.inner, says=shape.says, unit=shape.unit)
+        for step in (*value, *(s for s in _UNLISTED.get(key, ()) if s not in value)):
+            yield from _leaves(inner, value.get(step, _LEFT_OUT.get(key)), (*path, step))
+    else:
+        yield key, shape, value
+
+
+def _flat(rig: Rig) -> Iterator[tuple[tuple[str, ...], Shape, Value]]:
+    for key, shape, value in _leaves(_ROOT, plain(rig), ()):
+        yield tuple(key.split(".")), shape, value
+
+
+def _knob(key: str, shape: Shape, default: Value) -> Knob:
+    inner = shape.inner or shape
+    while inner.inner is not None:
+        inner = inner.inner
+    entry = key.rpartition(".")[0]
+    choices: tuple[Value, ...] = tuple(inner.choices)  # type: ignore[arg-type]
+    return Knob(
+        key,
+        entry,
+        shape.unit,
+        shape.says,
+        inner.low,
+        inner.high,
+        choices,
+        "mapping" if shape.form == "params" else shape.form,
+        default,
+        live(key),
+        shape.optional or (entry in _UNLISTED and entry not in _LEFT_OUT),
+        shape.length,
+        shape.inner.form if shape.inner is not None else None,
+    )
+
+
+def live(key: str) -> str:
+    """Say when a change of a key takes effect, and why no sooner."""
+    for pattern, reason in _AT_START.items():
+        if fnmatchcase(key, pattern):
+            return f"{NEXT_START}: {reason}"
+    return NEXT_TICK
+
+
+def _at(rig: Rig, key: str) -> Value:
+    """Give the value at a key, None where this rig has no such entry."""
+    try:
+        return value_of(rig, key)
+    except ConfigError:
+        return None
+
+
+def _is_group(rig: Rig, key: str) -> bool:
+    """Tell whether a key holds keys of its own in a file."""
+    shape: Shape | None = _ROOT
+    for step in key.split("."):
+        if shape is None:
+            return False
+        shape = shapes_of(shape.params).get(step) if shape.params is not None else shape.inner
+    return shape is not None and (shape.params is not None or shape.form == "mapping")
+
+
+def _differing(
+    shape: Shape, before: Any, after: Any, path: tuple[str, ...]
+) -> Iterator[tuple[str, Value]]:
+    if before == after and type(before) is type(after):
+        return
+    if shape.params is not None and before is not None and after is not None:
+        for name, field in shapes_of(shape.params).items():
+            yield from _differing(field, before[name], after[name], (*path, name))
+    elif shape.form == "mapping" and shape.inner is not None:
+        for step in {**before, **after}:
+            if step in before and step in after:
+                yield from _differing(shape.inner, before[step], after[step], (*path, step))
+            else:
+                yield ".".join((*path, step)), after.get(step)
+    else:
+        yield ".".join(path), after
+
+
+def _put(data: dict[str, Any], key: str, value: Value) -> list[Fault]:
+    """Lay a value over plain data at a dotted key."""
+    *over, last = key.split(".")
+    held: Any = data
+    shape: Shape | None = _ROOT
+    for step in over:
+        shape = _below(shape, step)
+        if isinstance(held, dict) and held.get(step, {}) is None and shape is not None:
+            held[step] = {}
+        held = held.setdefault(step, {}) if isinstance(held, dict) else None
+    if not isinstance(held, dict):
+        rule = f"unknown key {shown(last)}; {'.'.join(over)} is a single value"
+        return [Fault("", None, key, shown(value), rule)]
+    entry = shape is not None and shape.form == "mapping" and shape.inner is not None
+    if value is None and entry and shape is not None and not _may_be_null(shape.inner):
+        held.pop(last, None)
+    elif isinstance(value, Mapping) and isinstance(held.get(last), dict):
+        held[last] = _laid_over(held[last], value)
+    else:
+        held[last] = value
+    return []
+
+
+def _may_be_null(shape: Shape | None) -> bool:
+    return shape is not None and shape.optional
+
+
+def _below(shape: Shape | None, step: str) -> Shape | None:
+    if shape is None:
+        return None
+    return shapes_of(shape.params).get(step) if shape.params is not None else shape.inner
+
+
+def _laid_over(low: dict[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
+    out = dict(low)
+    for key, value in high.items():
+        both = isinstance(value, Mapping) and isinstance(out.get(key), dict)
+        out[key] = _laid_over(out[key], value) if both else value
+    return out
+
+
+def _frozen(value: Any) -> Any:
+    """Make tuples of lists and plain dicts of mappings."""
+    if isinstance(value, list | tuple):
+        return tuple(_frozen(item) for item in value)
+    if isinstance(value, Mapping):
+        return {str(key): _frozen(item) for key, item in value.items()}
+    return value
+
+
+def _entries(value: Any) -> Entry:
+    """Make entries, as if read from a file that has no name."""
+    if isinstance(value, dict):
+        return Entry({key: _entries(item) for key, item in value.items()}, "", 0)
+    if isinstance(value, tuple):
+        return Entry(tuple(_entries(item) for item in value), "", 0)
+    return Entry(value, "", 0)

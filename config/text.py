@@ -1,0 +1,45 @@
+"""A configuration written as one YAML text that stands for all its layers.
+
+It is read back with ``config.load.load``; values come back exactly.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+from config.knobs import plain
+from config.save_text import written
+from config.schema import Rig, load_walk
+
+
+def rig_text(rig: Rig) -> str:
+    """Write everything that is in force of a rig: rig, profile, character and changes."""
+    return "".join(_lines(plain(rig)))
+
+
+def walk_text(name_or_path: str) -> str:
+    """Write the walk over a face that a rig names.
+
+    Raises:
+        config.load.ConfigError: the walk is at fault.
+    """
+    return "".join(_lines(plain(load_walk(name_or_path))))
+
+
+def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:
+    """Write mappings as YAML, one key a line."""
+    for key, value in values.items():
+        start = f"{'  ' * depth}{written(key)}:"
+        if isinstance(value, dict) and value:
+            yield f"{start}\n"
+            yield from _lines(value, depth + 1)
+        else:
+            yield f"{start} {_flow(value)}\n"
+
+
+def _flow(value: Any) -> str:
+    """Write a value on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{written(k)}: {_flow(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    return written(value)

@@ -1,0 +1,190 @@
+"""Everything that watches a run, or reaches into it, beside the control loop.
+
+The page, the status line, other programs, the rig's files and the recording: each is optional,
+has its own thread or process, and is told of a tick in next to no time.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from robot.assemble import Assembly
+from robot.live_control import FileTuning, LiveControl
+from robot.loop import LoopCount, Tick
+from robot.onlooker import InForce, Onlooker
+from robot.orders import Tune
+from robot.page import Page
+from robot.page_feed import Fed, TuningFeed
+from robot.page_hear import PageHear
+from robot.picking import Picking
+from robot.recording.recorder import Recorder
+from robot.recording.run_info import RunInfo
+from robot.snapshot import Snapshots
+
+
+class LiveTuning(FileTuning, Fed, Protocol):
+    """The parameters of the running rig, as robot.tuning.Tuning has them."""
+
+
+class Wished(NamedTuple):
+    """What shall watch, None or False where nothing shall.
+
+    page: host and port; status_line: on the terminal; record: a file to write; over: also
+    where it exists
+    """
+
+    page: tuple[str, int] | None = None
+    status_line: bool = False
+    record: Path | None = None
+    over: bool = False
+
+
+class Told(NamedTuple):
+    """What only the command line knows.
+
+    tuning: the parameters; refusals: what it raises where a value breaks a rule
+    about: what does not change, for other programs; info: for the recording
+    """
+
+    tuning: LiveTuning
+    refusals: tuple[type[Exception], ...]
+    about: dict[str, object]
+    info: Callable[[], RunInfo]
+
+
+class Audience:
+    """All of them, opened and closed together."""
+
+    def __init__(
+        self,
+        made: Assembly,
+        wished: Wished,
+        told: Told | None,
+        fast: bool,
+        say: Callable[[str], None],
+        status: Callable[[str], None],
+    ) -> None:
+        """Take the robot before it starts.
+
+        told: None where parameters cannot be changed from outside and nothing is recorded
+        fast: simulated time, in which nobody can watch
+        """
+        self._made, self._fast, self._say = made, fast, say
+        self._tuning = told.tuning if told is not None else None
+        self._live = (
+            LiveControl(made.robot, told.tuning, told.refusals, made.clock, told.about, say)
+            if told is not None and not fast
+            else None
+        )
+        self._picking = Picking(made.mount, made.poses, made.camera)
+        self._page = self._made_page(wished.page, told) if wished.page is not None else None
+        self._snapshots = Snapshots(made.loop.rate_hz, made.shown())
+        self._onlooker = self._made_onlooker(status if wished.status_line else None)
+        self._recorder = self._made_recorder(wished, told)
+        self._watchers = self._all_watchers()
+
+    def _made_page(self, address: tuple[str, int], told: Told | None) -> Page:
+        hear = PageHear(
+            self._made.robot.order,
+            tuning=self._tuning,
+            point=self._picking.point,
+            refusals=told.refusals if told is not None else (),
+            saved=self._live.saved if self._live is not None else None,
+            depth=self._show_depth,
+        )
+        return Page(*address, hear)
+
+    def _made_onlooker(self, status: Callable[[str], None] | None) -> Onlooker:
+        page, made, tuning = self._page, self._made, self._tuning
+        return Onlooker(
+            page,
+            status,
+            self._snapshots,
+            made.robot.body.bus.health,
+            self._in_force,
+            made.robot.perception.residual,
+            made.mount,
+            made.poses,
+            lambda: made.horizontal_field_deg,
+            TuningFeed(page.send, tuning) if page is not None and tuning is not None else None,
+            self._say,
+        )
+
+    def _made_recorder(self, wished: Wished, told: Told | None) -> Recorder | None:
+        if wished.record is None or told is None:
+            return None
+        robot = self._made.robot
+        recorder = Recorder(
+            wished.record, told.info(), robot.body.bus.health, wished.over, patient=self._fast
+        )
+        robot.body = recorder.tapped(robot.body)
+        return recorder
+
+    def _all_watchers(self) -> list[Callable[[Tick], None]]:
+        watchers: list[Callable[[Tick], None]] = []
+        if not self._fast:
+            watchers.append(self._onlooker.note)
+        if self._page is not None:
+            watchers += [self._picking.note, self._keep_shown]
+        if self._live is not None:
+            watchers.append(self._live.note)
+        if self._recorder is not None:
+            watchers.append(self._recorder.note)
+        return watchers
+
+    def note(self, tick: Tick) -> None:
+        """Tell all of a tick; called by the loop."""
+        for note in self._watchers:
+            note(tick)
+
+    def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
+        """Give the loop's ``stop`` as the recording needs it."""
+        return self._recorder.timed(stop) if self._recorder is not None else stop
+
+    def open_files(self) -> None:
+        """Create what is written, before anything moves.
+
+        Raises:
+            drivers.errors.SetupError: it exists already or cannot be made.
+        """
+        if self._recorder is not None:
+            self._recorder.open()
+
+    def open(self) -> None:
+        """Open the doors, once the robot has started."""
+        if self._page is not None:
+            self._page.open()
+            self._page.offer(self._made.robot.menus())
+        if self._live is not None:
+            self._live.open()
+        if not self._fast:
+            self._onlooker.start()
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened to those who watch."""
+        return self._recorder.events() if self._recorder is not None else ()
+
+    def close(self, count: LoopCount) -> None:
+        """Close all, when the torque is off."""
+        if self._live is not None:
+            self._live.close()
+        if not self._fast:
+            self._onlooker.stop()
+        if self._page is not None:
+            self._page.close()
+        if self._recorder is not None:
+            self._say(self._recorder.close(count.stopped_by, self._made.sent_digest()))
+
+    def _in_force(self) -> InForce:
+        robot = self._made.robot
+        menus = robot.menus()
+        character = self._tuning.character_name if self._tuning is not None else ""
+        return InForce(menus["behaviour"][0], menus["conversation"][0], character)
+
+    def _show_depth(self, on: bool) -> None:
+        self._onlooker.depth = on
+
+    def _keep_shown(self, tick: Tick) -> None:
+        """Show the rig as it is built now: limits and the field of view can be tuned."""
+        if any(isinstance(order, Tune) for order in tick.orders):
+            self._snapshots.rig = self._made.shown()

@@ -1,0 +1,133 @@
+"""Files edited by hand: notices a new content once it is whole.
+
+Editors write in many ways: over the old file, in two steps, into a new file that takes
+the old one's name, or with the old one gone for a moment. So a content counts when two
+looks in a row found the same, and a missing file when it stays away.
+"""
+
+import hashlib
+import threading
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+EVERY_S = 0.5
+_SAME_LOOKS = 1
+"""Looks that must find what the one before found."""
+_SAME_LOOKS_CUT = 5
+"""The same for a text that ends within a line: most likely the rest is still to come."""
+_MISSING_LOOKS = 6
+"""Looks in a row without a file, or with an empty one, before that is news."""
+
+
+class Look(NamedTuple):
+    """What a file was at one look.
+
+    digest: of its bytes; whole: its last line is ended
+    """
+
+    mtime_ns: int
+    size: int
+    digest: bytes
+    whole: bool
+
+
+def look(path: Path) -> Look | None:
+    """Look at a file; None where there is nothing to read: absent, empty or not permitted."""
+    try:
+        stat, data = path.stat(), path.read_bytes()
+    except OSError:
+        return None
+    if not data:
+        return None
+    return Look(stat.st_mtime_ns, len(data), hashlib.sha256(data).digest(), data.endswith(b"\n"))
+
+
+class Settling:
+    """Tells from one look after the other when a file holds something new that stays."""
+
+    def __init__(self, first: Look | None) -> None:
+        """Take what the file is when it was last read."""
+        self.known(first)
+
+    def known(self, now: Look | None) -> None:
+        """Take what the file is now as read."""
+        self._known = now.digest if now is not None else b""
+        self._last = now
+        self._same = 0
+        self._missing = 0
+
+    def note(self, now: Look | None) -> bool:
+        """Take a look; tell whether the file should be read, to find it new or missing."""
+        self._same = self._same + 1 if now == self._last else 0
+        self._last = now
+        if now is None:
+            self._missing += 1
+            gone = self._missing == _MISSING_LOOKS
+            # When it comes back it is news, whatever it holds.
+            self._known = b"" if gone else self._known
+            return gone
+        self._missing = 0
+        enough = _SAME_LOOKS if now.whole else _SAME_LOOKS_CUT
+        if self._same < enough or now.digest == self._known:
+            return False
+        self._known = now.digest
+        return True
+
+
+class FileWatch:
+    """A thread that looks at some files again and again."""
+
+    def __init__(
+        self,
+        files: Callable[[], Iterable[Path]],
+        changed: Callable[[Path], None],
+        every_s: float = EVERY_S,
+    ) -> None:
+        """Take what gives the files in use, and who is told that one should be read again.
+
+        changed: called in this thread with a path as ``files`` gave it, also when that
+        file stays away
+        """
+        self._files = files
+        self._changed = changed
+        self._every_s = every_s
+        self._lock = threading.Lock()
+        self._watched: dict[Path, Settling] = {}
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="file watch", daemon=True)
+
+    def start(self) -> None:
+        """Begin to look; what the files hold now is known."""
+        self.look()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._over.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=2.0)
+
+    def saved(self, path: Path) -> None:
+        """Take a file as known: it was written by this program; from any thread."""
+        same = path.resolve()
+        with self._lock:
+            for watched, settling in self._watched.items():
+                if watched.resolve() == same:
+                    settling.known(look(watched))
+
+    def look(self) -> None:
+        """Look at all files once and tell of those that are new or stay away."""
+        with self._lock:
+            files = dict.fromkeys(self._files())
+            self._watched = {
+                path: self._watched.get(path) or Settling(look(path)) for path in files
+            }
+            new = [path for path, settling in self._watched.items() if settling.note(look(path))]
+        # Not under the lock: who is told may be waiting for a thread that saves.
+        for path in new:
+            self._changed(path)
+
+    def _watch(self) -> None:
+        while not self._over.wait(self._every_s):
+            self.look()

@@ -1,0 +1,125 @@
+"""Listens to the page beside the control loop: what is urgent is heard at once.
+
+One thread waits on the socket and hears orders the moment they come, so that a stop is
+obeyed at the next tick. What may take long, such as checking a changed parameter, is
+heard by a second thread, and a stop never waits behind it.
+"""
+
+import json
+import queue
+import select
+import socket
+import threading
+from collections.abc import Callable
+
+TELL = b"t"
+"""First byte of a message from a person at the page."""
+MESSAGE_BYTES = 200_000
+"""No message is longer: a socket's default send buffer in Linux holds 212,992 bytes."""
+
+_URGENT = b'{"order":'
+_CHANGE = b'{"tune":{"set":'
+_OVER = b""
+_CHANGES_EVERY_S = 0.1
+"""Checking a change takes some 5 ms of Python that the control loop has to share."""
+_CLOSE_PATIENCE_S = 2.0
+
+
+def telling(who: str, data: bytes) -> bytes:
+    """Give the message for what a person asks for.
+
+    who: a word that comes back with the answer
+    data: a JSON object, compact (no blanks between its parts), an order's "order" first
+    """
+    return TELL + who.encode() + b" " + data
+
+
+def told(message: bytes) -> tuple[str, bytes]:
+    """Give who asks and the JSON object of a message that ``telling`` made."""
+    who, _, data = message[1:].partition(b" ")
+    return who.decode(), data
+
+
+def overtaken(earlier: bytes, later: bytes) -> bool:
+    """Tell whether a change of a parameter need not be made, as a later one makes it again."""
+    who, first = told(earlier)
+    again, second = told(later)
+    if who != again or not (first.startswith(_CHANGE) and second.startswith(_CHANGE)):
+        return False
+    keys: set[str] = set(json.loads(first)["tune"]["set"])
+    return keys <= set(json.loads(second)["tune"]["set"])
+
+
+def urgent(message: bytes) -> bool:
+    """Tell whether a message cannot wait: an order, or the page's own words."""
+    return message[:1] != TELL or told(message)[1].startswith(_URGENT)
+
+
+class Ear:
+    """Two threads that hear what comes over one socket."""
+
+    def __init__(
+        self, link: socket.socket, take: Callable[[bytes], None], lost: Callable[[], None]
+    ) -> None:
+        """Listen at once.
+
+        take: called with each message, orders in one thread and the rest in another
+        lost: called once when the other side is gone, unless this side was closed first
+        """
+        self._link = link
+        self._take = take
+        self._lost = lost
+        self._over = threading.Event()
+        self._later: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._threads = [
+            threading.Thread(target=self._listen, name="page ear", daemon=True),
+            threading.Thread(target=self._hear_later, name="page ear, slow", daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def _listen(self) -> None:
+        waiting = select.poll()
+        waiting.register(self._link, select.POLLIN)
+        while True:
+            waiting.poll()
+            try:
+                message = self._link.recv(MESSAGE_BYTES)
+            except BlockingIOError:
+                continue
+            except OSError:  # reset by a page that died, or closed here
+                message = b""
+            if not message:
+                break
+            if urgent(message):
+                self._take(message)
+            else:
+                self._later.put(message)
+        self._later.put(_OVER)
+        if not self._over.is_set():
+            self._lost()
+
+    def _hear_later(self) -> None:
+        waiting = [self._later.get()]
+        while waiting[0]:
+            while not self._later.empty():
+                waiting.append(self._later.get())
+            # A slider that is dragged sends more than can be checked: its last word counts.
+            message = waiting.pop(0)
+            if not any(overtaken(message, later) for later in waiting if later):
+                self._take(message)
+                if told(message)[1].startswith(_CHANGE):
+                    self._over.wait(_CHANGES_EVERY_S)
+            if not waiting:
+                waiting.append(self._later.get())
+
+    def close(self) -> None:
+        """Stop listening; the socket itself stays the caller's."""
+        self._over.set()
+        try:
+            self._link.shutdown(socket.SHUT_RDWR)  # wakes the thread that waits on it
+        except OSError:
+            return  # the other side was quicker
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join(_CLOSE_PATIENCE_S)

@@ -1,0 +1,79 @@
+"""Listens to the machine: notes what enters a run beside the reading of every tick.
+
+The goals at torque-on, a second reading in one tick and a refusal are decisions' food as
+well; with them a recorded run can be done again to the bit.
+"""
+
+from collections.abc import Callable, Mapping
+
+from drivers.errors import ServoFault, SetupError
+from robot.body import Body, JointParams
+from robot.recording.moment import Engaged, Heard, Measured, Refused
+from robot.safety import JointLimit
+from robot.types import JointAngles, JointState
+
+
+class BodyTap(Body):
+    """A body before a body: every call goes on to it, and what it gives is noted."""
+
+    def __init__(self, body: Body, note: Callable[[Heard], None]) -> None:
+        """Take the body that does the work, and who wants to know."""
+        # Not set up as a body of its own: it has no joints, only the other's.
+        self.bus = body.bus
+        self._body = body
+        self._note = note
+
+    def retune(self, joints: Mapping[str, JointParams]) -> dict[int, tuple[float, float]]:
+        """Count angles otherwise from now on."""
+        return self._body.retune(joints)
+
+    def reach(self) -> tuple[JointLimit, ...]:
+        """Give the ranges and speeds that servos keep to as they were set up."""
+        return self._body.reach()
+
+    def start(self) -> JointAngles:
+        """Start the machine; note the goals."""
+        goals = self._body.start()
+        self._note(Engaged(goals))
+        return goals
+
+    def read(self, t_s: float) -> JointState:
+        """Read all joints; note them."""
+        joints = self._body.read(t_s)
+        self._note(Measured(t_s, joints))
+        return joints
+
+    def write(self, command_rad: JointAngles) -> None:
+        """Send one goal to every servo."""
+        self._body.write(command_rad)
+
+    def angles(self, steps: tuple[int, ...] | list[float]) -> JointAngles:
+        """Give the joint angles of servo positions in the order of JOINTS."""
+        return self._body.angles(steps)
+
+    def let_go(self) -> None:
+        """Torque off at once.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        self._body.let_go()
+
+    def take_hold(self) -> JointAngles:
+        """Torque on again; note the goals, or why there are none.
+
+        Raises:
+            drivers.errors.SetupError: a servo does not answer, refuses or has latched a fault.
+            drivers.errors.BusLost: the port is gone.
+        """
+        try:
+            goals = self._body.take_hold()
+        except (SetupError, ServoFault) as error:
+            self._note(Refused(str(error)))
+            raise
+        self._note(Engaged(goals))
+        return goals
+
+    def stop(self) -> None:
+        """Torque off and close the bus."""
+        self._body.stop()

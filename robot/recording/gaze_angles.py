@@ -1,0 +1,203 @@
+"""Ticks of a run -> what an eye tracker would have measured: angles in degrees, a column each.
+
+One definition for all exports. Angles are of lines of sight in space, not in the head:
+
+x  yaw, the turn about the upright axis of the world, + to the robot's own left
+y  pitch above the level, + up
+
+0, 0 is level and straight ahead of the base. The cyclopean gaze is the mean of both eyes'
+unit lines of sight. These are angles of Fick: a turn in x of 1 deg moves the gaze by
+cos(y) deg. Where a servo that an angle rests on gave no fresh answer in a tick, the angle is
+NaN: the eye was lost, as an eye tracker says it.
+"""
+
+from array import array
+from collections.abc import Iterable
+from math import degrees, nan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaze.angles import add, angle_between, sub, yaw_pitch
+from gaze.field_of_view import line_of_sight
+from gaze.types import Angles2, Floats, GazeState, Target, Vec3
+from robot.loop import Tick
+from robot.orders import Jog, Order, Stop
+
+Ints = NDArray[np.int64]
+
+MOVEMENTS = ("", "fixation", "saccade", "pursuit")
+"""What eyes do; "" where nobody knows, as they were moved by hand or stood without torque."""
+
+_CODE = {"fixate": 1, "saccade": 2, "pursue": 3}
+_ARRIVED_RAD = 0.009  # half a degree: nearer than that a new target needs no saccade
+_NECK = frozenset(("neck_yaw", "neck_pitch", "neck_roll"))
+_LEFT = _NECK | {"left_eye_pan", "left_eye_tilt"}
+_RIGHT = _NECK | {"right_eye_pan", "right_eye_tilt"}
+_LOST: Angles2 = (nan, nan)
+
+
+class InSpace(NamedTuple):
+    """Lines of sight in space: (x, y) each, degrees, + left and + up."""
+
+    left_deg: Angles2
+    right_deg: Angles2
+    cyclopean_deg: Angles2
+
+
+class LookedAt(NamedTuple):
+    """What the gaze rests on or goes to: kind and id, and the part of a face, "" elsewhere."""
+
+    target: str
+    part: str
+
+
+class Trace(NamedTuple):
+    """One run as columns of n ticks.
+
+    start_s: clock of the rig at the first tick; time_s: (n,) since then
+    left_deg, right_deg, cyclopean_deg: (n, 2) x and y as measured, NaN where lost
+    head_deg: (n, 3) yaw + left, pitch + up, roll + right ear down; lids: (n, 2) 0 shut .. 1 open
+    planned_deg: (n, 2) cyclopean x and y that were wished for
+    movement: (n,) index in MOVEMENTS, as planned; blink: (n,) whether one was planned
+    looked_at: (n,) index in names, as planned
+    messages: what happened and was asked for, (time_s, words) in order
+    """
+
+    start_s: float
+    time_s: Floats
+    left_deg: Floats
+    right_deg: Floats
+    cyclopean_deg: Floats
+    head_deg: Floats
+    lids: Floats
+    planned_deg: Floats
+    movement: Ints
+    blink: NDArray[np.bool_]
+    looked_at: Ints
+    names: tuple[LookedAt, ...]
+    messages: tuple[tuple[float, str], ...]
+
+    @property
+    def rate_hz(self) -> float:
+        """Give the usual rate of the ticks."""
+        return 1.0 / float(np.median(np.diff(self.time_s)))
+
+
+def in_space(pose: GazeState) -> InSpace:
+    """Give where both eyes and the cyclopean gaze point in space."""
+    left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
+    return InSpace(_degrees(left), _degrees(right), _degrees(add(left, right)))
+
+
+def trace_of(ticks: Iterable[Tick]) -> Trace:
+    """Gather the columns of a run.
+
+    Raises:
+        ValueError: there are fewer than two ticks.
+    """
+    tracing = Tracing()
+    for tick in ticks:
+        tracing.note(tick)
+    return tracing.trace()
+
+
+class Tracing:
+    """Gathers one run, tick by tick; some 200 bytes a tick."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._angles = array("d")
+        self._codes = array("l")
+        self._numbers: dict[LookedAt, int] = {}
+        self._messages: list[tuple[float, str]] = []
+        self._start_s: float | None = None
+        self._fixated: Target | None = None
+        self._saccades = 0
+        self._jogged = False
+
+    def note(self, tick: Tick) -> None:
+        """Add a tick."""
+        if self._start_s is None:
+            self._start_s = tick.t_s
+        pose, missing = tick.pose, tick.joints.missing
+        left, right, cyclopean = in_space(pose)
+        planned = _degrees(sub(tick.gaze.gaze_point_world_m, pose.p_world_head_m))
+        lids = (pose.lid_left, pose.lid_right)
+        head = tuple(map(degrees, pose.head_rad))
+        if missing:
+            lost_left, lost_right = not _LEFT.isdisjoint(missing), not _RIGHT.isdisjoint(missing)
+            cyclopean = _LOST if lost_left or lost_right else cyclopean
+            left, right = _LOST if lost_left else left, _LOST if lost_right else right
+            head = (nan, nan, nan) if not _NECK.isdisjoint(missing) else head
+            lids = (
+                nan if "left_upper_lid" in missing else lids[0],
+                nan if "right_upper_lid" in missing else lids[1],
+            )
+        time_s = tick.t_s - self._start_s
+        self._angles.extend((time_s, *left, *right, *cyclopean, *head, *lids, *planned))
+        self._note_orders(tick, time_s)
+        known = not (tick.stopped or self._jogged)
+        movement = _CODE[tick.gaze.phase] if known else 0
+        self._codes.extend((movement, tick.gaze.blink and known, self._number(tick)))
+
+    def trace(self) -> Trace:
+        """Give the columns so far.
+
+        Raises:
+            ValueError: there are fewer than two ticks.
+        """
+        a = np.array(self._angles).reshape(-1, 14)
+        codes = np.array(self._codes, np.int64).reshape(-1, 3)
+        if len(a) < 2 or self._start_s is None:
+            raise ValueError("fewer than two ticks: there is nothing to export")
+        return Trace(
+            self._start_s, a[:, 0], a[:, 1:3], a[:, 3:5], a[:, 5:7], a[:, 7:10], a[:, 10:12],
+            a[:, 12:14], codes[:, 0], codes[:, 1] > 0, codes[:, 2], tuple(self._numbers),
+            tuple(self._messages),
+        )  # fmt: skip
+
+    def _note_orders(self, tick: Tick, time_s: float) -> None:
+        """Keep what was said and asked for, and whether the joints are moved by hand."""
+        self._messages += [(time_s, event) for event in tick.events]
+        for order in tick.orders:
+            self._messages.append((time_s, order_words(order)))
+            if isinstance(order, Jog):
+                self._jogged = bool(order.angles_rad)
+            elif isinstance(order, Stop):
+                self._jogged = False
+
+    def _number(self, tick: Tick) -> int:
+        """Give the number of what the eyes are on, which a new target is only once they go there.
+
+        The gaze goes to a new target with a saccade, after its latency; without one only
+        where the new target is so near that it needs none.
+        """
+        target, fixated = tick.target, self._fixated
+        if fixated is None or tick.gaze.saccades != self._saccades:
+            fixated = target
+        elif target.shift != fixated.shift and tick.gaze.phase != "saccade":
+            head = tick.pose.p_world_head_m
+            way = sub(tick.gaze.gaze_point_world_m, head)
+            if angle_between(way, sub(target.p_world_m, head)) < _ARRIVED_RAD:
+                fixated = target
+        self._fixated, self._saccades = fixated, tick.gaze.saccades
+        name = LookedAt(target_words(fixated), fixated.part or "")
+        return self._numbers.setdefault(name, len(self._numbers))
+
+
+def target_words(target: Target) -> str:
+    """Give kind and id of a target, e.g. "face 3"."""
+    return target.kind if target.id < 0 else f"{target.kind} {target.id}"
+
+
+def order_words(order: Order) -> str:
+    """Say in words what was asked for, e.g. "asked: stop why=space bar"."""
+    given = " ".join(f"{name}={value}" for name, value in order._asdict().items())
+    return f"asked: {type(order).__name__.lower()} {given}".rstrip()
+
+
+def _degrees(way: Vec3) -> Angles2:
+    yaw, pitch = yaw_pitch(way)
+    return (degrees(yaw), degrees(pitch))

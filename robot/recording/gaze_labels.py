@@ -1,0 +1,168 @@
+"""What the eyes did, sample by sample and stretch by stretch: saccade, fixation, pursuit, blink.
+
+Nothing is detected: the models know what they do, and say so in every tick. The servos
+follow a little later, so the plan is moved by the lag at which it fits the measured gaze
+best.
+Amplitudes and speeds are measured.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaze.types import Floats
+from robot.recording.gaze_angles import MOVEMENTS, Ints, LookedAt, Trace
+
+LONGEST_LAG_S = 0.1
+SHORTEST_PURSUIT_S = 0.1
+"""A target's velocity flickers about the smallest that counts as motion; what is shorter than
+this is taken as part of what is around it."""
+
+_LAGS_S = np.arange(0.0, LONGEST_LAG_S, 0.001)
+_FIXATION, _SACCADE, _PURSUIT = 1, 2, 3
+
+
+class Labels(NamedTuple):
+    """What the measured samples show; columns as in Trace, moved by the lag.
+
+    lag_s: from the plan to its measured motion
+    """
+
+    lag_s: float
+    movement: Ints
+    blink: NDArray[np.bool_]
+    looked_at: Ints
+
+    def event(self) -> list[str]:
+        """Give one word a sample: "blink" under a blink, else what the eyes do."""
+        words = np.array(MOVEMENTS, dtype=object)[self.movement]
+        return list(np.where(self.blink, "blink", words))
+
+
+class Stretch(NamedTuple):
+    """One saccade, fixation, pursuit or blink.
+
+    onset_s: since the first tick
+    amplitude_deg: great circle from its first to its last sample, peak_deg_s: the fastest in it,
+        both of the cyclopean gaze as measured, None where it was lost, and of a blink
+    looked_at: where a saccade goes, else what the eyes are on
+    """
+
+    onset_s: float
+    duration_s: float
+    event: str
+    amplitude_deg: float | None
+    peak_deg_s: float | None
+    looked_at: LookedAt
+
+
+def labels_of(trace: Trace) -> Labels:
+    """Label a trace's samples."""
+    lag_s = lag_of(trace)
+    source = np.searchsorted(trace.time_s, trace.time_s - lag_s + 1e-9, side="right") - 1
+    source = np.maximum(source, 0)
+    movement = _steadied(trace.movement[source], trace.time_s)
+    return Labels(lag_s, movement, trace.blink[source], trace.looked_at[source])
+
+
+def lag_of(trace: Trace) -> float:
+    """Give the lag of the measured gaze behind the planned one, 0 .. LONGEST_LAG_S.
+
+    That at which the speeds of both correlate best during saccades and just after: speeds,
+    as the gaze may be off by a constant, and saccades, as at rest all lags fit alike.
+    """
+    jumps = trace.movement == _SACCADE
+    if not jumps.any():
+        return 0.0
+    t = trace.time_s
+    planned, seen = speed_deg_s(t, trace.planned_deg), speed_deg_s(t, trace.cyclopean_deg)
+    onsets = t[jumps]
+    since = t - onsets[np.maximum(np.searchsorted(onsets, t, side="right") - 1, 0)]
+    near = (since >= 0.0) & (since <= LONGEST_LAG_S) & np.isfinite(seen)
+    if np.count_nonzero(near) < 3 or np.ptp(seen[near]) == 0.0:
+        return 0.0
+    fits = [np.corrcoef(np.interp(t[near] - lag, t, planned), seen[near])[0, 1] for lag in _LAGS_S]
+    return float(_LAGS_S[int(np.argmax(fits))])
+
+
+def stretches_of(trace: Trace, labels: Labels) -> tuple[Stretch, ...]:
+    """Give all stretches in the order of their onsets; a blink overlaps what the eyes do."""
+    key = labels.movement * len(trace.names) + labels.looked_at
+    # A target that changes under way does not make two saccades of one.
+    key = np.where(labels.movement == _SACCADE, -1, key)
+    speed = speed_deg_s(trace.time_s, trace.cyclopean_deg)
+    found = [
+        _stretch(trace, labels, speed, first, last)
+        for first, last in _runs(key)
+        if labels.movement[first]
+    ]
+    found += [
+        _blink(trace, labels, first, last)
+        for first, last in _runs(labels.blink.astype(np.int64))
+        if labels.blink[first]
+    ]
+    return tuple(sorted(found, key=lambda s: (s.onset_s, s.event)))
+
+
+def _steadied(movement: Ints, time_s: Floats) -> Ints:
+    """Take short pursuits as fixations, and short fixations inside a pursuit as pursuit."""
+    out = movement.copy()
+    for wanted, other in ((_PURSUIT, _FIXATION), (_FIXATION, _PURSUIT)):
+        for first, last in _runs(out):
+            if out[first] != wanted or time_s[last] - time_s[first] >= SHORTEST_PURSUIT_S:
+                continue
+            before = out[first - 1] if first else 0
+            after = out[last + 1] if last + 1 < len(out) else 0
+            if wanted == _PURSUIT or (before == other and after == other):
+                out[first : last + 1] = other
+    return out
+
+
+def _runs(key: Ints) -> list[tuple[int, int]]:
+    """Give first and last index of every run of equal values."""
+    breaks = np.flatnonzero(np.diff(key)) + 1
+    firsts = [0, *breaks.tolist()]
+    return list(zip(firsts, [*(b - 1 for b in breaks.tolist()), len(key) - 1], strict=True))
+
+
+def _stretch(trace: Trace, labels: Labels, speed: Floats, first: int, last: int) -> Stretch:
+    amplitude = _apart_deg(trace.cyclopean_deg[first], trace.cyclopean_deg[last])
+    peak = float(np.max(speed[first : last + 1]))
+    return Stretch(
+        float(trace.time_s[first]),
+        _until(trace, last) - float(trace.time_s[first]),
+        MOVEMENTS[labels.movement[first]],
+        amplitude if np.isfinite(amplitude) else None,
+        peak if np.isfinite(peak) else None,
+        trace.names[labels.looked_at[first]],
+    )
+
+
+def _blink(trace: Trace, labels: Labels, first: int, last: int) -> Stretch:
+    onset_s = float(trace.time_s[first])
+    duration_s = _until(trace, last) - onset_s
+    return Stretch(onset_s, duration_s, "blink", None, None, trace.names[labels.looked_at[first]])
+
+
+def _until(trace: Trace, last: int) -> float:
+    """Give when the sample after the last one of a stretch was taken."""
+    if last + 1 < len(trace.time_s):
+        return float(trace.time_s[last + 1])
+    return float(trace.time_s[last]) + 1.0 / trace.rate_hz
+
+
+def speed_deg_s(time_s: Floats, gaze_deg: Floats) -> Floats:
+    """Give the angular speed (n,) of a gaze (n, 2) over two samples each."""
+    x, y = gaze_deg.T
+    dx, dy = np.gradient(x, time_s), np.gradient(y, time_s)
+    speed: Floats = np.hypot(dx * np.cos(np.radians(y)), dy)
+    return speed
+
+
+def _apart_deg(a_deg: Floats, b_deg: Floats) -> float:
+    """Give the great-circle angle between two directions (x, y)."""
+    (xa, ya), (xb, yb) = np.radians(a_deg), np.radians(b_deg)
+    # Haversine: exact for small angles.
+    h = np.sin((yb - ya) / 2) ** 2 + np.cos(ya) * np.cos(yb) * np.sin((xb - xa) / 2) ** 2
+    return float(np.degrees(2.0 * np.arcsin(min(1.0, np.sqrt(h)))))

@@ -1,0 +1,258 @@
+"""A recorded run, read as it was; what a killed program left counts up to its end."""
+
+import base64
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import orjson
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Header, Metadata
+from mcap.stream_reader import get_chunk_data_stream
+
+from drivers.errors import SetupError
+from gaze.types import Percept
+from robot.loop import Tick
+from robot.recording import run_format as fmt
+from robot.recording.moment import Moment, from_json, percept_from_json
+from robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
+
+_MAGIC = b"\x89MCAP0\r\n"
+_CAMERA = "gazerig-camera-"
+_RUN = PROFILE.rstrip("0123456789")
+_HEAD = 9  # bytes of a record before its content: kind and length
+_LARGEST = 1 << 30  # bytes of a record; more is damage
+_FIXED = 22  # bytes of a message before its data: channel, sequence, two times
+_PERCEPTS_KEPT = 8  # a tick goes by the newest, or by the one before
+_DAMAGE = (McapError, KeyError, TypeError, ValueError, IndexError, struct.error, zlib.error)
+
+
+class BadRecording(SetupError):
+    """A file is no recording of a run, or cannot be read further."""
+
+
+class _Place(NamedTuple):
+    """Where a chunk's content lies in the file, and the times of its messages."""
+
+    offset: int
+    length: int
+    first_ns: int
+    last_ns: int
+
+
+class RunRecording:
+    """A recording made by ``gazerig run --record``; reading begins anew with every call.
+
+    path: the file
+    info: the run as it was started; end: how it ended
+    whole: the file was closed properly; else it ends where its writer was killed
+    duration_s: from the first to the last message
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        """Find out what the file holds; its ticks are read when they are asked for.
+
+        Raises:
+            BadRecording: it is absent, no recording of a run, or of a newer format.
+        """
+        self.path = Path(path)
+        self.whole = False
+        self.end = RunEnd()
+        self._chunks: list[_Place] = []
+        found: RunInfo | None = None
+        with _opened(self.path) as file:
+            for kind, offset, length in self._records(file):
+                if kind == Opcode.HEADER:
+                    self._judge(Header.read(_content(file, offset, length)).profile)
+                elif kind == Opcode.CHUNK:
+                    first_ns, last_ns = struct.unpack("<QQ", _bytes(file, offset, 16))
+                    self._chunks.append(_Place(offset, length, first_ns, last_ns))
+                elif kind == Opcode.METADATA:
+                    found = self._meet(Metadata.read(_content(file, offset, length))) or found
+                elif kind == Opcode.FOOTER:
+                    self.whole = True
+        if found is None:
+            raise BadRecording(f"{self.path} ends before it begins: nothing of the run is in it")
+        self.info = found
+        chunks = self._chunks
+        self.duration_s = (
+            (max(c.last_ns for c in chunks) - min(c.first_ns for c in chunks)) / 1e9
+            if chunks
+            else 0.0
+        )
+
+    @property
+    def note(self) -> str:
+        """Say what is not as it should be with the recording, or nothing."""
+        name, lost = self.path.name, self.end.lost
+        if not self.whole:
+            return f"{name} was not closed: what its writer had put on the disk is there"
+        if not self.end.stopped_by:
+            return f"{name} ends where the program was killed"
+        return f"{name} lacks {lost} ticks that could not be kept" if lost else ""
+
+    def ticks(self) -> Iterator[Tick]:
+        """Give the ticks, bit for bit, but for detections and pictures (``detections=None``).
+
+        Raises:
+            BadRecording: the file is damaged.
+        """
+        return (moment.tick for moment in self.moments())
+
+    def moments(self) -> Iterator[Moment]:
+        """Give the ticks with what else entered them.
+
+        Raises:
+            BadRecording: the file is damaged.
+        """
+        percepts: dict[int, Percept] = {}
+        for topic, data in self._messages({fmt.TICK, fmt.PERCEPT}):
+            with _damage(self.path):
+                message = orjson.loads(data)
+                if topic == fmt.PERCEPT:
+                    number, percept = percept_from_json(message)
+                    percepts[number] = percept
+                    if len(percepts) > _PERCEPTS_KEPT:
+                        del percepts[next(iter(percepts))]
+                    continue
+                moment = from_json(message, percepts)
+            yield moment
+
+    def pictures(self) -> Iterator[tuple[float, bytes]]:
+        """Give the camera's pictures: time of the exposure and JPEG.
+
+        Raises:
+            BadRecording: the file is damaged.
+        """
+        for _, data in self._messages({fmt.PICTURE}):
+            with _damage(self.path):
+                message = orjson.loads(data)
+                picture = float(message["captured_s"]), base64.b64decode(message["data"])
+            yield picture
+
+    def health(self) -> Iterator[dict[str, Any]]:
+        """Give the bus counts and the servos' figures, as recorded once a second.
+
+        Raises:
+            BadRecording: the file is damaged.
+        """
+        for _, data in self._messages({fmt.HEALTH}):
+            with _damage(self.path):
+                message: dict[str, Any] = orjson.loads(data)
+            yield message
+
+    def _messages(self, wanted: set[str]) -> Iterator[tuple[str, memoryview]]:
+        """Give topic and data of the messages of some topics, in the order of the file."""
+        topics: dict[int, str] = {}
+        with _opened(self.path) as file:
+            for place in self._chunks:
+                with _damage(self.path):
+                    chunk = Chunk.read(_content(file, place.offset, place.length))
+                    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+                    records = memoryview(stream.read(length))
+                    found = list(_wanted(records, topics, wanted))
+                yield from found
+
+    def _meet(self, record: Metadata) -> RunInfo | None:
+        """Read a metadata record; give the run's beginning where it is that."""
+        with _damage(self.path):
+            if record.name == fmt.END:
+                self.end = end_of(record.metadata)
+            return info_of(record.metadata) if record.name == fmt.RUN else None
+
+    def _judge(self, profile: str) -> None:
+        """Refuse what is not a recording of a run."""
+        if profile == PROFILE:
+            return
+        if profile.startswith(_CAMERA):
+            raise BadRecording(
+                f"{self.path} is a recording of a camera, not of a run: look at it with "
+                "gazerig run --replay"
+            )
+        if profile.startswith(_RUN):
+            raise BadRecording(
+                f"{self.path} is of format {profile.removeprefix(_RUN)}, this program reads up to "
+                f"{FORMAT}: update gazerig"
+            )
+        raise BadRecording(
+            f"{self.path} is no recording of gazerig (its profile is {profile!r}): make one with "
+            "gazerig run --record"
+        )
+
+    def _records(self, file: BinaryIO) -> Iterator[tuple[int, int, int]]:
+        """Walk over the records that are whole: kind, offset and length of each."""
+        end = self.path.stat().st_size
+        offset = len(_MAGIC)
+        while offset + _HEAD <= end:
+            head = _bytes(file, offset, _HEAD)
+            kind, length = head[0], int.from_bytes(head[1:], "little")
+            if length > _LARGEST:
+                raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it anew")
+            if offset + _HEAD + length > end:
+                return
+            yield kind, offset + _HEAD, length
+            if kind == Opcode.FOOTER:
+                return
+            offset += _HEAD + length
+
+
+def _wanted(
+    records: memoryview, topics: dict[int, str], wanted: set[str]
+) -> Iterator[tuple[str, memoryview]]:
+    """Give topic and data of the wanted messages of an unpacked chunk; learn its channels."""
+    at = 0
+    while at < len(records):
+        kind, length = records[at], int.from_bytes(records[at + 1 : at + _HEAD], "little")
+        at += _HEAD
+        if kind == Opcode.MESSAGE:
+            topic = topics[int.from_bytes(records[at : at + 2], "little")]
+            if topic in wanted:
+                yield topic, records[at + _FIXED : at + length]
+        elif kind == Opcode.CHANNEL:
+            channel = Channel.read(ReadDataStream(BytesIO(records[at : at + length])))
+            topics[channel.id] = channel.topic
+        at += length
+
+
+@contextmanager
+def _damage(path: Path) -> Iterator[None]:
+    """Turn what a damaged file leads to into one line."""
+    try:
+        yield
+    except BadRecording:
+        raise
+    except _DAMAGE as error:
+        what = " ".join(str(error).split())[:80]
+        raise BadRecording(f"{path} is damaged ({what}): copy it anew") from None
+
+
+def _opened(path: Path) -> BinaryIO:
+    """Open a file that begins as MCAP files do."""
+    if not path.exists():
+        raise BadRecording(f"no recording at {path}: check the path")
+    if not path.is_file():
+        raise BadRecording(f"{path} is not a file: name a recording in it")
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise BadRecording(f"cannot read {path} ({error.strerror}): check its rights") from None
+    if file.read(len(_MAGIC)) != _MAGIC:
+        file.close()
+        raise BadRecording(f"{path} is no recording: make one with gazerig run --record")
+    return file
+
+
+def _bytes(file: BinaryIO, offset: int, length: int) -> bytes:
+    file.seek(offset)
+    return file.read(length)
+
+
+def _content(file: BinaryIO, offset: int, length: int) -> ReadDataStream:
+    """Read a record's content."""
+    return ReadDataStream(BytesIO(_bytes(file, offset, length)))

@@ -1,0 +1,157 @@
+"""Shows a recording on the page: what the player says, as snapshots, pictures and a slider."""
+
+import json
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+from robot.clock import Clock
+from robot.page import PICTURE, REPLAY
+from robot.recording.frames import Frames
+from robot.recording.player import KINDS, Mark, Player, State
+
+ROUND_S = 0.04
+_SLIDE_S = 0.1  # how often the slider moves by itself
+_BEAT_S = 0.2
+"""The page takes a second without news for a rig that has gone silent."""
+_MOST_FRAMES = 20  # of one round: eightfold speed needs 16, a round that came late more
+_REST_ROUNDS = 5
+_DRAWN_ROUNDS = 35  # of a page's panels those that are drawn least often wait 25
+_MARKS = 170
+_MOST_EVENTS = 800  # of 150 characters each they fit in one message
+_MOST_WORDS = 150
+
+
+class Screen(Protocol):
+    """What shows the messages, as robot.page.Page does."""
+
+    def send(self, message: bytes) -> bool:
+        """Hand over a message; False where it is not taken now."""
+        ...
+
+
+class Replay:
+    """Plays frames on a screen."""
+
+    def __init__(self, frames: Frames, clock: Clock) -> None:
+        """Stand at the beginning."""
+        self._frames = frames
+        self._clock = clock
+        self._player = Player(frames.duration_s, frames.marks)
+        self._lock = threading.Lock()
+        self._number, self._picture = -1, -1
+        self._still = 0
+        self._missing: int | None = None
+        self._told: State | None = None
+        self._told_s, self._introduced = 0.0, False
+
+    def hear(self, data: Mapping[str, object]) -> str | None:
+        """Do what a person at the page asks for; give the refusal. From any thread."""
+        if "replay" not in data:
+            return "this is a recording: nothing moves here"
+        try:
+            self.ask(data["replay"])
+        except ValueError as error:
+            return str(error)
+        return None
+
+    def ask(self, asked: object) -> None:
+        """Do one thing that can be asked of a player. From any thread.
+
+        Raises:
+            ValueError: it cannot be done; the message says why.
+        """
+        with self._lock:
+            self._player.obey(asked, self._clock.now_s())
+
+    def run(self, screen: Screen, over: Callable[[State], bool]) -> None:
+        """Show until ``over`` says so, looking every 40 ms."""
+        while True:
+            now_s = self._clock.now_s()
+            state = self.show(screen, now_s)
+            if over(state):
+                return
+            self._clock.sleep_until(now_s + ROUND_S)
+
+    def show(self, screen: Screen, now_s: float) -> State:
+        """Send what is new since the last call; give where the recording stands."""
+        with self._lock:
+            state = self._player.state(now_s)
+        self._show_frames(screen, self._frames.at(state.at_s))
+        self._show_picture(screen, state.at_s)
+        if self._due(state, now_s):
+            self._tell(screen, state, now_s)
+        return state
+
+    def _show_frames(self, screen: Screen, number: int) -> None:
+        """Send the frames up to this one; after a leap only this one."""
+        passed = number - self._number
+        if passed == 0:
+            self._stand(screen)
+        elif 0 < passed <= 4 * _MOST_FRAMES:
+            step = max(1, -(-passed // _MOST_FRAMES))
+            for between in range(self._number + 1, number, step):
+                screen.send(self._frames.message(between))
+            if screen.send(self._frames.message(number)):
+                self._number, self._still, self._missing = number, 0, None
+        elif screen.send(self._frames.bare(number)):
+            # Backwards the page begins anew: it knows of nothing that was before.
+            first = self._number + 1 if passed > 0 else 0
+            self._missing = first if self._missing is None else min(first, self._missing)
+            self._number, self._still = number, 0
+
+    def _stand(self, screen: Screen) -> None:
+        """Send the same frame again for a while: a page draws its panels by turns.
+
+        When the slider has come to rest the page is also told what a leap passed over, so
+        that traces and figures show what has led to the place.
+        """
+        self._still += 1
+        if self._still > _DRAWN_ROUNDS:
+            return
+        if self._missing is None or self._still < _REST_ROUNDS:
+            screen.send(self._frames.bare(self._number))
+        elif screen.send(self._frames.recalled(self._missing, self._number)):
+            self._missing = None
+
+    def _show_picture(self, screen: Screen, at_s: float) -> None:
+        number = self._frames.picture_at(at_s)
+        if number is None or number == self._picture:
+            return
+        if screen.send(PICTURE + self._frames.picture(number)):
+            self._picture = number
+
+    def _due(self, state: State, now_s: float) -> bool:
+        """Tell whether the page is to know: at once what a person changed, else now and then."""
+        told = self._told
+        if told is None or state._replace(at_s=told.at_s) != told:
+            return True
+        leapt = state.at_s != told.at_s and not state.playing
+        return leapt or now_s - self._told_s >= (_SLIDE_S if state.playing else _BEAT_S)
+
+    def _tell(self, screen: Screen, state: State, now_s: float) -> None:
+        more = {} if self._introduced else introduction(self._frames)
+        message = REPLAY + json.dumps({**state._asdict(), **more}).encode()
+        if screen.send(message):
+            self._told, self._told_s, self._introduced = state, now_s, True
+
+
+def introduction(frames: Frames) -> dict[str, object]:
+    """Give what a page needs to know of a recording once: marks along it, and its events."""
+    events = [m for m in frames.marks if m.kind == "event"]
+    return {
+        "marks": {
+            kind: counts([m for m in frames.marks if m.kind == kind], frames.duration_s)
+            for kind in KINDS
+        },
+        "events": [(round(m.at_s, 3), m.words[:_MOST_WORDS]) for m in events[:_MOST_EVENTS]],
+    }
+
+
+def counts(marks: Sequence[Mark], duration_s: float) -> list[int]:
+    """Count the marks in equal shares of the recording."""
+    found = [0] * _MARKS
+    for mark in marks:
+        share = mark.at_s / duration_s if duration_s > 0.0 else 0.0
+        found[min(int(share * _MARKS), _MARKS - 1)] += 1
+    return found

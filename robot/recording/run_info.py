@@ -1,0 +1,112 @@
+"""What should be known of a recorded run beside its ticks; kept in the recording as text."""
+
+import importlib.metadata
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from datetime import datetime
+from typing import Any
+
+FORMAT = 1
+"""Version of what the messages hold; goes up when an older reader would misread them."""
+PROFILE = "gazerig-run-1"
+"""MCAP profile of recordings of runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunInfo:
+    """A run as it was started.
+
+    rig, profile, character: names as given on the command line, or paths
+    config_yaml: everything in force at the start, of one piece; walk_yaml: the face walk's file
+    scene: what was simulated, None where a camera looked; eyes: what looked, in words
+    mock: emulated servos; fast: simulated time
+    rate_hz: control rate at the start; pictures_hz: rate of the recorded pictures
+    started_utc: wall clock at the start, ISO 8601
+    versions: name -> version of the packages whose arithmetic counts
+    """
+
+    rig: str
+    profile: str
+    config_yaml: str
+    seed: int
+    rate_hz: float
+    started_utc: str
+    character: str | None = None
+    walk_yaml: str = ""
+    scene: str | None = None
+    eyes: str = ""
+    mock: bool = False
+    fast: bool = False
+    pictures_hz: float = 0.0
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class RunEnd:
+    """How a run ended, as the program said it; what it did not say is at its default.
+
+    stopped_by: "seconds", a signal, a fault; "" where the program was killed
+    lost: ticks that could not be kept
+    ran_s: time from the start of the loop to the slot at which it ended
+    tx_sha256: of all bytes sent to an emulated bus in simulated time, else ""
+    """
+
+    stopped_by: str = ""
+    lost: int = 0
+    ran_s: float | None = None
+    tx_sha256: str = ""
+
+
+def versions() -> dict[str, str]:
+    """Give the versions of Python, of this package and of those that do its arithmetic."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    for package in ("gazerig", "numpy", "scipy", "opencv-contrib-python-headless"):
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            found[package] = "not installed as a package"
+    return found
+
+
+def started_ns(info: RunInfo) -> int:
+    """Give the wall clock at the start in nanoseconds since 1970.
+
+    Raises:
+        ValueError: it is no time of ISO 8601.
+    """
+    return round(datetime.fromisoformat(info.started_utc).timestamp() * 1e6) * 1000
+
+
+def as_text(value: RunInfo | RunEnd) -> dict[str, str]:
+    """Give the fields as MCAP metadata: YAML as it is, all else as JSON."""
+    plain = asdict(value)
+    return {k: v if k.endswith("_yaml") else json.dumps(v) for k, v in plain.items()}
+
+
+def info_of(text: Mapping[str, str]) -> RunInfo:
+    """Read what ``as_text`` gave of a run's beginning.
+
+    Raises:
+        ValueError: something is missing or no JSON.
+    """
+    try:
+        return RunInfo(**_read(text, {f.name for f in fields(RunInfo)}))
+    except TypeError as error:
+        raise ValueError(str(error)) from None
+
+
+def end_of(text: Mapping[str, str]) -> RunEnd:
+    """Read what ``as_text`` gave of a run's end.
+
+    Raises:
+        ValueError: something is no JSON.
+    """
+    return RunEnd(**_read(text, {f.name for f in fields(RunEnd)}))
+
+
+def _read(text: Mapping[str, str], names: set[str]) -> dict[str, Any]:
+    """Read the fields that this version knows."""
+    known = {key: value for key, value in text.items() if key in names}
+    return {k: v if k.endswith("_yaml") else json.loads(v) for k, v in known.items()}

@@ -1,0 +1,129 @@
+"""Parts of a tick in the shapes that viewers draw, named as in Foxglove's message schemas.
+
+Quaternions are x, y, z, w. Frames: world at the neck base, head between the eyes, left_eye
+and right_eye with x along the line of sight.
+"""
+
+import base64
+from math import copysign, sqrt
+from typing import Any
+
+from gaze.angles import add, compose, norm, rotate, rotation, sub
+from gaze.types import Angles2, GazeState, Mat3, Vec3
+from robot.recording.run_format import UNUSED
+from robot.types import JOINTS, JointState
+
+Json = dict[str, Any]
+
+_INFO = 2
+_LINE_LIST = 2
+_STILL: Json = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+_AT_HEAD = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": _STILL}
+_FOREVER = {"sec": 0, "nsec": 0}
+_FACE_M = 0.11  # half the height of a face, drawn as a ball
+_SKIN = {"r": 0.95, "g": 0.72, "b": 0.55, "a": 0.7}
+_SIGHT = {"r": 0.2, "g": 0.6, "b": 1.0, "a": 1.0}
+_AIM = {"r": 1.0, "g": 0.3, "b": 0.2, "a": 1.0}
+
+
+def stamp(ns: int) -> dict[str, int]:
+    """Give a time in nanoseconds as viewers take it."""
+    sec, nsec = divmod(ns, 1_000_000_000)
+    return {"sec": sec, "nsec": nsec}
+
+
+def image(jpeg: bytes, captured_s: float, at_ns: int) -> Json:
+    """Give a JPEG as foxglove.CompressedImage, with its exposure in the rig's own time."""
+    return {
+        "timestamp": stamp(at_ns),
+        "frame_id": "camera",
+        "format": "jpeg",
+        "data": base64.b64encode(jpeg).decode("ascii"),
+        "captured_s": captured_s,
+    }
+
+
+def line(words: str, at_ns: int) -> Json:
+    """Give words as foxglove.Log."""
+    return {
+        "timestamp": stamp(at_ns), "level": _INFO, "message": words, "name": "gazerig", "file": "",
+        "line": 0,
+    }  # fmt: skip
+
+
+def joint_states(joints: JointState, at_ns: int) -> Json:
+    """Give joints as measured as foxglove.JointStates: rad and rad/s."""
+    rows = zip(JOINTS, joints.position_rad, joints.velocity_rad_s, strict=True)
+    return {
+        "timestamp": stamp(at_ns),
+        "joints": [{"name": n, "position": q, "velocity": v} for n, q, v in rows],
+    }
+
+
+def transforms(pose: GazeState, at_ns: int) -> Json:
+    """Give head and eyes as measured as foxglove.FrameTransforms."""
+    head = _transform("world", "head", pose.p_world_head_m, pose.R_world_head, at_ns)
+    eyes = (
+        ("left_eye", pose.p_world_eye_left_m, pose.eye_left_rad),
+        ("right_eye", pose.p_world_eye_right_m, pose.eye_right_rad),
+    )
+    turned = [
+        _transform("world", name, p, compose(pose.R_world_head, _eye(angles)), at_ns)
+        for name, p, angles in eyes
+    ]
+    return {"transforms": [head, *turned]}
+
+
+def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json:
+    """Give faces, lines of sight and the point aimed at as foxglove.SceneUpdate."""
+    sights: list[Vec3] = []
+    for p, angles in (
+        (pose.p_world_eye_left_m, pose.eye_left_rad),
+        (pose.p_world_eye_right_m, pose.eye_right_rad),
+    ):
+        R = compose(pose.R_world_head, _eye(angles))
+        sights += [p, add(p, rotate(R, (norm(sub(point_m, p)), 0.0, 0.0)))]
+    entity: Json = {
+        **{kind: [] for kind in UNUSED},
+        "timestamp": stamp(at_ns), "frame_id": "world", "id": "gaze", "lifetime": _FOREVER,
+        "frame_locked": False,
+        "spheres": [
+            *(_ball(face, 2.0 * _FACE_M, _SKIN) for face in faces), _ball(point_m, 0.02, _AIM),
+        ],
+        "lines": [{
+            "type": _LINE_LIST, "pose": _AT_HEAD, "thickness": 2.0, "scale_invariant": True,
+            "points": [_xyz(p) for p in sights], "color": _SIGHT, "colors": [], "indices": [],
+        }],
+    }  # fmt: skip
+    return {"deletions": [], "entities": [entity]}
+
+
+def quaternion(R: Mat3) -> dict[str, float]:
+    """Give a rotation matrix as a unit quaternion with w >= 0 (Shepperd's signs by halves)."""
+    (a, b, c), (d, e, f), (g, h, i) = R
+    return {
+        "x": copysign(0.5 * sqrt(max(0.0, 1.0 + a - e - i)), h - f),
+        "y": copysign(0.5 * sqrt(max(0.0, 1.0 - a + e - i)), c - g),
+        "z": copysign(0.5 * sqrt(max(0.0, 1.0 - a - e + i)), d - b),
+        "w": 0.5 * sqrt(max(0.0, 1.0 + a + e + i)),
+    }
+
+
+def _transform(parent: str, child: str, p: Vec3, R: Mat3, at_ns: int) -> Json:
+    return {
+        "timestamp": stamp(at_ns), "parent_frame_id": parent, "child_frame_id": child,
+        "translation": _xyz(p), "rotation": quaternion(R),
+    }  # fmt: skip
+
+
+def _ball(p: Vec3, across_m: float, colour: Json) -> Json:
+    size = {"x": across_m, "y": across_m, "z": across_m}
+    return {"pose": {"position": _xyz(p), "orientation": _STILL}, "size": size, "color": colour}
+
+
+def _eye(angles: Angles2) -> Mat3:
+    return rotation((angles[0], angles[1], 0.0))
+
+
+def _xyz(p: Vec3) -> dict[str, float]:
+    return {"x": p[0], "y": p[1], "z": p[2]}

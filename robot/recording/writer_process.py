@@ -1,0 +1,129 @@
+"""The process that writes a recording: fed through a socket, it outlives the program it serves.
+
+Run as ``python -m robot.recording.writer_process SOCKET FILE``, two open file descriptors,
+by robot.recording.writer_link. A message is a letter, MORE or LAST, and a piece of some
+pickled (kind, values); the first of all is the run's beginning. When the other side is
+gone, however it ended, the file is closed as it should be.
+"""
+
+import contextlib
+import io
+import os
+import pickle
+import select
+import socket
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+from drivers.types import BusHealth
+from robot.clock import Clock, RealClock
+from robot.recording.run_info import RunEnd
+from robot.recording.run_writer import RunWriter
+from robot.recording.scribe import Scribe
+
+MORE, LAST = b"+", b"."
+BEGIN, TICK, PERCEPT, PICTURE, HEALTH, END = "begin", "tick", "percept", "picture", "health", "end"
+"""What may be handed over."""
+FAILED, DONE = "failed", "done"
+"""What is answered: why nothing more can be written; what was written."""
+PIECE_BYTES = 100_000
+"""No message is longer: a socket's default send buffer in Linux holds 212,992 bytes."""
+
+_FLUSH_S = 0.4
+_SYNC_S = 1.0
+_WAIT_S = 0.1
+_NICE = 5
+
+
+def main(socket_fd: int, file_fd: int) -> None:
+    """Write until the other side is gone or says that the run is over."""
+    os.nice(_NICE)
+    with socket.socket(fileno=socket_fd) as rig:
+        told = _told(rig, os.getppid())
+        first = next((one for one in told if one is not None), None)
+        if first is None:
+            return
+        _, (about, started_ns) = first
+        writer = RunWriter(file_fd, about, started_ns)
+        end = _write(told, writer, rig, RealClock())
+        writer.close(end)
+        _answer(rig, FAILED if writer.failed else DONE, writer.failed or tuple(writer.written))
+
+
+def _write(
+    told: Iterator[tuple[str, Any] | None], writer: RunWriter, rig: socket.socket, clock: Clock
+) -> RunEnd:
+    """Write what is told; give how the run ended."""
+    scribe = Scribe(writer)
+    end = RunEnd()
+    flushed_s = synced_s = clock.now_s()
+    said = False
+    for one in told:
+        if one is not None:
+            kind, values = one
+            if kind == END:
+                end = RunEnd(**values)
+            else:
+                _take(scribe, kind, values)
+        now_s = clock.now_s()
+        if now_s - flushed_s >= _FLUSH_S:
+            flushed_s = now_s
+            writer.flush()
+        if now_s - synced_s >= _SYNC_S:
+            synced_s = now_s
+            writer.sync()
+        if writer.failed and not said:
+            said = True
+            _answer(rig, FAILED, writer.failed)
+    return end
+
+
+def _take(scribe: Scribe, kind: str, values: Any) -> None:
+    """Write one thing that was handed over."""
+    if kind == TICK:
+        scribe.tick(values)
+    elif kind == PERCEPT:
+        scribe.percept(values)
+    elif kind == PICTURE:
+        scribe.picture(*values)
+    elif kind == HEALTH:
+        counts, lost = values
+        scribe.health(BusHealth(*counts), lost)
+
+
+def _told(rig: socket.socket, parent: int) -> Iterator[tuple[str, Any] | None]:
+    """Give what is handed over, None where nothing comes for a while, until the end.
+
+    parent: the program's process; one that it forked may hold the socket open after its death
+    """
+    pieces: list[bytes] = []
+    while True:
+        if not select.select([rig], [], [], _WAIT_S)[0]:
+            if os.getppid() != parent:
+                return
+            yield None
+            continue
+        try:
+            message = rig.recv(PIECE_BYTES + 1)
+        except OSError:
+            return
+        if not message:
+            return
+        pieces.append(message[1:])
+        if message[:1] == LAST:
+            stream = io.BytesIO(b"".join(pieces))
+            pieces.clear()
+            while stream.tell() < len(stream.getbuffer()):
+                # Only ever fed by the program that started it.
+                yield pickle.load(stream)
+
+
+def _answer(rig: socket.socket, kind: str, values: Any) -> None:
+    """Tell the other side, if it is still there."""
+    with contextlib.suppress(OSError):
+        rig.send(pickle.dumps((kind, values)))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))

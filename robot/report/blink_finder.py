@@ -1,0 +1,143 @@
+"""Blinks in a trace of lid openings, with their shape.
+
+A blink shuts both lids by half or more and opens them again; lids that sink with the gaze
+stay down. Closing and opening last for as long as the lid is faster than a twentieth of that
+phase's peak, as blink kinematics are usually measured (VanderWerf et al. 2003).
+"""
+
+from collections import deque
+from typing import NamedTuple
+
+_DEEP_SHARE, _BACK_SHARE = 0.5, 0.75
+"""Of the opening before: below the one it is a blink, above the other it is over."""
+
+_LONGEST_S = 2.0
+_BEFORE_S = 0.4
+_AFTER_S = 0.12
+_FOOT_SHARE = 0.05
+_OPEN_S = 0.5
+"""The opening before a blink is learned with this time constant."""
+
+_LEAST_OPEN = 0.15
+"""Lids that hang lower than this do not show a blink."""
+
+
+class Blink(NamedTuple):
+    """One blink of both lids.
+
+    onset_s: the lids begin to shut; close_s, hold_s, open_s: lengths of its phases
+    depth: share of the opening that it took away, 1 is shut
+    close_peak_1_s, open_peak_1_s: fastest closing and opening, full travels of the lid a second
+    """
+
+    onset_s: float
+    close_s: float
+    hold_s: float
+    open_s: float
+    depth: float
+    close_peak_1_s: float
+    open_peak_1_s: float
+
+    @property
+    def duration_s(self) -> float:
+        """Give the whole length."""
+        return self.close_s + self.hold_s + self.open_s
+
+
+class BlinkFinder:
+    """Takes one opening after the other and gives each blink when it is over."""
+
+    def __init__(self) -> None:
+        """Begin with no trace."""
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the trace: there was a gap."""
+        self._trace: deque[tuple[float, float]] = deque()
+        self._usual = 0.0
+        self._shut_s: float | None = None
+        self._back_s: float | None = None
+
+    def note(self, t_s: float, left: float, right: float) -> Blink | None:
+        """Take both openings, 0 shut .. 1 open; give the blink that is over now, if any."""
+        opening = left if left > right else right  # a wink is no blink
+        trace = self._trace
+        if not trace:
+            self._usual = opening
+        elif t_s <= trace[-1][0]:
+            return None
+        else:
+            self._learn(opening, t_s - trace[-1][0])
+        trace.append((t_s, opening))
+        if self._shut_s is None:
+            while trace[0][0] < t_s - _BEFORE_S:
+                trace.popleft()
+            if opening < _DEEP_SHARE * self._usual and self._usual > _LEAST_OPEN:
+                self._shut_s = t_s
+            return None
+        return self._wait(t_s, opening, self._shut_s)
+
+    def _learn(self, opening: float, dt_s: float) -> None:
+        """Follow the opening between blinks, quickly up and slowly down."""
+        if self._shut_s is None:
+            share = dt_s / _OPEN_S
+            self._usual += (opening - self._usual) * min(1.0, 4 * share if opening > self._usual
+                                                         else share)  # fmt: skip
+
+    def _wait(self, t_s: float, opening: float, shut_s: float) -> Blink | None:
+        """Wait for the lids to be open again, and for a little longer."""
+        if self._back_s is None and opening >= _BACK_SHARE * self._usual:
+            self._back_s = t_s
+        if self._back_s is not None and t_s - self._back_s >= _AFTER_S:
+            self._shut_s = self._back_s = None
+            return _shape(list(self._trace), self._usual)
+        if t_s - shut_s > _LONGEST_S:  # asleep, or looking down: that is the opening now
+            self._shut_s = self._back_s = None
+            self._usual = opening
+        return None
+
+
+def _shape(trace: list[tuple[float, float]], usual: float) -> Blink | None:
+    """Measure one blink: (time, opening) rows from before it until after it."""
+    t = [row[0] for row in trace]
+    o = [row[1] for row in trace]
+    lowest = min(range(len(o)), key=o.__getitem__)
+    speed = [
+        (o[i + 1] - o[i - 1]) / (t[i + 1] - t[i - 1]) for i in range(1, len(o) - 1)
+    ]  # of row i + 1
+    if not 1 < lowest < len(o) - 2:
+        return None
+    down = min(range(lowest), key=speed.__getitem__)
+    up = max(range(lowest - 1, len(speed)), key=speed.__getitem__)
+    if speed[down] >= 0.0 or speed[up] <= 0.0:
+        return None
+    close_from, close_to = _phase(t[1:-1], [-v for v in speed], down)
+    open_from, open_to = _phase(t[1:-1], speed, up)
+    return Blink(
+        close_from,
+        close_to - close_from,
+        max(0.0, open_from - close_to),
+        open_to - max(open_from, close_to),
+        1.0 - o[lowest] / usual,
+        -speed[down],
+        speed[up],
+    )
+
+
+def _phase(t: list[float], speed: list[float], peak: int) -> tuple[float, float]:
+    """Give when the speed rises above its foot before its peak, and falls below it after."""
+    foot = _FOOT_SHARE * speed[peak]
+    first = last = peak
+    while first > 0 and speed[first] > foot:
+        first -= 1
+    while last < len(speed) - 1 and speed[last] > foot:
+        last += 1
+    return (
+        _between(t[first], t[first + 1], speed[first], speed[first + 1], foot),
+        _between(t[last], t[last - 1], speed[last], speed[last - 1], foot),
+    )
+
+
+def _between(t_low: float, t_high: float, low: float, high: float, level: float) -> float:
+    share = (level - low) / (high - low) if high > low else 0.0
+    return t_low + min(1.0, max(0.0, share)) * (t_high - t_low)

@@ -1,0 +1,149 @@
+"""Two runs held against each other: the same figures, the differences, and whether they are chance.
+
+For each measure the events of both runs are thrown together and dealt out again at random
+(permutation test) to see how often chance makes a difference as large; where a measure has one
+number an event, the two distributions are held against each other too (Kolmogorov-Smirnov).
+All these chances are corrected for their number (Holm 1979). The interval of the difference is a
+bootstrap's (Efron 1979). Events count as independent of each other, as is usual; within a run
+they are not quite, so a difference just above chance deserves another run.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite, nan
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from gaze.types import Floats
+from robot.loop import Tick
+from robot.report.about import About
+from robot.report.bands import BY_KEY
+from robot.report.build import Progress, drawn, measured, read
+from robot.report.canvas import COLOURS, Shown
+from robot.report.compare_page import Difference, Word, compare_page
+from robot.report.measured import Measured, figure, judged
+from robot.report.measured import drawn as resampled
+from robot.report.written import write_all
+
+LEVEL = 0.05
+_DRAWS = 2000
+_SEED = 20060401
+COMPARING = "comparing"
+
+
+class Comparison(NamedTuple):
+    """What was found, and the files that say so."""
+
+    differences: tuple[Difference, ...]
+    page: Path
+    pictures: tuple[Path, ...]
+    data: Path
+
+
+def compare(
+    ticks: tuple[Iterable[Tick], Iterable[Tick]],
+    abouts: tuple[About, About],
+    out: Path,
+    progress: Progress,
+) -> Comparison:
+    """Write a page that puts two runs side by side, its figures and numbers; give what differs.
+
+    Raises:
+        drivers.errors.SetupError: a file cannot be written, or there is nothing in a run.
+    """
+    runs = [read(each, about, progress) for each, about in zip(ticks, abouts, strict=True)]
+    progress(COMPARING, 0.0)
+    differences = differences_of(measured(runs[0]), measured(runs[1]))
+    progress(COMPARING, 1.0)
+    shown = [
+        Shown(about.name, run, colour, about.model)
+        for about, run, colour in zip(abouts, runs, COLOURS, strict=True)
+    ]
+    pictures = drawn(shown, progress)
+    page = compare_page(abouts, runs, differences, pictures)
+    written = write_all(out, page, pictures, [_numbers(d) for d in differences])
+    return Comparison(differences, out, *written)
+
+
+def differences_of(a: Sequence[Measured], b: Sequence[Measured]) -> tuple[Difference, ...]:
+    """Hold the measures that both runs have against each other."""
+    theirs = {measure.key: measure for measure in b}
+    pairs = [(m, theirs[m.key]) for m in a if m.key in theirs]
+    enough = {m.key for m, n in pairs if min(m.events, n.events) >= BY_KEY[m.key].least}
+    rng = np.random.default_rng(_SEED)
+    chances = {m.key: chance(m, n, rng) for m, n in pairs if m.key in enough}
+    shapes = {m.key: chance_of_shape(m, n) for m, n in pairs if m.key in enough}
+    known = {k: p for k, p in shapes.items() if isfinite(p)}
+    both = corrected({**chances, **{f"{k} shape": p for k, p in known.items()}})
+    out = []
+    for m, n in pairs:
+        p, shape = both.get(m.key, nan), both.get(f"{m.key} shape", nan)
+        out.append(_difference(m, n, p, shape, rng))
+    return tuple(out)
+
+
+def chance(a: Measured, b: Measured, rng: np.random.Generator) -> float:
+    """Give how often events dealt out at random differ in their figure as much as these."""
+    rows, n = np.concatenate([a.rows, b.rows]), len(a.rows)
+    seen = abs(figure(b.of, b.rows) - figure(a.of, a.rows))
+    as_much = drawn_count = 0
+    for _ in range(_DRAWS):
+        order = rng.permutation(len(rows))
+        dealt = abs(figure(a.of, rows[order[n:]]) - figure(a.of, rows[order[:n]]))
+        if isfinite(dealt):
+            drawn_count += 1
+            as_much += dealt >= seen - 1e-12
+    return (as_much + 1.0) / (drawn_count + 1.0)
+
+
+def chance_of_shape(a: Measured, b: Measured) -> float:
+    """Give the Kolmogorov-Smirnov chance of two distributions, nan of rows that are none."""
+    if a.rows.ndim != 1 or len(np.unique(np.concatenate([a.rows, b.rows]))) <= 2:
+        return nan
+    return float(stats.ks_2samp(a.rows, b.rows).pvalue)
+
+
+def corrected(chances: Mapping[str, float]) -> dict[str, float]:
+    """Correct chances for being many (Holm 1979)."""
+    ordered = sorted(chances.items(), key=lambda item: item[1])
+    out, least = {}, 0.0
+    for rank, (key, p) in enumerate(ordered):
+        least = max(least, min(1.0, (len(ordered) - rank) * p))
+        out[key] = least
+    return out
+
+
+def _difference(
+    a: Measured, b: Measured, p: float, shape: float, rng: np.random.Generator
+) -> Difference:
+    band = BY_KEY[a.key]
+    ours, theirs = judged(a, band), judged(b, band)
+    if not isfinite(p):
+        return Difference(ours, theirs, nan, nan, nan, nan, nan, "too few events")
+    value = theirs.value - ours.value
+    low, high = _interval(resampled(b, rng), resampled(a, rng), value)
+    differs = p < LEVEL or (isfinite(shape) and shape < LEVEL)
+    word: Word = "more than chance" if differs else "may be chance"
+    return Difference(ours, theirs, value, low, high, p, shape, word)
+
+
+def _interval(b: Floats, a: Floats, value: float) -> tuple[float, float]:
+    n = min(len(a), len(b))
+    spread = b[:n] - a[:n]
+    bias = float(spread.mean()) - value
+    low, high = (float(x) - bias for x in np.percentile(spread, (2.5, 97.5)))
+    return low, high
+
+
+def _numbers(d: Difference) -> dict[str, object]:
+    values = {
+        "a": d.a.value, "b": d.b.value, "difference": d.difference, "low95": d.low95,
+        "high95": d.high95, "chance": d.chance, "chance_of_shape": d.chance_shape,
+    }  # fmt: skip
+    known = {key: value if isfinite(value) else None for key, value in values.items()}
+    events = [d.a.measured.events, d.b.measured.events]
+    return {"key": d.a.band.key, "title": d.a.band.title, "unit": d.a.band.unit, **known,
+            "events": events, "verdicts": [d.a.verdict, d.b.verdict],
+            "word": d.word}  # fmt: skip

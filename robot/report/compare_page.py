@@ -1,0 +1,126 @@
+"""The page that puts two runs side by side, and the values it shows."""
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Literal, NamedTuple
+
+from robot.report.about import About
+from robot.report.bands import GROUPS
+from robot.report.gathered import Gathered
+from robot.report.measured import Finding
+from robot.report.page import Picture, line_of, number, rendered, with_unit
+
+Word = Literal["more than chance", "may be chance", "too few events"]
+
+
+class Difference(NamedTuple):
+    """One measure of two runs.
+
+    difference: b - a; low95, high95: its interval, nan where there is none
+    chance: how often chance alone gives as much, corrected; chance_shape: the same for the
+        whole distribution, nan where a measure has none
+    """
+
+    a: Finding
+    b: Finding
+    difference: float
+    low95: float
+    high95: float
+    chance: float
+    chance_shape: float
+    word: Word
+
+
+class Row(NamedTuple):
+    """One row of the page's table, ready to print."""
+
+    title: str
+    people: str
+    a: str
+    b: str
+    a_css: str
+    b_css: str
+    a_verdict: str
+    b_verdict: str
+    events: str
+    difference: str
+    interval: str
+    chance: str
+    word: str
+    css: str
+
+
+_CLASSES = {"more than chance": "more", "may be chance": "same", "too few events": "few"}
+
+
+def _row(difference: Difference, abouts: tuple[About, About]) -> Row:
+    a, b = difference.a, difference.b
+    lines = (line_of(a, abouts[0].styles), line_of(b, abouts[1].styles))
+    known = isfinite(difference.difference)
+    chances = [f"p {_p(difference.chance)}"] if known else []
+    if isfinite(difference.chance_shape):
+        chances.append(f"distribution p {_p(difference.chance_shape)}")
+    return Row(
+        a.band.title,
+        lines[0].band,
+        lines[0].value,
+        lines[1].value,
+        lines[0].css,
+        lines[1].css,
+        a.verdict,
+        b.verdict,
+        f"{a.measured.events} and {b.measured.events}",
+        with_unit(difference.difference, a.band.unit) if known else "",
+        f"{number(difference.low95)} to {number(difference.high95)}" if known else "",
+        "; ".join(chances),
+        difference.word,
+        _CLASSES[difference.word],
+    )
+
+
+def _p(chance: float) -> str:
+    return "< .001" if chance < 0.001 else f"{chance:.3f}"
+
+
+class Section(NamedTuple):
+    """One section of the page."""
+
+    name: str
+    rows: tuple[Row, ...]
+    pictures: tuple[Picture, ...]
+
+
+def compare_page(
+    abouts: tuple[About, About],
+    runs: Sequence[Gathered],
+    differences: Sequence[Difference],
+    pictures: Sequence[Picture],
+) -> str:
+    """Give the page as HTML that needs no other file."""
+    sections = tuple(
+        Section(
+            group,
+            tuple(_row(d, abouts) for d in differences if d.a.band.group == group),
+            tuple(p for p in pictures if p.drawing.group == group),
+        )
+        for group in GROUPS
+    )
+    return rendered(
+        "compare.html", abouts=abouts, sections=sections, facts=_facts(abouts, runs),
+        differing=[d.a.band.title for d in differences if d.word == "more than chance"],
+        counts={word: sum(d.word == word for d in differences) for word in _CLASSES},
+    )  # fmt: skip
+
+
+def _facts(
+    abouts: tuple[About, About], runs: Sequence[Gathered]
+) -> tuple[tuple[str, str, str], ...]:
+    """Give what is known of both runs, side by side."""
+    first, second = (dict(about.facts) for about in abouts)
+    names = dict.fromkeys((*first, *second))
+    counts = [
+        f"{run.seconds:.1f} s, {len(run.saccades)} saccades, {len(run.blinks)} blinks"
+        for run in runs
+    ]
+    facts = [(name, first.get(name, ""), second.get(name, "")) for name in names]
+    return (("length", counts[0], counts[1]), *facts)

@@ -1,0 +1,201 @@
+"""Where on the face the gaze rests, for how long, and where it goes next."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gaze.types import PARTS, Floats
+from robot.face_pose import PARTS_FACE_M
+from robot.report import human
+from robot.report.gathered import Gathered
+from robot.report.measured import Measured, mean, median
+
+N = len(PARTS)
+_EYES = (PARTS.index("LE"), PARTS.index("RE"))
+_SETTLED_S = 0.04
+_PAUSE_S = 0.3
+"""Visits farther apart in time do not follow each other."""
+
+# Grid of the heat map: 4 mm, and half a degree seen from a metre away.
+_Y_M, _Z_M = np.arange(-0.1, 0.1001, 0.004), np.arange(-0.13, 0.1301, 0.004)
+_SPREAD_M = 0.0085
+GRID_M = (_Y_M, _Z_M)
+"""Centres of the cells of a density: sideways and up."""
+
+
+class Visit(NamedTuple):
+    """Time on one part, refixations of it included."""
+
+    part: int
+    start_s: float
+    end_s: float
+
+
+def visits(run: Gathered) -> list[Visit]:
+    """Give the visits to parts in their order."""
+    out: list[Visit] = []
+    for f in run.fixations:
+        if f.part is None or not f.on_face:
+            continue
+        part = PARTS.index(f.part)
+        if out and out[-1].part == part and f.start_s - out[-1].end_s < _PAUSE_S:
+            out[-1] = out[-1]._replace(end_s=f.end_s)
+        else:
+            out.append(Visit(part, f.start_s, f.end_s))
+    return out
+
+
+def shifts(run: Gathered) -> Floats:
+    """Give (n, 2) from and to of shifts between parts, as indices of PARTS."""
+    seen = visits(run)
+    rows = [
+        (a.part, b.part)
+        for a, b in zip(seen, seen[1:], strict=False)
+        if a.part != b.part and b.start_s - a.end_s < _PAUSE_S
+    ]
+    return np.array(rows, dtype=float).reshape(-1, 2)
+
+
+def counted(rows: Floats) -> Floats:
+    """Give (8, 8) counts of shifts, rows from."""
+    out = np.zeros((N, N))
+    np.add.at(out, (rows[:, 0].astype(int), rows[:, 1].astype(int)), 1.0)
+    return out
+
+
+def on_parts(run: Gathered) -> Floats:
+    """Give (n, 2) part and seconds of every fixation on one."""
+    rows = [(PARTS.index(f.part), f.duration_s) for f in run.fixations if f.part is not None]
+    return np.array(rows, dtype=float).reshape(-1, 2)
+
+
+def share(rows: Floats) -> Floats:
+    """Give the share of time on each part, (8,)."""
+    time = np.bincount(rows[:, 0].astype(int), weights=rows[:, 1], minlength=N)
+    out: Floats = time / time.sum()
+    return out
+
+
+def human_share() -> Floats:
+    """Give the share of time that people spend on each part (Nakamoto & Tsuruno), (8,)."""
+    return human.time_share(human.matrix(), human.DWELL_MEAN_S)
+
+
+def points(run: Gathered) -> Floats:
+    """Give (n, 3) y and z on the face in metres, and seconds, of fixations meant for a face.
+
+    They may well lie beside it.
+    """
+    y, z = run.column("face_y"), run.column("face_z")
+    rows = []
+    for f in run.fixations:
+        rested = run.between(f.start_s + _SETTLED_S, f.end_s)
+        if f.kind != "face" or not np.isfinite(y[rested]).any():
+            continue
+        rows.append((np.nanmedian(y[rested]), np.nanmedian(z[rested]), f.duration_s))
+    return np.array(rows).reshape(-1, 3)
+
+
+def density(rows: Floats) -> Floats:
+    """Spread (n, 3) y, z, seconds over the grid: (rows z, columns y)."""
+    time, _, _ = np.histogram2d(
+        rows[:, 1], rows[:, 0], bins=(_edges(_Z_M), _edges(_Y_M)), weights=rows[:, 2]
+    )
+    out: Floats = _bell(_Z_M) @ time @ _bell(_Y_M)
+    return out
+
+
+def expected_density() -> Floats:
+    """Give the density that people's share of time on the parts makes."""
+    places = np.array([PARTS_FACE_M[part][1:] for part in PARTS])
+    return density(np.column_stack([places, human_share()]))
+
+
+def measures(run: Gathered) -> list[Measured]:
+    """Give what there is to say about the gaze on faces."""
+    parts, moves, seen = on_parts(run), shifts(run), visits(run)
+    on_eyes = np.isin(parts[:, 0], _EYES).astype(float)
+    never = human.matrix() == 0.0
+    forbidden = never[moves[:, 0].astype(int), moves[:, 1].astype(int)].astype(float)
+    lengths = np.array([visit.end_s - visit.start_s for visit in seen])
+    meant = [(float(f.part is not None), f.duration_s) for f in run.fixations if f.kind == "face"]
+    return [
+        Measured("on_parts", np.array(meant).reshape(-1, 2), _weighted),
+        Measured("part_share", parts, _share_apart),
+        Measured("eyes_share", np.column_stack([on_eyes, parts[:, 1]]), _weighted),
+        Measured("visit", lengths, mean),
+        Measured("never_taken", forbidden, mean),
+        Measured("transitions", moves, _rows_apart),
+        Measured("heat", points(run), _alike),
+        *_axes(run),
+    ]
+
+
+def _axes(run: Gathered) -> list[Measured]:
+    """Measure where both eyes point, one row a fixation on a face."""
+    rows = axes(run)
+    vergence = rows[:, 6]
+    good = (vergence >= -2.5) & (vergence <= 4.5)
+    within = np.maximum(rows[:, 4], rows[:, 5]) <= 0.5 * human.CONE_DEG
+    return [
+        Measured("left_mm", np.hypot(rows[:, 0], rows[:, 1]), median),
+        Measured("right_mm", np.hypot(rows[:, 2], rows[:, 3]), median),
+        Measured("in_cone", within.astype(float), mean),
+        Measured("vergence", vergence, median),
+        Measured("vergence_ok", good.astype(float), mean),
+    ]
+
+
+def axes(run: Gathered) -> Floats:
+    """Give (n, 7) medians of fixations on a face.
+
+    Columns: where the left, then the right pupil axis passes the point looked at (y, z, in mm
+    of the face's plane); angles off it, in deg; vergence beyond what is due, in deg.
+    """
+    names = ("left_y_mm", "left_z_mm", "right_y_mm", "right_z_mm", "off_left", "off_right")
+    due = run.column("vergence") - run.column("vergence_due")
+    table = np.column_stack([*(run.column(name) for name in names), due])
+    parts = [table[run.between(f.start_s + _SETTLED_S, f.end_s)] for f in run.fixations
+             if f.kind == "face"]  # fmt: skip
+    rows = [np.median(part, axis=0) for part in parts if len(part)]
+    found = np.array(rows).reshape(-1, 7)
+    whole: Floats = found[np.isfinite(found).all(axis=1)]
+    return whole
+
+
+def _share_apart(rows: Floats) -> float:
+    """Give half the sum of the differences to people's shares: 0 alike, 1 nothing in common."""
+    return float(0.5 * np.abs(share(rows) - human_share()).sum())
+
+
+def _rows_apart(rows: Floats) -> float:
+    """Give that difference of the rows of the transition matrix, weighted by their shifts."""
+    counts = counted(rows)
+    total = counts.sum(axis=1)
+    here = total > 0.0
+    ours = counts[here] / total[here, None]
+    apart = 0.5 * np.abs(ours - human.visit_matrix(human.matrix())[here]).sum(axis=1)
+    return float(np.average(apart, weights=total[here]))
+
+
+def _weighted(rows: Floats) -> float:
+    return float(np.average(rows[:, 0], weights=rows[:, 1]))
+
+
+def _alike(rows: Floats) -> float:
+    """Give the correlation of the heat map with that expected of people."""
+    ours = density(rows).ravel()
+    if ours.std() == 0.0:  # all of it beside the face
+        return 0.0
+    return float(np.corrcoef(ours, expected_density().ravel())[0, 1])
+
+
+def _edges(centres: Floats) -> Floats:
+    step = centres[1] - centres[0]
+    out: Floats = np.append(centres - 0.5 * step, centres[-1] + 0.5 * step)
+    return out
+
+
+def _bell(centres: Floats) -> Floats:
+    out: Floats = np.exp(-0.5 * ((centres[:, None] - centres[None]) / _SPREAD_M) ** 2)
+    return out

@@ -1,0 +1,170 @@
+"""The page of a report: words, numbers and pictures put into the HTML templates."""
+
+from base64 import b64encode
+from collections import Counter
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import NamedTuple
+
+import jinja2
+
+from robot.report.about import About
+from robot.report.bands import GROUPS, Band
+from robot.report.canvas import Drawing
+from robot.report.gathered import Gathered
+from robot.report.measured import Finding
+
+_CLASSES = {"pass": "pass", "outside": "outside", "too few events": "few"}
+
+
+class Picture(NamedTuple):
+    """A drawn figure."""
+
+    drawing: Drawing
+    png: bytes
+
+    @property
+    def data_uri(self) -> str:
+        """Give it as the page holds it."""
+        return f"data:image/png;base64,{b64encode(self.png).decode()}"
+
+
+class Line(NamedTuple):
+    """One row of a table of the page, ready to print.
+
+    css: class of its verdict; gauge: SVG of the value beside its band; notes: why it is so
+    """
+
+    title: str
+    value: str
+    interval: str
+    asked: str
+    band: str
+    events: str
+    verdict: str
+    css: str
+    source: str
+    notes: tuple[str, ...]
+    gauge: "Gauge | None"
+
+
+class Gauge(NamedTuple):
+    """Places on a scale of 0..100: the band, the value and its interval."""
+
+    band_from: float
+    band_wide: float
+    value: float
+    low: float
+    wide: float
+
+
+class Section(NamedTuple):
+    """One section of the page."""
+
+    name: str
+    lines: tuple[Line, ...]
+    pictures: tuple[Picture, ...]
+
+
+def report_page(
+    about: About, run: Gathered, findings: Sequence[Finding], pictures: Sequence[Picture]
+) -> str:
+    """Give the page of one run as HTML that needs no other file."""
+    styles = about.styles | {f"conversation {run.mode}"}
+    sections = tuple(
+        Section(
+            group,
+            tuple(line_of(f, styles) for f in findings if f.band.group == group),
+            tuple(p for p in pictures if p.drawing.group == group),
+        )
+        for group in GROUPS
+    )
+    counts = Counter(finding.verdict for finding in findings)
+    facts = (*about.facts, *_facts(run))
+    return rendered(
+        "report.html", about=about, facts=facts, sections=sections, counts=counts,
+        outside=[f.band.title for f in findings if f.verdict == "outside"],
+    )  # fmt: skip
+
+
+def rendered(template: str, **values: object) -> str:
+    """Fill a template that stands beside this file."""
+    loader = jinja2.FileSystemLoader(Path(__file__).parent)
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template(template).render(**values)
+
+
+def line_of(finding: Finding, styles: frozenset[str]) -> Line:
+    """Put a finding into words."""
+    band, value = finding.band, finding.value
+    known = isfinite(finding.low95)
+    interval = f"{number(finding.low95)} to {number(finding.high95)}" if known else ""
+    asked = finding.measured.asked
+    notes = tuple(words for style, words in band.notes if style in styles)
+    return Line(
+        band.title,
+        with_unit(value, band.unit) if isfinite(value) else "nothing measured",
+        interval,
+        number(asked) if isfinite(asked) else "",
+        band_words(band),
+        f"{finding.measured.events} of {band.least}"
+        if finding.verdict == "too few events"
+        else f"{finding.measured.events}",
+        finding.verdict,
+        _CLASSES[finding.verdict],
+        band.source,
+        notes if finding.verdict == "outside" else (),
+        gauge(finding) if known else None,
+    )
+
+
+def gauge(finding: Finding) -> Gauge:
+    """Place band and value on one scale; a value far away stands at its end."""
+    band = finding.band
+    margin = 0.75 * (band.high - band.low)
+    start, span = band.low - margin, band.high - band.low + 2.0 * margin
+
+    def at(x: float) -> float:
+        return min(100.0, max(0.0, 100.0 * (x - start) / span))
+
+    low, high = at(finding.low95), at(finding.high95)
+    return Gauge(at(band.low), at(band.high) - at(band.low), at(finding.value), low, high - low)
+
+
+def band_words(band: Band) -> str:
+    """Give a band as text."""
+    return f"{number(band.low)} to {with_unit(band.high, band.unit)}"
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Give a number with its unit; shares have none."""
+    return number(value) if unit in ("", "share") else f"{number(value)} {unit}"
+
+
+def number(value: float) -> str:
+    """Give a number with as many digits as are of use."""
+    size = abs(value)
+    if size >= 100.0:
+        return f"{value:.0f}"
+    if size >= 10.0:
+        return f"{value:.1f}".rstrip("0").rstrip(".")
+    text = f"{value:.2f}" if size >= 0.1 or value == 0.0 else f"{value:.3f}"
+    text = text.rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def _facts(run: Gathered) -> tuple[tuple[str, str], ...]:
+    """Give what the ticks themselves say of the run."""
+    total = sum(run.kinds.values()) or 1.0
+    shares = sorted(run.kinds.items(), key=lambda item: -item[1])
+    return (
+        ("length", f"{run.seconds:.1f} s, {len(run.rows)} ticks at {run.rate_hz:.0f} Hz"),
+        ("events", f"{len(run.saccades)} saccades, {len(run.fixations)} fixations, "
+                   f"{len(run.blinks)} blinks"),
+        ("looked at", ", ".join(f"{kind} {100 * s / total:.0f} %" for kind, s in shares)),
+        ("conversation", run.mode),
+    )  # fmt: skip

@@ -1,0 +1,304 @@
+"""A rig's parameters put into the running parts, between two ticks and without a jump.
+
+Each part has a ``retune`` that takes its parameters and keeps what it knows. Only parts
+whose parameters differ are touched. What cannot change while the rig runs (see
+config.knobs) keeps the value it started with until the next start.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import radians
+from typing import NamedTuple
+
+from config.knobs import NEXT_START, changed, differences, live
+from config.load import ConfigError
+from config.schema import Rig, load_walk
+from drivers.types import Camera
+from gaze.attention import Attention
+from gaze.aversion import Aversion
+from gaze.bottom_up import BottomUp
+from gaze.breathing import Breathing
+from gaze.field_of_view import FieldOfView
+from gaze.head import Head
+from gaze.idle import Idle
+from gaze.lids import Lids
+from gaze.oculomotor import Oculomotor
+from gaze.pursuit import Pursuit
+from gaze.saccade import Saccade
+from gaze.scanpath import Scanpath, Walk
+from gaze.top_down import TopDown
+from gaze.types import Angles2, Vec3
+from robot.body import Body, JointParams
+from robot.cameras import retune_camera
+from robot.frames import CameraMount, CameraParams
+from robot.kinematics import Kinematics
+from robot.loop import LoopParams
+from robot.orders import Tune, Value
+from robot.perception import Perception
+from robot.safety import Guard, JointLimit
+from robot.tracks import Tracker
+from robot.types import JOINTS, JointAngles
+
+EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
+"""Of the left and the right eye: ((yaw low, high), (pitch low, high)), radians."""
+
+
+class Parts(NamedTuple):
+    """The parts of a running robot that have parameters."""
+
+    body: Body
+    guard: Guard
+    kinematics: Kinematics
+    camera: Camera
+    mount: CameraMount
+    perception: Perception
+    tracker: Tracker
+    attention: Attention
+    field_of_view: FieldOfView
+    bottom_up: BottomUp
+    top_down: TopDown
+    idle: Idle
+    scanpath: Scanpath
+    aversion: Aversion
+    oculomotor: Oculomotor
+    saccade: Saccade
+    pursuit: Pursuit
+    head: Head
+    breathing: Breathing
+    lids: Lids
+
+
+class Placed(NamedTuple):
+    """Where the camera is taken to sit, which may be standing still though the rig's does not."""
+
+    camera: Callable[[Rig], CameraParams]
+    mount: str
+
+
+class _Ready(NamedTuple):
+    """A rig that was checked before its turn.
+
+    changes: what makes it of ``base``; walk: what its scanpath names, None if as before
+    """
+
+    changes: tuple[tuple[str, Value], ...]
+    base: Rig
+    rig: Rig
+    walk: Walk | None
+
+
+class Retuner:
+    """Puts changes into the parts of a robot; a robot.loop.Robot's ``tune``.
+
+    rig: in force
+    """
+
+    def __init__(self, parts: Parts, rig: Rig, placed: Placed) -> None:
+        """Take the parts as they were made of ``rig``."""
+        self.rig = rig
+        self.parts = parts
+        self._placed = placed
+        self._started = rig
+        self._walk = load_walk(rig.gaze.scanpath.walk)
+        self._ready: dict[int, _Ready] = {}
+
+    @property
+    def loop(self) -> LoopParams:
+        """Give the rate and the time for parking in force."""
+        return self.rig.loop
+
+    @property
+    def park_rad(self) -> JointAngles:
+        """Give the pose before torque goes off."""
+        return park_pose(self.rig)
+
+    @property
+    def camera(self) -> CameraParams:
+        """Give lens and place of the camera as they are believed."""
+        return self._placed.camera(self.rig)
+
+    @property
+    def horizontal_field_deg(self) -> float:
+        """Give the camera's field of view as it is believed."""
+        return self._placed.camera(self.rig).horizontal_field_deg
+
+    def prepare(self, base: Rig, rig: Rig) -> Tune:
+        """Make the order that turns one rig into another that was checked; from any thread.
+
+        Its tick then need not check it. base: in force when the order comes
+
+        Raises:
+            config.load.ConfigError: the walk that the rig names is at fault.
+        """
+        before, name = base.gaze.scanpath.walk, rig.gaze.scanpath.walk
+        walk = load_walk(name) if name != before else None
+        order = Tune(tuple(differences(base, rig).items()))
+        self._ready[id(order.changes)] = _Ready(order.changes, base, rig, walk)
+        return order
+
+    def __call__(self, order: Tune, t_s: float) -> tuple[str, ...]:
+        """Put a change in force, from this tick on; say what was done.
+
+        A change that nobody has prepared is checked here; a wrong one changes nothing.
+        """
+        ready = self._ready.pop(id(order.changes), None)
+        if ready is None or ready.changes is not order.changes or ready.base is not self.rig:
+            try:
+                ready = self._checked(order)
+            except ConfigError as error:
+                return tuple(f"not tuned: {line}" for line in str(error).splitlines())
+        said = self._put(ready.rig, ready.walk or self._walk)
+        return (*(_told(key, value) for key, value in order.changes), *said)
+
+    def _checked(self, order: Tune) -> _Ready:
+        rig, before = changed(self.rig, dict(order.changes)), self.rig.gaze.scanpath.walk
+        name = rig.gaze.scanpath.walk
+        walk = load_walk(name) if name != before else None
+        return _Ready(order.changes, self.rig, rig, walk)
+
+    def _put(self, rig: Rig, walk: Walk) -> tuple[str, ...]:
+        """Hand the parameters that differ to their parts."""
+        before, self.rig = self.rig, rig
+        self._put_gaze(before, rig, walk)
+        self._walk = walk
+        return self._put_machine(before, rig)
+
+    def _put_gaze(self, old: Rig, new: Rig, walk: Walk) -> None:
+        parts, was, now = self.parts, old.gaze, new.gaze
+        if now.field_of_view != was.field_of_view:
+            parts.field_of_view.retune(now.field_of_view)
+        if now.bottom_up != was.bottom_up:
+            parts.bottom_up.retune(now.bottom_up)
+        if now.top_down != was.top_down:
+            parts.top_down.retune(now.top_down)
+        if now.attention != was.attention:
+            parts.attention.retune(now.attention)
+        if now.idle != was.idle:
+            parts.idle.retune(now.idle)
+        if now.aversion != was.aversion:
+            parts.aversion.retune(now.aversion)
+        if now.scanpath != was.scanpath or walk != self._walk:
+            parts.scanpath.retune(now.scanpath, walk)
+        if now.saccade != was.saccade:
+            parts.saccade.retune(now.saccade)
+        if now.pursuit != was.pursuit:
+            parts.pursuit.retune(now.pursuit)
+        if now.breathing != was.breathing:
+            parts.breathing.retune(now.breathing)
+        if now.lids != was.lids:
+            parts.lids.retune(now.lids)
+        eyes = eye_limits(new)
+        if now.oculomotor != was.oculomotor or eyes != eye_limits(old):
+            parts.oculomotor.retune(now.oculomotor, eyes)
+        if (now.head, *head_limits(new)) != (was.head, *head_limits(old)):
+            parts.head.retune(now.head, *head_limits(new))
+
+    def _put_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
+        parts = self.parts
+        bends = (new.geometry, new.lid_joints) != (old.geometry, old.lid_joints)
+        if bends:
+            parts.kinematics.retune(new.geometry, *lid_angles(new))
+        said = self._put_joints(old, new)
+        if bends or new.ranges != old.ranges:
+            parts.guard.go_gently()  # wishes are elsewhere all at once
+        if new.tracks != old.tracks:
+            parts.tracker.retune(new.tracks)
+        placed, was_placed = self._placed.camera(new), self._placed.camera(old)
+        if placed != was_placed:
+            parts.mount.retune(replace(placed, mount=self._placed.mount))
+        sees = placed.horizontal_field_deg, placed.lens, new.face_parts_mm
+        if sees != (was_placed.horizontal_field_deg, was_placed.lens, old.face_parts_mm):
+            parts.perception.retune(placed.horizontal_field_deg, own_parts(new), placed.lens)
+        camera = retune_camera(parts.camera, old, new, placed)
+        return (*said, camera) if camera else said
+
+    def _put_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
+        """Tell body and guard of joints; the guard where each joint is in angles of now.
+
+        Gives what has to wait for the servos to be set up anew.
+        """
+        parts, joints = self.parts, self._lasting(new)
+        others = joints != self._lasting(old)
+        if others:
+            for i, (factor, offset_rad) in parts.body.retune(joints).items():
+                parts.guard.recount(i, factor, offset_rad)
+        if new.guard != old.guard or limits(joints) != limits(self._lasting(old)):
+            parts.guard.retune(new.guard, limits(joints))
+        return _beyond(limits(joints), parts.body.reach()) if others else ()
+
+    def _lasting(self, rig: Rig) -> dict[str, JointParams]:
+        """Give the joints with the servos that the bus was opened with."""
+        return {
+            name: replace(
+                rig.joints[name],
+                id=first.id,
+                model=first.model,
+                firmware_min=first.firmware_min,
+            )
+            for name, first in self._started.joints.items()
+        }
+
+
+def _beyond(wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]) -> tuple[str, ...]:
+    """Say which joints may go farther or faster than their servos were set up to."""
+    more = [
+        name
+        for name, wish, most in zip(JOINTS, wanted, reach, strict=True)
+        if wish.low_rad < most.low_rad - 1e-6
+        or wish.high_rad > most.high_rad + 1e-6
+        or wish.speed_rad_s > most.speed_rad_s + 1e-6
+    ]
+    if not more:
+        return ()
+    return (f"{', '.join(more)}: all of the range and speed come with a stop and a resume",)
+
+
+def limits(joints: Mapping[str, JointParams]) -> tuple[JointLimit, ...]:
+    """Give the joints' limits in the order of JOINTS."""
+    return tuple(joints[name].limit() for name in JOINTS)
+
+
+def park_pose(rig: Rig) -> JointAngles:
+    """Give the pose before torque goes off."""
+    return tuple(radians(rig.park_deg.get(name, 0.0)) for name in JOINTS)
+
+
+def own_parts(rig: Rig) -> dict[str, Vec3]:
+    """Give the rig's own places of face parts in metres."""
+    return {code: (x / 1e3, y / 1e3, z / 1e3) for code, (x, y, z) in rig.face_parts_mm.items()}
+
+
+def lid_angles(rig: Rig) -> tuple[Angles2, Angles2]:
+    """Give the (left, right) lid joint angles shut, and open."""
+    lids = rig.lid_joints
+    shut = radians(lids.left_shut_deg), radians(lids.right_shut_deg)
+    return shut, (radians(lids.left_open_deg), radians(lids.right_open_deg))
+
+
+def eye_limits(rig: Rig) -> EyeLimits:
+    """Give the eyes' ranges: the narrower of the joints' and the profile's."""
+    return (_eye(rig, "left"), _eye(rig, "right"))
+
+
+def head_limits(rig: Rig) -> tuple[float, tuple[Angles2, Angles2]]:
+    """Give the smallest eye limit and the neck's ((yaw low, high), (pitch low, high))."""
+    smallest = min(abs(end) for eye in eye_limits(rig) for span in eye for end in span)
+    neck = _span(rig, "neck_yaw", rig.ranges.neck_yaw_deg), _span(rig, "neck_pitch", 180.0)
+    return smallest, neck
+
+
+def _eye(rig: Rig, side: str) -> tuple[Angles2, Angles2]:
+    yaw = _span(rig, f"{side}_eye_pan", rig.ranges.eye_yaw_deg)
+    return yaw, _span(rig, f"{side}_eye_tilt", rig.ranges.eye_pitch_deg)
+
+
+def _span(rig: Rig, name: str, most_deg: float) -> Angles2:
+    """Give a joint's range within +-most_deg, in radians."""
+    joint = rig.joints[name]
+    return radians(max(joint.min_deg, -most_deg)), radians(min(joint.max_deg, most_deg))
+
+
+def _told(key: str, value: Value) -> str:
+    when = live(key)
+    note = f" ({when})" if when.startswith(NEXT_START) else ""
+    return f"tuned: {key} = {value}{note}"

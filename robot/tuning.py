@@ -1,0 +1,346 @@
+"""The parameters of a running rig: what they are, what they are to be, and the file they are in.
+
+Three rigs matter: the one that its files make (with the options of the command line), the
+one in force, and the one of defaults. What a person changes lies over the files until it is
+saved, whichever character is chosen and however often the files are edited meanwhile.
+
+Everything may be called from any thread. Changes reach the running parts as one order,
+checked as a whole beforehand.
+"""
+
+import os
+import shutil
+import threading
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from config.apart import apart
+from config.knobs import NEXT_START, Knob, changed, differences, flattened, live, value_of, values
+from config.knobs import knobs as knobs_of
+from config.load import ConfigError, Fault, shipped_names
+from config.save import Change, Saved, copy_shipped, rig_file, save
+from config.save_text import Unchangeable, written
+from config.schema import Rig, layers_of, load_rig
+from robot.orders import Order, Value
+from robot.retune import Retuner
+
+NO_CHARACTER = "none"
+_DEFAULTS = "desk"
+
+
+class _State(NamedTuple):
+    """Everything at one moment; a new one takes its place as a whole.
+
+    saved: what the files make, with the options; rig: in force
+    name: of the rig as it was asked for, a shipped name or a path
+    """
+
+    saved: Rig
+    rig: Rig
+    name: str
+    character: str | None
+    version: int
+
+
+class Tuning:
+    """Gives and changes the parameters of one running rig.
+
+    version: goes up at each change
+    """
+
+    def __init__(
+        self,
+        retuner: Retuner,
+        order: Callable[[Order], None],
+        rig: str,
+        character: str | None = None,
+        profile: str | None = None,
+        now: Callable[[], datetime] = datetime.now,
+        elsewhere: Callable[..., Any] = apart,
+    ) -> None:
+        """Take a rig as it was assembled, and the names of the files it was made of.
+
+        order: takes orders for the next tick, as robot.loop.Robot.order
+        now: the time in the name of a backup
+        elsewhere: calls a function that reads or writes rig files, so that the control loop
+            does not feel it
+
+        Raises:
+            config.load.ConfigError: the files have changed since, and are at fault now.
+        """
+        self._retuner, self._order = retuner, order
+        self._profile, self._now, self._elsewhere = profile, now, elsewhere
+        self._changing = threading.Lock()
+        self._defaults = _defaults(retuner.rig)
+        # What the command line says otherwise stays in force whatever the files say.
+        self._options = differences(load_rig(rig, character, profile), retuner.rig)
+        self._state = _State(retuner.rig, retuner.rig, rig, character, 0)
+        self._knobs: tuple[int, tuple[Knob, ...]] = (-1, ())
+
+    @property
+    def version(self) -> int:
+        """Count the changes."""
+        return self._state.version
+
+    @property
+    def name(self) -> str:
+        """Give the rig's name or path."""
+        return self._state.name
+
+    @property
+    def path(self) -> Path:
+        """Give the rig's file."""
+        return rig_file(self._state.name)
+
+    @property
+    def character_name(self) -> str:
+        """Give the character in force, "none" without one."""
+        return self._state.character or NO_CHARACTER
+
+    def files(self) -> tuple[Path, ...]:
+        """Give the files in use: the rig's, and those laid over it.
+
+        Raises:
+            config.load.ConfigError: the rig's file cannot be read.
+        """
+        state = self._state
+        return tuple(layers_of(state.name, state.character, self._profile))
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Give all parameters in the order of the file."""
+        state = self._state
+        version, made = self._knobs
+        if version != state.version:
+            made = knobs_of(state.rig, self._defaults)
+            self._knobs = state.version, made
+        return made
+
+    def values(self) -> dict[str, Value]:
+        """Give key -> value in force of every knob."""
+        return values(self._state.rig)
+
+    def get(self, prefix: str = "") -> dict[str, Value]:
+        """Give the values in force whose keys begin so.
+
+        Raises:
+            config.load.ConfigError: there is none; the message says what is near.
+        """
+        rig = self._state.rig
+        found = {key: value for key, value in values(rig).items() if key.startswith(prefix)}
+        return found or {prefix: value_of(rig, prefix)}
+
+    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
+        """Put values at dotted keys in force from the next tick on, all of them or none.
+
+        Gives a line for each value that is another one now.
+
+        Raises:
+            config.load.ConfigError: with every fault; what was in force stays.
+        """
+        with self._changing:
+            return self._put(self._state, changed(self._state.rig, changes))
+
+    def unsaved(self) -> tuple[Change, ...]:
+        """Give what is in force and not in the files."""
+        state = self._state
+        return _changes(state.saved, state.rig)
+
+    def differs(self) -> tuple[Change, ...]:
+        """Give what differs from the defaults, those of the shipped rig."""
+        return _changes(self._defaults, self._state.rig)
+
+    def revert(self) -> tuple[str, ...]:
+        """Put in force what the files say."""
+        with self._changing:
+            return self._put(self._state, self._state.saved)
+
+    def save(self, path: Path | str | None = None) -> Saved:
+        """Write what is unsaved into the rig's file, or into a copy of it at a new path.
+
+        From then on the copy is this rig's file.
+
+        Raises:
+            config.load.ConfigError: the rig is a shipped one and no path is given, the path
+                exists or cannot be written, or another layer overrides a value.
+        """
+        with self._changing:
+            state = self._state
+            wanted = flattened(state.rig, differences(state.saved, state.rig))
+            _refuse_lists(wanted)
+            target = rig_file(state.name)
+            if path is not None and os.path.realpath(path) != os.path.realpath(target):
+                done = self._elsewhere(
+                    save_copy, state.name, str(path), wanted, self._now(), *self._layers(state)
+                )
+                state = state._replace(name=str(path))
+            else:
+                done = self._elsewhere(
+                    save_over, str(target), wanted, self._now(), *self._layers(state)
+                )
+            self._state = state._replace(saved=state.rig, version=state.version + 1)
+            saved: Saved = done
+            return saved
+
+    def characters(self) -> tuple[str, ...]:
+        """Give the characters there are, the one in force first; "none" is the rig itself."""
+        now = self.character_name
+        return (now, *(n for n in (NO_CHARACTER, *shipped_names("characters")) if n != now))
+
+    def character(self, name: str) -> tuple[str, ...]:
+        """Lay another character over the rig; what is unsaved stays over both.
+
+        name: of a shipped one, a path, or "none"
+
+        Raises:
+            config.load.ConfigError: there is no such character, or it does not fit the rig.
+        """
+        with self._changing:
+            state = self._state
+            wanted = None if name in (NO_CHARACTER, "") else name
+            fresh = self._read(state._replace(character=wanted))
+            rig = changed(fresh, differences(state.saved, state.rig))
+            return self._put(state._replace(saved=fresh, character=wanted), rig)
+
+    def reload(self, path: Path | str | None = None) -> tuple[str, ...]:
+        """Put in force what the files say now; what is unsaved stays, unless they changed it.
+
+        path: the one of the files that was edited
+
+        Raises:
+            config.load.ConfigError: with every fault; what was in force stays.
+        """
+        with self._changing:
+            state = self._state
+            fresh = self._read(state)
+            edited = differences(state.saved, fresh)
+            kept = {
+                key: value
+                for key, value in differences(state.saved, state.rig).items()
+                if not any(_overlap(key, other) for other in edited)
+            }
+            return self._put(state._replace(saved=fresh), changed(fresh, kept))
+
+    def _layers(self, state: _State) -> tuple[str | None, str | None]:
+        return state.character, self._profile
+
+    def _read(self, state: _State) -> Rig:
+        """Read the files, with the options over them."""
+        rig = self._elsewhere(load_rig, state.name, *self._layers(state))
+        return changed(rig, self._options)
+
+    def _put(self, state: _State, rig: Rig) -> tuple[str, ...]:
+        """Put a rig in force that was checked, and say what is other than before."""
+        before = self._state
+        found = differences(before.rig, rig)
+        if found:
+            self._order(self._retuner.prepare(before.rig, rig))
+        elif state == before:
+            return ()
+        self._state = state._replace(rig=rig if found else before.rig, version=before.version + 1)
+        return tuple(_told(key, value) for key, value in found.items())
+
+
+def save_over(
+    path: str,
+    wanted: Mapping[str, Any],
+    now: datetime,
+    character: str | None,
+    profile: str | None,
+) -> Saved:
+    """Write values into a rig's file; each must hold with character and profile laid over it.
+
+    Raises:
+        config.load.ConfigError: see config.save.save.
+    """
+    check = partial(load_rig, character=character, profile=profile)
+    return save(Path(path), wanted, now, check, Rig)
+
+
+def save_copy(
+    name: str,
+    to: str,
+    wanted: Mapping[str, Any],
+    now: datetime,
+    character: str | None,
+    profile: str | None,
+) -> Saved:
+    """Write values into a new copy of a rig's file, which is not there if that fails.
+
+    Raises:
+        config.load.ConfigError: see config.save.save; or ``to`` exists or is no YAML file.
+    """
+    if not to.endswith((".yaml", ".yml")):
+        raise ConfigError([Fault(to, None, "", "", "a rig's file ends in .yaml; name it so")])
+    if name in shipped_names("rigs"):
+        copy_shipped(name, to)
+    else:
+        _copy(rig_file(name), Path(to))
+    try:
+        return save_over(to, wanted, now, character, profile)
+    except ConfigError:
+        os.unlink(to)
+        raise
+
+
+def _copy(source: Path, to: Path) -> None:
+    try:
+        with source.open("rb") as old, to.open("xb") as new:
+            shutil.copyfileobj(old, new)
+    except FileExistsError:
+        rule = "is there already and is not overwritten; choose another name"
+        raise ConfigError([Fault(str(to), None, "", "", rule)]) from None
+    except OSError as error:
+        rule = f"cannot be written: {error.strerror}; check it and its folder"
+        raise ConfigError([Fault(str(to), None, "", "", rule)]) from error
+
+
+def _defaults(rig: Rig) -> Rig:
+    """Give the shipped rig of the same name, else the one that all others are made of."""
+    return load_rig(rig.name if rig.name in shipped_names("rigs") else _DEFAULTS)
+
+
+def _refuse_lists(wanted: Mapping[str, Value]) -> None:
+    """Refuse what no single line can hold."""
+    faults = [
+        Fault("", None, key, "", "holds mappings: change it in the file, which is read again")
+        for key, value in wanted.items()
+        if isinstance(value, tuple) and any(isinstance(item, Mapping) for item in value)
+    ]
+    if faults:
+        raise ConfigError(faults)
+
+
+def _changes(before: Rig, after: Rig) -> tuple[Change, ...]:
+    """Give each value that differs, as YAML."""
+    was = values(before)
+    found = flattened(after, differences(before, after))
+    return tuple(
+        Change(key, _text(was[key]) if key in was else None, _text(value))
+        for key, value in found.items()
+    )
+
+
+def _text(value: Value) -> str:
+    """Write a value as YAML on one line."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {_text(item)}' for key, item in value.items())}}}"
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_text, value))}]"
+    try:
+        return written(value)
+    except Unchangeable:
+        return str(value)
+
+
+def _overlap(one: str, other: str) -> bool:
+    """Tell whether two keys are the same or one is above the other."""
+    return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
+
+
+def _told(key: str, value: Value) -> str:
+    when = live(key)
+    note = f" ({when})" if when.startswith(NEXT_START) else ""
+    return f"{key} = {_text(value)}{note}"

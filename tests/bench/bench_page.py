@@ -1,0 +1,289 @@
+"""What the live page costs the control loop, and how fast a hand on it is felt.
+
+    python tests/bench/bench_page.py [SECONDS]
+
+A simulated rig in real time, its servos behind a pseudo-terminal, with the page off and with
+0, 1 and 5 browsers that take all that comes. Printed a run: how far ticks are off their slots,
+skipped slots, and the processor time of the rig's and of the page's process, in per cent of
+one core. Then the time until the page can be opened, until a browser has its first picture,
+and from a slider that is moved (and from a stop) to the goals on the bus.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from contextlib import ExitStack
+from math import radians
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+import viser
+import zstandard
+from websockets.sync.client import ClientConnection, connect
+
+from config.load import ConfigError
+from config.schema import load_rig
+from robot.assemble import assemble
+from robot.audience import Audience, Told, Wished
+from robot.choice import Choice
+from robot.loop import LoopCount, Tick, run
+from robot.recording.run_info import RunInfo
+from robot.tuning import Tuning
+
+VISER = [f"viser-v{viser.__version__}"]
+TRIES = 30
+CAMERA = msgspec.msgpack.encode(
+    {
+        "type": "ViewerCameraMessage",
+        "wxyz": [1.0, 0.0, 0.0, 0.0],
+        "position": [1.0, 0.0, 0.0],
+        "fov": 0.8,
+        "near": 0.01,
+        "far": 1000.0,
+        "image_height": 600,
+        "image_width": 800,
+        "look_at": [0.0, 0.0, 0.0],
+        "up_direction": [0.0, 0.0, 1.0],
+    }
+)
+
+
+def browser(url: str) -> ClientConnection:
+    """Connect as a browser does, with a camera, so that the page is drawn for it."""
+    there = connect(
+        url.replace("http", "ws"), origin=url, subprotocols=VISER, max_size=None, compression=None
+    )
+    there.send(CAMERA)
+    return there
+
+
+def messages(data: bytes) -> list[dict[str, Any]]:
+    """What viser sent: sizes, then packed messages."""
+    size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
+    plain = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
+    found: list[dict[str, Any]] = msgspec.msgpack.decode(plain)["messages"]
+    return found
+
+
+def no_recording() -> RunInfo:
+    raise AssertionError("nothing is recorded here")
+
+
+class Run(NamedTuple):
+    off_slot_ms: np.ndarray
+    overruns: int
+    rig_percent: float
+    page_percent: float
+
+
+class Bench:
+    """A rig that runs in a thread of this process, as gazerig run does."""
+
+    def __init__(self, page: bool) -> None:
+        self.made = made = assemble(
+            load_rig("desk"), Choice(mock=True, fast=False, seed=0, scene="visitor")
+        )
+        robot = made.robot
+        tuning = Tuning(made.retuner, robot.order, "desk")
+        told = Told(tuning, (ConfigError,), {"rig": "desk", "pid": os.getpid()}, no_recording)
+        wished = Wished(page=("127.0.0.1", 8700) if page else None)
+        self.audience = Audience(made, wished, told, False, lambda _: None, lambda _: None)
+        self.page = self.audience._page
+        self.times: list[float] = []
+        self.obeyed: list[tuple[float, object]] = []
+        self.over = False
+        self.count = 0
+        robot.start(made.clock)
+        self.opened_s = time.monotonic()
+        self.audience.open()
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+
+    def _run(self) -> None:
+        stop = lambda _: "over" if self.over else None  # noqa: E731
+        count = run(self.made.robot, self.made.clock, lambda: self.made.loop, stop, self._note)
+        self.count = count.overruns
+
+    def _note(self, tick: Tick) -> None:
+        self.audience.note(tick)
+        self.times.append(tick.t_s)
+        if tick.orders:  # the goals of this tick are written
+            now_s = time.monotonic()
+            self.obeyed += [(now_s, order) for order in tick.orders]
+
+    def url(self) -> str:
+        assert self.page is not None
+        while (url := self.page.url()) is None:
+            time.sleep(0.002)
+        return url
+
+    def measure(self, seconds: float) -> Run:
+        pid = self.page._process.pid if self.page is not None and self.page._process else None
+        before = len(self.times), cpu_s(os.getpid()), cpu_s(pid)
+        time.sleep(seconds)
+        off = 1e3 * np.abs(np.diff(self.times[before[0] :]) - 0.005)
+        rig, page = cpu_s(os.getpid()) - before[1], cpu_s(pid) - before[2]
+        skipped = int((np.round(np.diff(self.times[before[0] :]) / 0.005) - 1).clip(0).sum())
+        return Run(off, skipped, 100 * rig / seconds, 100 * page / seconds)
+
+    def close(self) -> None:
+        self.over = True
+        self.thread.join()
+        self.made.robot.stop()
+        self.audience.close(LoopCount(0, 0, "over"))
+        self.made.close()
+
+
+def cpu_s(pid: int | None) -> float:
+    """Processor time of a process so far."""
+    if pid is None:
+        return 0.0
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+SPECTATORS = """
+import sys, threading
+sys.path.insert(0, {here!r})
+from bench_page import browser
+socks = [browser({url!r}) for _ in range({n})]
+def take(sock):
+    for _ in sock: pass
+for sock in socks: threading.Thread(target=take, args=(sock,), daemon=True).start()
+sys.stdin.read()
+"""
+
+
+def watched(url: str, n: int) -> "subprocess.Popen[bytes]":
+    """Browsers in a process of their own, which take all that comes."""
+    code = SPECTATORS.format(here=str(Path(__file__).parent), url=url, n=n)
+    return subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
+
+
+def show(name: str, run: Run) -> None:
+    off = run.off_slot_ms
+    print(
+        f"{name:12s} off slot p50 {np.median(off):5.2f} p99 {np.percentile(off, 99):5.2f} "
+        f"worst {off.max():6.2f} ms | {run.overruns:3d} slots skipped of {len(off)} | "
+        f"rig {run.rig_percent:4.1f} % page {run.page_percent:4.1f} % of a core",
+        flush=True,
+    )
+
+
+def first_picture(url: str) -> tuple[float, float]:
+    """Seconds until a browser has the page's script, and until it has a picture and traces."""
+    start_s = time.monotonic()
+    with urllib.request.urlopen(url) as answer:
+        answer.read()
+    script_s = time.monotonic() - start_s
+    with browser(url) as there:
+        while True:
+            data = there.recv(timeout=30)
+            assert isinstance(data, bytes)
+            if any(m["type"] == "GuiImageMessage" for m in messages(data)):
+                return script_s, time.monotonic() - start_s
+
+
+def slider_uuid(there: ClientConnection, label: str) -> str:
+    while True:
+        data = there.recv(timeout=30)
+        assert isinstance(data, bytes)
+        for message in messages(data):
+            if message["type"] == "GuiSliderMessage" and message["props"]["label"] == label:
+                return str(message["uuid"])
+
+
+def slider_ms(bench: Bench, url: str) -> np.ndarray:
+    """From a slider's message at the door to the tick that has written its goal."""
+    took = []
+    with browser(url) as there:
+        uuid = slider_uuid(there, "neck yaw")
+        taking = threading.Thread(target=lambda: [None for _ in there], daemon=True)
+        taking.start()
+        for n in range(TRIES):
+            angle = float(5 + n % 2)
+            before = len(bench.obeyed)
+            update = {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": angle}}
+            start_s = time.monotonic()
+            there.send(msgspec.msgpack.encode(update))
+            while len(bench.obeyed) == before:
+                time.sleep(0.0005)
+            at_s, order = bench.obeyed[before]
+            assert abs(order.angles_rad[0][1] - radians(angle)) < 1e-9  # type: ignore[attr-defined]
+            took.append(1e3 * (at_s - start_s))
+            time.sleep(0.05)
+    return np.array(took)
+
+
+def dragging(url: str, over: threading.Event) -> None:
+    """Drag a slider of the tuning to and fro, as fast as a browser sends."""
+    n = 0
+    while not over.wait(1 / 60):
+        n += 1
+        body = json.dumps({"tune": {"set": {"gaze.head.align": 0.5 + 0.001 * (n % 100)}}}).encode()
+        request = urllib.request.Request(f"{url}/rig/ask", body, {"Origin": url})
+        urllib.request.urlopen(request).close()
+
+
+def stop_ms(bench: Bench, url: str) -> np.ndarray:
+    """From a stop at the door to the tick that has taken the torque off."""
+    took = []
+    for _ in range(TRIES):
+        for order in ({"order": "stop", "why": "bench"}, {"order": "resume"}):
+            before = len(bench.obeyed)
+            body = json.dumps(order).encode()
+            request = urllib.request.Request(f"{url}/rig/ask", body, {"Origin": url})
+            start_s = time.monotonic()
+            urllib.request.urlopen(request).close()
+            while len(bench.obeyed) == before:
+                time.sleep(0.0005)
+            if order["order"] == "stop":
+                took.append(1e3 * (bench.obeyed[before][0] - start_s))
+    return np.array(took)
+
+
+def main(seconds: float) -> None:
+    bench = Bench(page=False)
+    time.sleep(2)
+    show("page off", bench.measure(seconds))
+    bench.close()
+    with ExitStack() as stack:
+        bench = Bench(page=True)
+        stack.callback(bench.close)
+        url = bench.url()
+        ready_s = time.monotonic() - bench.opened_s
+        script_s, picture_s = first_picture(url)
+        time.sleep(2)
+        show("0 browsers", bench.measure(seconds))
+        for n in (1, 5):
+            spectators = watched(url, n)
+            time.sleep(3)
+            show(f"{n} browser{'s' * (n > 1)}", bench.measure(seconds))
+            spectators.kill()
+            spectators.wait()
+        over = threading.Event()
+        hand = threading.Thread(target=dragging, args=(url, over))
+        hand.start()
+        time.sleep(1)
+        before = len(bench.obeyed)
+        show("tuning", bench.measure(seconds))
+        over.set()
+        hand.join()
+        print(f"  {(len(bench.obeyed) - before) / seconds:.0f} changes a second came in force")
+        print(f"page there after {ready_s:.2f} s; a browser has the script after {script_s:.2f} s")
+        print(f"and the first camera picture after {picture_s:.2f} s")
+        for name, took in (("slider", slider_ms(bench, url)), ("stop", stop_ms(bench, url))):
+            print(
+                f"{name} to the bus: p50 {np.median(took):.1f} p90 {np.percentile(took, 90):.1f} "
+                f"worst {took.max():.1f} ms of {len(took)}"
+            )
+
+
+if __name__ == "__main__":
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 10.0)

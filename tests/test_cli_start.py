@@ -1,0 +1,115 @@
+"""``gazerig`` alone says what to do next; help has examples that parse; errors are one line."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+from typer.core import TyperGroup
+
+from drivers.dynamixel_ports import SerialPort
+from robot.cli import app
+from robot.cli_examples import EXAMPLES
+from robot.cli_start import next_steps
+
+ADAPTER = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-U2D2")
+ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)
+
+
+def gazerig(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    code = "import sys; from robot.cli import main; sys.argv[0] = 'gazerig'; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *words],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "COLUMNS": "120", **environment},
+        timeout=120,
+    )
+
+
+def test_without_anything_the_first_step_needs_no_hardware() -> None:
+    words = next_steps([ON_BOARD], [], running=False)
+    assert "gazerig run --mock" in words and "No USB serial adapter" in words
+    assert "gazerig --help" in words
+
+
+def test_an_adapter_leads_to_scan_and_a_rig_file_to_doctor() -> None:
+    assert "gazerig scan --port /dev/ttyUSB0" in next_steps([ADAPTER], [], running=False)
+    words = next_steps([ADAPTER], [Path("my.yaml")], running=False)
+    assert "gazerig doctor my.yaml" in words and "scan" not in words
+
+
+def test_a_running_rig_comes_first() -> None:
+    words = next_steps([], [], running=True)
+    assert words.index("gazerig stop") < words.index("gazerig run --mock")
+
+
+def test_gazerig_alone_shows_it_and_is_no_error() -> None:
+    done = gazerig()
+    assert done.returncode == 0 and "What next?" in done.stdout and not done.stderr
+
+
+def commands() -> dict[str, typer.core.TyperCommand | TyperGroup]:
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    return dict(group.commands)
+
+
+def test_every_command_has_examples_and_no_example_is_without_command() -> None:
+    assert set(commands()) == set(EXAMPLES)
+    for name, command in commands().items():
+        assert f"gazerig {name}" in str(command.epilog), name
+
+
+@pytest.mark.parametrize(
+    "words", [words for examples in EXAMPLES.values() for words, _ in examples]
+)
+def test_every_example_names_options_that_there_are(words: str) -> None:
+    name, *rest = shlex.split(words)
+    command = commands()[name]
+    if isinstance(command, TyperGroup):
+        command = command.commands[rest.pop(0)]
+    context = command.make_context(name, rest, resilient_parsing=True)
+    assert context.args == []
+
+
+def test_help_shows_them() -> None:
+    done = gazerig("run", "--help")
+    assert "gazerig run my.yaml --oak" in re.sub(r"\s+", " ", done.stdout)
+
+
+def test_a_shell_completes_rigs_scenes_and_characters() -> None:
+    def completed(words: str) -> list[str]:
+        done = gazerig(
+            _GAZERIG_COMPLETE="complete_bash",
+            COMP_WORDS=f"gazerig {words}",
+            COMP_CWORD=str(len(words.split())),
+        )
+        return done.stdout.split()
+
+    assert completed("check de") == ["desk"]
+    assert completed("run --character bo") == ["bold"]
+    assert "steps-aside" in completed("run --scene st")
+
+
+def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(tmp_path: Path) -> None:
+    short = gazerig("check", str(tmp_path / "none.yaml"))
+    assert short.returncode == 2 and len(short.stderr.strip().splitlines()) == 1
+    for words in (("--debug", "check"), ("check", "--debug")):
+        long = gazerig(*words, str(tmp_path / "none.yaml"))
+        assert long.returncode == 2 and "Traceback" in long.stderr
+        assert long.stderr.strip().splitlines()[-1] == short.stderr.strip()
+
+
+def test_what_nobody_thought_of_is_one_line_too() -> None:
+    code = (
+        "import sys; from robot import cli; sys.argv = ['gazerig', *sys.argv[1:]]\n"
+        "cli.next_steps = lambda *a: 1 / 0\ncli.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1 and len(done.stderr.strip().splitlines()) == 1
+    assert "ZeroDivisionError" in done.stderr and "--debug" in done.stderr

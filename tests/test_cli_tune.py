@@ -1,0 +1,432 @@
+"""Tuning a running rig from a shell: gazerig get, set, save ... on a rig in another process.
+
+``python tests/test_cli_tune.py RIG`` is that process: a real-time loop before an emulated bus.
+"""
+
+import contextlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from typer.testing import CliRunner
+
+from config import knobs
+from config.load import ConfigError
+from config.save import copy_shipped
+from config.schema import load_rig
+from drivers.errors import SetupError
+from robot.assemble import assemble
+from robot.choice import Choice
+from robot.cli_quick import QUICK, is_quick
+from robot.cli_tune import app, read_pairs, read_point, read_value
+from robot.live_control import LiveControl
+from robot.loop import Tick
+from robot.loop import run as run_loop
+from robot.remote import RunningRig, running
+from robot.tuning import Tuning
+
+GAZERIG = "import sys; sys.argv[0] = 'gazerig'; from robot.cli_quick import main; main()"
+SPEED = "gaze.saccade.max_speed_deg_s"
+RATE = "loop.rate_hz"
+
+
+def serve(path: Path) -> None:
+    """Run until SIGTERM; says what the rig says on standard error."""
+    over: list[str] = []
+    signal.signal(signal.SIGTERM, lambda *_: over.append("SIGTERM"))
+    made = assemble(load_rig(str(path)), Choice(mock=True, fast=False, seed=0, scene="visitor"))
+    robot = made.robot
+
+    def say(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    about = {"rig": str(path), "pid": os.getpid()}
+    tuning = Tuning(made.retuner, robot.order, str(path))
+    live = LiveControl(robot, tuning, (ConfigError,), made.clock, about, say)
+
+    def watch(tick: Tick) -> None:
+        live.note(tick)
+        for event in tick.events:
+            say(event)
+
+    robot.start(made.clock)
+    live.open()
+    print("open", flush=True)
+    try:
+        run_loop(robot, made.clock, made.loop, lambda _: over[0] if over else None, watch)
+    finally:
+        live.close()
+        robot.stop()
+        made.close()
+
+
+class Running(NamedTuple):
+    """A rig in another process."""
+
+    process: subprocess.Popen[str]
+    path: Path
+    log: Path
+
+    def hears(self, words: str) -> bool:
+        """Wait until it says something."""
+        for _ in range(400):
+            if words in self.log.read_text(encoding="utf-8"):
+                return True
+            time.sleep(0.05)
+        return False
+
+
+@contextlib.contextmanager
+def a_rig() -> Iterator[Running]:
+    folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
+    path, log = copy_shipped("desk", folder / "my.yaml"), folder / "log"
+    with log.open("w") as said:
+        process = subprocess.Popen(
+            [sys.executable, __file__, str(path)],
+            stdout=subprocess.PIPE,
+            stderr=said,
+            text=True,
+            env={**os.environ, "XDG_RUNTIME_DIR": str(folder), "PYTHONPATH": str(ROOT)},
+        )
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "open\n", log.read_text(encoding="utf-8")
+            yield Running(process, path, log)
+        finally:
+            process.terminate()
+            process.communicate(timeout=20.0)
+            shutil.rmtree(folder)
+
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def rig() -> Iterator[Running]:
+    with a_rig() as found:
+        yield found
+
+
+@pytest.fixture(autouse=True)
+def as_before(rig: Running, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(rig.path.parent))
+    yield
+    with RunningRig.connect(rig.process.pid) as found:
+        found.revert()
+        found.resume()
+        found.look_freely()
+
+
+class Done(NamedTuple):
+    """What a command wrote."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def gazerig(*words: str) -> Done:
+    """Run a command in this process, which takes a tenth of the time."""
+    done = CliRunner().invoke(app, words, input="")
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return Done(done.exit_code, done.stdout, done.stderr)
+
+
+def whole_gazerig(*words: str, **environ: str) -> Done:
+    """Run a command as a shell does."""
+    done = subprocess.run(
+        [sys.executable, "-c", GAZERIG, *words],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environ},
+        timeout=60.0,
+        stdin=subprocess.DEVNULL,
+    )
+    return Done(done.returncode, done.stdout, done.stderr)
+
+
+def held(key: str) -> Any:
+    with RunningRig.connect() as rig:
+        return rig.get(key)[key]
+
+
+pytestmark = pytest.mark.xdist_group("a rig in another process")
+
+
+def test_get_shows_all_and_marks_what_is_not_saved() -> None:
+    everything = gazerig("get").stdout.splitlines()
+    assert len(everything) > 300 and everything[0].split() == ["key", "value", "unit", "default"]
+    assert gazerig("set", RATE, "150").returncode == 0
+    table = gazerig("get", "loop").stdout.splitlines()
+    (row,) = (line for line in table if RATE in line)
+    assert row.split() == ["*", RATE, "150.0", "Hz", "200.0"]
+    (other,) = (line for line in table if "loop.park_s" in line)
+    assert not other.startswith("*")
+    alone = gazerig("get", RATE).stdout
+    assert "control rate; 20 .. 1000 Hz; changes at the next tick" in alone
+
+
+def test_get_differs_and_json() -> None:
+    assert gazerig("get", "--differs").stdout.splitlines()[1:] == []
+    gazerig("set", RATE, "150", "park_deg.neck_pitch", "-3")
+    rows = gazerig("get", "--differs").stdout.splitlines()[1:]
+    assert [row.split()[1] for row in rows] == ["park_deg.neck_pitch", RATE]
+    assert json.loads(gazerig("get", RATE, "--json").stdout) == {RATE: 150.0}
+
+
+def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it() -> None:
+    done = gazerig("set", RATE, "150", "gaze.scanpath.model", "random")
+    assert done.returncode == 0, done.stderr
+    assert sorted(done.stdout.splitlines()) == [
+        "gaze.scanpath.model = random",
+        f"{RATE} = 150.0",
+    ]
+    assert "in force already" in gazerig("set", RATE, "150.0").stderr
+    assert "not saved yet: 2 values" in done.stderr
+
+
+def test_what_takes_effect_later_is_said() -> None:
+    done = gazerig("set", "bus.port", "/dev/ttyUSB7")
+    assert "bus.port = /dev/ttyUSB7 (next start: " in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "rule"),
+    [
+        ((RATE, "1e9"), "above 1000"),
+        ((RATE, "fast"), "wanted a number"),
+        ((RATE, ".nan"), "finite number"),
+        (("loop.rate", "100"), "unknown key"),
+        (("gaze.scanpath.model", "markof"), "did you mean 'markov'?"),
+        ((RATE,), "a value is missing"),
+        ((RATE, "100", RATE, "200"), "stands twice"),
+        ((RATE, "[1"), "not valid YAML"),
+        ((RATE, "100\nmore: 1"), "more than one value"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_the_rule_and_exit_code_2(
+    words: tuple[str, ...], rule: str
+) -> None:
+    done = gazerig("set", *words)
+    assert done.returncode == 2 and rule in done.stderr and "Traceback" not in done.stderr
+    assert done.stdout == "" and held(RATE) == 200.0
+
+
+def test_every_rule_is_listed_and_no_value_taken() -> None:
+    done = gazerig("set", RATE, "1e9", "gaze.scanpath.model", "markof", "loop.park_s", "2")
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 2
+    assert held("loop.park_s") == 4.0
+
+
+def test_save_keeps_comments_and_the_old_file(rig: Running) -> None:
+    before = rig.path.read_text(encoding="utf-8")
+    gazerig("set", RATE, "150")
+    done = gazerig("save")
+    assert f"{RATE}: 200.0 -> 150.0" in done.stdout and str(rig.path) in done.stderr
+    assert load_rig(str(rig.path)).loop.rate_hz == 150.0
+    kept = [line for line in before.splitlines() if line.lstrip().startswith("#")]
+    assert all(line in rig.path.read_text(encoding="utf-8") for line in kept)
+    (backup,) = rig.path.parent.glob("my.yaml.bak-*")
+    assert backup.read_text(encoding="utf-8") == before and str(backup) in done.stderr
+    assert "nothing to save" in gazerig("save").stderr
+    backup.unlink()
+    gazerig("set", RATE, "200")
+    gazerig("save")
+
+
+def test_save_takes_a_path_from_the_folder_it_is_typed_in(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with a_rig() as rig, monkeypatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(rig.path.parent))
+        patch.chdir(tmp_path)
+        gazerig("set", RATE, "150")
+        assert gazerig("save", "other.yaml").returncode == 0
+        other = tmp_path / "other.yaml"
+        assert load_rig(str(other)).loop.rate_hz == 150.0
+        assert load_rig(str(rig.path)).loop.rate_hz == 200.0
+        # The copy is the rig's file from now on: it is the one that is watched.
+        text = other.read_text(encoding="utf-8")
+        other.write_text(text.replace("rate_hz: 150", "rate_hz: 160"), encoding="utf-8")
+        assert rig.hears("other.yaml was edited: read again")
+        assert held(RATE) == 160.0
+
+
+def test_revert_tells_what_it_takes_back() -> None:
+    gazerig("set", RATE, "150")
+    done = gazerig("revert")
+    assert f"{RATE} = 200.0" in done.stdout and held(RATE) == 200.0
+    assert "1 value taken back" in done.stderr
+
+
+def test_stop_and_resume() -> None:
+    done = gazerig("stop", "finger")
+    assert done.returncode == 0 and "torque is off" in done.stderr
+    with RunningRig.connect() as rig:
+        assert rig.status()["stopped"] == "finger"
+    unsure = gazerig("resume")  # nobody there to say that no hand is in it
+    assert unsure.returncode != 0 and "no hand" in unsure.stdout + unsure.stderr
+    with RunningRig.connect() as rig:
+        assert rig.status()["stopped"] == "finger"
+    assert gazerig("resume", "--yes").returncode == 0
+    assert "nothing to resume" in gazerig("resume").stderr
+
+
+def test_stop_stops_every_rig_that_runs() -> None:
+    with a_rig_beside() as other:
+        both = {rig.pid: rig for rig in running()}
+        assert len(both) == 2
+        refused = gazerig("get", RATE)
+        assert refused.returncode == 2 and "--pid" in refused.stderr
+        assert gazerig("stop").returncode == 0
+        assert all(rig.status()["stopped"] for rig in both.values())
+        for rig in both.values():
+            rig.close()
+        assert str(other.pid) in refused.stderr
+
+
+@contextlib.contextmanager
+def a_rig_beside() -> Iterator[subprocess.Popen[str]]:
+    """A second one whose sockets are in the same folder."""
+    folder = os.environ["XDG_RUNTIME_DIR"]
+    process = subprocess.Popen(
+        [sys.executable, __file__, str(Path(folder) / "my.yaml")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    try:
+        assert process.stdout is not None and process.stdout.readline() == "open\n"
+        yield process
+    finally:
+        process.terminate()
+        process.communicate(timeout=20.0)
+
+
+def test_look_and_character() -> None:
+    assert gazerig("look", "1", "-0.2", "0.3").returncode == 0
+    with RunningRig.connect() as rig:
+        assert rig.status()["why"] == "somebody chose this point"
+    assert gazerig("look", "free").returncode == 0
+    done = gazerig("look", "there")
+    assert done.returncode == 2 and "X Y Z in metres" in done.stderr
+    assert gazerig("character", "shy").returncode == 0
+    done = gazerig("character", "brave")
+    assert done.returncode == 2 and "brave" in done.stderr
+
+
+def test_a_file_edited_by_hand_is_read_again(rig: Running) -> None:
+    before = rig.path.read_text(encoding="utf-8")
+    rig.path.write_text(before.replace("rate_hz: 200", "rate_hz: 160"), encoding="utf-8")
+    assert rig.hears("my.yaml was edited: read again, in force")
+    assert held(RATE) == 160.0
+    wrong = before.replace("rate_hz: 200.0", "rate_hz: 2e6") + "nonsense: 1\n"
+    rig.path.write_text(wrong, encoding="utf-8")
+    assert rig.hears("refused; the values from before stay")
+    said = rig.log.read_text(encoding="utf-8")
+    assert "is above 1000" in said and "nonsense" in said
+    assert held(RATE) == 160.0
+    rig.path.write_text(before, encoding="utf-8")
+    for _ in range(200):
+        if held(RATE) == 200.0:
+            return
+        time.sleep(0.05)
+    pytest.fail("the good file was not read again")
+
+
+def test_where_no_rig_runs_it_is_one_line_and_exit_code_2(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+        there_is_none()
+
+
+def there_is_none() -> None:
+    none = (2, "", "no rig is running: start one with gazerig run ...\n")
+    for words in (("get",), ("set", RATE, "100"), ("stop",), ("look", "free"), ("save",)):
+        assert gazerig(*words) == none, words
+    assert whole_gazerig("stop") == none
+    done = gazerig("stop", "--pid", "1")
+    assert done.stderr == "no rig runs as process 1: start one with gazerig run ...\n"
+
+
+def completed(*words: str) -> list[str]:
+    environ = {
+        "_GAZERIG_COMPLETE": "complete_bash",
+        "COMP_WORDS": " ".join(("gazerig", *words)),
+        "COMP_CWORD": str(len(words)),
+    }
+    return whole_gazerig(**environ).stdout.split()
+
+
+def test_a_shell_completes_keys_and_the_values_that_there_are() -> None:
+    assert completed("get", "loop.") == ["loop.rate_hz", "loop.park_s"]
+    assert RATE in completed("set", "loop.r")
+    assert completed("set", "gaze.scanpath.model", "") == list(
+        next(k for k in knobs_of_desk() if k.key == "gaze.scanpath.model").choices
+    )
+    assert RATE in completed("set", "loop.park_s", "2", "loop.r")
+    assert "shy" in completed("character", "s")
+
+
+def test_without_a_rig_a_shell_completes_keys_of_the_shipped_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+        assert completed("get", "loop.") == ["loop.rate_hz", "loop.park_s"]
+
+
+def knobs_of_desk() -> tuple[knobs.Knob, ...]:
+    desk = load_rig("desk")
+    return knobs.knobs(desk, desk)
+
+
+# Without a process
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1", 1), ("1.5", 1.5), ("-3", -3), ("1e3", 1000.0), ("true", True), ("null", None),
+        ("markov", "markov"), ("'1'", "1"), ("[1, 2.5]", (1, 2.5)), ("{a: 1}", {"a": 1}),
+        ("", None), ("200 # Hz", 200), ("2026-01-31", "2026-01-31"),
+    ],
+)  # fmt: skip
+def test_values_are_read_as_in_the_file(text: str, value: object) -> None:
+    read = read_value("key", text)
+    assert read == value and type(read) is type(value)
+
+
+def test_pairs_and_points() -> None:
+    assert read_pairs(["a", "1", "b", "x"]) == {"a": 1, "b": "x"}
+    assert read_point(["1", "-0.5", "2e-1"]) == (1.0, -0.5, 0.2)
+    assert read_point(["free"]) is None
+    with pytest.raises(SetupError):
+        read_point(["1", "2"])
+
+
+def test_the_quick_way_knows_all_its_commands_and_no_other() -> None:
+    assert {c.name or c.callback.__name__ for c in app.registered_commands if c.callback} == QUICK
+    assert is_quick(["stop"], {}) and is_quick(["set", "a", "1"], {})
+    for words in ([], ["run"], ["stop", "--help"], ["--debug", "stop"], ["get", "--debug"]):
+        assert not is_quick(words, {})
+    for typed, quick in (("gazerig set a", True), ("gazerig se", False), ("gazerig set", False)):
+        environ = {"_GAZERIG_COMPLETE": "complete_bash", "COMP_WORDS": typed}
+        assert is_quick([], environ) is quick
+
+
+if __name__ == "__main__":
+    serve(Path(sys.argv[1]))

@@ -1,0 +1,130 @@
+"""Two runs side by side: what differs is found, what is chance is not, and the page says so."""
+
+import json
+from html import unescape
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from config.schema import load_rig
+from config.text import rig_text, walk_text
+from robot.assemble import assemble
+from robot.choice import Choice
+from robot.cli_report import app
+from robot.loop import run
+from robot.recording.recorder import Recorder
+from robot.recording.run_info import RunInfo, versions
+from robot.report.about import About
+from robot.report.bands import BY_KEY
+from robot.report.compare import chance, compare, corrected, differences_of
+from robot.report.measured import Measured, mean, median
+
+pytestmark = pytest.mark.xdist_group("report")
+DICE = np.random.default_rng(11)
+
+
+def rates(mean_s: float, count: int, seed: int) -> Measured:
+    dice = np.random.default_rng(seed)
+    return Measured("visit", dice.lognormal(np.log(mean_s), 0.6, count), mean)
+
+
+def test_what_differs_is_more_than_chance() -> None:
+    (found,) = differences_of([rates(0.25, 200, 1)], [rates(0.35, 200, 2)])
+    assert found.word == "more than chance"
+    assert found.low95 < found.difference < found.high95 and found.low95 > 0.0
+    assert found.chance < 0.01 and found.chance_shape < 0.01
+
+
+def test_the_same_is_chance_nineteen_times_of_twenty() -> None:
+    words = []
+    for seed in range(20):
+        (found,) = differences_of([rates(0.3, 80, seed)], [rates(0.3, 80, 100 + seed)])
+        words.append(found.word)
+    assert words.count("more than chance") <= 3
+    assert set(words) <= {"more than chance", "may be chance"}
+
+
+def test_another_spread_is_found_where_the_middle_is_the_same() -> None:
+    narrow = Measured("vergence", DICE.normal(0.0, 0.1, 300), median)
+    wide = Measured("vergence", DICE.normal(0.0, 0.6, 300), median)
+    (found,) = differences_of([narrow], [wide])
+    assert found.chance_shape < 0.001 and found.word == "more than chance"
+
+
+def test_too_few_events_tell_nothing() -> None:
+    few = Measured("visit", np.full(BY_KEY["visit"].least - 1, 9.0), mean)
+    (found,) = differences_of([few], [rates(0.3, 200, 1)])
+    assert found.word == "too few events" and np.isnan(found.difference)
+    assert differences_of([few], [Measured("rate", np.ones(40), mean)]) == ()
+
+
+def test_dealing_out_again_gives_the_chance_of_a_known_case() -> None:
+    a, b = Measured("visit", np.zeros(4), mean), Measured("visit", np.ones(4), mean)
+    # of the 70 ways to deal 8 events out, 2 are as extreme
+    assert chance(a, b, np.random.default_rng(0)) == pytest.approx(2 / 70, abs=0.012)
+    assert chance(a, a, np.random.default_rng(0)) == 1.0
+
+
+def test_chances_are_corrected_for_their_number() -> None:
+    found = corrected({"a": 0.01, "b": 0.04, "c": 0.03})
+    assert found == pytest.approx({"a": 0.03, "c": 0.06, "b": 0.06})
+    assert corrected({"a": 0.9, "b": 0.8}) == {"a": 1.0, "b": 1.0}
+
+
+def record(path: Path, seconds: float, saccade: str) -> None:
+    """Record a simulated run."""
+    made = assemble(load_rig("desk"), Choice(True, True, 0, "face-to-face", saccade=saccade))
+    rig = made.retuner.rig
+    info = RunInfo(
+        "desk", rig.profile, rig_text(rig), 0, 200.0, "2026-01-31T12:00:00+00:00",
+        walk_yaml=walk_text(rig.gaze.scanpath.walk), scene="face-to-face", mock=True, fast=True,
+        versions=versions(),
+    )  # fmt: skip
+    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
+    recorder.open()
+    made.robot.start(made.clock)
+    run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, recorder.note)
+    made.robot.stop()
+    recorder.close("seconds")
+    made.close()
+
+
+def test_two_recordings_and_one_on_the_command_line(tmp_path: Path) -> None:
+    a, b = tmp_path / "soft.mcap", tmp_path / "hard.mcap"
+    record(a, 22.0, "min_jerk")
+    record(b, 22.0, "literal_frame")
+    out, runner = tmp_path / "both.html", CliRunner()
+    done = runner.invoke(app, ["compare", str(a), str(b), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    page = unescape(out.read_text(encoding="utf-8"))
+    assert "soft" in page and "hard" in page and page.count("data:image/png;base64,") > 10
+    rows = {row["key"]: row for row in json.loads(out.with_suffix(".json").read_text("utf-8"))}
+    assert rows["peak_small"]["word"] == "more than chance"
+    assert rows["peak_small"]["verdicts"] == ["pass", "outside"]
+    assert rows["vergence"]["word"] == "may be chance"
+    assert "peak speed inside the human band" in done.output
+    one = runner.invoke(app, ["report", str(b)])
+    assert one.exit_code == 0, one.output
+    page = b.with_suffix(".html").read_text(encoding="utf-8")
+    assert "over in two frames" in page and "literal_frame" in page
+    assert len(list((tmp_path / "hard_figures").glob("*.png"))) > 10
+
+
+def test_a_run_against_itself_differs_in_nothing(tmp_path: Path) -> None:
+    made = assemble(load_rig("desk"), Choice(True, True, 0, "face-to-face"))
+    ticks = []
+    made.robot.start(made.clock)
+    run(made.robot, made.clock, made.loop, lambda s: "over" if s > 14.0 else None, ticks.append)
+    made.robot.stop()
+    made.close()
+    abouts = About("this", duration_s=14.0), About("again", duration_s=14.0)
+    told: list[str] = []
+    found = compare(
+        (ticks, ticks), abouts, tmp_path / "same.html", lambda words, share: told.append(words)
+    )
+    assert any(d.word == "may be chance" for d in found.differences)
+    assert not any(d.word == "more than chance" for d in found.differences)
+    assert "Nothing differs by more than chance" in found.page.read_text("utf-8")
+    assert told[0] == "reading the run" and told[-1] == "drawing figures"

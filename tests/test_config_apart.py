@@ -1,0 +1,88 @@
+"""Rig files read and written in another process are as if read and written here."""
+
+import os
+import signal
+import sys
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+
+from config.apart import apart
+from config.load import ConfigError
+from config.save import copy_shipped, save_rig
+from config.schema import load_rig
+
+
+def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    copy_shipped("desk", tmp_path / "my.yaml")
+    monkeypatch.chdir(tmp_path)  # a relative path means the same there
+    assert apart(load_rig, "my.yaml", "shy", profile="robot") == load_rig(
+        "my.yaml", "shy", profile="robot"
+    )
+
+
+def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
+    file = copy_shipped("desk", tmp_path / "my.yaml")
+    text = file.read_text(encoding="utf-8")
+    file.write_text(f"nonsense: 1\n{text}\nmore: 2\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as here:
+        load_rig(str(file))
+    with pytest.raises(ConfigError) as there:
+        apart(load_rig, str(file))
+    assert there.value.faults == here.value.faults and len(here.value.faults) == 2
+    assert str(there.value) == str(here.value)
+
+
+def test_saving_works_there(tmp_path: Path) -> None:
+    file = copy_shipped("desk", tmp_path / "my.yaml")
+    now = datetime(2026, 1, 31, 23, 59, 59)
+    saved = apart(save_rig, file, {"loop.rate_hz": 100.0}, now)
+    assert saved.path == file and saved.backup is not None and saved.backup.exists()
+    assert [str(change) for change in saved.changes] == ["loop.rate_hz: 200.0 -> 100.0"]
+    assert load_rig(str(file)).loop.rate_hz == 100.0
+
+
+def fails() -> None:
+    raise KeyError("a mistake")
+
+
+def ends() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def sleeps() -> None:
+    signal.pause()
+
+
+def here() -> tuple[int, int]:
+    return os.getpid(), os.getsid(0)
+
+
+@pytest.fixture
+def importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the other process find the functions of this file."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    monkeypatch.setitem(sys.modules, "test_config_apart", sys.modules[__name__])
+    for work in (fails, ends, sleeps, here):
+        monkeypatch.setattr(work, "__module__", "test_config_apart")
+
+
+def test_it_is_another_process_that_ctrl_c_does_not_reach(importable: None) -> None:
+    pid, session = apart(here)
+    assert pid != os.getpid() and session == pid
+
+
+def test_a_process_that_fails_is_an_error_in_one_line(
+    importable: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ConfigError, match="process for fails: ended by itself: KeyError"):
+        apart(fails)
+    with pytest.raises(ConfigError, match="process for ends: ended by itself: -9"):
+        apart(ends)
+    monkeypatch.setattr("config.apart._LONGEST_S", 0.5)
+    with pytest.raises(ConfigError, match="took more than 0.5 s"):
+        apart(sleeps)
+    monkeypatch.setattr(sys, "executable", "/nonexistent/python")
+    with pytest.raises(ConfigError, match="cannot be started: No such file"):
+        apart(here)

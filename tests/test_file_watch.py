@@ -1,0 +1,213 @@
+"""A file edited by hand counts once it is whole, whichever way the editor writes it."""
+
+import os
+import threading
+from pathlib import Path
+
+import pytest
+
+from robot.file_watch import FileWatch
+
+OLD = "name: old\n"
+NEW = "name: new\n"
+
+
+class Rig:
+    """One watched file, and what was told of it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / "rig.yaml"
+        self.path.write_text(OLD, encoding="utf-8")
+        self.told: list[str] = []
+        self.watch = FileWatch(lambda: [self.path], self._changed)
+        self.watch.look()
+
+    def _changed(self, path: Path) -> None:
+        assert path == self.path
+        self.told.append(path.read_text(encoding="utf-8") if path.exists() else "(gone)")
+
+    def looks(self, number: int) -> list[str]:
+        for _ in range(number):
+            self.watch.look()
+        return self.told
+
+    def write(self, text: str) -> None:
+        self.path.write_text(text, encoding="utf-8")
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Rig:
+    return Rig(tmp_path)
+
+
+def test_an_untouched_file_is_no_news(rig: Rig) -> None:
+    assert rig.looks(20) == []
+
+
+def test_a_new_content_is_told_once_after_it_was_seen_twice(rig: Rig) -> None:
+    rig.write(NEW)
+    assert rig.looks(1) == []
+    assert rig.looks(1) == [NEW]
+    assert rig.looks(20) == [NEW]
+
+
+def test_touch_is_no_news(rig: Rig) -> None:
+    os.utime(rig.path, (1.0, 1.0))
+    assert rig.looks(5) == []
+
+
+def test_same_time_and_size_but_other_content_is_news(rig: Rig) -> None:
+    stat = rig.path.stat()
+    rig.write(NEW)
+    os.utime(rig.path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    assert rig.path.stat().st_mtime_ns == stat.st_mtime_ns and len(OLD) == len(NEW)
+    assert rig.looks(3) == [NEW]
+
+
+def test_a_change_taken_back_before_it_counted_is_no_news(rig: Rig) -> None:
+    rig.write(NEW)
+    rig.looks(1)
+    rig.write(OLD)
+    assert rig.looks(10) == []
+
+
+def test_an_editor_that_renames_a_new_file_over_it(rig: Rig) -> None:
+    beside = rig.path.with_suffix(".tmp")
+    beside.write_text(NEW, encoding="utf-8")
+    beside.replace(rig.path)
+    assert rig.looks(3) == [NEW]
+
+
+@pytest.mark.parametrize("looks_without", [1, 3, 5])
+def test_an_editor_that_removes_it_for_a_moment(rig: Rig, looks_without: int) -> None:
+    rig.path.rename(rig.path.with_suffix(".bak"))
+    assert rig.looks(looks_without) == []
+    rig.write(NEW)
+    assert rig.looks(3) == [NEW]
+
+
+def test_the_same_content_back_after_a_moment_is_no_news(rig: Rig) -> None:
+    rig.path.unlink()
+    rig.looks(2)
+    rig.write(OLD)
+    assert rig.looks(10) == []
+
+
+def test_an_editor_that_empties_it_first(rig: Rig) -> None:
+    rig.write("")
+    assert rig.looks(4) == []
+    rig.write(NEW)
+    assert rig.looks(3) == [NEW]
+
+
+def test_a_text_cut_within_a_line_waits_for_its_rest(rig: Rig) -> None:
+    rig.write("name: ne")
+    assert rig.looks(4) == []
+    rig.write(NEW)
+    assert rig.looks(3) == [NEW]
+
+
+def test_a_text_that_never_ends_its_line_is_told_later(rig: Rig) -> None:
+    rig.write("name: newest")
+    assert rig.looks(20) == ["name: newest"]
+
+
+def test_a_file_that_grows_is_told_when_it_has_stopped(rig: Rig) -> None:
+    for lines in range(1, 6):
+        rig.write(NEW + "# and\n" * lines)
+        assert rig.looks(1) == []
+    assert rig.looks(2) == [NEW + "# and\n" * 5]
+
+
+def test_a_file_that_stays_away_is_told_once_and_so_is_its_return(rig: Rig) -> None:
+    rig.path.unlink()
+    assert rig.looks(20) == ["(gone)"]
+    rig.write(OLD)
+    assert rig.looks(20) == ["(gone)", OLD]
+
+
+def test_a_file_that_stays_empty_is_told(rig: Rig) -> None:
+    rig.write("")
+    assert rig.looks(20) == [""]
+
+
+def test_a_file_without_rights_counts_as_missing(rig: Rig) -> None:
+    rig.path.chmod(0)
+    if os.access(rig.path, os.R_OK):
+        pytest.skip("this user may read everything")
+    assert rig.looks(3) == []
+    rig.path.chmod(0o600)
+    assert rig.looks(5) == []
+
+
+def test_what_the_program_saved_itself_is_no_news(rig: Rig) -> None:
+    rig.write(NEW)
+    rig.looks(1)
+    rig.watch.saved(rig.path)
+    assert rig.looks(10) == []
+    rig.write(OLD)
+    assert rig.looks(3) == [OLD]
+
+
+def test_saved_finds_a_file_by_any_of_its_names(rig: Rig) -> None:
+    other = rig.path.with_name("link.yaml")
+    other.symlink_to(rig.path)
+    rig.write(NEW)
+    rig.watch.saved(other)
+    assert rig.looks(10) == []
+
+
+def test_files_may_change_while_it_looks(tmp_path: Path) -> None:
+    one, two = tmp_path / "one.yaml", tmp_path / "two.yaml"
+    for path in (one, two):
+        path.write_text(OLD, encoding="utf-8")
+    files, told = [one], list[Path]()
+    watch = FileWatch(lambda: files, told.append)
+    watch.look()
+    files[:] = [one, two]
+    for _ in range(5):
+        watch.look()
+    assert told == []  # what it holds when it comes into use is known
+    two.write_text(NEW, encoding="utf-8")
+    for _ in range(5):
+        watch.look()
+    assert told == [two]
+
+
+def test_the_thread_looks_by_itself_and_ends(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(OLD, encoding="utf-8")
+    told = threading.Event()
+    watch = FileWatch(lambda: [path], lambda _: told.set(), every_s=0.01)
+    watch.start()
+    path.write_text(NEW, encoding="utf-8")
+    assert told.wait(10.0)
+    watch.stop()
+    assert threads_named("file watch") == []
+
+
+def test_stop_without_start_is_no_error() -> None:
+    FileWatch(list, lambda _: None).stop()
+
+
+def threads_named(name: str) -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == name]
+
+
+def test_saved_may_be_called_while_somebody_is_told(rig: Rig) -> None:
+    """A save waits for the tuning, the tuning for nobody who waits for the save."""
+    done: list[bool] = []
+
+    def changed(path: Path) -> None:
+        saver = threading.Thread(target=watch.saved, args=(path,))
+        saver.start()
+        saver.join(timeout=5.0)
+        done.append(not saver.is_alive())
+
+    watch = FileWatch(lambda: [rig.path], changed)
+    watch.look()
+    rig.write(NEW)
+
+    watch.look()
+    watch.look()
+    assert done == [True]

@@ -1,0 +1,162 @@
+"""Knobs: every parameter of a rig by its key, with the rules and words of its file."""
+
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from config.knobs import (
+    NEXT_START,
+    NEXT_TICK,
+    changed,
+    differences,
+    flattened,
+    knobs,
+    value_of,
+    values,
+)
+from config.load import ConfigError, shipped_names
+from config.schema import Rig, load_rig
+from robot.orders import Value
+
+RIG = load_rig("desk")
+KNOBS = knobs(RIG, RIG)
+LENS = {"width_px": 640, "height_px": 480, "fx_px": 500.0, "fy_px": 500.0}
+
+
+def test_every_field_of_every_section_is_a_knob() -> None:
+    def count(value: object) -> int:
+        if is_dataclass(value):
+            return sum(count(getattr(value, f.name)) for f in fields(value))
+        if isinstance(value, dict):
+            return sum(map(count, value.values()))
+        return 1
+
+    unlisted = 9 - len(RIG.park_deg) + 8 - len(RIG.face_parts_mm)
+    assert len(KNOBS) == count(RIG) + unlisted == len({knob.key for knob in KNOBS})
+    assert values(RIG).keys() == {knob.key for knob in KNOBS}
+
+
+def test_a_knob_says_what_its_field_says() -> None:
+    (knob,) = (k for k in KNOBS if k.key == "gaze.lids.blinks_per_min")
+    assert knob.group == "gaze.lids" and knob.unit == "1/min" and knob.kind == "number"
+    assert (knob.low, knob.high, knob.default) == (0.0, 60.0, 17.0)
+    assert knob.says == "spontaneous blinks at rest; 0 is never" and knob.live == NEXT_TICK
+    (pan,) = (k for k in KNOBS if k.key == "park_deg.left_eye_pan")
+    assert (pan.default, pan.low, pan.unit) == (0.0, -180.0, "deg")
+    (part,) = (k for k in KNOBS if k.key == "face_parts_mm.N")
+    assert part.optional and part.default is None and part.length == 3
+
+
+def test_all_have_words_and_structure_waits_for_the_next_start() -> None:
+    waiting = {knob.key for knob in KNOBS if knob.live.startswith(NEXT_START)}
+    assert {"bus.port", "joints.neck_yaw.id", "oak.rate_hz", "camera.mount", "name"} <= waiting
+    assert not any(key.startswith(("gaze.", "guard.", "tracks.", "loop.")) for key in waiting)
+    for knob in KNOBS:
+        assert knob.says, knob.key
+        assert knob.live == NEXT_TICK or len(knob.live) > len("next start: "), knob.key
+        assert knob.kind != "choice" or knob.choices, knob.key
+
+
+def test_the_order_is_that_of_the_file() -> None:
+    groups = [knob.key.split(".")[0] for knob in KNOBS]
+    firsts = list(dict.fromkeys(groups))
+    assert firsts == [f.name for f in fields(Rig)]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"loop.rate_hz": 5000.0}, "loop.rate_hz: 5000.0 is above 1000 (unit Hz)"),
+        ({"gaze.lid.x": 1}, "gaze.lid: unknown key 'lid'; did you mean 'lids'?"),
+        ({"loop.rate_hz.x": 1}, "loop.rate_hz is a single value"),
+        ({"loop.rate_hz": "fast"}, "loop.rate_hz: 'fast' is text, wanted a number, 20 to 1000 Hz"),
+        ({"loop.rate_hz": float("nan")}, "is not a finite number"),
+        ({"joints.neck_yaw.max_deg": -80.0}, "min_deg -70.0 must be below max_deg -80.0"),
+        ({"joints.neck_yaw.id": 1}, "id 1 is already that of left_eye_pan"),
+        ({"park_deg.neck_pitch": -50.0}, "-50.0 is outside the joint's range -35.0..35.0"),
+        ({"joints.left_upper_lid.min_deg": -5.0}, "lid_joints.left_shut_deg"),
+        ({"gaze.top_down.rules.wait": None}, "behaviour 'wait' has no rule"),
+        ({"face_parts_mm.XX": (1.0, 2.0, 3.0)}, "unknown face part"),
+        ({"gaze.scanpath.model": "markow"}, "did you mean 'markov'"),
+    ],
+)
+def test_what_is_wrong_is_refused_in_the_words_of_a_file(
+    changes: dict[str, object], words: str
+) -> None:
+    with pytest.raises(ConfigError) as refused:
+        changed(RIG, changes)  # type: ignore[arg-type]
+    assert words in str(refused.value)
+
+
+def test_all_faults_are_told_at_once() -> None:
+    with pytest.raises(ConfigError) as refused:
+        changed(RIG, {"loop.rate_hz": 5.0, "guard.gentle_ms": -1.0, "gaze.lids.close_ms": "x"})
+    assert len(refused.value.faults) == 3
+
+
+def test_the_words_are_those_of_the_loaded_file(tmp_path: Path) -> None:
+    file = tmp_path / "rig.yaml"
+    text = Path("config/rigs/desk.yaml").read_text(encoding="utf-8")
+    file.write_text(text.replace("rate_hz: 200.0  # Hz, 20", "rate_hz: 5000.0  # Hz, 20"))
+    with pytest.raises(ConfigError) as loading:
+        load_rig(str(file))
+    with pytest.raises(ConfigError) as changing:
+        changed(RIG, {"loop.rate_hz": 5000.0})
+    assert loading.value.faults[0].rule == changing.value.faults[0].rule
+    assert loading.value.faults[0].key == changing.value.faults[0].key
+
+
+@pytest.mark.parametrize("name", shipped_names("characters"))
+def test_differences_turn_one_rig_into_the_other_and_back(name: str) -> None:
+    other = load_rig("desk", name)
+    found = differences(RIG, other)
+    assert found and changed(RIG, found) == other
+    assert changed(other, differences(other, RIG)) == RIG
+
+
+def test_entries_and_groups_come_and_go() -> None:
+    rule: dict[str, Value] = {"look_at": "hand", "pull": 1.0}
+    other = changed(
+        RIG,
+        {
+            "gaze.top_down.rules.point": rule,
+            "face_parts_mm.N": (1, 2, 3),
+            "park_deg.neck_yaw": 3.0,
+            "camera.lens": {**LENS, "cx_px": 320.0, "cy_px": 240.0},
+        },
+    )
+    assert other.face_parts_mm == {"N": (1.0, 2.0, 3.0)}
+    assert value_of(other, "gaze.top_down.rules.point.pull") == 1.0
+    assert changed(RIG, differences(RIG, other)) == other
+    assert changed(other, differences(other, RIG)) == RIG
+    flat = flattened(other, differences(RIG, other))
+    assert flat["gaze.top_down.rules.point.look_at"] == "hand"
+    assert flat["camera.lens.fx_px"] == 500.0
+
+
+def test_an_unknown_key_has_no_value() -> None:
+    with pytest.raises(ConfigError, match="did you mean 'lids'"):
+        value_of(RIG, "gaze.lid")
+    assert value_of(RIG, "park_deg.left_eye_pan") == 0.0
+
+
+NUMBERS = [k for k in KNOBS if k.kind in ("number", "whole") and k.low is not None]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.data())
+def test_any_number_within_its_bounds_comes_back_or_breaks_a_rule(data: st.DataObject) -> None:
+    knob = data.draw(st.sampled_from(NUMBERS))
+    assert knob.low is not None and knob.high is not None
+    whole = st.integers(int(knob.low), int(knob.high))
+    value = data.draw(whole if knob.kind == "whole" else st.floats(knob.low, knob.high))
+    try:
+        other = changed(RIG, {knob.key: value})
+    except ConfigError as refused:
+        assert all(fault.rule for fault in refused.faults)
+        return
+    assert value_of(other, knob.key) == value
+    assert set(differences(RIG, other)) <= {knob.key}

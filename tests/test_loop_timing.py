@@ -1,0 +1,71 @@
+"""Figures of the loop's time, from the times of its ticks."""
+
+import numpy as np
+import pytest
+
+from robot.loop_timing import OVER_S, LoopTiming
+from robot.types import Timing
+
+
+def timed(times_s: list[float], rate_hz: float = 200.0) -> Timing:
+    timing = LoopTiming(rate_hz)
+    for t_s in times_s:
+        timing.note(t_s)
+    figures = timing.figures()
+    assert figures is not None
+    return figures
+
+
+def test_a_loop_that_keeps_its_slots_has_no_jitter() -> None:
+    figures = timed([0.005 * k for k in range(400)])
+    assert figures.rate_hz == pytest.approx(200.0)
+    assert figures.worst_ms == pytest.approx(0.0, abs=1e-6)
+    assert figures.overruns == figures.overruns_ever == 0
+
+
+def test_a_late_tick_shows_as_a_long_and_a_short_wait() -> None:
+    times = [0.005 * k for k in range(400)]
+    times[200] += 0.0015
+    figures = timed(times)
+    assert figures.worst_ms == pytest.approx(1.5, abs=1e-6)
+    assert figures.p50_ms == pytest.approx(0.0, abs=1e-6)
+    assert figures.overruns == 0
+
+
+def test_percentiles_are_those_of_the_waits() -> None:
+    dice = np.random.default_rng(4)
+    times = 0.005 * np.arange(900) + dice.uniform(0.0, 1e-3, 900)
+    off_ms = 1e3 * np.abs(np.diff(times) - 0.005)
+    figures = timed(times.tolist())
+    assert figures.p50_ms == pytest.approx(np.percentile(off_ms, 50))
+    assert figures.p99_ms == pytest.approx(np.percentile(off_ms, 99))
+    assert figures.worst_ms == pytest.approx(off_ms.max())
+
+
+def test_skipped_slots_are_overruns_and_no_jitter() -> None:
+    times = [0.005 * k for k in range(200) if k not in (50, 51, 120)]
+    figures = timed(times)
+    assert figures.overruns == figures.overruns_ever == 3
+    assert figures.worst_ms == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_is_long_past_counts_only_as_ever() -> None:
+    times = [0.005 * k for k in range(3000) if k != 50]
+    figures = timed(times)
+    assert figures.overruns == 0
+    assert figures.overruns_ever == 1
+    assert figures.over_s == pytest.approx(OVER_S, abs=0.011)
+
+
+def test_the_first_tick_and_a_clock_set_back_give_nothing() -> None:
+    timing = LoopTiming(200.0)
+    assert timing.figures() is None
+    timing.note(5.0)
+    assert timing.figures() is None
+    timing.note(5.005)
+    assert timing.figures() is not None
+    timing.note(0.0)
+    assert timing.figures() is None
+    timing.note(0.005)
+    figures = timing.figures()
+    assert figures is not None and figures.overruns_ever == 0

@@ -1,0 +1,335 @@
+"""A person at a browser and a simulated rig: stop, lead, move joints, tune; nobody else.
+
+The rig ticks in simulated time, slower than real, so that it leaves the processor to the
+browser.
+"""
+
+import importlib.util
+import json
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from math import degrees
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from config.load import ConfigError
+from config.schema import load_rig
+from robot.assemble import assemble
+from robot.audience import Audience, Told, Wished
+from robot.choice import Choice
+from robot.loop import LoopCount, Tick
+from robot.orders import Ask, LookAt
+from robot.recording.run_info import RunInfo
+from robot.tuning import Tuning
+from robot.types import JOINTS
+
+
+def load_browser() -> ModuleType:
+    """The browser's driver, which stands in another test file."""
+    spec = importlib.util.spec_from_file_location(
+        "browser_of_the_page", Path(__file__).with_name("test_page.py")
+    )
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+browser_of_the_page = load_browser()
+wait_for, free_port = browser_of_the_page.wait_for, browser_of_the_page.free_port
+
+YAW = JOINTS.index("neck_yaw")
+PACE_S = 0.02  # real seconds a tick of 5 simulated ms
+
+
+def no_recording() -> RunInfo:
+    raise AssertionError("nothing is recorded here")
+
+
+class Rig:
+    """A simulated rig with a page, ticked by a thread."""
+
+    def __init__(self, host: str = "127.0.0.1") -> None:
+        made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
+        self.made, self.robot = made, made.robot
+        self.tuning = Tuning(made.retuner, self.robot.order, "desk")
+        told = Told(self.tuning, (ConfigError,), {"rig": "desk", "pid": os.getpid()}, no_recording)
+        self.said: list[str] = []
+        wished = Wished(page=(host, free_port()))
+        # Not fast: the page is for real time, of which these ticks are a slow imitation.
+        self.audience = Audience(made, wished, told, False, self.said.append, self.said.append)
+        self.newest: Tick | None = None
+        self.orders: list[object] = []
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._tick_on)
+
+    def open(self) -> str:
+        self.robot.start(self.made.clock)
+        self.audience.open()
+        self._thread.start()
+        words = wait_for(lambda: self.saying("the page is at "), "the page's address")
+        return str(words).rpartition(" ")[2]
+
+    def saying(self, part: str) -> str | None:
+        return next((line for line in self.said if part in line), None)
+
+    def _tick_on(self) -> None:
+        clock = self.made.clock
+        while not self._over.wait(PACE_S):
+            clock.sleep_until(clock.now_s() + 0.005)
+            tick = self.robot.tick(clock.now_s(), 0.005)
+            self.newest = tick
+            self.orders += tick.orders
+            self.audience.note(tick)
+
+    def wish_deg(self) -> float:
+        assert self.newest is not None
+        return degrees(self.newest.wish_rad[YAW])
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join()
+        self.robot.stop()
+        self.audience.close(LoopCount(0, 0, "the end of the test"))
+        self.made.close()
+
+
+class Person:
+    """Who sits at the browser: looks for things by what they say, clicks and types."""
+
+    def __init__(self, tab: object) -> None:
+        self.tab = tab
+
+    def run(self, script: str) -> object:
+        answer = self.tab._ask(  # type: ignore[attr-defined]
+            "Runtime.evaluate", expression=script, returnByValue=True
+        )
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def reads(self, *words: str) -> bool:
+        said = self.tab.words()  # type: ignore[attr-defined]
+        return all(word in said for word in words)
+
+    def place(self, element: str, across: float = 0.5) -> tuple[float, float] | None:
+        """Where an element is, once it stays there; brought into view where it is not."""
+        found = self.run(
+            f"(() => {{ const e = {element}; if (!e || !e.getClientRects().length) return null;"
+            "let r = e.getBoundingClientRect();"
+            "if (r.top < 0 || r.bottom > innerHeight) { e.scrollIntoView({block: 'center'});"
+            "r = e.getBoundingClientRect(); }"
+            f"return [r.x + r.width * {across}, r.y + r.height / 2]; }})()"
+        )
+        return None if found is None else (found[0], found[1])  # type: ignore[index]
+
+    def click(self, element: str, across: float = 0.5) -> None:
+        def steady() -> tuple[float, float] | None:
+            first = self.place(element, across)
+            return first if first is not None and first == self.place(element, across) else None
+
+        x, y = wait_for(steady, f"a place to click: {element}")
+        for kind, button in (("mouseMoved", "none"), ("mousePressed", "left")):
+            self._mouse(kind, x, y, button)
+        self._mouse("mouseReleased", x, y, "left")
+
+    def _mouse(self, kind: str, x: float, y: float, button: str) -> None:
+        self.tab._ask(  # type: ignore[attr-defined]
+            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1
+        )
+
+    def press(self, key: str, code: str, number: int) -> None:
+        for kind in ("keyDown", "keyUp"):
+            self.tab._ask(  # type: ignore[attr-defined]
+                "Input.dispatchKeyEvent",
+                type=kind, key=key, code=code, windowsVirtualKeyCode=number, text=key,
+            )  # fmt: skip
+
+    def space(self) -> None:
+        self.press(" ", "Space", 32)
+
+    def type(self, text: str) -> None:
+        self.tab._ask("Input.insertText", text=text)  # type: ignore[attr-defined]
+
+
+def saying(words: str, kind: str = "button, [role=tab], label") -> str:
+    """The element that says so, whatever is written smaller beside it."""
+    return (
+        f"[...document.querySelectorAll({json.dumps(kind)})].find("
+        f"e => e.textContent.trim() === {json.dumps(words)} && e.getClientRects().length)"
+    )
+
+
+def beside(words: str, kind: str) -> str:
+    """The control of a kind that a label names."""
+    return f"({saying(words, 'label')})?.closest('.mantine-Flex-root').querySelector('{kind}')"
+
+
+STOP = "document.querySelector('#rig-stop')"
+
+
+@contextmanager
+def running(host: str = "127.0.0.1") -> Iterator[tuple[Rig, str]]:
+    rig = Rig(host)
+    try:
+        yield rig, rig.open()
+    finally:
+        rig.close()
+
+
+@pytest.fixture(scope="module")
+def at_the_rig() -> Iterator[tuple[Rig, Person]]:
+    with ExitStack() as stack:
+        tab = stack.enter_context(browser_of_the_page.browsing((1100, 760)))
+        rig, url = stack.enter_context(running())
+        tab.go(url)
+        person = Person(tab)
+        wait_for(lambda: person.reads("STOP", "behaviour", "guard: "), "the page")
+        yield rig, person
+
+
+def resumed(rig: Rig, person: Person) -> None:
+    person.click(saying("Resume …"))
+    assert rig.robot.stopped  # not without being asked again
+    wait_for(lambda: person.reads("Fingers out?"), "the question")
+    person.click(saying("Yes, resume"))
+    wait_for(lambda: not rig.robot.stopped, "the rig going on")
+    wait_for(lambda: not person.reads("Torque is off"), "the page going on")
+
+
+def test_stop_takes_the_torque_off_until_it_is_asked_back(
+    at_the_rig: tuple[Rig, Person],
+) -> None:
+    rig, person = at_the_rig
+    person.click(STOP)
+    wait_for(lambda: rig.robot.stopped == "somebody pressed STOP on the page", "the stop")
+    wait_for(lambda: rig.newest.verdict.level == "limp", "torque off")
+    wait_for(lambda: person.reads("Torque is off", "Resume"), "the words")
+    resumed(rig, person)
+
+
+def test_the_space_bar_stops_but_not_while_somebody_types(
+    at_the_rig: tuple[Rig, Person],
+) -> None:
+    rig, person = at_the_rig
+    person.click(saying("tuning"))
+    person.click(beside("find", "input"))
+    before = len(rig.orders)
+    person.type("saccade")
+    person.space()
+    person.type("peak")
+    wait_for(lambda: person.reads("human_peak"), "what is found")
+    assert person.run(f"{beside('find', 'input')}.value") == "saccade peak"
+    assert not rig.robot.stopped and rig.orders[before:] == []
+    # On a button in focus a space would press it; here it stops, and nothing else.
+    person.run(f"{beside('find', 'input')}.blur(); {saying('joints')}.focus()")
+    person.space()
+    wait_for(lambda: rig.robot.stopped == "somebody pressed the space bar", "the stop")
+    assert len(rig.orders) == before + 1
+    resumed(rig, person)
+
+
+def test_stop_stays_in_sight_when_the_panels_are_shut(at_the_rig: tuple[Rig, Person]) -> None:
+    _, person = at_the_rig
+    covered = (
+        "(() => { const r = document.querySelector('#rig-stop').getBoundingClientRect();"
+        "return [[.1, .1], [.5, .5], [.9, .9]].map(([x, y]) => document.elementFromPoint("
+        "r.x + r.width * x, r.y + r.height * y).closest('#rig-stop') !== null); })()"
+    )
+    assert person.run(covered) == [True, True, True]
+    inside = "(() => { const r = document.querySelector('#rig-stop').getBoundingClientRect();"
+    inside += "return r.top >= 0 && r.bottom <= innerHeight && r.left >= 0; })()"
+    assert person.run(inside) is True
+    # It is no part of what viser draws, so nothing that viser does can take it away.
+    root = "document.querySelector('#root').contains(document.querySelector('#rig-stop'))"
+    assert person.run(root) is False
+
+
+def test_a_slider_moves_the_wish_of_its_joint(at_the_rig: tuple[Rig, Person]) -> None:
+    rig, person = at_the_rig
+    person.click(saying("joints"))
+    person.click(beside("neck yaw", ".mantine-Slider-track"), 0.8)
+    wait_for(lambda: abs(rig.wish_deg() - 42.0) < 6.0, "the wish")  # 0.8 of -70..70
+    person.click(saying("let go: look freely"))
+    wait_for(lambda: rig.orders[-1] == LookAt(None), "the rig being let go")
+
+
+def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]) -> None:
+    rig, person = at_the_rig
+    person.click(saying("lead"))
+    person.click(saying("guard"))
+    wait_for(lambda: rig.orders[-1] == Ask("behaviour", "guard"), "the behaviour")
+    picture = "[...document.querySelectorAll('img')].find(i => i.naturalWidth > 100 && "
+    picture += "i.parentElement.previousElementSibling?.textContent === 'camera')"
+    person.click(picture, 0.2)
+    wait_for(lambda: isinstance(rig.orders[-1], LookAt), "the click in the picture")
+    wait_for(lambda: rig.newest.target.kind == "puppet", "the head being led")
+    person.click(saying("look freely again"))
+    wait_for(lambda: rig.newest.target.kind != "puppet", "the head being free")
+
+
+def test_a_parameter_is_found_changed_marked_and_put_back(
+    at_the_rig: tuple[Rig, Person],
+) -> None:
+    rig, person = at_the_rig
+    key = "ranges.neck_yaw_deg"
+    (label,) = (k.key for k in rig.tuning.knobs() if k.key == key)
+    person.click(saying("tuning"))
+    person.run(f"{beside('find', 'input')}.select()")
+    person.click(beside("find", "input"))
+    person.run(f"{beside('find', 'input')}.select()")
+    person.type(key)
+    name = f"{label} (deg)"
+    before = rig.tuning.values()[key]
+    person.click(beside(name, ".mantine-Slider-track"), 0.25)
+    wait_for(lambda: rig.tuning.values()[key] != before, "the value in force")
+    wait_for(lambda: person.reads(f"● {name}", "not saved"), "the mark")
+    # Another program changes it: the control shows that.
+    rig.tuning.set({key: 44.0})
+    shown = f"({beside('● ' + name, 'input')})?.value"
+    wait_for(lambda: person.run(shown) == "44", "the value another program set")
+    person.click(saying("revert to the file"))
+    wait_for(lambda: rig.tuning.values()[key] == before, "what the file says")
+    wait_for(lambda: person.reads("all saved"), "no mark")
+
+
+def test_what_breaks_a_rule_is_refused_in_words_and_goes_back(
+    at_the_rig: tuple[Rig, Person],
+) -> None:
+    rig, person = at_the_rig
+    person.click(saying("tuning"))
+    person.click(beside("find", "input"))
+    person.run(f"{beside('find', 'input')}.select()")
+    person.type("joints.neck_yaw.gains")
+    name = "neck_yaw.gains"
+    field = beside(name, "input")
+    before = wait_for(lambda: person.run(f"({field})?.value"), "the field")
+    person.click(field)
+    person.run(f"{field}.select()")
+    person.type("[99999, 0, 0]")
+    person.press("\r", "Enter", 13)
+    wait_for(lambda: person.reads("refused", "16383"), "the rule")
+    wait_for(lambda: person.run(f"{field}.value") == before, "the control going back")
+    assert rig.tuning.unsaved() == ()
+
+
+def test_without_the_token_there_is_one_line_and_with_it_the_page() -> None:
+    with ExitStack() as stack:
+        tab = stack.enter_context(browser_of_the_page.browsing((900, 600)))
+        rig, url = stack.enter_context(running("127.0.0.2"))
+        person = Person(tab)
+        words = str(wait_for(lambda: rig.saying("token="), "the token"))
+        with_token = next(word for word in words.split() if "token=" in word)
+        tab.go(url)
+        wait_for(lambda: person.reads("refused: open the address with the token"), "the refusal")
+        assert not person.reads("STOP")
+        tab.go(with_token)
+        wait_for(lambda: person.reads("STOP", "guard: "), "the page")
+        assert "token" not in str(person.run("location.href + document.cookie"))
+        person.click(STOP)
+        wait_for(lambda: rig.robot.stopped, "the stop")

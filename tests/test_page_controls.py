@@ -1,0 +1,535 @@
+"""What people do on the page reaches the rig: menus, joints, parameters; and its answers return."""
+
+import asyncio
+import json
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from math import radians
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import viser
+
+from gaze.types import Vec3
+from robot.orders import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_json
+from robot.page import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
+from robot.page_controls import LeadView
+from robot.page_ear import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
+from robot.page_feed import TuningFeed
+from robot.page_hear import PageHear
+from robot.page_jog import JogView, measured_table
+from robot.page_knob import PageKnob, hint, knob_from, label, read, slides, step_of, written
+from robot.page_tell import Teller
+from robot.page_tuning import found, group_of
+from robot.page_view import News, drain
+from robot.types import JOINTS, Snapshot
+
+PATIENCE_S = 20.0
+AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+SNAPSHOT = Snapshot(
+    t_s=1.0,
+    measured_rad=(0.1,) * 9,
+    wish_rad=(0.1,) * 9,
+    R_world_head=AHEAD,
+    p_world_head_m=(0.03, 0.0, 0.14),
+    p_world_eyes_m=((0.03, 0.031, 0.14), (0.03, -0.031, 0.14)),
+    gaze_world=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    lids=(0.8, 0.8),
+    p_world_target_m=(0.9, 0.1, 0.25),
+    target_name="face 3: nose",
+    why="it is there",
+    phase="fixate",
+    level="ok",
+    reasons=(),
+    faces=(),
+    bodies=(),
+    rate_hz=200.0,
+    health="0 lost",
+)
+
+
+def wait_for(ready: Callable[[], object], what: str) -> None:
+    last_s = time.monotonic() + PATIENCE_S
+    while not ready():
+        assert time.monotonic() < last_s, f"{what} did not come within {PATIENCE_S:.0f} s"
+        time.sleep(0.01)
+
+
+@contextmanager
+def linked(
+    hear: Callable[[dict[str, object]], str | None] | None = None,
+) -> Iterator[tuple[Page, socket.socket]]:
+    """A page's rig side and the socket that its process would hold."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    page = Page("127.0.0.1", 8080, hear)
+    page.join(ours)
+    with theirs:
+        yield page, theirs
+        page.close()
+
+
+def sent(theirs: socket.socket) -> tuple[bytes, object]:
+    """The next message to the page: its kind, and what its JSON holds."""
+    message = theirs.recv(MESSAGE_BYTES)
+    return message[:1], json.loads(message[1:])
+
+
+# --- over the socket ------------------------------------------------------------------------
+
+
+def test_what_is_asked_is_heard_and_answered() -> None:
+    heard: list[dict[str, object]] = []
+
+    def hear(data: dict[str, object]) -> str | None:
+        heard.append(data)
+        return "refused: too far" if "pick" in data else None
+
+    with linked(hear) as (_, theirs):
+        teller = Teller(theirs)
+        assert teller.order(Ask("behaviour", "guard"), "7")
+        assert sent(theirs) == (WORDS, ["7", None])
+        assert teller.ask({"pick": {"x": 0.5, "y": 0.5}}, "8:tuning")
+        assert sent(theirs) == (WORDS, ["8:tuning", "refused: too far"])
+        assert heard == [as_json(Ask("behaviour", "guard")), {"pick": {"x": 0.5, "y": 0.5}}]
+
+
+def test_a_request_that_goes_wrong_leaves_ears_for_a_stop() -> None:
+    heard: list[object] = []
+
+    def hear(data: dict[str, object]) -> str | None:
+        if "order" not in data:
+            raise RuntimeError("a fault in this program")
+        heard.append(data["order"])
+        return None
+
+    with linked(hear) as (_, theirs):
+        teller = Teller(theirs)
+        teller.ask({"pick": {}}, "7")
+        kind, (who, words) = sent(theirs)
+        assert (kind, who) == (WORDS, "7") and "a fault in this program" in words
+        theirs.send(telling("7", b'{"order": no JSON'))
+        theirs.send(TELL + b"7 no JSON either")
+        teller.order(Stop("a test"), "7")
+        wait_for(lambda: heard == ["stop"], "the stop")
+
+
+def test_a_stop_does_not_wait_behind_what_takes_long() -> None:
+    done, heard = threading.Event(), []
+
+    def hear(data: dict[str, object]) -> str | None:
+        if "tune" in data:
+            assert done.wait(PATIENCE_S)
+        heard.append(next(iter(data)))
+        return None
+
+    with linked(hear) as (_, theirs):
+        teller = Teller(theirs)
+        teller.ask({"tune": {"revert": True}}, "7")
+        teller.order(Stop("a test"), "7")
+        wait_for(lambda: heard, "the stop")
+        assert heard == ["order"]
+        done.set()
+        wait_for(lambda: heard == ["order", "tune"], "the rest")
+
+
+def test_of_a_slider_that_is_dragged_the_last_word_counts() -> None:
+    go_on, values = threading.Event(), []
+
+    def hear(data: dict[str, object]) -> str | None:
+        assert go_on.wait(PATIENCE_S)
+        values.append(data["tune"])
+        return None
+
+    with linked(hear) as (_, theirs):
+        teller = Teller(theirs)
+        for value in range(50):
+            teller.ask({"tune": {"set": {"gaze.head.lag_ms": value}}}, "7")
+        teller.ask({"tune": {"save": None}}, "7")
+        time.sleep(0.3)
+        go_on.set()
+        wait_for(lambda: {"save": None} in values, "the last request")
+    assert values[-2] == {"set": {"gaze.head.lag_ms": 49}}
+    assert len(values) < 10
+
+
+def test_only_the_same_change_by_the_same_person_is_overtaken() -> None:
+    def change(who: str, key: str) -> bytes:
+        return telling(who, b'{"tune":{"set":{"%s":1}}}' % key.encode())
+
+    assert overtaken(change("7", "a"), change("7", "a"))
+    assert not overtaken(change("7", "a"), change("8", "a"))
+    assert not overtaken(change("7", "a"), change("7", "b"))
+    assert not overtaken(telling("7", b'{"tune":{"save":null}}'), change("7", "a"))
+    assert told(telling("7:tuning", b'{"a":"b c"}')) == ("7:tuning", b'{"a":"b c"}')
+    assert urgent(telling("7", b'{"order":"stop","why":""}'))
+    assert not urgent(telling("7", b'{"tune":{"revert":true}}'))
+
+
+def test_answers_wait_until_the_page_has_room() -> None:
+    with linked(lambda data: "x" * 15_000) as (page, theirs):
+        for number in range(40):
+            Teller(theirs).order(Ask("behaviour", str(number)), str(number))
+        said = []
+        wait_for(lambda: len(page._owed) > 0, "a full socket")
+        for _ in range(40):
+            said.append(sent(theirs)[1][0])
+            page._pay()
+        assert said == [str(number) for number in range(40)]
+
+
+def test_a_rig_that_takes_nothing_holds_up_nobody() -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with ours, theirs:
+        teller = Teller(theirs)
+        taken = [teller.ask({"pick": "x" * 10_000}, "7") for _ in range(300)]
+        assert taken[0] and not taken[-1]
+        assert not teller.ask({"pick": "x" * MESSAGE_BYTES}, "7")
+    assert not teller.order(Stop("a test"), "7")  # the rig is gone
+
+
+def test_words_menus_and_their_way() -> None:
+    with linked() as (page, theirs):
+        page.offer({"behaviour": ("wait", "guard")})
+        page.say("the disk is full")
+        news = drain(theirs)
+    assert news.others == (
+        (CHOICES, {"behaviour": ["wait", "guard"]}),
+        (WORDS, [EVERYBODY, "the disk is full"]),
+    )
+
+
+def test_the_ear_tells_once_that_the_page_is_gone() -> None:
+    lost: list[bool] = []
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setblocking(False)
+    with ours:
+        ear = Ear(ours, lambda message: None, lambda: lost.append(True))
+        theirs.close()
+        wait_for(lambda: lost, "the end")
+        ear.close()
+        assert lost == [True]
+
+
+# --- what the rig makes of it -----------------------------------------------------------------
+
+
+class Refused(Exception):
+    """As the tuning refuses."""
+
+
+class Saved(NamedTuple):
+    path: Path
+    backup: Path | None
+    changes: tuple[object, ...] = ()
+
+
+class OneKnob:
+    """The parameters of a rig that has one."""
+
+    path = Path("/rigs/mine.yaml")
+    character_name = "none"
+
+    def __init__(self) -> None:
+        self.version = 0
+        self.value: Value = 1.0
+        self.saved_as: Path | None = None
+
+    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
+        if changes.get("a.b") == 99:
+            raise Refused("a.b: 99 is above 10")
+        self.value = changes["a.b"]
+        self.version += 1
+        return ("a.b = 2", "a.c = 3 (next start: it is so)")
+
+    def save(self, path: Path | None = None) -> Saved:
+        self.saved_as = path
+        return Saved(path or self.path, Path("/rigs/mine.yaml.1"))
+
+    def revert(self) -> tuple[str, ...]:
+        self.value = 1.0
+        return ()
+
+    def knobs(self) -> tuple[PageKnob, ...]:
+        return tuple(KNOB._replace(key=f"a.{n}") for n in range(100))
+
+    def values(self) -> dict[str, Value]:
+        return {f"a.{n}": (1.0, 2.0) for n in range(99)} | {"a.b": self.value}
+
+    def unsaved(self) -> tuple[object, ...]:
+        return ()
+
+    def differs(self) -> tuple[object, ...]:
+        return ()
+
+    def characters(self) -> tuple[str, ...]:
+        return ("none", "calm")
+
+    def character(self, name: str) -> tuple[str, ...]:
+        raise Refused(f"unknown character {name}")
+
+    def get(self, prefix: str) -> dict[str, Value]:
+        return self.values()
+
+
+KNOB = PageKnob("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
+
+
+class Heard(NamedTuple):
+    hear: PageHear
+    orders: list[Order]
+    tuning: OneKnob
+    saved: list[Path]
+
+
+@pytest.fixture
+def heard() -> Heard:
+    orders: list[Order] = []
+    saved: list[Path] = []
+    tuning = OneKnob()
+
+    def point(x: float, y: float) -> Vec3 | None:
+        return (1.0, x, y) if x < 0.9 else None
+
+    hear = PageHear(
+        orders.append,
+        tuning,
+        point,
+        steer=lambda way: f"went {way}",
+        refusals=(Refused,),
+        saved=saved.append,
+    )
+    return Heard(hear, orders, tuning, saved)
+
+
+def test_orders_are_obeyed(heard: Heard) -> None:
+    for order in (Stop("a test"), LookAt(None), Jog((("neck_yaw", 0.1),))):
+        assert heard.hear(json.loads(json.dumps(as_json(order)))) is None
+        assert heard.orders[-1] == order
+
+
+def test_what_is_no_order_is_refused_with_the_rule(heard: Heard) -> None:
+    words = heard.hear({"order": "jog", "angles_rad": [["tail", 0.1]]})
+    assert words is not None and words.startswith("refused: unknown joint 'tail'")
+    unchecked = {"order": "tune", "changes": [["guard.max_speed", 1e9]]}
+    words = heard.hear(unchecked)
+    assert words is not None and words.startswith("refused") and heard.orders == []
+    for nonsense in ({}, {"pick": {"x": "1"}}, {"replay": {"play": True}}, {"tune": 3}):
+        words = heard.hear(nonsense)
+        assert words is not None and words.startswith("refused")
+
+
+def test_a_click_in_the_picture_is_looked_at(heard: Heard) -> None:
+    assert heard.hear({"pick": {"x": 0.5, "y": 1}}) is None
+    assert heard.orders == [LookAt((1.0, 0.5, 1.0))]
+    words = heard.hear({"pick": {"x": 0.95, "y": 0.5}})
+    assert words is not None and "no camera picture" in words
+
+
+def test_parameters_are_put_in_force_or_refused(heard: Heard) -> None:
+    words = heard.hear({"tune": {"set": {"a.b": [1, 2]}}})
+    assert heard.tuning.value == (1, 2)
+    assert words == "a.c = 3 (next start: it is so)"  # what did work is seen in the controls
+    assert heard.hear({"tune": {"set": {"a.b": 99}}}) == "refused: a.b: 99 is above 10"
+    assert heard.hear({"tune": {"character": "mad"}}) == "refused: unknown character mad"
+    assert heard.hear({"tune": {"revert": True}}) is not None and heard.tuning.value == 1.0
+    assert heard.hear({"steer": "left"}) == "went left"
+
+
+def test_saving_says_where(heard: Heard) -> None:
+    words = heard.hear({"tune": {"save": None}})
+    assert words == "saved in /rigs/mine.yaml, what was there is in /rigs/mine.yaml.1"
+    assert heard.tuning.saved_as is None and heard.saved == [Path("/rigs/mine.yaml")]
+    heard.hear({"tune": {"save": "~/other.yaml"}})
+    assert heard.tuning.saved_as == Path.home() / "other.yaml"
+    words = heard.hear({"tune": {"save": "other.yaml"}})
+    assert words is not None and "whole path" in words and len(heard.saved) == 2
+
+
+def test_the_feed_tells_all_once_and_then_what_changed() -> None:
+    tuning, sent, room = OneKnob(), [], [5]
+
+    def send(message: bytes) -> bool:
+        assert len(message) < MESSAGE_BYTES
+        if room[0] == 0:
+            return False
+        room[0] -= 1
+        sent.append((message[:1], json.loads(message[1:])))
+        return True
+
+    feed = TuningFeed(send, tuning)
+    feed.step()
+    assert len(sent) == 5  # the page was full; nothing is lost
+    room[0] = 100
+    feed.step()
+    keys = [knob["key"] for kind, data in sent if kind == KNOBS for knob in data]
+    assert keys == [f"a.{n}" for n in range(100)]
+    values = {k: v for kind, d in sent if kind == VALUES for k, v in d["values"].items()}
+    assert len(values) == 100 and values["a.0"] == [1.0, 2.0]
+    before = len(sent)
+    feed.step()
+    assert len(sent) == before
+    tuning.set({"a.b": 5.0})
+    feed.step()
+    ((kind, state),) = sent[before:]
+    assert (kind, state["values"], state["path"]) == (VALUES, {"a.b": 5.0}, "/rigs/mine.yaml")
+
+
+# --- controls -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+class Mouth:
+    """Keeps what is told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[object, str]] = []
+
+    def order(self, order: Order, who: str) -> bool:
+        self.told.append((order, who))
+        return True
+
+    def ask(self, data: Mapping[str, object], who: str) -> bool:
+        self.told.append((dict(data), who))
+        return True
+
+
+def touch(server: viser.ViserServer, handle: object, value: object) -> None:
+    """What viser does when the browser with number 5 sends another value."""
+    event = viser.GuiEvent(None, 5, handle)  # type: ignore[arg-type]
+    handle._impl.value = value  # type: ignore[attr-defined]
+    (callback,) = handle._impl.update_cb  # type: ignore[attr-defined]
+    asyncio.run_coroutine_threadsafe(callback(event), server._event_loop).result(PATIENCE_S)
+
+
+def test_menus_become_buttons_that_ask(server: viser.ViserServer) -> None:
+    mouth = Mouth()
+    tab = server.gui.add_tab_group().add_tab("lead")
+    lead = LeadView(server, tab, mouth)  # type: ignore[arg-type]
+    lead.offer("behaviour", ["wait", "guard"])
+    lead.offer("steer", ["left", "right"])
+    lead.characters(["none", "calm"], "none")
+    touch(server, lead._menus["behaviour"], "guard")
+    touch(server, lead._menus["steer"], "left")
+    assert lead._characters is not None
+    touch(server, lead._characters, "calm")
+    assert mouth.told == [
+        (Ask("behaviour", "guard"), "5"),
+        ({"steer": "left"}, "5"),
+        ({"tune": {"character": "calm"}}, "5"),
+    ]
+    lead.show(replace(SNAPSHOT, behaviour="<b>"))
+    assert "behaviour <b>&lt;b&gt;</b>" in lead._words.content
+
+
+def jogging(server: viser.ViserServer) -> tuple[JogView, Mouth]:
+    mouth = Mouth()
+    view = JogView(server.gui, server.gui.add_tab_group().add_tab("joints"), mouth)  # type: ignore[arg-type]
+    ends = {f"joints.{j}.{end}_deg": v for j in JOINTS for end, v in (("min", -30), ("max", 40.0))}
+    view.values(ends)
+    return view, mouth
+
+
+def test_every_joint_has_a_slider_with_its_limits(server: viser.ViserServer) -> None:
+    view, _ = jogging(server)
+    assert tuple(view._sliders) == JOINTS
+    assert {(s.min, s.max) for s in view._sliders.values()} == {(-30.0, 40.0)}
+    view.values({"joints.neck_yaw.min_deg": -10.0, "joints.neck_yaw.max_deg": 10.0})
+    assert (view._sliders["neck_yaw"].min, view._sliders["neck_yaw"].max) == (-10.0, 10.0)
+
+
+def test_a_slider_jogs_and_then_follows_its_joint(server: viser.ViserServer) -> None:
+    view, mouth = jogging(server)
+    slider = view._sliders["neck_yaw"]
+    yaw = JOINTS.index("neck_yaw")
+    view.show(replace(SNAPSHOT, t_s=1.0))
+    assert slider.value == pytest.approx(5.7) and mouth.told == []  # 0.1 rad, and nobody asked
+    touch(server, slider, 20.0)
+    assert mouth.told == [(Jog((("neck_yaw", radians(20.0)),)), "5")]
+
+    def wished(t_s: float, wish_deg: float, stopped: str = "") -> float:
+        wish = tuple(radians(wish_deg) if i == yaw else 0.1 for i in range(9))
+        view.show(replace(SNAPSHOT, t_s=t_s, wish_rad=wish, stopped=stopped))
+        return float(slider.value)
+
+    assert wished(1.1, 6.0) == 20.0  # not yet obeyed
+    assert wished(1.2, 20.0) == 20.0  # obeyed; the joint is still on its way
+    assert wished(5.0, 20.0) == 20.0
+    assert wished(5.2, -3.0) == 20.0
+    assert wished(5.8, -3.0) == pytest.approx(5.7)  # somebody let go elsewhere
+    touch(server, slider, 20.0)
+    assert wished(5.9, 20.0, "a test") == pytest.approx(5.7)  # a stop lets go at once
+
+
+def test_the_table_shows_wish_and_measured() -> None:
+    table = measured_table(replace(SNAPSHOT, wish_rad=(radians(12.34),) * 9))
+    assert table.count("12.3") == 9 and table.count("5.7") == 9 and "neck yaw" in table
+
+
+# --- parameters ---------------------------------------------------------------------------------
+
+
+def test_a_knob_is_read_as_the_rig_writes_it() -> None:
+    data = {**KNOB._asdict(), "choices": [1, -1], "length": None, "items": None}
+    assert knob_from(json.loads(json.dumps(data))) == KNOB._replace(choices=(1, -1))
+
+
+def test_a_hint_says_all_there_is_to_know() -> None:
+    words = hint(KNOB._replace(choices=("a", "b")))
+    for part in ("a.b", "how far", "0 to 10 deg", "a, b", "default 1.0 deg", "next tick"):
+        assert part in words
+    assert label(KNOB, True) == "● a.b (deg)" and label(KNOB, False) == "a.b (deg)"
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-35.0, 35.0), (0.3, 0.7), (10.0, 1e5)])
+def test_a_slider_has_some_hundred_round_steps(low: float, high: float) -> None:
+    step = step_of(low, high)
+    assert 190 <= (high - low) / step <= 501
+    assert f"{step:.0e}"[0] in "125"
+
+
+def test_what_a_slider_cannot_set_finely_is_typed() -> None:
+    assert slides(KNOB, 1.0)
+    assert not slides(KNOB._replace(high=1e6), 1.0)
+    assert not slides(KNOB, 11.0) and not slides(KNOB._replace(optional=True), 1.0)
+    assert not slides(KNOB._replace(kind="list"), (1.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [("number", 1e-7), ("number", 3.0), ("whole", 7), ("text", "a b"), ("list", [1.0, 2.5])],
+)
+def test_what_is_written_is_read_again(kind: str, value: object) -> None:
+    knob = KNOB._replace(kind=kind, default=value)
+    assert read(knob, written(knob, value)) == value
+
+
+def test_what_cannot_be_read_is_refused_with_an_example() -> None:
+    with pytest.raises(ValueError, match=r"a\.b: '1,5' is no number; write it like 1\.0"):
+        read(KNOB, "1,5")
+    assert read(KNOB._replace(optional=True), "null") is None
+
+
+def test_search_takes_every_word() -> None:
+    knobs = (KNOB, KNOB._replace(key="guard.speed", group="guard", says="how fast"))
+    assert found("how FAR", knobs) == ["a.b"]
+    assert found("how", knobs) == ["a.b", "guard.speed"] and found("how not", knobs) == []
+    assert group_of(KNOB._replace(group="joints.neck_yaw.more")) == "joints.neck_yaw"
+    assert group_of(KNOB._replace(group="")) == "rig"
+
+
+def test_orders_survive_the_way_of_the_page() -> None:
+    order = Jog((("neck_yaw", 0.25),))
+    data = told(telling("7", json.dumps(as_json(order), separators=(",", ":")).encode()))[1]
+    assert from_json(json.loads(data)) == order
+    assert News((), None, False).others == ()

@@ -1,0 +1,189 @@
+"""The health of servos, loop and picture in words and colours, and why the gaze is where it is."""
+
+from dataclasses import replace
+from typing import TypeVar
+
+import pytest
+import viser
+
+from gaze.types import Pull
+from robot.page_health import (
+    health,
+    servo_table,
+    strain_of_heat,
+    strain_of_load,
+    strain_of_voltage,
+)
+from robot.page_layers import Layers, LayersView
+from robot.page_panel import PanelView
+from robot.page_style import AMBER, RED
+from robot.page_why import pulls, winner
+from robot.types import (
+    Ghost,
+    SeenCamera,
+    SeenFixation,
+    SeenSaccade,
+    ServoLimits,
+    Servos,
+    Snapshot,
+    Timing,
+    Trail,
+)
+
+AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+LIMITS = ServoLimits((55.0,) * 9, (65.0,) * 9, (3.8,) * 9, (6.7,) * 9, (0.5,) * 9)
+WELL = Servos(
+    (30.0,) * 9, (5.0,) * 9, (0.1,) * 9, (True,) * 9, ("",) * 9, (0.0,) * 9, (0,) * 9, LIMITS
+)
+REST = (0.0,) * 9
+T = TypeVar("T")
+
+
+def snapshot(t_s: float = 1.0) -> Snapshot:
+    eyes = ((0.03, 0.031, 0.14), (0.03, -0.031, 0.14))
+    sight = ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    return Snapshot(
+        t_s=t_s, measured_rad=REST, wish_rad=REST, R_world_head=AHEAD,
+        p_world_head_m=(0.03, 0.0, 0.14), p_world_eyes_m=eyes, gaze_world=sight, lids=(0.8, 0.8),
+        p_world_target_m=(1.0, 0.0, 0.14), target_name="thing <4>", why="slide <0.4>",
+        phase="pursue", level="ok", reasons=(), faces=(), bodies=(), rate_hz=200.0,
+        health="bus ok", behaviour="wait", servos=WELL,
+        timing=Timing(200.0, 0.04, 0.21, 0.9, 0, 3, 5.0), picture_age_s=0.06,
+        ghost=Ghost(AHEAD, (0.03, 0.0, 0.14), eyes, sight, (0.8, 0.8)),
+        camera=SeenCamera(AHEAD, (0.05, 0.0, 0.18), 1.2, 1.6), field_deg=(100.0, 60.0, 60.0, 75.0),
+        trail=(Trail(t_s, REST, REST, REST),),
+        events=(SeenSaccade(0.5, 0.05, 5.0, 180.0), SeenFixation(0.2, 0.3, "LE")),
+    )  # fmt: skip
+
+
+def put(column: tuple[float | None, ...], i: int, value: float | None) -> tuple[float | None, ...]:
+    return (*column[:i], value, *column[i + 1 :])
+
+
+@pytest.mark.parametrize(
+    ("celsius", "strain"), [(54.9, ""), (55.0, "near"), (65.0, "over"), (None, "")]
+)
+def test_heat_is_told_by_what_the_guard_does(celsius: float | None, strain: str) -> None:
+    assert strain_of_heat(WELL._replace(temperature_c=put(REST, 2, celsius)), 2) == strain
+
+
+@pytest.mark.parametrize(("load", "strain"), [(0.5, ""), (-0.51, "near"), (-0.95, "over")])
+def test_load_is_told_by_its_size(load: float, strain: str) -> None:
+    assert strain_of_load(WELL._replace(load=(load,) * 9), 0) == strain
+
+
+@pytest.mark.parametrize(("volts", "strain"), [(3.7, "near"), (3.8, ""), (6.8, "near"), (None, "")])
+def test_voltage_is_told_by_both_ends(volts: float | None, strain: str) -> None:
+    assert strain_of_voltage(WELL._replace(voltage_v=put(REST, 1, volts)), 1) == strain
+
+
+def test_without_limits_nothing_is_coloured() -> None:
+    hot = WELL._replace(temperature_c=(90.0,) * 9, limits=None)
+    assert strain_of_heat(hot, 0) == ""
+    assert AMBER not in servo_table(hot) and RED not in servo_table(hot)
+
+
+def test_a_healthy_rig_has_no_alarm_and_every_joint_a_row() -> None:
+    table = servo_table(WELL)
+    assert table.count("<tr") == 10
+    assert AMBER not in table and RED not in table
+    assert "neck roll" in table and "+10 %" in table
+
+
+def test_faults_and_silence_are_said_beside_the_joint() -> None:
+    fault = ("", "overload <1>") + ("",) * 7
+    table = servo_table(WELL._replace(fault=fault, age_s=(0.0, 0.0, 1.25) + (0.0,) * 6))
+    assert "left eye tilt<div" in table and "overload &lt;1&gt;" in table
+    assert "right eye pan<div" in table and "silent for 1.2 s" in table
+    assert "torque off" in servo_table(WELL._replace(torque=(False,) * 9))
+    assert "nothing is known" in servo_table(Servos())
+
+
+def test_what_was_not_measured_is_a_dash_and_no_zero() -> None:
+    unread = WELL._replace(temperature_c=(None,) * 9, voltage_v=(None,) * 9, unanswered=())
+    assert servo_table(unread).count(">-</td>") == 27
+
+
+def test_loop_figures_are_told_and_coloured_when_late() -> None:
+    said = health(snapshot())
+    for words in ("200.0 Hz", "0.04 ms", "0.21 ms", "0.90 ms", "3 slots overrun", "60 ms</b> old"):
+        assert words in said
+    assert AMBER not in said
+    late = replace(snapshot(), timing=Timing(200.0, 0.1, 2.0, 4.0, 2, 2, 5.0))
+    assert health(late).count(f"background:{AMBER}") == 2
+    assert "no picture yet" in health(replace(snapshot(), picture_age_s=None))
+
+
+def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:
+    tugs = (
+        Pull(4, "thing", 0.41, 0.0, 0.0, 0.0, 0.0, 1.0, 0.41),
+        Pull(1, "<b>", 0.02, 0.0, 0.0, 0.0, 0.5, 0.6, 0.3),
+    )
+    shot = replace(snapshot(), pulls=tugs, character="shy", conversation="listen")
+    said = pulls(shot)
+    assert said.index("thing 4") < said.index("&lt;b&gt; 1")
+    assert "slide 0.41" in said and "slide 0.02 rule 0.50" in said
+    assert "loom 0.00</div>" not in said
+    assert "0.60 &times;&ensp;0.30" in said
+    named = winner(shot)
+    for words in ("thing &lt;4&gt;", "slide &lt;0.4&gt;", "behaviour: wait", "character: shy",
+                  "conversation: listen"):  # fmt: skip
+        assert words in named
+    assert "wanders" in pulls(snapshot())
+
+
+# --- on a page --------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def server():
+    made = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield made
+    made.stop()
+
+
+def handles(server: viser.ViserServer, kind: type[T]) -> list[T]:
+    """Everything of a kind that stands on the page, in whatever tab."""
+    places = server.gui._container_handle_from_uuid.values()
+    return [
+        thing for place in places for thing in place._children.values() if isinstance(thing, kind)
+    ]
+
+
+def test_panel_takes_snapshots_and_fills_its_tabs(server: viser.ViserServer) -> None:
+    panel = PanelView(server.gui)
+    shots = tuple(snapshot(0.04 * k) for k in range(51))
+    for shot in shots:
+        panel.note((shot,))
+        panel.show(shot)
+    said = " ".join(html.content for html in handles(server, viser.GuiHtmlHandle))
+    for words in (
+        "thing &lt;4&gt;", "51 saccades", "51 rests", "neck roll", "the last 30 seconds",
+    ):  # fmt: skip
+        assert words in said
+    plots = handles(server, viser.GuiUplotHandle)
+    assert len(plots) == 3
+    assert all(len(plot.data[0]) > 40 for plot in plots)
+    panel.note((snapshot(0.0),))
+    for _ in range(26):
+        panel.show(snapshot(0.0))
+    again = " ".join(html.content for html in handles(server, viser.GuiHtmlHandle))
+    assert "51 saccades" not in again and "1 saccade<" in again
+    panel.silent()
+    assert "nothing has come from the rig" in panel._status.content
+
+
+def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> None:
+    view = LayersView(server.scene)
+
+    def seen() -> set[str]:
+        nodes = {"ghost": "/ghost", "camera": "/camera", "eyes": "/field_left"}
+        handles = server.scene._handle_from_node_name
+        return {name for name, node in nodes.items() if node in handles and handles[node].visible}
+
+    view.show(snapshot(), Layers(ghost=True, camera=True, eyes=True))
+    assert seen() == {"ghost", "camera", "eyes"}
+    view.show(snapshot(), Layers(ghost=False, camera=True, eyes=False))
+    assert seen() == {"camera"}
+    view.show(replace(snapshot(), ghost=None, camera=None, field_deg=None), Layers(eyes=True))
+    assert seen() == set()

@@ -1,0 +1,119 @@
+"""A click in the picture means the thing that is seen there."""
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from drivers.types import Detections
+from gaze.angles import norm, sub
+from gaze.types import Bodies, Face, Percept, Vec3
+from robot.frames import CameraMount, CameraParams, PoseHistory
+from robot.intrinsics import intrinsics_of_view, project
+from robot.kinematics import GeometryParams, Kinematics
+from robot.loop import Tick
+from robot.picking import USUAL_M, Picking, distance_m
+
+CAMERA = CameraParams(position_mm=(20.0, 0.0, 45.0), horizontal_field_deg=70.0)
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+WIDTH, HEIGHT = 640, 480
+
+
+def looking(
+    head_rad: tuple[float, float, float], percept: Percept | None, depth: np.ndarray | None = None
+) -> tuple[Picking, CameraMount, PoseHistory]:
+    """A head that was turned so when the picture was taken, and has turned on since."""
+    kinematics = Kinematics(
+        GeometryParams(pitch_axis_height_mm=90.0, eyes_ahead_mm=30.0, eyes_above_mm=50.0),
+        (0.0, 0.0),
+        (0.5, 0.5),
+    )
+    poses = PoseHistory(kinematics)
+    for t_s in (0.9, 1.0):
+        poses.remember(t_s, head_rad)
+    poses.remember(1.1, (head_rad[0] + 0.3, 0.0, 0.0))
+    mount = CameraMount(CAMERA)
+    picking = Picking(mount, poses, lambda: CAMERA)
+    found = Detections(1.0, 1, WIDTH, HEIGHT, (), (), None, depth, None)
+    picking.note(cast(Tick, SimpleNamespace(detections=found, percept=percept)))
+    return picking, mount, poses
+
+
+def place(p_world_m: Vec3, mount: CameraMount, poses: PoseHistory) -> tuple[float, float]:
+    """Where a point was in the picture, 0..1."""
+    R, p = mount.pose(*poses.head_pose(1.0))
+    in_camera = np.array(R).T @ np.array(sub(p_world_m, p))
+    lens = intrinsics_of_view(np.radians(70.0), WIDTH, HEIGHT)
+    x, y = project(in_camera[None], lens)[0]
+    return float(x) / (WIDTH - 1), float(y) / (HEIGHT - 1)
+
+
+def face_at(p_world_m: Vec3) -> Face:
+    return Face(3, p_world_m, (0.0, 0.0, 0.0), AXES, (p_world_m,) * 8, 0.9)
+
+
+def test_without_a_picture_there_is_nothing_to_pick() -> None:
+    kinematics = Kinematics(
+        GeometryParams(pitch_axis_height_mm=90.0, eyes_ahead_mm=30.0, eyes_above_mm=50.0),
+        (0.0, 0.0),
+        (0.5, 0.5),
+    )
+    picking = Picking(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)
+    assert picking.point(0.5, 0.5) is None
+    picking.note(cast(Tick, SimpleNamespace(detections=None, percept=None)))
+    assert picking.point(0.5, 0.5) is None
+
+
+@pytest.mark.parametrize("yaw_rad", [-0.5, 0.0, 0.4])
+def test_a_click_on_a_face_is_at_the_face(yaw_rad: float) -> None:
+    # Somebody before the camera as it stood when the picture was taken.
+    there: Vec3 = (0.9 * np.cos(yaw_rad), 0.9 * np.sin(yaw_rad) + 0.05, 0.22)
+    picking, mount, poses = looking((yaw_rad, 0.0, 0.0), Percept(1.0, Bodies(), (face_at(there),)))
+    x, y = place(there, mount, poses)
+    assert 0.0 < x < 1.0 and 0.0 < y < 1.0
+    point = picking.point(x, y)
+    assert point is not None and norm(sub(point, there)) < 1e-6
+
+
+def test_a_click_beside_everybody_is_at_a_usual_distance() -> None:
+    picking, mount, poses = looking(
+        (0.0, 0.0, 0.0), Percept(1.0, Bodies(), (face_at((0.9, 0.4, 0.2)),))
+    )
+    point = picking.point(0.9, 0.5)
+    assert point is not None
+    _, p = mount.pose(*poses.head_pose(1.0))
+    assert norm(sub(point, p)) == pytest.approx(USUAL_M)
+    assert point[1] < 0.0  # the right of the picture is the head's right
+
+
+def test_depth_is_along_the_optical_axis() -> None:
+    depth = np.full((HEIGHT, WIDTH), 2.0, np.float32)
+    depth[:, : WIDTH // 2] = 0.7
+    picking, mount, poses = looking((0.0, 0.0, 0.0), None, depth)
+    _, p = mount.pose(*poses.head_pose(1.0))
+    left, right = picking.point(0.1, 0.5), picking.point(0.9, 0.5)
+    assert left is not None and right is not None
+    assert left[0] - p[0] == pytest.approx(0.7, abs=1e-3)
+    assert right[0] - p[0] == pytest.approx(2.0, abs=1e-3)
+
+
+def test_the_nearest_direction_wins() -> None:
+    bodies = Bodies(
+        (1,),
+        ("hand",),
+        np.array([(0.5, 0.03, 0.0)]),
+        np.zeros((1, 3)),
+        np.zeros((1, 3)),
+        np.ones(1),
+    )
+    percept = Percept(0.0, bodies, (face_at((2.0, 0.0, 0.0)),))
+    assert distance_m(percept, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)) == pytest.approx(2.0)
+    towards_hand = (0.5 / np.hypot(0.5, 0.03), 0.03 / np.hypot(0.5, 0.03), 0.0)
+    assert distance_m(percept, (0.0, 0.0, 0.0), towards_hand) == pytest.approx(0.5, abs=0.01)
+    assert distance_m(None, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)) == USUAL_M
+
+
+def test_clicks_outside_count_as_on_the_edge() -> None:
+    picking, _, _ = looking((0.0, 0.0, 0.0), None)
+    assert picking.point(-3.0, 0.5) == picking.point(0.0, 0.5)

@@ -1,0 +1,701 @@
+"""Other programs steer a running rig: what is asked is done, what is rubbish costs nobody."""
+
+import contextlib
+import json
+import os
+import re
+import shutil
+import socket
+import stat
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from config.schema import load_rig
+from drivers.errors import SetupError
+from robot import remote_socket
+from robot.assemble import assemble
+from robot.choice import Choice
+from robot.clock import RealClock
+from robot.loop import Robot, Tick
+from robot.orders import Tune, Value
+from robot.remote import NoRig, Refused, RigGone, RunningRig, running
+from robot.remote_requests import Pulse, Requests
+from robot.remote_server import RemoteServer
+from robot.remote_socket import REQUEST_BYTES
+
+RATE = "loop.rate_hz"
+BLINKS = "gaze.lids.blinks_per_min"
+
+
+class Knob(NamedTuple):
+    key: str
+    group: str
+    unit: str
+    says: str
+    low: float | None
+    high: float | None
+    choices: tuple[Value, ...]
+    kind: str
+    default: Value
+    live: str
+
+
+@dataclass
+class Change:
+    key: str
+    old: Value
+    new: Value
+
+
+@dataclass
+class Saved:
+    path: Path
+    backup: Path | None
+    changes: tuple[Change, ...]
+
+
+class Broken(Exception):
+    """A rule is broken, as config.load.ConfigError says it."""
+
+
+class SecondTuning:
+    """Two parameters with memory; it checks one bound and knows no file."""
+
+    def __init__(self, order: Callable[[Tune], None]) -> None:
+        self._order = order
+        self._file: dict[str, Value] = {RATE: 200.0, BLINKS: 17.0}
+        self._now = dict(self._file)
+        self.version = 0
+
+    def knobs(self) -> tuple[Knob, ...]:
+        return tuple(
+            Knob(
+                key, key.rpartition(".")[0], "Hz", "a rate", 1.0, 1000.0, (), "number", 17.0, "now"
+            )
+            for key in self._now
+        )
+
+    def get(self, prefix: str) -> Mapping[str, Value]:
+        return {key: value for key, value in self._now.items() if key.startswith(prefix)}
+
+    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
+        broken = [
+            f"{key}: {value} breaks the rule"
+            for key, value in changes.items()
+            if not isinstance(value, float) or not 1.0 <= value <= 1000.0
+        ]
+        if broken:
+            raise Broken("\n".join(broken))
+        if "bug" in changes:
+            raise KeyError("bug")
+        self._now |= changes
+        self.version += 1
+        self._order(Tune(tuple(changes.items())))
+        return ("taken",)
+
+    def unsaved(self) -> tuple[Change, ...]:
+        return tuple(
+            Change(key, self._file.get(key), value)
+            for key, value in self._now.items()
+            if value != self._file.get(key)
+        )
+
+    def differs(self) -> tuple[Change, ...]:
+        return self.unsaved()
+
+    def save(self, path: Path | None = None) -> Saved:
+        changes = self.unsaved()
+        self._file = dict(self._now)
+        return Saved(path or Path("/nowhere/my.yaml"), None, changes)
+
+    def revert(self) -> tuple[str, ...]:
+        self._now = dict(self._file)
+        return ()
+
+    def characters(self) -> tuple[str, ...]:
+        return ("bold", "shy")
+
+    def character(self, name: str) -> tuple[str, ...]:
+        if name not in self.characters():
+            raise Broken(f"no character {name!r}")
+        return ()
+
+
+class Beat:
+    """A simulated robot whose loop runs in a thread, slowly enough to leave the processor."""
+
+    def __init__(self) -> None:
+        made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
+        self.robot: Robot = made.robot
+        self.clock = made.clock
+        self.pulse = Pulse(self.clock)
+        self.ticks: list[Tick] = []
+        self.hold = threading.Event()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self.robot.tune = lambda tune, t_s: (f"tuned {len(tune.changes)}",)
+
+    def __enter__(self) -> "Beat":
+        self.robot.start(self.clock)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+        self.robot.stop()
+
+    def _run(self) -> None:
+        slot = 0
+        while not self._over.wait(0.002):
+            if self.hold.is_set():
+                continue
+            slot += 1
+            self.clock.sleep_until(slot * 0.005)
+            tick = self.robot.tick(slot * 0.005, 0.005)
+            self.ticks.append(tick)
+            self.pulse.note(tick)
+
+
+@pytest.fixture
+def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder for sockets of this test alone; pytest's own are too long for a socket."""
+    place = tempfile.mkdtemp(prefix="gz-", dir="/tmp")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", place)
+    yield Path(place) / "gazerig"
+    shutil.rmtree(place)
+
+
+@pytest.fixture(scope="module")
+def beat() -> Iterator[Beat]:
+    with Beat() as running_robot:
+        yield running_robot
+
+
+@pytest.fixture
+def errors() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RunningRig]:
+    tuning = SecondTuning(beat.robot.order)
+    about = {"rig": "desk", "pid": os.getpid()}
+    requests = Requests(beat.robot, tuning, beat.pulse, about, (Broken,))
+    server = RemoteServer(requests, errors.append)
+    server.open()
+    with RunningRig.connect() as connected:
+        yield connected
+    if not server_closed(server):
+        server.close()
+
+
+def server_closed(server: RemoteServer) -> bool:
+    return server._listener is None
+
+
+def raw(folder: Path) -> socket.socket:
+    return remote_socket.dial(folder / f"{os.getpid()}.sock", 5.0)
+
+
+def line_of(end: socket.socket) -> dict[str, Any]:
+    with end.makefile("rb") as file:
+        answer: dict[str, Any] = json.loads(file.readline())
+    return answer
+
+
+def hung_up(end: socket.socket) -> bool:
+    end.settimeout(5.0)
+    with contextlib.suppress(ConnectionError):
+        return end.recv(100) == b""
+    return True
+
+
+# What can be asked
+
+
+def test_values_rules_and_changes(rig: RunningRig) -> None:
+    assert rig.get() == {RATE: 200.0, BLINKS: 17.0}
+    assert rig.get("gaze.") == {BLINKS: 17.0}
+    assert rig.knob(RATE).high == 1000.0 and rig.knob(RATE).group == "loop"
+    assert rig.set(RATE, 100.0) == ("taken",)
+    assert rig.get(RATE) == {RATE: 100.0}
+    assert rig.unsaved() == rig.differs() == ((RATE, 200.0, 100.0),)
+    assert rig.status()["version"] == 1 and rig.status()["unsaved"] == 1
+    saved = rig.save("/tmp/my.yaml")
+    assert saved.path == Path("/tmp/my.yaml") and saved.changes == ((RATE, 200.0, 100.0),)
+    assert rig.unsaved() == ()
+    rig.set(BLINKS, 3.0)
+    rig.revert()
+    assert rig.get(BLINKS) == {BLINKS: 17.0}
+
+
+def test_a_broken_rule_is_told_in_full_and_nothing_changes(rig: RunningRig) -> None:
+    with pytest.raises(Refused) as refused:
+        rig.set_many({RATE: 1e9, BLINKS: -1.0})
+    assert str(refused.value).splitlines() == [
+        f"{RATE}: 1000000000.0 breaks the rule",
+        f"{BLINKS}: -1.0 breaks the rule",
+    ]
+    assert rig.get() == {RATE: 200.0, BLINKS: 17.0}
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), object(), b"1"])
+def test_what_has_no_json_is_refused_before_it_is_sent(rig: RunningRig, value: Value) -> None:
+    with pytest.raises(Refused, match="finite numbers"):
+        rig.set(RATE, value)
+    assert rig.get(RATE) == {RATE: 200.0}
+
+
+def test_unknown_key_and_character(rig: RunningRig) -> None:
+    with pytest.raises(Refused, match="unknown key"):
+        rig.knob("loop.rate")
+    assert rig.characters() == ("bold", "shy")
+    rig.character("shy")
+    with pytest.raises(Refused, match="no character 'brave'"):
+        rig.character("brave")
+
+
+def test_when_set_returns_the_loop_has_it(rig: RunningRig, beat: Beat) -> None:
+    rig.set(RATE, 150.0)
+    assert any(Tune(((RATE, 150.0),)) in tick.orders for tick in beat.ticks)
+    assert "tuned 1" in rig.status()["said"]
+
+
+def test_the_first_tick_after_set_has_it(rig: RunningRig, beat: Beat) -> None:
+    beat.hold.set()
+    asking = threading.Thread(target=rig.set, args=(RATE, 140.0))
+    try:
+        asking.start()
+        while not beat.robot._orders:
+            asking.join(timeout=0.002)
+            assert asking.is_alive()
+        held = len(beat.ticks)
+    finally:
+        beat.hold.clear()
+    asking.join()
+    assert beat.ticks[held].orders == (Tune(((RATE, 140.0),)),)
+
+
+def test_looking_jogging_and_asking(rig: RunningRig, beat: Beat) -> None:
+    rig.look_at(1.0, 0.2, 0.1)
+    assert rig.status()["why"] == "somebody chose this point"
+    assert beat.ticks[-1].target.p_world_m == (1.0, 0.2, 0.1)
+    rig.look_freely()
+    assert rig.status()["why"] != "somebody chose this point"
+    rig.jog("neck_yaw", 10.0)
+    wish = dict(zip(rig.status()["joints_deg"], beat.ticks[-1].wish_rad, strict=True))
+    assert wish["neck_yaw"] == pytest.approx(radians(10.0))
+    rig.jog_free()
+    menus = rig.menus()
+    rig.ask("conversation", "talk")
+    assert menus["conversation"][0] == "none" and rig.menus()["conversation"][0] == "talk"
+    rig.ask("conversation", "none")
+
+
+def test_stop_and_resume(rig: RunningRig, beat: Beat) -> None:
+    rig.stop("finger")
+    status = rig.status()
+    assert status["stopped"] == "finger" and status["level"] == "limp"
+    assert not any(beat.ticks[-1].joints.torque)
+    rig.resume()
+    assert rig.status()["stopped"] == ""
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda rig: rig.jog("nose", 1.0), "unknown joint 'nose'"),
+        (lambda rig: rig.jog("neck_yaw", float("nan")), "finite"),
+        (lambda rig: rig.look_at(float("inf"), 0.0, 0.0), "finite"),
+        (lambda rig: rig.ask("mood", "good"), "nothing called 'mood'"),
+        (lambda rig: rig.ask("lids", "blue"), "no lids 'blue'"),
+    ],
+)
+def test_orders_that_cannot_be_meant(
+    rig: RunningRig, ask: Callable[[RunningRig], None], words: str
+) -> None:
+    with pytest.raises(Refused, match=words):
+        ask(rig)
+
+
+# A loop that hangs, a resume that fails
+
+
+def test_a_loop_that_hangs_is_told_to_who_stops(
+    folder: Path, beat: Beat, errors: list[str], rig: RunningRig
+) -> None:
+    beat.hold.set()
+    try:
+        with pytest.raises(Refused, match="emergency stop"):
+            rig.stop()
+    finally:
+        beat.hold.clear()
+    rig.resume()
+
+
+def test_a_servo_that_refuses_torque_is_named(
+    rig: RunningRig, beat: Beat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse() -> None:
+        raise SetupError("neck_yaw: overload; gazerig reboot")
+
+    rig.stop("test")
+    with monkeypatch.context() as patch:
+        patch.setattr(beat.robot.body, "take_hold", refuse)
+        with pytest.raises(Refused, match="still stopped: neck_yaw: overload"):
+            rig.resume()
+    rig.resume()
+
+
+def test_an_error_of_the_program_is_told_to_both_sides_and_the_rest_goes_on(
+    rig: RunningRig, errors: list[str]
+) -> None:
+    with pytest.raises(RigGone, match="KeyError"):
+        rig.set("bug", 5.0)
+    assert "KeyError" in errors[0]
+    assert rig.get(RATE) == {RATE: 200.0}
+
+
+# Rubbish
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (b"hello\n", "not a line of JSON"),
+        (b"\n", "not a line of JSON"),
+        (b'{"do": "get", "prefix": NaN}\n', "no number"),
+        (b"\xff\xfe\n", "not a line of JSON"),
+        (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
+        (b"[]\n", "not understood"),
+        (b'{"do": "dance"}\n', "there is status; menus"),
+        (b'{"do": "get"}\n', "not understood"),
+        (b'{"do": "get", "prefix": 1}\n', "not understood"),
+        (b'{"do": "get", "prefix": "", "more": 1}\n', "not understood"),
+        (b'{"do": "set", "changes": [["a", 1]]}\n', "not understood"),
+        (b'{"do": "save", "path": "my.yaml"}\n', "whole path"),
+        (b'{"do": "order", "order": {"order": "fly"}}\n', "no order; there is ask"),
+        (b'{"do": "order", "order": {"order": []}}\n', "no order|unhashable"),
+        (b'{"do": "order", "order": {"order": "tune", "changes": [["a", 1]]}}\n', "request set"),
+    ],
+)
+def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(
+    rig: RunningRig, folder: Path, line: bytes, words: str
+) -> None:
+    with raw(folder) as end:
+        end.sendall(line)
+        answer = line_of(end)
+        (said,) = answer.values()
+        assert re.search(words, said), said
+        end.sendall(b'{"do": "characters"}\n')
+        assert line_of(end) == {"ok": ["bold", "shy"]}
+
+
+def test_a_huge_request_is_refused_and_hung_up_on(rig: RunningRig, folder: Path) -> None:
+    with raw(folder) as end:
+        with contextlib.suppress(ConnectionError):
+            end.sendall(b"x" * (REQUEST_BYTES + 70_000))
+        assert "longer than" in line_of(end)["refused"]
+        assert hung_up(end)
+
+
+def test_an_endless_request_is_refused_and_hung_up_on(
+    rig: RunningRig, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robot.remote_server._REST_S", 0.2)
+    with raw(folder) as end:
+        end.sendall(b'{"do": "characters"}\n')
+        assert "ok" in line_of(end)
+        over = threading.Event()
+
+        def dribble() -> None:
+            with contextlib.suppress(OSError):
+                while not over.wait(0.01):
+                    end.sendall(b"x")
+
+        # The next line is waited for without end, and must then come within its time.
+        dribbler = threading.Thread(target=dribble)
+        dribbler.start()
+        answer = line_of(end)
+        over.set()
+        dribbler.join()
+        assert "no end of the line" in answer["refused"]
+
+
+def test_two_requests_in_one_piece_get_two_answers(rig: RunningRig, folder: Path) -> None:
+    with raw(folder) as end:
+        end.sendall(b'{"do": "characters"}\n{"do": "get", "prefix": "loop"}\n')
+        with end.makefile("rb") as file:
+            assert json.loads(file.readline()) == {"ok": ["bold", "shy"]}
+            assert json.loads(file.readline()) == {"ok": {RATE: 200.0}}
+
+
+def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
+    rig: RunningRig, folder: Path, beat: Beat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robot.remote_server._TAKES_S", 0.2)
+    with raw(folder) as end:
+        ticks = len(beat.ticks)
+        with contextlib.suppress(OSError):
+            for _ in range(20_000):
+                end.sendall(b'{"do": "dance"}\n')
+        rig.set(RATE, 120.0)
+        assert len(beat.ticks) > ticks
+
+
+# Several at once
+
+
+def test_two_programs_at_once(rig: RunningRig, beat: Beat) -> None:
+    refused: list[str] = []
+
+    def work(value: float) -> None:
+        with RunningRig.connect() as mine:
+            for step in range(20):
+                mine.set(BLINKS, value + step)
+                if not mine.get(BLINKS):
+                    refused.append("lost")
+
+    before = len(beat.ticks)
+    threads = [threading.Thread(target=work, args=(value,)) for value in (100.0, 500.0)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not refused
+    orders = [order for tick in beat.ticks[before:] for order in tick.orders]
+    given = sorted(
+        float(str(change[1]))
+        for order in orders
+        if isinstance(order, Tune)
+        for change in order.changes
+    )
+    assert given == [*(100.0 + n for n in range(20)), *(500.0 + n for n in range(20))]
+
+
+def test_one_who_holds_a_half_request_does_not_hold_up_another(
+    rig: RunningRig, folder: Path
+) -> None:
+    with raw(folder) as end:
+        end.sendall(b'{"do": ')
+        rig.stop("the other one is slow")
+        assert rig.status()["stopped"]
+        rig.resume()
+        end.sendall(b'"characters"}\n')
+        assert "ok" in line_of(end)
+
+
+def test_who_was_quiet_longest_makes_room(rig: RunningRig, folder: Path) -> None:
+    """Whoever comes to stop the head is let in, however many programs hang around."""
+    with contextlib.ExitStack() as stack:
+        ends = [stack.enter_context(raw(folder)) for _ in range(15)]
+        ends[-1].sendall(b'{"do": "characters"}\n')
+        assert "ok" in line_of(ends[-1])  # all are in by now
+        rig.get(RATE)  # and this one was heard last
+        with RunningRig.connect() as stopper:
+            stopper.stop("many around")
+            stopper.resume()
+        assert hung_up(ends[0])
+        assert rig.get(RATE) == {RATE: 200.0}
+        ends[1].sendall(b'{"do": "characters"}\n')
+        assert "ok" in line_of(ends[1])
+
+
+# The socket
+
+
+def test_the_socket_is_the_owners_alone(rig: RunningRig, folder: Path) -> None:
+    path = folder / f"{os.getpid()}.sock"
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    assert [p.name for p in folder.iterdir()] == [path.name]
+
+
+def open_server() -> RemoteServer:
+    beat_less = Requests(None, None, Pulse(RealClock()), {})  # type: ignore[arg-type]
+    return RemoteServer(beat_less, lambda _: None)
+
+
+def test_close_removes_it_and_hangs_up(folder: Path) -> None:
+    server = open_server()
+    path = server.open()
+    with remote_socket.dial(path, 1.0) as end:
+        server.close()
+        assert hung_up(end)
+    assert not path.exists() and running() == []
+    server.close()  # twice is no error
+    names = [thread.name for thread in threading.enumerate()]
+    assert "remote control" not in names
+
+
+def test_a_folder_open_to_others_is_refused_by_both_sides(folder: Path) -> None:
+    folder.mkdir(mode=0o700)
+    folder.chmod(0o777)
+    with pytest.raises(SetupError, match="not a folder of yours alone"):
+        open_server().open()
+    remote_socket.listen(folder / "1.sock").close()
+    assert running() == []
+
+
+def test_a_link_in_place_of_the_folder_is_refused(folder: Path, tmp_path: Path) -> None:
+    tmp_path.chmod(0o700)
+    folder.symlink_to(tmp_path)
+    with pytest.raises(SetupError, match="not a folder of yours alone"):
+        open_server().open()
+
+
+def test_a_folder_of_somebody_else_is_refused(folder: Path) -> None:
+    folder.mkdir(mode=0o700)
+    assert remote_socket.is_private(folder, os.getuid())
+    assert not remote_socket.is_private(folder, os.getuid() + 1)
+
+
+INTRUDES = """
+import os, socket, sys
+os.setgroups([])
+os.setuid(65534)
+try:
+    socket.socket(socket.AF_UNIX).connect(sys.argv[1])
+except PermissionError:
+    print("kept out")
+"""
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can play another user")
+def test_another_user_is_kept_out(folder: Path) -> None:
+    folder.parent.chmod(0o755)
+    server = open_server()
+    path = server.open()
+
+    def said() -> str:
+        words = [sys.executable, "-S", "-c", INTRUDES, str(path)]
+        return subprocess.run(words, capture_output=True, text=True).stdout
+
+    assert said() == "kept out\n"
+    folder.chmod(0o755)
+    assert said() == "kept out\n"  # by the socket itself
+    path.chmod(0o666)
+    assert said() == ""  # so the two were what kept it out
+    server.close()
+
+
+def test_a_path_too_long_for_a_socket_is_refused_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    long = tmp_path / ("x" * 100)
+    long.mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(long))
+    with pytest.raises(SetupError, match="too long for a socket; set XDG_RUNTIME_DIR"):
+        open_server().open()
+
+
+def test_without_a_runtime_folder_it_is_one_of_the_user_in_tmp(tmp_path: Path) -> None:
+    assert remote_socket.folder({"XDG_RUNTIME_DIR": str(tmp_path)}, os.getuid()) == (
+        tmp_path / "gazerig"
+    )
+    for environ in ({}, {"XDG_RUNTIME_DIR": "/nonexistent"}, {"XDG_RUNTIME_DIR": str(tmp_path)}):
+        assert remote_socket.folder(environ, 4_000_000) == Path("/tmp/gazerig-4000000")
+
+
+LISTENS = """
+import os, sys
+from robot.clock import RealClock
+from robot.remote_requests import Pulse, Requests
+from robot.remote_server import RemoteServer
+server = RemoteServer(Requests(None, None, Pulse(RealClock()), {}), print)
+server.open()
+print("open", flush=True)
+sys.stdin.read()
+server.close()
+"""
+
+
+@contextlib.contextmanager
+def listening() -> Iterator[subprocess.Popen[str]]:
+    """Another process with a socket."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", LISTENS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout is not None and process.stdout.readline() == "open\n"
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_a_killed_rig_leaves_a_socket_that_is_no_rig_and_that_the_next_removes(
+    folder: Path,
+) -> None:
+    with listening() as killed:
+        pass
+    dead = folder / f"{killed.pid}.sock"
+    assert dead.exists() and running() == []
+    with pytest.raises(NoRig, match="no rig is running: start one with gazerig run"):
+        RunningRig.connect()
+    server = open_server()
+    path = server.open()
+    assert not dead.exists() and path.exists()
+    server.close()
+
+
+def test_a_living_neighbour_keeps_its_socket(folder: Path) -> None:
+    with listening() as neighbour:
+        server = open_server()
+        server.open()
+        assert set(remote_socket.sockets(folder)) == {neighbour.pid, os.getpid()}
+        server.close()
+        assert set(remote_socket.sockets(folder)) == {neighbour.pid}
+
+
+def test_a_new_rig_takes_over_the_socket_of_a_dead_one_with_its_number(folder: Path) -> None:
+    folder.mkdir(mode=0o700)
+    remote_socket.listen(folder / f"{os.getpid()}.sock").close()  # dead
+    server = open_server()
+    server.open()
+    (found,) = running()
+    found.close()
+    server.close()
+
+
+def test_several_rigs_are_named_and_chosen_by_process(folder: Path, rig: RunningRig) -> None:
+    with listening() as other:
+        with pytest.raises(NoRig) as which:
+            RunningRig.connect()
+        assert f"{os.getpid()} (desk)" in str(which.value) and str(other.pid) in str(which.value)
+        assert "\n" not in str(which.value)
+        with RunningRig.connect(os.getpid()) as mine:
+            assert mine.pid == os.getpid()
+        with pytest.raises(NoRig, match=f"no rig runs as process 1: .*{other.pid}"):
+            RunningRig.connect(1)
+
+
+def test_a_rig_that_ends_while_asked_is_gone_in_words(folder: Path) -> None:
+    with listening() as other:
+        rig = RunningRig.connect()
+        other.kill()
+        other.wait()
+        with pytest.raises(RigGone, match=f"process {other.pid}\\) has ended or hung up"):
+            rig.get()
+        rig.close()
+
+
+def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robot.remote._ANSWER_S", 0.1)
+    folder.mkdir(mode=0o700)
+    with remote_socket.listen(folder / "77.sock"), RunningRig.connect() as rig:
+        for _ in range(2):
+            with pytest.raises(RigGone, match="does not answer|has ended or hung up"):
+                rig.get()

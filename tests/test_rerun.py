@@ -1,0 +1,273 @@
+"""A recorded run done again: to the bit with what was in force, followed with what changed."""
+
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from math import inf, nextafter
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from config.schema import load_rig
+from config.text import rig_text, walk_text
+from drivers.errors import SetupError
+from drivers.types import BusHealth
+from gaze.types import Percept
+from robot.assemble import Assembly, assemble
+from robot.choice import Choice
+from robot.loop import Tick, run
+from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune
+from robot.recording.moment import Engaged, Measured, Moment, Refused
+from robot.recording.played_back import PlayedBody
+from robot.recording.read import RunRecording
+from robot.recording.recorder import Recorder
+from robot.recording.rerun import recorded_rig, rerun
+from robot.recording.run_info import RunEnd, RunInfo, as_text
+from robot.recording.run_writer import RunWriter
+from robot.session import leave
+
+NECK_YAW = 6
+Asked = dict[int, tuple[Order, ...]]
+
+PUPPET: Asked = {
+    40: (Ask("conversation", "talk"), Ask("lids", "wink left")),
+    80: (LookAt((1.0, 0.3, 0.3)),),
+    140: (LookAt(None), Jog((("neck_yaw", 0.2), ("left_eye_pan", 0.1)))),
+    200: (Jog(()),),
+    240: (Stop("a finger is in it"),),
+    280: (Resume(),),
+    330: (Tune((("gaze.saccade.profile", "min_jerk"), ("joints.neck_yaw.zero_step", 2060))),),
+    360: (Tune((("gaze.attention.stale_ms", 200.0), ("gaze.idle.rest_ms", 500.0))),),
+}
+
+
+def recorded(
+    path: Path,
+    seconds: float,
+    asked: Asked | None = None,
+    character: str | None = None,
+    start_s: float = 0.0,
+    at: Callable[[int, Assembly], None] = lambda n, made: None,
+) -> list[Tick]:
+    """Record a simulated run as ``gazerig run --fast --record`` does; give its ticks."""
+    made = assemble(
+        load_rig("desk", character), Choice(mock=True, fast=True, seed=5, scene="visitor")
+    )
+    rig = made.retuner.rig
+    info = RunInfo(
+        rig="desk", profile=rig.profile, character=character, config_yaml=rig_text(rig),
+        walk_yaml=walk_text(rig.gaze.scanpath.walk), seed=5, rate_hz=made.loop.rate_hz,
+        started_utc="2026-01-31T12:00:00+00:00", scene="visitor", mock=True, fast=True,
+    )  # fmt: skip
+    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
+    recorder.open()
+    robot = made.robot
+    robot.body = recorder.tapped(robot.body)
+    seen: list[Tick] = []
+
+    def watch(tick: Tick) -> None:
+        recorder.note(tick)
+        seen.append(tick)
+        at(len(seen), made)
+        for order in (asked or {}).get(len(seen), ()):
+            robot.order(order)
+
+    made.clock.sleep_until(start_s)
+    robot.start(made.clock)
+    stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
+    count = run(robot, made.clock, lambda: made.loop, stop, watch)
+    leave(made, count, lambda line: None)
+    recorder.close(count.stopped_by, made.sent_digest())
+    made.close()
+    return seen
+
+
+class Once(NamedTuple):
+    recording: RunRecording
+    ticks: list[Tick]
+
+
+@pytest.fixture(scope="module")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
+    path = tmp_path_factory.mktemp("reruns") / "run.mcap"
+    ticks = recorded(path, 3.0, PUPPET)
+    return Once(RunRecording(path), ticks)
+
+
+def exact(tick: Tick) -> str:
+    return repr(tick._replace(detections=None, percept=None))
+
+
+def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: Once) -> None:
+    seen: list[Tick] = []
+    found = rerun(once.recording, note=seen.append)
+    assert found.same and found.ticks == found.agreeing == len(once.ticks) == 599
+    assert found.first_difference_s is None and found.differs == ""
+    assert found.joints == "recorded" and found.notes == ()
+    assert found.recorded == found.again
+    # Not the decisions alone: whole ticks, stop, puppet and tuning included.
+    assert list(map(exact, seen)) == list(map(exact, once.ticks))
+
+
+def test_the_same_bytes_go_over_the_bus(once: Once) -> None:
+    assert len(once.recording.end.tx_sha256) == 64
+    assert rerun(once.recording).tx_same is True
+
+
+def test_emulated_servos_do_what_they_did(once: Once) -> None:
+    found = rerun(once.recording, joints="emulated")
+    assert found.joints == "emulated"
+    assert found.same and found.tx_same is True
+
+
+def test_with_other_dice_it_differs(once: Once) -> None:
+    recording = RunRecording(once.recording.path)
+    recording.info = replace(recording.info, seed=6)
+    found = rerun(recording)
+    assert not found.same and found.agreeing < found.ticks
+    assert found.tx_same is False
+    assert found.first_difference_s is not None and found.differs
+
+
+def test_the_last_bit_of_one_joint_is_seen(once: Once, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = RunRecording.moments
+
+    def bent(self: RunRecording) -> Iterator[Moment]:
+        for number, moment in enumerate(real(self)):
+            if number == 20:
+                joints = moment.tick.joints
+                angles = list(joints.position_rad)
+                angles[NECK_YAW] = nextafter(angles[NECK_YAW], inf)
+                joints = joints._replace(position_rad=tuple(angles))
+                moment = moment._replace(tick=moment.tick._replace(joints=joints))
+            yield moment
+
+    monkeypatch.setattr(RunRecording, "moments", bent)
+    found = rerun(once.recording)
+    assert found.first_difference_s == pytest.approx(0.1)
+
+
+def test_another_character_is_followed_by_the_servos(once: Once, tmp_path: Path) -> None:
+    bold = tmp_path / "bold.yaml"
+    bold.write_text("gaze:\n  saccade:\n    profile: main_sequence\n  scanpath:\n    tempo: 4.0\n")
+    seen: list[Tick] = []
+    found = rerun(once.recording, character=str(bold), note=seen.append)
+    assert found.joints == "emulated" and not found.same
+    assert len(seen) == found.ticks == 599
+    assert found.agreeing < found.ticks and found.differs
+    # What was seen is the same, and the servos went where the new commands sent them.
+    assert [captured(t.percept) for t in seen] == [captured(t.percept) for t in once.ticks]
+    behind = [
+        abs(now - sent)
+        for tick in seen[-20:]
+        for now, sent in zip(tick.joints.position_rad, tick.verdict.command_rad, strict=True)
+    ]
+    assert max(behind) < 0.3
+
+
+def captured(percept: Percept | None) -> float | None:
+    return percept.captured_s if percept is not None else None
+
+
+def test_another_rig_by_name_and_as_it_is(once: Once) -> None:
+    by_name = rerun(once.recording, rig="desk", joints="recorded")
+    as_it_is = rerun(once.recording, rig=load_rig("desk"), joints="recorded")
+    assert by_name.same and as_it_is.same
+    with pytest.raises(
+        SetupError, match="joints upside_down: unknown; there is recorded, emulated"
+    ):
+        rerun(once.recording, joints="upside_down")
+
+
+def test_a_run_of_a_character_is_done_again_without_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "shy.mcap"
+    recorded(path, 1.0, character="shy")
+    assert rerun(RunRecording(path)).same
+
+
+def test_the_recorded_rig(once: Once) -> None:
+    assert repr(recorded_rig(once.recording)) == repr(load_rig("desk"))
+
+
+def test_a_configuration_of_another_version_is_told_in_one_line(once: Once) -> None:
+    recording = RunRecording(once.recording.path)
+    text = f"{recording.info.config_yaml}antennas: 2\n"
+    recording.info = replace(recording.info, config_yaml=text)
+    words = r"a configuration that this version does not know \(antennas: .*\): give another rig"
+    with pytest.raises(SetupError, match=words) as found:
+        rerun(recording)
+    assert "\n" not in str(found.value)
+
+
+def test_a_run_on_the_hosts_clock_is_done_again(tmp_path: Path) -> None:
+    """Times of a machine that has been up for days, and slots that are not round numbers."""
+    path = tmp_path / "days.mcap"
+    ticks = recorded(path, 1.5, {100: (Stop("x"),), 150: (Resume(),)}, start_s=345678.9012345)
+    recording = RunRecording(path)
+    found = rerun(recording)
+    assert found.same and found.ticks == len(ticks)
+
+
+def test_a_fault_that_ended_a_run_ends_nothing_here(tmp_path: Path) -> None:
+    path = tmp_path / "fault.mcap"
+
+    def fail(number: int, made: Assembly) -> None:
+        if number == 100:
+            made.robot.body.bus._port.chain[7].fail("overload")  # type: ignore[attr-defined]
+
+    ticks = recorded(path, 2.0, at=fail)
+    assert ticks[-1].verdict.level == "limp"
+    recording = RunRecording(path)
+    assert recording.end.stopped_by.startswith("fault")
+    found = rerun(recording)
+    assert found.same and found.ticks == len(ticks)
+
+
+def test_an_order_that_is_none_any_more_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "ask.mcap"
+    recorded(path, 0.5, {20: (Ask("behaviour", "guard"),)})
+    rig = load_rig("desk")
+    top_down = rig.gaze.top_down
+    fewer = replace(top_down, rules={"wait": top_down.rules["wait"]}, behaviour="wait")
+    rig = replace(rig, gaze=replace(rig.gaze, top_down=fewer))
+    found = rerun(RunRecording(path), rig=rig)
+    (note,) = found.notes
+    assert "could not be given again: no behaviour 'guard'" in note
+
+
+def test_a_refused_resumption_is_refused_again() -> None:
+    made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
+    made.robot.start(made.clock)
+    tick = made.robot.tick(0.005, 0.005)
+    body = PlayedBody(made.robot.body)
+    goals, other = (0.1,) * 9, tick.joints._replace(position_rad=(0.2,) * 9)
+    body.play(
+        Moment(tick, 0.005, (Refused("servo 7 is mute"), Engaged(goals), Measured(0.0, other)))
+    )
+    with pytest.raises(SetupError, match="servo 7 is mute"):
+        body.take_hold()
+    assert body.take_hold() == goals
+    assert body.read(0.005) is other
+    assert body.read(0.005) is tick.joints
+    assert body.read(0.010) is tick.joints  # more readings than there were
+    body.leave_off()
+    assert body.read(0.015) is not tick.joints
+
+
+def test_a_recording_without_ticks_is_refused(once: Once, tmp_path: Path) -> None:
+    path = tmp_path / "none.mcap"
+    writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), as_text(once.recording.info), 0)
+    writer.close(RunEnd("seconds"))
+    with pytest.raises(SetupError, match="holds no tick: there is nothing to run again"):
+        rerun(RunRecording(path))
+
+
+def test_a_new_run_can_be_recorded_itself(once: Once, tmp_path: Path) -> None:
+    again = tmp_path / "again.mcap"
+    recorder = Recorder(again, once.recording.info, lambda: BusHealth(0, 0, {}), patient=True)
+    recorder.open()
+    rerun(once.recording, note=recorder.note)
+    recorder.close("seconds")
+    back = list(RunRecording(again).ticks())
+    assert list(map(exact, back)) == list(map(exact, once.ticks))

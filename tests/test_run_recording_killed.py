@@ -1,0 +1,99 @@
+"""A rig that is killed while it records: the file closes, or opens up to the last second."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from robot.recording.read import RunRecording
+
+ROOT = Path(__file__).parents[1]
+
+RIG = """
+import sys
+from pathlib import Path
+from config.schema import load_rig
+from robot.assemble import assemble
+from robot.choice import Choice
+from robot.clock import RealClock
+from robot.recording.recorder import Recorder
+from robot.recording.run_info import RunInfo
+
+made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
+info = RunInfo("desk", "robot", "a: 1", 0, 200.0, "2026-01-31T00:00:00+00:00")
+recorder = Recorder(Path(sys.argv[1]), info, made.robot.body.bus.health)
+recorder.open()
+print(recorder._link._process.pid, flush=True)
+made.robot.body = recorder.tapped(made.robot.body)
+made.robot.start(made.clock)
+wall = RealClock()
+start_s = wall.now_s()
+for number in range(1, 100000):
+    t_s = 0.005 * number
+    wall.sleep_until(start_s + t_s)
+    made.clock.sleep_until(t_s)
+    recorder.note(made.robot.tick(t_s, 0.005))
+    print(wall.now_s(), t_s, flush=True)
+"""
+"""A rig that goes on until it is killed, and says when each tick was handed over."""
+
+
+class Killed:
+    """A rig that has been killed, alone or with its writer.
+
+    handed: (wall clock, rig's time) of every tick that it had handed over; killed_s: when
+    """
+
+    def __init__(self, path: Path, both: bool) -> None:
+        rig = subprocess.Popen(
+            [sys.executable, "-c", RIG, str(path)],
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+        )
+        assert rig.stdout is not None
+        writer = int(rig.stdout.readline())
+        lines = []
+        for line in rig.stdout:
+            lines.append(line)
+            if float(line.split()[1]) >= 2.5:
+                break
+        if both:
+            os.kill(writer, signal.SIGKILL)
+        rig.kill()
+        self.killed_s = time.monotonic()
+        lines += rig.stdout.readlines()
+        rig.wait()
+        self.handed = [tuple(map(float, line.split())) for line in lines if line.endswith("\n")]
+        deadline_s = time.monotonic() + 30.0
+        while alive(writer):
+            assert time.monotonic() < deadline_s, "the writer outlives its rig"
+            time.sleep(0.02)
+
+
+def alive(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
+@pytest.mark.parametrize("both", [False, True], ids=["rig", "rig and writer"])
+def test_a_killed_rig_leaves_a_recording(tmp_path: Path, both: bool) -> None:
+    path = tmp_path / "killed.mcap"
+    killed = Killed(path, both)
+    recording = RunRecording(path)
+    assert recording.whole is not both
+    words = "was not closed" if both else "ends where the program was killed"
+    assert words in recording.note
+    times = [tick.t_s for tick in recording.ticks()]
+    assert times == [t_s for _, t_s in killed.handed][: len(times)]  # nothing lacks in between
+    kept_s = dict((t_s, wall_s) for wall_s, t_s in killed.handed)[times[-1]]
+    assert killed.killed_s - kept_s <= 1.0
+    assert recording.info.rig == "desk" and recording.end.stopped_by == ""

@@ -1,0 +1,181 @@
+"""What people are shown of a running rig: nothing of it is lost between two snapshots."""
+
+from collections.abc import Callable
+from functools import cache
+from math import degrees, radians
+
+import numpy as np
+import pytest
+
+from config.schema import Rig, load_rig
+from gaze.angles import angle_between
+from robot.assemble import Assembly, assemble, gaze_parts
+from robot.choice import Choice
+from robot.loop import Tick, run
+from robot.page import MESSAGE_BYTES, pack, unpack
+from robot.report.gaze_events import Blink, Fixation, GazeEvents, Saccade
+from robot.snapshot import Said, ShownRig, Snapshots, snapshot
+from robot.types import JOINTS, SeenBlink, SeenFixation, SeenSaccade, Snapshot
+
+RATE_HZ = 200.0
+TICKS_BETWEEN = 8
+
+
+@cache
+def visit() -> tuple[Rig, Assembly, tuple[Tick, ...]]:
+    """Eight seconds of a rig that talks with somebody."""
+    rig = load_rig("desk")
+    made = assemble(rig, Choice(mock=True, fast=True, seed=0, scene="face-to-face"))
+    ticks: list[Tick] = []
+    made.robot.start(made.clock)
+    over: Callable[[float], str | None] = lambda s: "over" if s >= 8.0 else None  # noqa: E731
+    run(made.robot, made.clock, made.loop, over, ticks.append)
+    made.robot.stop()
+    made.close()
+    return rig, made, tuple(ticks)
+
+
+def shown_rig() -> ShownRig:
+    rig, made, _ = visit()
+    limits = tuple(rig.joints[name].limit() for name in JOINTS)
+    return ShownRig(
+        gaze_parts(rig, 0)[0],
+        limits,
+        rig.guard.health,
+        made.mount,
+        radians(made.horizontal_field_deg),
+        rig.gaze.field_of_view,
+    )
+
+
+@cache
+def taken() -> tuple[Snapshot, ...]:
+    snapshots = Snapshots(RATE_HZ, shown_rig())
+    out = []
+    for number, tick in enumerate(visit()[2]):
+        snapshots.note(tick)
+        if number % TICKS_BETWEEN == TICKS_BETWEEN - 1:
+            shot = snapshots.take(Said("bus ok", "wait", "seeing", "shy", "listen"))
+            assert shot is not None
+            out.append(shot)
+    return tuple(out)
+
+
+def test_nothing_is_shown_before_the_first_tick() -> None:
+    assert Snapshots(RATE_HZ).take(Said()) is None
+
+
+def test_every_eye_movement_is_shown_once() -> None:
+    finder = GazeEvents()
+    found = [event for tick in visit()[2] for event in finder.note(tick)]
+    seen = [event for shot in taken() for event in shot.events]
+    kinds = ((Saccade, SeenSaccade), (Fixation, SeenFixation), (Blink, SeenBlink))
+    for kind, shown in kinds:
+        assert sum(isinstance(event, shown) for event in seen) == sum(
+            isinstance(event, kind) for event in found
+        )
+    assert sum(isinstance(event, SeenSaccade) for event in seen) > 10
+    jumps = [event for event in found if isinstance(event, Saccade)]
+    first = next(event for event in seen if isinstance(event, SeenSaccade))
+    assert first == (
+        jumps[0].onset_s, jumps[0].duration_s, jumps[0].amplitude_deg, jumps[0].peak_deg_s,
+    )  # fmt: skip
+
+
+def test_joints_are_shown_a_hundred_times_a_second_as_wished_permitted_and_measured() -> None:
+    by_time = {tick.t_s: tick for tick in visit()[2]}
+    rows = [row for shot in taken() for row in shot.trail]
+    assert np.allclose(np.diff([row.t_s for row in rows]), 0.01)
+    for row in rows:
+        tick = by_time[row.t_s]
+        assert row[1:] == (tick.wish_rad, tick.verdict.command_rad, tick.joints.position_rad)
+
+
+def test_the_ghost_is_where_the_wish_is() -> None:
+    apart = []
+    for shot in taken():
+        assert shot.ghost is not None
+        apart.append(degrees(angle_between(shot.ghost.gaze_world[0], shot.gaze_world[0])))
+        if shot.wish_rad == shot.measured_rad:
+            assert shot.ghost.p_world_eyes_m == shot.p_world_eyes_m
+    assert np.median(apart) < 1.0  # while the eyes rest
+    assert max(apart) > 1.0  # while they jump, the servos lag behind
+
+
+def test_the_camera_sits_on_the_head_and_sees_the_face() -> None:
+    shot = taken()[-1]
+    assert shot.camera is not None
+    p, R = np.array(shot.camera.p_world_camera_m), np.array(shot.camera.R_world_camera)
+    x, y, z = R.T @ (np.array(shot.faces[0].p_world_m) - p)
+    assert z > 0.0
+    assert abs(x / z) < np.tan(shot.camera.horizontal_rad / 2)
+    assert abs(y / z) < np.tan(shot.camera.horizontal_rad / 2) / shot.camera.aspect
+    assert np.linalg.norm(p - shot.p_world_head_m) < 0.1
+
+
+def test_what_a_tick_does_not_tell_is_said() -> None:
+    shot = taken()[-1]
+    assert (shot.health, shot.behaviour, shot.seeing) == ("bus ok", "wait", "seeing")
+    assert (shot.character, shot.conversation) == ("shy", "listen")
+    assert shot.timing is not None
+    assert shot.timing.rate_hz == pytest.approx(RATE_HZ)
+    assert shot.rate_hz == shot.timing.rate_hz
+    assert shot.target_kind == "face" and shot.target_id == shot.faces[0].id
+    assert shot.picture_age_s is not None and 0.0 < shot.picture_age_s < 0.2
+
+
+def test_servos_come_with_their_limits_and_their_silences() -> None:
+    rig, _, ticks = visit()
+    snapshots = Snapshots(RATE_HZ, shown_rig())
+    silent = ticks[3].joints._replace(missing=("neck_yaw",))
+    for tick in (*ticks[:3], ticks[3]._replace(joints=silent)):
+        snapshots.note(tick)
+    shot = snapshots.take(Said())
+    assert shot is not None and shot.servos.limits is not None
+    assert shot.servos.unanswered == tuple(int(name == "neck_yaw") for name in JOINTS)
+    hottest = rig.joints["neck_yaw"].limit().hottest_c
+    assert shot.servos.limits.hot_c[6] == hottest - rig.guard.health.hot_c
+    assert shot.servos.limits.warm_c[6] < shot.servos.limits.hot_c[6]
+
+
+def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
+    ticks = visit()[2]
+    snapshots = Snapshots(RATE_HZ)
+    calm = [tick for tick in ticks if tick.verdict.level == "ok"][:4]
+    short = calm[1]._replace(verdict=calm[1].verdict._replace(level="hold"))
+    for tick in (calm[0], short, calm[2]):
+        snapshots.note(tick)
+    shot = snapshots.take(Said())
+    assert shot is not None and (shot.level, shot.worst) == ("ok", "hold")
+    snapshots.note(calm[3])
+    after = snapshots.take(Said())
+    assert after is not None and after.worst == "ok"
+
+
+def test_a_clock_set_back_begins_anew() -> None:
+    ticks = visit()[2]
+    snapshots = Snapshots(RATE_HZ)
+    for tick in (*ticks[:300], *ticks[:300]):
+        snapshots.note(tick)
+    shot = snapshots.take(Said())
+    once = Snapshots(RATE_HZ)
+    for tick in ticks[:300]:
+        once.note(tick)
+    alone = once.take(Said())
+    assert shot is not None and alone is not None
+    assert shot.timing == alone.timing
+    assert shot.trail == alone.trail * 2
+    assert shot.events == alone.events * 2
+
+
+def test_without_a_rig_a_single_tick_is_shown_as_far_as_it_goes() -> None:
+    shot = snapshot(visit()[2][-1], 200.0, "bus ok", "wait")
+    assert shot.ghost is None and shot.camera is None and shot.servos.limits is None
+    assert len(shot.trail) == 1 and shot.servos.load != ()
+
+
+def test_snapshots_survive_the_way_and_are_short() -> None:
+    for shot in taken():
+        message = pack(shot)
+        assert len(message) < MESSAGE_BYTES / 20
+        assert unpack(message) == shot

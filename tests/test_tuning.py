@@ -1,0 +1,219 @@
+"""Tuning: values set, saved, reverted and read again while a rig runs."""
+
+import re
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from config.load import ConfigError
+from config.schema import load_rig
+from robot.assemble import Assembly, assemble
+from robot.choice import Choice
+from robot.orders import Order, Tune
+from robot.tuning import Tuning
+
+DESK = Path("config/rigs/desk.yaml")
+NOW = datetime(2026, 1, 31, 23, 59, 59)
+
+
+def here(work: Callable[..., Any], *words: Any) -> Any:
+    """Call in this process."""
+    return work(*words)
+
+
+class Bench:
+    """A running rig's tuning, and what was ordered."""
+
+    def __init__(self, name: str, character: str | None = None, **chosen: Any) -> None:
+        rig = load_rig(name, character)
+        self.made: Assembly = assemble(rig, Choice(True, True, 0, "visitor", **chosen))
+        self.orders: list[Order] = []
+        self.tuning = Tuning(
+            self.made.retuner, self.take, name, character, now=lambda: NOW, elsewhere=here
+        )
+
+    def take(self, order: Order) -> None:
+        self.orders.append(order)
+        assert isinstance(order, Tune)
+        self.said = self.made.retuner(order, 0.0)
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.yaml"
+    path.write_text(DESK.read_text(encoding="utf-8"), encoding="utf-8")
+    return path
+
+
+def test_set_puts_all_in_force_with_one_order() -> None:
+    bench = Bench("desk")
+    lines = bench.tuning.set({"gaze.lids.close_ms": 90, "bus.port": "/dev/ttyACM1"})
+    assert len(bench.orders) == 1 and bench.made.retuner.rig.gaze.lids.close_ms == 90.0
+    assert "gaze.lids.close_ms = 90.0" in lines
+    assert "bus.port = /dev/ttyACM1 (next start: the servo bus is opened with it)" in lines
+    assert bench.tuning.version == 1
+    assert bench.tuning.get("gaze.lids.close")["gaze.lids.close_ms"] == 90.0
+    assert {c.key: (c.old, c.new) for c in bench.tuning.unsaved()} == {
+        "gaze.lids.close_ms": ("75.0", "90.0"),
+        "bus.port": ("/dev/ttyUSB0", "/dev/ttyACM1"),
+    }
+    assert bench.tuning.unsaved() == bench.tuning.differs()
+
+
+def test_what_is_in_force_already_orders_nothing() -> None:
+    bench = Bench("desk")
+    assert bench.tuning.set({"gaze.lids.close_ms": 75.0}) == ()
+    assert not bench.orders and bench.tuning.version == 0
+
+
+def test_one_wrong_value_refuses_all_with_every_rule() -> None:
+    bench = Bench("desk")
+    with pytest.raises(ConfigError) as refused:
+        bench.tuning.set(
+            {"gaze.lids.close_ms": 9e9, "gaze.lids.open_ms": 100.0, "guard.gentle_ms": -1.0}
+        )
+    assert len(refused.value.faults) == 2 and not bench.orders
+    assert bench.tuning.values()["gaze.lids.open_ms"] == 175.0
+    with pytest.raises(ConfigError, match="no such file"):
+        bench.tuning.set({"gaze.scanpath.walk": "absent.yaml"})
+    assert not bench.orders and bench.tuning.version == 0
+
+
+def test_save_keeps_comments_and_a_backup_and_reload_finds_nothing_new(mine: Path) -> None:
+    bench = Bench(str(mine))
+    before = mine.read_text(encoding="utf-8")
+    bench.tuning.set({"gaze.lids.close_ms": 90.0, "park_deg.neck_yaw": 5.0})
+    saved = bench.tuning.save()
+    assert saved.path == mine and saved.backup == Path(f"{mine}.bak-20260131-235959")
+    assert saved.backup.read_text(encoding="utf-8") == before
+    after = mine.read_text(encoding="utf-8")
+    changed_lines = [a for a in after.splitlines() if a not in before.splitlines()]
+    assert len(changed_lines) == 2 and re.search(r"close_ms: 90.0  # ms", after)
+    assert bench.tuning.unsaved() == ()
+    version = bench.tuning.version
+    assert bench.tuning.reload(mine) == () and bench.tuning.version == version
+
+
+def test_a_shipped_rig_asks_for_a_path_and_goes_on_from_it(tmp_path: Path) -> None:
+    bench = Bench("desk")
+    bench.tuning.set({"gaze.lids.close_ms": 90.0})
+    with pytest.raises(ConfigError, match="comes with the program"):
+        bench.tuning.save()
+    with pytest.raises(ConfigError, match=r"ends in \.yaml"):
+        bench.tuning.save(tmp_path / "my")
+    copy = tmp_path / "my.yaml"
+    bench.tuning.save(copy)
+    assert load_rig(str(copy)).gaze.lids.close_ms == 90.0
+    assert bench.tuning.path == copy and bench.tuning.unsaved() == ()
+    assert copy in bench.tuning.files()
+    bench.tuning.set({"gaze.lids.close_ms": 95.0})
+    bench.tuning.save()
+    assert load_rig(str(copy)).gaze.lids.close_ms == 95.0
+
+
+def test_a_copy_never_takes_the_place_of_another_file(mine: Path, tmp_path: Path) -> None:
+    bench = Bench(str(mine))
+    other = tmp_path / "other.yaml"
+    other.write_text("mine", encoding="utf-8")
+    bench.tuning.set({"gaze.lids.close_ms": 90.0})
+    with pytest.raises(ConfigError, match="is there already"):
+        bench.tuning.save(other)
+    assert other.read_text(encoding="utf-8") == "mine" and bench.tuning.path == mine
+
+
+def test_revert_takes_everything_back() -> None:
+    bench = Bench("desk")
+    first = bench.made.retuner.rig
+    bench.tuning.set({"gaze.lids.close_ms": 90.0, "face_parts_mm.N": (1.0, 2.0, 3.0)})
+    bench.tuning.revert()
+    assert bench.made.retuner.rig == first and bench.tuning.unsaved() == ()
+
+
+def test_a_file_edited_by_hand_is_put_in_force_and_what_is_unsaved_stays(mine: Path) -> None:
+    bench = Bench(str(mine))
+    bench.tuning.set({"gaze.lids.close_ms": 90.0, "gaze.lids.open_ms": 200.0})
+    text = mine.read_text(encoding="utf-8")
+    text = text.replace("rate_hz: 200.0", "rate_hz: 100.0")
+    mine.write_text(text.replace("open_ms: 175.0", "open_ms: 150.0"), encoding="utf-8")
+    lines = bench.tuning.reload(mine)
+    assert set(lines) == {"loop.rate_hz = 100.0", "gaze.lids.open_ms = 150.0"}
+    lids = bench.made.retuner.rig.gaze.lids
+    assert (lids.close_ms, lids.open_ms, bench.made.loop.rate_hz) == (90.0, 150.0, 100.0)
+    assert [c.key for c in bench.tuning.unsaved()] == ["gaze.lids.close_ms"]
+
+
+def test_a_file_that_is_wrong_changes_nothing(mine: Path) -> None:
+    bench = Bench(str(mine))
+    text = mine.read_text(encoding="utf-8").replace("rate_hz: 200.0", "rate_hz: 9000.0")
+    mine.write_text(text.replace("close_ms: 75.0", "close_ms: fast"), encoding="utf-8")
+    with pytest.raises(ConfigError) as refused:
+        bench.tuning.reload(mine)
+    assert len(refused.value.faults) == 2 and str(mine) in str(refused.value)
+    assert not bench.orders and bench.made.loop.rate_hz == 200.0
+
+
+def test_characters_are_switched_and_what_is_unsaved_stays_over_them() -> None:
+    bench = Bench("desk", "shy")
+    assert bench.tuning.characters()[0] == "shy" and "none" in bench.tuning.characters()
+    bench.tuning.set({"gaze.lids.close_ms": 90.0})
+    bench.tuning.character("sleepy")
+    want = load_rig("desk", "sleepy").gaze
+    got = bench.made.retuner.rig.gaze
+    assert got.head == want.head and got.top_down == want.top_down
+    assert got.lids.close_ms == 90.0 and got.lids.open_ms == want.lids.open_ms
+    assert bench.tuning.character_name == "sleepy"
+    bench.tuning.revert()
+    assert bench.made.retuner.rig == load_rig("desk", "sleepy")
+    bench.tuning.character("none")
+    assert bench.made.retuner.rig == load_rig("desk")
+    with pytest.raises(ConfigError, match="nothing named 'slepy'"):
+        bench.tuning.character("slepy")
+    assert bench.tuning.character_name == "none"
+
+
+def test_a_value_that_the_character_sets_is_not_saved_into_the_rig(mine: Path) -> None:
+    bench = Bench(str(mine), "shy")
+    before = mine.read_bytes()
+    bench.tuning.set({"gaze.lids.blinks_per_min": 5.0})
+    with pytest.raises(ConfigError, match="a later layer sets it"):
+        bench.tuning.save()
+    assert mine.read_bytes() == before and bench.tuning.unsaved()
+
+
+def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> None:
+    bench = Bench(str(mine), scanpath="random", saccade="main_sequence")
+    assert bench.tuning.unsaved() == ()
+    bench.tuning.character("bold")
+    bench.tuning.reload(mine)
+    assert bench.made.retuner.rig.gaze.scanpath.model == "random"
+    bench.tuning.set({"gaze.aversion.shortest_s": 0.3})
+    bench.tuning.save()
+    assert load_rig(str(mine)).gaze.scanpath.model == "markov"
+    assert load_rig(str(mine)).gaze.aversion.shortest_s == 0.3
+
+
+def test_knobs_follow_what_entries_there_are() -> None:
+    bench = Bench("desk")
+    before = len(bench.tuning.knobs())
+    rule: dict[str, Any] = {"look_at": "hand", "pull": 1.0}
+    bench.tuning.set({"gaze.top_down.rules.fetch": rule})
+    assert len(bench.tuning.knobs()) == before + 3
+    assert "fetch" in bench.made.robot.menus()["behaviour"]
+
+
+def test_lists_of_mappings_are_left_to_the_file(mine: Path) -> None:
+    bench = Bench(str(mine))
+    box: dict[str, Any] = {
+        "first": "neck_pitch",
+        "first_min_deg": -40.0,
+        "first_max_deg": -30.0,
+        "second": "left_upper_lid",
+        "second_min_deg": 5.0,
+        "second_max_deg": 20.0,
+    }
+    bench.tuning.set({"guard.collisions": (box,)})
+    with pytest.raises(ConfigError, match="change it in the file"):
+        bench.tuning.save()
