@@ -28,6 +28,8 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_motion.py
 	$(BIN)/python tests/bench/bench_camera.py
 	$(BIN)/python tests/bench/bench_latency.py
+	$(BIN)/python tests/bench/bench_page.py
+	$(BIN)/python tests/bench/bench_recording.py
 
 figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/make_figures.py

@@ -2,14 +2,19 @@
 
 A key is the dotted path of the YAML. A rig is changed by keys as a file would change it:
 what is wrong is said in the same words, and nothing is changed then. Pure.
+
+A changed rig shares with the one it was made of every section in which nothing changed, and
+only what is not shared is checked and compared: a slider that is dragged makes ten rigs a
+second beside a control loop that needs the same interpreter.
 """
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from typing import Any, NamedTuple
 
-from config.bounds import Form, Shape, shapes_of
+from config.bounds import Form, Shape, judge, shapes_of
 from config.export import closest, shown
 from config.load import ConfigError, Entry, Fault, weighed
 from config.schema import RULES, Rig
@@ -70,9 +75,7 @@ class Knob(NamedTuple):
 
 def knobs(rig: Rig, defaults: Rig) -> tuple[Knob, ...]:
     """List the parameters of a rig in the order of its file."""
-    return tuple(
-        _knob(key, shape, _at(defaults, key)) for key, shape, _ in _leaves(_ROOT, plain(rig), ())
-    )
+    return tuple(_knob(key, shape, _at(defaults, key)) for key, shape, _ in _leaves(_ROOT, rig, ()))
 
 
 def value_of(rig: Rig, key: str) -> Value:
@@ -81,25 +84,38 @@ def value_of(rig: Rig, key: str) -> Value:
     Raises:
         config.load.ConfigError: there is no such key; the message says which there are.
     """
-    value: Any = plain(rig)
+    value: Any = rig
     for done, step in enumerate(steps := key.split(".")):
-        if isinstance(value, dict) and step in value:
-            value = value[step]
+        held = _parts(value)
+        if held is not None and step in held:
+            value = held[step]
             continue
         over = ".".join(steps[:done])
         if over in _UNLISTED and step in _UNLISTED[over] and done == len(steps) - 1:
             return _LEFT_OUT.get(over)
-        names = tuple(value) if isinstance(value, dict) else ()
+        names = tuple(held or ())
         near = closest(step, names) or ";"
         there = f"there is {', '.join(names)}" if names else f"{over} has no keys"
         raise ConfigError([Fault("", None, key, "", f"unknown key {shown(step)}{near} {there}")])
-    held: Value = value
-    return held
+    found: Value = plain(value)
+    return found
 
 
 def values(rig: Rig) -> dict[str, Value]:
     """Give key -> value of every knob."""
-    return {".".join(path): value for path, _, value in _flat(rig)}
+    return {key: value for key, _, value in _leaves(_ROOT, rig, ())}
+
+
+def values_after(
+    before: Mapping[str, Value], rig: Rig, found: Mapping[str, Value]
+) -> dict[str, Value]:
+    """Give ``values(rig)`` from those of the rig before it and the differences between the two."""
+    single = all(
+        key in before and value is not None and not isinstance(value, Mapping)
+        for key, value in found.items()
+    )
+    # Anything else may be an entry that came or went, and other keys with it.
+    return {**before, **found} if single else values(rig)
 
 
 def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
@@ -111,6 +127,26 @@ def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     Raises:
         config.load.ConfigError: with every fault, in the words of loading a file.
     """
+    made = _judged(rig, changes)
+    return made if made is not None else _weighed(rig, changes)
+
+
+def _judged(rig: Rig, changes: Mapping[str, Value]) -> Rig | None:
+    """Give the changed rig, None where anything is wrong with it.
+
+    Sections in which nothing changes go through the judge as they are, already checked.
+    """
+    data = _opened(rig, [tuple(key.split(".")) for key in changes])
+    if any([_put(data, key, _frozen(value)) for key, value in changes.items()]):
+        return None
+    made, _ = judge(Rig, data)
+    if made is None or any(True for rule in RULES for _ in rule(made)):
+        return None
+    return made
+
+
+def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
+    """Give the changed rig, or raise every fault; all is checked anew."""
     data, faults = plain(rig), []
     for key, value in changes.items():
         faults += _put(data, key, _frozen(value))
@@ -127,7 +163,7 @@ def differences(before: Rig, after: Rig) -> dict[str, Value]:
 
     Where a mapping lost an entry, that entry's value is None.
     """
-    return dict(_differing(_ROOT, plain(before), plain(after), ()))
+    return dict(_differing(_ROOT, before, after, ()))
 
 
 def flattened(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
@@ -153,6 +189,27 @@ def plain(value: Any) -> Any:
     return value
 
 
+def _parts(value: Any) -> dict[str, Any] | None:
+    """Give what stands one step below a value, None where there is nothing."""
+    if isinstance(value, Mapping):
+        return {str(key): item for key, item in value.items()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {name: getattr(value, name) for name in shapes_of(type(value))}
+    return None
+
+
+def _opened(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
+    """Give a value with plain dicts along the paths and at their ends, the rest as it is."""
+    if () in paths:
+        return plain(value)
+    parts = _parts(value) if paths else None
+    if parts is None:
+        return value
+    for step in {path[0] for path in paths} & parts.keys():
+        parts[step] = _opened(parts[step], [path[1:] for path in paths if path[0] == step])
+    return parts
+
+
 _ROOT = Shape("params", params=Rig)
 
 
@@ -161,18 +218,13 @@ def _leaves(shape: Shape, value: Any, path: tuple[str, ...]) -> Iterator[tuple[s
     key = ".".join(path)
     if shape.params is not None and value is not None:
         for name, field in shapes_of(shape.params).items():
-            yield from _leaves(field, value.get(name), (*path, name))
+            yield from _leaves(field, getattr(value, name), (*path, name))
     elif shape.form == "mapping" and shape.inner is not None:
         inner = dataclasses.replace(shape.inner, says=shape.says, unit=shape.unit)
         for step in (*value, *(s for s in _UNLISTED.get(key, ()) if s not in value)):
             yield from _leaves(inner, value.get(step, _LEFT_OUT.get(key)), (*path, step))
     else:
-        yield key, shape, value
-
-
-def _flat(rig: Rig) -> Iterator[tuple[tuple[str, ...], Shape, Value]]:
-    for key, shape, value in _leaves(_ROOT, plain(rig), ()):
-        yield tuple(key.split(".")), shape, value
+        yield key, shape, plain(value)
 
 
 def _knob(key: str, shape: Shape, default: Value) -> Knob:
@@ -198,6 +250,7 @@ def _knob(key: str, shape: Shape, default: Value) -> Knob:
     )
 
 
+@lru_cache(maxsize=1024)
 def live(key: str) -> str:
     """Say when a change of a key takes effect, and why no sooner."""
     for pattern, reason in _AT_START.items():
@@ -227,19 +280,21 @@ def _is_group(rig: Rig, key: str) -> bool:
 def _differing(
     shape: Shape, before: Any, after: Any, path: tuple[str, ...]
 ) -> Iterator[tuple[str, Value]]:
-    if before == after and type(before) is type(after):
+    if before is after:
         return
     if shape.params is not None and before is not None and after is not None:
         for name, field in shapes_of(shape.params).items():
-            yield from _differing(field, before[name], after[name], (*path, name))
+            yield from _differing(field, getattr(before, name), getattr(after, name), (*path, name))
+    elif before == after and type(before) is type(after):
+        return
     elif shape.form == "mapping" and shape.inner is not None:
         for step in {**before, **after}:
             if step in before and step in after:
                 yield from _differing(shape.inner, before[step], after[step], (*path, step))
             else:
-                yield ".".join((*path, step)), after.get(step)
+                yield ".".join((*path, step)), plain(after.get(step))
     else:
-        yield ".".join(path), after
+        yield ".".join(path), plain(after)
 
 
 def _put(data: dict[str, Any], key: str, value: Value) -> list[Fault]:

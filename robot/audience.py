@@ -12,7 +12,7 @@ from robot.assemble import Assembly
 from robot.live_control import FileTuning, LiveControl
 from robot.loop import LoopCount, Tick
 from robot.onlooker import InForce, Onlooker
-from robot.orders import Tune
+from robot.orders import Order, Resume, Stop, Tune
 from robot.page import Page
 from robot.page_feed import Fed, TuningFeed
 from robot.page_hear import PageHear
@@ -20,6 +20,9 @@ from robot.picking import Picking
 from robot.recording.recorder import Recorder
 from robot.recording.run_info import RunInfo
 from robot.snapshot import Snapshots
+
+STEER = "steer"
+"""The menu of this name is the page's steps of a calibration (robot.page_controls)."""
 
 
 class LiveTuning(FileTuning, Fed, Protocol):
@@ -52,6 +55,18 @@ class Told(NamedTuple):
     info: Callable[[], RunInfo]
 
 
+class Steer(NamedTuple):
+    """Buttons of the page that lead a calibration in the place of all that leads the robot.
+
+    keys: what stands on them; press: takes one, in a thread of the page's, and gives what there
+    is to say about it; shown: gives how far things are, in words
+    """
+
+    keys: tuple[str, ...]
+    press: Callable[[str], str | None]
+    shown: Callable[[], str]
+
+
 class Audience:
     """All of them, opened and closed together."""
 
@@ -63,12 +78,15 @@ class Audience:
         fast: bool,
         say: Callable[[str], None],
         status: Callable[[str], None],
+        steer: Steer | None = None,
     ) -> None:
         """Take the robot before it starts.
 
         told: None where parameters cannot be changed from outside and nothing is recorded
         fast: simulated time, in which nobody can watch
+        steer: who leads the head by buttons; then the page can otherwise only stop and resume
         """
+        self._steer = steer
         self._made, self._fast, self._say = made, fast, say
         self._tuning = told.tuning if told is not None else None
         self._live = (
@@ -84,10 +102,12 @@ class Audience:
         self._watchers = self._all_watchers()
 
     def _made_page(self, address: tuple[str, int], told: Told | None) -> Page:
+        order, steer = self._made.robot.order, self._steer
         hear = PageHear(
-            self._made.robot.order,
+            order if steer is None else only_stops(order),
             tuning=self._tuning,
             point=self._picking.point,
+            steer=steer.press if steer is not None else None,
             refusals=told.refusals if told is not None else (),
             saved=self._live.saved if self._live is not None else None,
             depth=self._show_depth,
@@ -154,11 +174,16 @@ class Audience:
         """Open the doors, once the robot has started."""
         if self._page is not None:
             self._page.open()
-            self._page.offer(self._made.robot.menus())
+            self._page.offer(self._menus())
         if self._live is not None:
             self._live.open()
         if not self._fast:
             self._onlooker.start()
+
+    def tell(self, words: str) -> None:
+        """Say something to everybody who looks at the page."""
+        if self._page is not None:
+            self._page.say(words)
 
     def events(self) -> tuple[str, ...]:
         """Say what has happened to those who watch."""
@@ -175,7 +200,14 @@ class Audience:
         if self._recorder is not None:
             self._say(self._recorder.close(count.stopped_by, self._made.sent_digest()))
 
+    def _menus(self) -> dict[str, tuple[str, ...]]:
+        if self._steer is not None:
+            return {STEER: self._steer.keys}
+        return self._made.robot.menus()
+
     def _in_force(self) -> InForce:
+        if self._steer is not None:
+            return InForce(self._steer.shown(), "", "")
         robot = self._made.robot
         menus = robot.menus()
         character = self._tuning.character_name if self._tuning is not None else ""
@@ -188,3 +220,16 @@ class Audience:
         """Show the rig as it is built now: limits and the field of view can be tuned."""
         if any(isinstance(order, Tune) for order in tick.orders):
             self._snapshots.rig = self._made.shown()
+
+
+def only_stops(order: Callable[[Order], None]) -> Callable[[Order], None]:
+    """Give what takes stop and resume alone; of the rest, it raises ValueError."""
+
+    def take(asked: Order) -> None:
+        if not isinstance(asked, Stop | Resume):
+            raise ValueError(
+                f"the buttons of {STEER!r} lead the head now; besides them only stop and resume go"
+            )
+        order(asked)
+
+    return take

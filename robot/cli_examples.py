@@ -13,6 +13,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("run my.yaml --oak", "the real rig looks through its OAK-D"),
         ("run --mock --video party.mp4", "an emulated rig before a film"),
         ("run --mock --fast --seconds 60 --seed 7 --summary -", "figures of a simulated minute"),
+        ("run my.yaml --oak --page 0.0.0.0:8080", "the page for other machines, with a token"),
         ("run my.yaml --oak --record evening.mcap", "keep every tick, to replay and judge"),
     ),
     "check": (("check my.yaml", "all faults of a file at once; no servo is touched"),),
@@ -55,6 +56,15 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "stop": (("stop", "torque off at once; the program goes on"),),
     "resume": (("resume", "torque on again, slowly on"),),
     "character": (("character shy", "lay a character over the running rig"),),
+    "ask": (
+        ("ask", "the menus of the running rig, the choices in force first"),
+        ("ask behaviour guard", "another behaviour of its rules"),
+        ("ask conversation listen", "look away as a listener does"),
+    ),
+    "status": (
+        ("status", "what the running rig looks at and why, guard, joints"),
+        ("status --json", "the same for a program"),
+    ),
     "look": (
         ("look 1 0.2 0.3", "the running head looks there"),
         ("look free", "and freely again"),

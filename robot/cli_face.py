@@ -15,10 +15,12 @@ from config.schema import Rig, load_rig
 from drivers.errors import SetupError
 from gaze.types import Vec3
 from robot.assemble import Assembly, assemble
+from robot.audience import Audience, Steer, Wished
 from robot.bus_events import drawn_together
 from robot.cli_calibrate import refuse_unwritable
-from robot.cli_keys import HELP, LineKeys, TerminalKeys
+from robot.cli_keys import BUTTONS, HELP, Keys, LineKeys, PageKeys, TerminalKeys
 from robot.cli_person import Lines, TerminalPerson
+from robot.cli_run import host_port
 from robot.cli_terminal import (
     FAULT,
     RigArgument,
@@ -59,6 +61,17 @@ def calibrate_face(
     answers: Annotated[
         Path | None, typer.Option(help="File with one key a line, e.g. left 3; empty is Enter.")
     ] = None,
+    page: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Where a page with the same keys is served. Other machines reach it at "
+            "0.0.0.0:8080, and only with the token in the address that is printed at start.",
+        ),
+    ] = "127.0.0.1:8080",
+    no_page: Annotated[
+        bool, typer.Option("--no-page", help="Without the page; with --answers there is none.")
+    ] = False,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
@@ -67,6 +80,8 @@ def calibrate_face(
         loaded = load_rig(rig)
         refuse_unwritable(rig, out)
         lines = Lines(answers)
+        address = host_port(page)
+        shows = None if no_page or answers is not None else address
         nothing = scene is None and video is None and camera is None and not oak
         wanted = Wanted(
             mock=mock,
@@ -81,7 +96,7 @@ def calibrate_face(
         )
         made = assemble(loaded, wanted.choice())
         try:
-            found = _steered(made, loaded, lines, answers is not None, stopped)
+            found = _steered(made, loaded, lines, answers is not None, stopped, shows)
             _write(rig, loaded, found, out, TerminalPerson(lines, stopped, yes))
         except Stopped as why:
             say(f"stopped by {why}: nothing written")
@@ -94,9 +109,11 @@ def _steered(
     lines: Lines,
     scripted: bool,
     stopped: Callable[[], str | None],
+    page: tuple[str, int] | None,
 ) -> FaceCalibration:
     """Let a person steer the gaze from part to part; the rig ends parked, torque off.
 
+    page: where one is served, None where there is none
     Raises:
         robot.single_joint.Stopped: a signal or a fault ended it.
         drivers.errors.DriverError: port, servos or camera are not as configured.
@@ -108,12 +125,14 @@ def _steered(
         (idle.rest_distance_m, 0.0, idle.rest_height_m),
     )
     made.robot.attention = steering
-    keys = TerminalKeys() if not scripted and sys.stdin.isatty() else LineKeys(lines)
-    sitting = _Sitting(steering, keys, made.clock.now_s, stopped, scripted)
+    keys = PageKeys(TerminalKeys() if not scripted and sys.stdin.isatty() else LineKeys(lines))
+    steer = Steer(BUTTONS, keys.press, lambda: shown(steering))
+    audience = Audience(made, Wished(page=page), None, page is None, say, status, steer)
+    sitting = _Sitting(steering, keys, made.clock.now_s, stopped, scripted, audience)
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     try:
-        count = _run(made, sitting, keys)
+        count = _run(made, sitting, keys, audience)
     finally:
         made.close()
     if stopped() is not None or count.stopped_by.startswith("fault"):
@@ -121,33 +140,37 @@ def _steered(
     return steering.state
 
 
-def _run(made: Assembly, sitting: "_Sitting", keys: TerminalKeys | LineKeys) -> LoopCount:
+def _run(made: Assembly, sitting: "_Sitting", keys: Keys, audience: Audience) -> LoopCount:
     """Run the robot until the sitting is over."""
     count = LoopCount(0, 0, "fault: unexpected error")
     made.robot.start(made.clock)
     try:
         for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
             say(note)
+        audience.open()
         with keys:
             count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.note)
+        audience.tell("over: the head parks; whether to write it is asked at the terminal")
     finally:
         leave(made, count, say)
+        audience.close(count)
     return count
 
 
 class _Sitting:
-    """Keys in, words out, between the ticks."""
+    """Keys in, words out on the terminal and the page, between the ticks."""
 
     def __init__(
         self,
         steering: FaceSteering,
-        keys: TerminalKeys | LineKeys,
+        keys: Keys,
         now_s: Callable[[], float],
         stopped: Callable[[], str | None],
         scripted: bool,
+        audience: Audience,
     ) -> None:
         self._steering, self._keys, self._now_s = steering, keys, now_s
-        self._stopped, self._scripted = stopped, scripted
+        self._stopped, self._scripted, self._audience = stopped, scripted, audience
         self._live_line = not scripted and sys.stderr.isatty()
         self._said: tuple[str | None, bool] | None = None
         self._ready_s = self._shown_s = self._seen_s = now_s()
@@ -167,6 +190,7 @@ class _Sitting:
 
     def note(self, tick: Tick) -> None:
         """See what the tick did, and say what a person should know."""
+        self._audience.note(tick)
         self._tell(self._steering.note(tick))
         for event in drawn_together(tick.events):
             say(event)
@@ -183,11 +207,11 @@ class _Sitting:
         if part is None or self._said == (part, seen):
             return
         if seen:
-            say(f"{PART_WORDS[part]}: steer until the gaze meets it, then Enter")
+            self._tell(f"{PART_WORDS[part]}: steer until the gaze meets it, then Enter")
         elif t_s - self._seen_s < _UNSEEN_S:
             return
         else:
-            say("no face is seen: sit before the camera, 0.5 to 1.5 m away, and look at it")
+            self._tell("no face is seen: sit before the camera, 0.5 to 1.5 m away, and look at it")
         self._said = part, seen
 
     def _refuse_hopeless(self, now_s: float) -> None:
@@ -201,6 +225,7 @@ class _Sitting:
     def _tell(self, what: str | None) -> None:
         if what is not None:
             say(what)
+            self._audience.tell(what)
 
 
 def shown(steering: FaceSteering) -> str:

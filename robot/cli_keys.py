@@ -6,8 +6,9 @@ import select
 import sys
 import termios
 import tty
+from queue import Empty, Full, Queue
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self, get_args
 
 from drivers.errors import SetupError
 from robot.cli_person import Lines
@@ -17,6 +18,10 @@ HELP = (
     "arrow keys or w a s d move the gaze as you see it; + and - the step; Enter: it looks at it; "
     "n: next, leave this part; b: back; q: end"
 )
+
+BUTTONS: tuple[Key, ...] = get_args(Key)
+"""What stands on the page's buttons."""
+_MOST_WAITING = 50
 
 _PLAIN: dict[str, Key] = {
     "w": "up", "a": "left", "s": "down", "d": "right",
@@ -66,6 +71,27 @@ def key_and_count(line: str) -> tuple[Key, int]:
             "enter or an empty line, skip, back, end"
         )
     return _WORDS[word], int(number)
+
+
+class Keys(Protocol):
+    """Where keys come from, one by one, for as long as the block lasts."""
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End."""
+        ...
+
+    def next(self, ready: bool) -> Key | None:
+        """Give the next key, None where there is none; ``ready``: the last one has been done."""
+        ...
 
 
 class TerminalKeys:
@@ -139,3 +165,48 @@ class LineKeys:
         key, times = key_and_count(line)
         self._ready = [key] * times
         return self._ready.pop(0)
+
+
+class PageKeys:
+    """Keys pressed as buttons of the page, side by side with those of another source."""
+
+    def __init__(self, others: Keys) -> None:
+        """Take the other source."""
+        self._others = others
+        self._pressed: Queue[Key] = Queue(_MOST_WAITING)
+
+    def __enter__(self) -> Self:
+        """Begin with the other source."""
+        self._others.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End with the other source."""
+        self._others.__exit__(kind, error, trace)
+
+    def press(self, word: str) -> str | None:
+        """Take what a button says, from any thread; give what stands against it.
+
+        Raises:
+            ValueError: there is no such button.
+        """
+        found = next((key for key in BUTTONS if key == word), None)
+        if found is None:
+            raise ValueError(f"{word!r} is no key: {', '.join(BUTTONS)}")
+        try:
+            self._pressed.put_nowait(found)
+        except Full:
+            return "refused: too many keys at once; the gaze still has to follow those before"
+        return None
+
+    def next(self, ready: bool) -> Key | None:
+        """Give the next key of either, those of the page first."""
+        try:
+            return self._pressed.get_nowait()
+        except Empty:
+            return self._others.next(ready)

@@ -7,7 +7,12 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 
-QUICK = frozenset({"get", "set", "save", "revert", "character", "look", "stop", "resume"})
+QUICK = frozenset(
+    {
+        *("get", "set", "save", "revert", "character"),
+        *("ask", "look", "status", "stop", "resume"),
+    }
+)
 """The commands of robot.cli_tune."""
 _ELSEWHERE = {"--help", "--debug"}
 """Options that the whole program knows more about."""

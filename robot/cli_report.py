@@ -31,6 +31,8 @@ app = typer.Typer(add_completion=False)
 
 _Tell = Callable[[str, float], None]
 
+_PAGES = {".html", ".htm"}
+
 
 class _Layers(NamedTuple):
     """What a rig is laid together from."""
@@ -56,7 +58,9 @@ def report(
     saccade: Annotated[str | None, typer.Option(help="Saccades instead of its own.")] = None,
     conversation: Annotated[str | None, typer.Option(help="talk, listen or think.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all dice.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="The page to write.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The page to write; .html is added where it is missing.")
+    ] = None,
 ) -> None:
     """Say how human a run's gaze was: gazerig report run.mcap, then open report.html."""
     with clear_errors():
@@ -74,7 +78,7 @@ def report(
                 choice = Choice(True, True, seed, scene, scanpath=scanpath, saccade=saccade)
                 layers = _Layers(rig, character, profile)
                 about, run = _simulated(choice, layers, seconds, conversation, tell)
-            made = report_of(run, about, out or _beside(file, scene), tell)
+            made = report_of(run, about, page_file(out or _beside(file, scene)), tell)
         _tell_findings(made.findings)
         say(f"{made.page}: the whole report; {len(made.pictures)} figures beside it")
 
@@ -83,7 +87,9 @@ def report(
 def compare(
     first: Annotated[Path, typer.Argument(metavar="A", help="A recording.")],
     second: Annotated[Path, typer.Argument(metavar="B", help="Another recording.")],
-    out: Annotated[Path, typer.Option(help="The page to write.")] = Path("compare.html"),
+    out: Annotated[
+        Path, typer.Option(help="The page to write; .html is added where it is missing.")
+    ] = Path("compare.html"),
 ) -> None:
     """Put two runs side by side and say what differs by more than chance."""
     with clear_errors():
@@ -95,7 +101,8 @@ def compare(
         names = _names(first, second)
         abouts = _about(recordings[0], names[0]), _about(recordings[1], names[1])
         with _progress() as tell:
-            made = comparing((recordings[0].ticks(), recordings[1].ticks()), abouts, out, tell)
+            ticks = recordings[0].ticks(), recordings[1].ticks()
+            made = comparing(ticks, abouts, page_file(out), tell)
         for difference in made.differences:
             if difference.word == "more than chance":
                 a, b = difference.a, difference.b
@@ -275,6 +282,14 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
     if first.stem != second.stem:
         return first.stem, second.stem
     return f"{first.stem} (A)", f"{second.stem} (B)"
+
+
+def page_file(out: Path) -> Path:
+    """Give the file of a page, whose name ends so that a browser opens it as one."""
+    if out.suffix.lower() in _PAGES:
+        return out
+    # Not with_suffix: what follows the dot of "evening-0.5" is no ending.
+    return out.with_name(f"{out.name}.html")
 
 
 def _beside(file: Path | None, scene: str | None) -> Path:

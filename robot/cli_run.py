@@ -83,7 +83,14 @@ def run(
     saccade: Annotated[
         str | None, typer.Option(help="Saccades: min_jerk, main_sequence, literal_frame.")
     ] = None,
-    page: Annotated[str, typer.Option(help="Where the live page is served.")] = "127.0.0.1:8080",
+    page: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Where the live page is served. Other machines reach it at 0.0.0.0:8080, and "
+            "only with the token in the address that is printed at start.",
+        ),
+    ] = "127.0.0.1:8080",
     no_page: Annotated[bool, typer.Option(help="Without the live page.")] = False,
     heatmap: Annotated[
         Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
@@ -109,7 +116,7 @@ def run(
         from robot.assemble import assemble
         from robot.audience import Wished
 
-        address = _host_port(page)
+        address = host_port(page)
         wanted = session.Wanted(
             mock=mock,
             fast=fast,
@@ -185,7 +192,12 @@ def _told(
     return Told(tuning, (ConfigError,), {"rig": rig, "pid": os.getpid()}, info)
 
 
-def _host_port(text: str) -> tuple[str, int]:
+def host_port(text: str) -> tuple[str, int]:
+    """Read what is given as --page.
+
+    Raises:
+        drivers.errors.SetupError: it is no address.
+    """
     host, _, port = text.rpartition(":")
     if not host or not port.isdecimal() or not 0 < int(port) < 65536:
         raise SetupError(f"--page {text}: not HOST:PORT, for example 127.0.0.1:8080")

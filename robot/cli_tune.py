@@ -2,7 +2,7 @@
 
 import json
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +14,9 @@ from robot.cli_terminal import FAULT, clear_errors, say
 from robot.remote import JsonValue, KnobInfo, RunningRig, running
 
 app = typer.Typer()
+_OLD_S = 1.0
+"""A loop that has not ticked for so long does not do as it should."""
+_LAST_SAID = 5
 _NEGATIVE = {"ignore_unknown_options": True}
 """Click settings: -3 is a number, no option."""
 
@@ -49,6 +52,26 @@ def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
 def complete_character(incomplete: str) -> list[str]:
     """Complete a shipped character."""
     return [name for name in shipped_names("characters") if name.startswith(incomplete)]
+
+
+def complete_menu(incomplete: str) -> list[str]:
+    """Complete a menu of the running rig."""
+    return [menu for menu in _menus() if menu.startswith(incomplete)]
+
+
+def complete_choice(context: typer.Context, incomplete: str) -> list[str]:
+    """Complete what can be chosen from the menu that stands before it."""
+    choices = _menus().get(context.params.get("menu") or "", ())
+    return [choice for choice in choices if choice.startswith(incomplete)]
+
+
+def _menus() -> dict[str, tuple[str, ...]]:
+    """Give the running rig's menus, none where none runs: a shell shows no errors."""
+    try:
+        with RunningRig.connect() as rig:
+            return rig.menus()
+    except DriverError:
+        return {}
 
 
 PidOption = Annotated[
@@ -153,6 +176,45 @@ def character(
     with clear_errors(), RunningRig.connect(pid) as rig:
         _tell(rig.character(name))
         say(f"character {name} is in force")
+
+
+@app.command()
+def ask(
+    menu: Annotated[
+        str | None,
+        typer.Argument(help="Without it, all menus are listed.", autocompletion=complete_menu),
+    ] = None,
+    choice: Annotated[
+        str | None,
+        typer.Argument(help="Without it, its choices are listed.", autocompletion=complete_choice),
+    ] = None,
+    pid: PidOption = None,
+) -> None:
+    """Ask the running head for a behaviour, or to talk, listen or think; or list all there is."""
+    with clear_errors(), RunningRig.connect(pid) as rig:
+        if menu is not None and choice is not None:
+            rig.ask(menu, choice)
+            say(f"{menu} {choice} is in force")
+            return
+        menus = rig.menus()
+        if menu is not None and menu not in menus:
+            raise SetupError(f"{menu}: no menu of this rig; there is {', '.join(menus)}")
+        shown = menus if menu is None else {menu: menus[menu]}
+        _tell(f"{name}: {_choices(choices)}" for name, choices in shown.items())
+
+
+@app.command()
+def status(
+    as_json: Annotated[bool, typer.Option("--json", help="Print all of it as JSON.")] = False,
+    pid: PidOption = None,
+) -> None:
+    """Say what the running rig does: target and why, guard, joints, what it said last."""
+    with clear_errors(), RunningRig.connect(pid) as rig:
+        now = rig.status()
+    if as_json:
+        print(json.dumps(now, indent=2))
+    else:
+        _tell(state_lines(now))
 
 
 @app.command(context_settings=_NEGATIVE)
@@ -264,6 +326,32 @@ def read_point(words: Sequence[str]) -> tuple[float, float, float] | None:
             f"{' '.join(words)}: give X Y Z in metres (ahead, left, up), or free"
         ) from None
     return x, y, z
+
+
+def state_lines(now: Mapping[str, Any]) -> list[str]:
+    """Say in a few lines what ``RunningRig.status`` gives."""
+    lines = [f"rig: {now.get('rig', '')}, process {now.get('pid', '')}"]
+    if not now["ticks"]:
+        return [*lines, "it has just been started: nothing is known yet"]
+    if now["stopped"]:
+        lines.append(f"STOPPED, torque off: {now['stopped']}; gazerig resume goes on")
+    if now["age_s"] > _OLD_S:
+        lines.append(f"the loop is held up: what follows is {now['age_s']:.1f} s old")
+    joints = ", ".join(f"{name} {deg:.1f}" for name, deg in now["joints_deg"].items())
+    unsaved = now["unsaved"]
+    return [
+        *lines,
+        f"looks at: {now['target']} - {now['why']} ({now['phase']})",
+        f"guard: {'; '.join((now['level'], *now['reasons']))}",
+        f"joints in deg: {joints}",
+        f"not saved: {_count(unsaved)}; gazerig save keeps" if unsaved else "all saved",
+        *(f"said: {words}" for words in now["said"][-_LAST_SAID:]),
+    ]
+
+
+def _choices(choices: Sequence[str]) -> str:
+    """Write a menu's choices, of which the one in force comes first."""
+    return ", ".join((f"{choices[0]} (in force)", *choices[1:]))
 
 
 def _table(found: Iterable[KnobInfo], values: dict[str, JsonValue], unsaved: set[str]) -> list[str]:

@@ -187,10 +187,10 @@ class Retuner:
             parts.breathing.retune(now.breathing)
         if now.lids != was.lids:
             parts.lids.retune(now.lids)
-        eyes = eye_limits(new)
-        if now.oculomotor != was.oculomotor or eyes != eye_limits(old):
-            parts.oculomotor.retune(now.oculomotor, eyes)
-        if (now.head, *head_limits(new)) != (was.head, *head_limits(old)):
+        bounds = (new.joints, new.ranges) != (old.joints, old.ranges)
+        if now.oculomotor != was.oculomotor or (bounds and eye_limits(new) != eye_limits(old)):
+            parts.oculomotor.retune(now.oculomotor, eye_limits(new))
+        if now.head != was.head or (bounds and head_limits(new) != head_limits(old)):
             parts.head.retune(now.head, *head_limits(new))
 
     def _put_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
@@ -217,6 +217,8 @@ class Retuner:
 
         Gives what has to wait for the servos to be set up anew.
         """
+        if (new.joints, new.guard) == (old.joints, old.guard):
+            return ()
         parts, joints = self.parts, self._lasting(new)
         others = joints != self._lasting(old)
         if others:

@@ -18,7 +18,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from config.apart import apart
-from config.knobs import NEXT_START, Knob, changed, differences, flattened, live, value_of, values
+from config.knobs import (
+    NEXT_START,
+    Knob,
+    changed,
+    differences,
+    flattened,
+    live,
+    value_of,
+    values,
+    values_after,
+)
 from config.knobs import knobs as knobs_of
 from config.load import ConfigError, Fault, shipped_names
 from config.save import Change, Saved, copy_shipped, rig_file, save
@@ -36,12 +46,17 @@ class _State(NamedTuple):
 
     saved: what the files make, with the options; rig: in force
     name: of the rig as it was asked for, a shipped name or a path
+    files: in use, the rig's first
+    was, values: of ``saved`` and of ``rig``, by key
     """
 
     saved: Rig
     rig: Rig
     name: str
     character: str | None
+    files: tuple[Path, ...]
+    was: Mapping[str, Value]
+    values: Mapping[str, Value]
     version: int
 
 
@@ -76,9 +91,11 @@ class Tuning:
         self._changing = threading.Lock()
         self._defaults = _defaults(retuner.rig)
         # What the command line says otherwise stays in force whatever the files say.
-        self._options = differences(load_rig(rig, character, profile), retuner.rig)
-        self._state = _State(retuner.rig, retuner.rig, rig, character, 0)
-        self._knobs: tuple[int, tuple[Knob, ...]] = (-1, ())
+        read, files = read_all(rig, character, profile)
+        whole, found = retuner.rig, values(retuner.rig)
+        self._options = differences(read, whole)
+        self._state = _State(whole, whole, rig, character, files, found, found, 0)
+        self._knobs = knobs_of(whole, self._defaults)
 
     @property
     def version(self) -> int:
@@ -101,26 +118,20 @@ class Tuning:
         return self._state.character or NO_CHARACTER
 
     def files(self) -> tuple[Path, ...]:
-        """Give the files in use: the rig's, and those laid over it.
-
-        Raises:
-            config.load.ConfigError: the rig's file cannot be read.
-        """
-        state = self._state
-        return tuple(layers_of(state.name, state.character, self._profile))
+        """Give the files in use: the rig's, and those laid over it."""
+        return self._state.files
 
     def knobs(self) -> tuple[Knob, ...]:
         """Give all parameters in the order of the file."""
-        state = self._state
-        version, made = self._knobs
-        if version != state.version:
-            made = knobs_of(state.rig, self._defaults)
-            self._knobs = state.version, made
+        state, made = self._state, self._knobs
+        # All but which entries there are stays as it is.
+        if [knob.key for knob in made] != list(state.values):
+            made = self._knobs = knobs_of(state.rig, self._defaults)
         return made
 
     def values(self) -> dict[str, Value]:
         """Give key -> value in force of every knob."""
-        return values(self._state.rig)
+        return dict(self._state.values)
 
     def get(self, prefix: str = "") -> dict[str, Value]:
         """Give the values in force whose keys begin so.
@@ -128,9 +139,9 @@ class Tuning:
         Raises:
             config.load.ConfigError: there is none; the message says what is near.
         """
-        rig = self._state.rig
-        found = {key: value for key, value in values(rig).items() if key.startswith(prefix)}
-        return found or {prefix: value_of(rig, prefix)}
+        state = self._state
+        found = {key: value for key, value in state.values.items() if key.startswith(prefix)}
+        return found or {prefix: value_of(state.rig, prefix)}
 
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
         """Put values at dotted keys in force from the next tick on, all of them or none.
@@ -146,11 +157,11 @@ class Tuning:
     def unsaved(self) -> tuple[Change, ...]:
         """Give what is in force and not in the files."""
         state = self._state
-        return _changes(state.saved, state.rig)
+        return _changes(state.saved, state.rig, state.was)
 
     def differs(self) -> tuple[Change, ...]:
         """Give what differs from the defaults, those of the shipped rig."""
-        return _changes(self._defaults, self._state.rig)
+        return _changes(self._defaults, self._state.rig, values(self._defaults))
 
     def revert(self) -> tuple[str, ...]:
         """Put in force what the files say."""
@@ -180,8 +191,11 @@ class Tuning:
                 done = self._elsewhere(
                     save_over, str(target), wanted, self._now(), *self._layers(state)
                 )
-            self._state = state._replace(saved=state.rig, version=state.version + 1)
-            saved: Saved = done
+            saved: Saved
+            saved, files = done
+            self._state = state._replace(
+                saved=state.rig, was=state.values, files=files, version=state.version + 1
+            )
             return saved
 
     def characters(self) -> tuple[str, ...]:
@@ -200,9 +214,9 @@ class Tuning:
         with self._changing:
             state = self._state
             wanted = None if name in (NO_CHARACTER, "") else name
-            fresh = self._read(state._replace(character=wanted))
-            rig = changed(fresh, differences(state.saved, state.rig))
-            return self._put(state._replace(saved=fresh, character=wanted), rig)
+            state = self._read(state._replace(character=wanted))
+            rig = changed(state.saved, differences(self._state.saved, self._state.rig))
+            return self._put(state, rig)
 
     def reload(self, path: Path | str | None = None) -> tuple[str, ...]:
         """Put in force what the files say now; what is unsaved stays, unless they changed it.
@@ -213,23 +227,23 @@ class Tuning:
             config.load.ConfigError: with every fault; what was in force stays.
         """
         with self._changing:
-            state = self._state
-            fresh = self._read(state)
-            edited = differences(state.saved, fresh)
+            before, state = self._state, self._read(self._state)
+            edited = differences(before.saved, state.saved)
             kept = {
                 key: value
-                for key, value in differences(state.saved, state.rig).items()
+                for key, value in differences(before.saved, before.rig).items()
                 if not any(_overlap(key, other) for other in edited)
             }
-            return self._put(state._replace(saved=fresh), changed(fresh, kept))
+            return self._put(state, changed(state.saved, kept))
 
     def _layers(self, state: _State) -> tuple[str | None, str | None]:
         return state.character, self._profile
 
-    def _read(self, state: _State) -> Rig:
-        """Read the files, with the options over them."""
-        rig = self._elsewhere(load_rig, state.name, *self._layers(state))
-        return changed(rig, self._options)
+    def _read(self, state: _State) -> _State:
+        """Read the files, with the options over them; what is in force stays."""
+        rig, files = self._elsewhere(read_all, state.name, *self._layers(state))
+        saved = changed(rig, self._options)
+        return state._replace(saved=saved, was=values(saved), files=files)
 
     def _put(self, state: _State, rig: Rig) -> tuple[str, ...]:
         """Put a rig in force that was checked, and say what is other than before."""
@@ -239,8 +253,21 @@ class Tuning:
             self._order(self._retuner.prepare(before.rig, rig))
         elif state == before:
             return ()
-        self._state = state._replace(rig=rig if found else before.rig, version=before.version + 1)
+        self._state = state._replace(
+            rig=rig if found else before.rig,
+            values=values_after(before.values, rig, found) if found else before.values,
+            version=before.version + 1,
+        )
         return tuple(_told(key, value) for key, value in found.items())
+
+
+def read_all(name: str, character: str | None, profile: str | None) -> tuple[Rig, tuple[Path, ...]]:
+    """Read a rig, and give the files that it is made of.
+
+    Raises:
+        config.load.ConfigError: see config.schema.load_rig.
+    """
+    return load_rig(name, character, profile), tuple(layers_of(name, character, profile))
 
 
 def save_over(
@@ -249,14 +276,17 @@ def save_over(
     now: datetime,
     character: str | None,
     profile: str | None,
-) -> Saved:
+) -> tuple[Saved, tuple[Path, ...]]:
     """Write values into a rig's file; each must hold with character and profile laid over it.
+
+    Gives what was written, and the files that the rig is made of now.
 
     Raises:
         config.load.ConfigError: see config.save.save.
     """
     check = partial(load_rig, character=character, profile=profile)
-    return save(Path(path), wanted, now, check, Rig)
+    saved = save(Path(path), wanted, now, check, Rig)
+    return saved, tuple(layers_of(path, character, profile))
 
 
 def save_copy(
@@ -266,8 +296,10 @@ def save_copy(
     now: datetime,
     character: str | None,
     profile: str | None,
-) -> Saved:
+) -> tuple[Saved, tuple[Path, ...]]:
     """Write values into a new copy of a rig's file, which is not there if that fails.
+
+    Gives what ``save_over`` gives.
 
     Raises:
         config.load.ConfigError: see config.save.save; or ``to`` exists or is no YAML file.
@@ -313,9 +345,8 @@ def _refuse_lists(wanted: Mapping[str, Value]) -> None:
         raise ConfigError(faults)
 
 
-def _changes(before: Rig, after: Rig) -> tuple[Change, ...]:
-    """Give each value that differs, as YAML."""
-    was = values(before)
+def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[Change, ...]:
+    """Give each value that differs, as YAML; was: those before."""
     found = flattened(after, differences(before, after))
     return tuple(
         Change(key, _text(was[key]) if key in was else None, _text(value))

@@ -1,11 +1,14 @@
 """calibrate face as it is typed: keys, scripts, what is written and what is not."""
 
+import json
 import os
 import pty
 import select
 import signal
+import socket
 import sys
 import time
+import urllib.request
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -21,9 +24,11 @@ from config.save import save_rig
 from config.schema import load_rig
 from drivers.errors import SetupError
 from robot import cli_face
+from robot.audience import only_stops
 from robot.cli_calibrations import app
-from robot.cli_keys import key_and_count, keys_of
+from robot.cli_keys import BUTTONS, PageKeys, key_and_count, keys_of
 from robot.face_pose import PARTS_FACE_M
+from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop
 
 ROOT = Path(__file__).parents[1]
 DESK = ROOT / "config" / "rigs" / "desk.yaml"
@@ -190,45 +195,184 @@ def test_lines_of_a_script() -> None:
 # --- on a terminal
 
 
-def typed(rig: Path, *keys: bytes) -> tuple[int, str]:
-    """Run the command on a pseudo-terminal; each key is sent when the last one has shown."""
-    pid, fd = pty.fork()
-    if pid == 0:
-        os.chdir(ROOT)
+class Sitting:
+    """The command on a pseudo-terminal, and what it has written so far."""
+
+    def __init__(self, rig: Path, *words: str) -> None:
         code = "from robot.cli import main; main()"
-        os.execv(
-            sys.executable,
-            [sys.executable, "-c", code, "calibrate", "face", str(rig), "--mock", "--yes"],
-        )
-    waits = [b"1/8 the tip of your nose: 0 mm", b"5 mm left", b"2/8 your left eye"]
-    out, sent, end_s = b"", 0, time.monotonic() + 40.0
-    while time.monotonic() < end_s:
-        if sent < len(keys) and waits[sent] in out:
-            os.write(fd, keys[sent])
-            sent += 1
-        if select.select([fd], [], [], 0.2)[0]:
-            try:
-                data = os.read(fd, 4096)
-            except OSError:  # Linux says so when the other side has closed
-                break
-            if not data:
-                break
-            out += data
-    else:
-        os.kill(pid, signal.SIGKILL)
-    _, how = os.waitpid(pid, 0)
-    os.close(fd)
-    return os.waitstatus_to_exitcode(how), out.decode()
+        words = ("calibrate", "face", str(rig), "--mock", "--yes", *words)
+        self.said = ""
+        self._end_s = time.monotonic() + 60.0
+        self.pid, self.fd = pty.fork()
+        if self.pid == 0:
+            os.chdir(ROOT)
+            os.execv(sys.executable, [sys.executable, "-c", code, *words])
+
+    def reads(self, words: str) -> None:
+        """Wait for words that have not been waited for."""
+        while words not in self.said:
+            assert time.monotonic() < self._end_s and self._read(), self.said
+        self.before, _, self.said = self.said.partition(words)
+
+    def types(self, keys: bytes) -> None:
+        os.write(self.fd, keys)
+
+    def _read(self) -> bool:
+        """Take what it has written; False where it has ended."""
+        if not select.select([self.fd], [], [], 0.2)[0]:
+            return True
+        try:
+            data = os.read(self.fd, 4096)
+        except OSError:  # Linux says so when the other side has closed
+            return False
+        self.said += data.decode()
+        return bool(data)
+
+    def ends(self) -> int:
+        """Wait for the end; give the exit code."""
+        while time.monotonic() < self._end_s and self._read():
+            continue
+        return self._reap()
+
+    def _reap(self) -> int:
+        if not os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+            time.sleep(1.0)
+        if not os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+            os.kill(self.pid, signal.SIGKILL)
+        _, how = os.waitpid(self.pid, 0)
+        os.close(self.fd)
+        self.pid = 0
+        return os.waitstatus_to_exitcode(how)
+
+    def __enter__(self) -> "Sitting":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.pid:
+            os.kill(self.pid, signal.SIGKILL)
+            self._reap()
 
 
 def test_keys_typed_move_the_gaze_and_are_written(rig: Path) -> None:
-    code, said = typed(rig, b"\x1b[D", b"\r", b"q")
-    assert code == 0, said
+    with Sitting(rig, "--no-page") as sitting:
+        sitting.reads("1/8 the tip of your nose: 0 mm")
+        sitting.types(b"\x1b[D")
+        sitting.reads("5 mm left")
+        sitting.types(b"\r")
+        sitting.reads("2/8 your left eye")
+        assert "the page" not in sitting.before
+        sitting.types(b"q")
+        assert sitting.ends() == 0, sitting.said
     assert load_rig(str(rig)).face_parts_mm == {"N": (0.0, 5.0, 0.0)}
 
 
 def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
     before = rig.read_bytes()
-    code, said = typed(rig, b"\x1b[D", b"\r", b"\x03")
-    assert code == 1 and "stopped by SIGINT: parked, torque off" in said
-    assert "nothing written" in said and rig.read_bytes() == before
+    with Sitting(rig, "--no-page") as sitting:
+        sitting.reads("1/8 the tip of your nose: 0 mm")
+        sitting.types(b"\x1b[D")
+        sitting.reads("5 mm left")
+        sitting.types(b"\x03")
+        assert sitting.ends() == 1, sitting.said
+    assert "stopped by SIGINT: parked, torque off" in sitting.said
+    assert "nothing written" in sitting.said and rig.read_bytes() == before
+
+
+# --- on the page
+
+
+def ask(url: str, asked: object) -> None:
+    """Ask as the page in a browser does."""
+    headers = {"Origin": url, "Content-Type": "application/json"}
+    request = urllib.request.Request(f"{url}/rig/ask", json.dumps(asked).encode(), headers)
+    with urllib.request.urlopen(request, timeout=20.0) as answer:
+        assert answer.status == 204
+
+
+def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        port = trial.getsockname()[1]
+    url = f"http://127.0.0.1:{port}"
+    with Sitting(rig, "--page", f"127.0.0.1:{port}") as sitting:
+        sitting.reads(f"the page is at {url}")
+        sitting.reads("1/8 the tip of your nose: 0 mm")
+        ask(url, {"steer": "left"})
+        sitting.reads("5 mm left, 0 mm up")
+        sitting.types(b"w")
+        sitting.reads("5 mm left, 5 mm up")
+        # Nothing else leads the head meanwhile: it would leave the face that is measured.
+        ask(url, {"order": "look_at", "p_world_m": [1.0, 0.5, 0.0]})
+        ask(url, {"steer": "enter"})
+        sitting.reads("2/8 your left eye")
+        ask(url, {"steer": "down"})
+        sitting.reads("0 mm across, 5 mm down")
+        ask(url, {"steer": "enter"})
+        sitting.reads("3/8")
+        ask(url, {"steer": "end"})
+        sitting.reads("stopped by you: parked, torque off")
+        assert sitting.ends() == 0, sitting.said
+    found = load_rig(str(rig)).face_parts_mm
+    usual = {part: tuple(v * 1e3 for v in PARTS_FACE_M[part]) for part in ("N", "LE")}
+    assert set(found) == {"N", "LE"}
+    assert found["N"] == pytest.approx((usual["N"][0], 5.0, 5.0), abs=0.06)
+    x, y, z = usual["LE"]
+    assert found["LE"] == pytest.approx((x, y, z - 5.0), abs=0.06)
+
+
+def test_a_page_that_cannot_be_is_said_before_anything_moves(rig: Path) -> None:
+    done = run(str(rig), "--mock", "--page", "here")
+    assert done.exit_code == 2 and "not HOST:PORT" in done.stderr
+    assert "head turns" not in done.stderr
+
+
+class NoKeys:
+    """Another source, of which nothing comes unless it is given."""
+
+    def __init__(self) -> None:
+        self.inside = False
+        self.given: list[str] = []
+
+    def __enter__(self) -> "NoKeys":
+        self.inside = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.inside = False
+
+    def next(self, ready: bool) -> Any:
+        return self.given.pop(0) if self.given else None
+
+
+def test_buttons_and_keys_come_one_by_one() -> None:
+    others = NoKeys()
+    with PageKeys(others) as keys:
+        assert others.inside and keys.next(True) is None
+        others.given = ["up"]
+        assert keys.press("left") is None and keys.press("enter") is None
+        assert [keys.next(False) for _ in range(4)] == ["left", "enter", "up", None]
+        with pytest.raises(ValueError, match="'jump' is no key: left, right, up"):
+            keys.press("jump")
+        assert "too many keys" in str([keys.press("left") for _ in range(200)][-1])
+        waiting = 0
+        while keys.next(True) is not None:
+            waiting += 1
+        assert 0 < waiting < 200
+        assert keys.press("right") is None
+    assert not others.inside
+
+
+def test_what_is_on_the_buttons_is_what_keys_there_are() -> None:
+    words = ("left", "right", "up", "down", "+", "-", "", "skip", "back", "end")
+    assert set(BUTTONS) == {key_and_count(word)[0] for word in words}
+
+
+def test_while_buttons_lead_the_page_can_only_stop_and_resume() -> None:
+    given: list[Order] = []
+    order = only_stops(given.append)
+    order(Stop("a test"))
+    order(Resume())
+    for asked in (LookAt((1.0, 0.0, 0.0)), Jog((("neck_yaw", 0.1),)), Ask("behaviour", "guard")):
+        with pytest.raises(ValueError, match="lead the head now"):
+            order(asked)
+    assert given == [Stop("a test"), Resume()]

@@ -27,7 +27,7 @@ from drivers.errors import SetupError
 from robot.assemble import assemble
 from robot.choice import Choice
 from robot.cli_quick import QUICK, is_quick
-from robot.cli_tune import app, read_pairs, read_point, read_value
+from robot.cli_tune import app, read_pairs, read_point, read_value, state_lines
 from robot.live_control import LiveControl
 from robot.loop import Tick
 from robot.loop import run as run_loop
@@ -326,6 +326,60 @@ def test_look_and_character() -> None:
     assert done.returncode == 2 and "brave" in done.stderr
 
 
+def test_ask_lists_the_menus_and_chooses_from_them() -> None:
+    with RunningRig.connect() as rig:
+        present, *others = rig.menus()["conversation"]
+    lines = gazerig("ask").stdout.splitlines()
+    assert any(line.startswith("behaviour: ") for line in lines)
+    assert f"conversation: {present} (in force), {', '.join(others)}" in lines
+    try:
+        done = gazerig("ask", "conversation", others[0])
+        assert (done.returncode, done.stderr) == (0, f"conversation {others[0]} is in force\n")
+        (line,) = gazerig("ask", "conversation").stdout.splitlines()
+        assert line.startswith(f"conversation: {others[0]} (in force), ")
+    finally:
+        gazerig("ask", "conversation", present)
+
+
+@pytest.mark.parametrize(
+    ("words", "rule"),
+    [
+        (("moods",), "moods: no menu of this rig; there is behaviour"),
+        (("moods", "glad"), "nothing called 'moods' to choose"),
+        (("conversation", "shout"), "shout"),
+    ],
+)
+def test_what_cannot_be_asked_for_is_refused_with_what_can(
+    words: tuple[str, ...], rule: str
+) -> None:
+    done = gazerig("ask", *words)
+    assert done.returncode == 2 and rule in done.stderr and "Traceback" not in done.stderr
+
+
+def test_status_says_what_the_rig_does() -> None:
+    said = gazerig("status").stdout
+    with RunningRig.connect() as rig:
+        assert f"rig: {rig.status()['rig']}, process {rig.pid}\n" in said
+    assert "looks at: " in said and "guard: " in said and "neck_yaw" in said
+    assert "all saved" in said and "STOPPED" not in said
+    gazerig("set", RATE, "150")
+    gazerig("stop", "finger")
+    said = gazerig("status").stdout
+    assert "STOPPED, torque off: finger; gazerig resume goes on" in said
+    assert "not saved: 1 value" in said and "said: stopped: finger" in said
+    assert json.loads(gazerig("status", "--json").stdout)["stopped"] == "finger"
+
+
+def test_a_rig_that_has_just_begun_or_is_held_up_says_so() -> None:
+    begun = {"rig": "desk", "pid": 7, "ticks": 0, "stopped": "", "said": []}
+    assert state_lines(begun) == ["rig: desk, process 7", "it has just been started: nothing is "
+                                  "known yet"]  # fmt: skip
+    with RunningRig.connect() as rig:
+        now = rig.status()
+    assert not any("held up" in line for line in state_lines({**now, "age_s": 0.1}))
+    assert "the loop is held up: what follows is 2.5 s old" in state_lines({**now, "age_s": 2.5})
+
+
 def test_a_file_edited_by_hand_is_read_again(rig: Running) -> None:
     before = rig.path.read_text(encoding="utf-8")
     rig.path.write_text(before.replace("rate_hz: 200", "rate_hz: 160"), encoding="utf-8")
@@ -355,7 +409,8 @@ def test_where_no_rig_runs_it_is_one_line_and_exit_code_2(
 
 def there_is_none() -> None:
     none = (2, "", "no rig is running: start one with gazerig run ...\n")
-    for words in (("get",), ("set", RATE, "100"), ("stop",), ("look", "free"), ("save",)):
+    for words in (("get",), ("set", RATE, "100"), ("stop",), ("look", "free"), ("save",),
+                  ("ask",), ("status",)):  # fmt: skip
         assert gazerig(*words) == none, words
     assert whole_gazerig("stop") == none
     done = gazerig("stop", "--pid", "1")
@@ -379,6 +434,8 @@ def test_a_shell_completes_keys_and_the_values_that_there_are() -> None:
     )
     assert RATE in completed("set", "loop.park_s", "2", "loop.r")
     assert "shy" in completed("character", "s")
+    assert completed("ask", "beh") == ["behaviour"]
+    assert "listen" in completed("ask", "conversation", "")
 
 
 def test_without_a_rig_a_shell_completes_keys_of_the_shipped_one(

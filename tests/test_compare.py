@@ -96,7 +96,7 @@ def test_two_recordings_and_one_on_the_command_line(tmp_path: Path) -> None:
     record(a, 22.0, "min_jerk")
     record(b, 22.0, "literal_frame")
     out, runner = tmp_path / "both.html", CliRunner()
-    done = runner.invoke(app, ["compare", str(a), str(b), "--out", str(out)])
+    done = runner.invoke(app, ["compare", str(a), str(b), "--out", str(tmp_path / "both")])
     assert done.exit_code == 0, done.output
     page = unescape(out.read_text(encoding="utf-8"))
     assert "soft" in page and "hard" in page and page.count("data:image/png;base64,") > 10
@@ -105,9 +105,9 @@ def test_two_recordings_and_one_on_the_command_line(tmp_path: Path) -> None:
     assert rows["peak_small"]["verdicts"] == ["pass", "outside"]
     assert rows["vergence"]["word"] == "may be chance"
     assert "peak speed inside the human band" in done.output
-    one = runner.invoke(app, ["report", str(b)])
+    one = runner.invoke(app, ["report", str(b), "--out", str(tmp_path / "one")])
     assert one.exit_code == 0, one.output
-    page = b.with_suffix(".html").read_text(encoding="utf-8")
+    page = (tmp_path / "one.html").read_text(encoding="utf-8")
     assert "over in two frames" in page and "literal_frame" in page
     assert len(list((tmp_path / "hard_figures").glob("*.png"))) > 10
 

@@ -16,7 +16,7 @@ from drivers.errors import SetupError
 from gaze.types import PARTS
 from robot.assemble import assemble
 from robot.choice import Choice
-from robot.cli_report import app
+from robot.cli_report import app, page_file
 from robot.loop import run
 from robot.report import bands, build, face, human
 from robot.report.about import About
@@ -241,6 +241,20 @@ def test_numbers_are_short() -> None:
     assert {value: number(value) for value in values} == values
     place = gauge(judged(Measured("vergence", np.full(40, 9.0), median), bands.BY_KEY["vergence"]))
     assert place.value == 100.0 and place.band_from == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "written"),
+    [
+        ("evening", "evening.html"),
+        ("evening.html", "evening.html"),
+        ("evening.HTM", "evening.HTM"),
+        ("evening-0.5", "evening-0.5.html"),
+        ("runs.old/evening", "runs.old/evening.html"),
+    ],
+)
+def test_a_page_ends_as_a_browser_wants_it(given: str, written: str) -> None:
+    assert page_file(Path(given)) == Path(written)
 
 
 def test_the_command_takes_a_file_or_a_scene() -> None:

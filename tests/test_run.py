@@ -224,3 +224,15 @@ def test_check_and_schema(tmp_path: Path) -> None:
         assert part in done.stderr
     lines = [line for line in done.stderr.splitlines() if line.startswith(f"{rig}:")]
     assert len(lines) >= 4 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)
+
+
+def test_a_recorded_run_is_run_again_to_the_same_bytes(tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    run = figures("--seconds", "4", "--record", str(file))
+    assert run["stopped_by"] == "seconds" and file.stat().st_size > 10_000
+    again = gazerig("replay", str(file), "--rerun")
+    assert again.returncode == 0, again.stderr
+    words = re.sub(r"\s+", " ", again.stdout + again.stderr)
+    assert "ticks are the same to the bit; the bytes on the bus are the same" in words
+    refused = gazerig("run", "--mock", "--fast", "--seconds", "1", "--record", str(file))
+    assert refused.returncode == 2 and "is there already" in refused.stderr

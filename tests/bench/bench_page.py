@@ -5,8 +5,11 @@
 A simulated rig in real time, its servos behind a pseudo-terminal, with the page off and with
 0, 1 and 5 browsers that take all that comes. Printed a run: how far ticks are off their slots,
 skipped slots, and the processor time of the rig's and of the page's process, in per cent of
-one core. Then the time until the page can be opened, until a browser has its first picture,
-and from a slider that is moved (and from a stop) to the goals on the bus.
+one core. Then the same with one browser while nobody tunes, while a slider of the tuning is
+dragged, while another program sets a value ten times a second, and while it reads all of them
+ten times a second; in turn and three times over, as a machine is never quiet for long. Then the
+time until the page can be opened, until a browser has its first picture, and from a slider that
+is moved (and from a stop) to the goals on the bus.
 """
 
 import json
@@ -166,6 +169,56 @@ def watched(url: str, n: int) -> "subprocess.Popen[bytes]":
     return subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
 
 
+HANDS = {
+    "drag": """
+import itertools, json, time, urllib.request
+for n in itertools.count():
+    time.sleep(1 / 60)
+    body = json.dumps({{"tune": {{"set": {{"gaze.head.align": 0.5 + 0.001 * (n % 100)}}}}}})
+    asked = urllib.request.Request("{url}/rig/ask", body.encode(), {{"Origin": "{url}"}})
+    urllib.request.urlopen(asked).close()
+""",
+    "remote set": """
+import itertools, time
+from robot.remote import RunningRig
+rig = RunningRig.connect({pid})
+for n in itertools.count():
+    time.sleep(0.1)
+    rig.set("gaze.head.align", 0.5 + 0.001 * (n % 100))
+""",
+    "remote get": """
+import time
+from robot.remote import RunningRig
+rig = RunningRig.connect({pid})
+while True:
+    time.sleep(0.1)
+    rig.get()
+""",
+}
+"""What somebody who tunes does, in a process of its own; a browser sends 60 times a second."""
+
+
+def tuned(how: str, url: str) -> "subprocess.Popen[bytes]":
+    """Somebody who tunes until killed."""
+    code = HANDS[how].format(url=url, pid=os.getpid())
+    return subprocess.Popen([sys.executable, "-c", code])
+
+
+def tuning_rows(bench: Bench, url: str, seconds: float) -> None:
+    """What tuning costs, against the same moments without it."""
+    for _ in range(3):
+        for how in ("nobody", *HANDS):
+            hand = tuned(how, url) if how in HANDS else None
+            time.sleep(1.5)
+            before = len(bench.obeyed)
+            show(how, bench.measure(seconds))
+            if hand is not None:
+                assert hand.poll() is None, f"{how} has ended"
+                hand.kill()
+                hand.wait()
+                print(f"{(len(bench.obeyed) - before) / seconds:16.1f} changes a second in force")
+
+
 def show(name: str, run: Run) -> None:
     off = run.off_slot_ms
     print(
@@ -221,16 +274,6 @@ def slider_ms(bench: Bench, url: str) -> np.ndarray:
     return np.array(took)
 
 
-def dragging(url: str, over: threading.Event) -> None:
-    """Drag a slider of the tuning to and fro, as fast as a browser sends."""
-    n = 0
-    while not over.wait(1 / 60):
-        n += 1
-        body = json.dumps({"tune": {"set": {"gaze.head.align": 0.5 + 0.001 * (n % 100)}}}).encode()
-        request = urllib.request.Request(f"{url}/rig/ask", body, {"Origin": url})
-        urllib.request.urlopen(request).close()
-
-
 def stop_ms(bench: Bench, url: str) -> np.ndarray:
     """From a stop at the door to the tick that has taken the torque off."""
     took = []
@@ -249,6 +292,7 @@ def stop_ms(bench: Bench, url: str) -> np.ndarray:
 
 
 def main(seconds: float) -> None:
+    sys.setswitchinterval(0.0003)  # as robot.session does
     bench = Bench(page=False)
     time.sleep(2)
     show("page off", bench.measure(seconds))
@@ -267,15 +311,11 @@ def main(seconds: float) -> None:
             show(f"{n} browser{'s' * (n > 1)}", bench.measure(seconds))
             spectators.kill()
             spectators.wait()
-        over = threading.Event()
-        hand = threading.Thread(target=dragging, args=(url, over))
-        hand.start()
-        time.sleep(1)
-        before = len(bench.obeyed)
-        show("tuning", bench.measure(seconds))
-        over.set()
-        hand.join()
-        print(f"  {(len(bench.obeyed) - before) / seconds:.0f} changes a second came in force")
+        spectators = watched(url, 1)
+        time.sleep(2)
+        tuning_rows(bench, url, seconds)
+        spectators.kill()
+        spectators.wait()
         print(f"page there after {ready_s:.2f} s; a browser has the script after {script_s:.2f} s")
         print(f"and the first camera picture after {picture_s:.2f} s")
         for name, took in (("slider", slider_ms(bench, url)), ("stop", stop_ms(bench, url))):

@@ -1,0 +1,136 @@
+"""``gazerig run`` is tuned, steered and stopped from other programs, and reads its file again."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from config.save import copy_shipped
+from config.schema import load_rig
+from drivers.errors import DriverError
+from robot.remote import NoRig, RunningRig, running
+from robot.remote_socket import folder, sockets
+
+RATE = "loop.rate_hz"
+ROOT = Path(__file__).parents[1]
+pytestmark = pytest.mark.xdist_group("a running rig")
+
+
+@pytest.fixture(scope="module")
+def place() -> Iterator[Path]:
+    """A folder for the rig's file and its socket; pytest's own are too long for a socket."""
+    found = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(found))
+        yield found
+    shutil.rmtree(found)
+
+
+class Run:
+    """``gazerig run`` on an emulated bus, its words in a file."""
+
+    def __init__(self, place: Path) -> None:
+        self.file, self.log = place / "my.yaml", place / "log"
+        if not self.file.exists():
+            copy_shipped("desk", self.file)
+        code = "from robot.cli import main; main()"
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", code, "run", str(self.file), "--mock", "--no-page"],
+                stderr=log,
+                env={**os.environ, "PYTHONPATH": str(ROOT)},
+            )
+
+    def connected(self) -> RunningRig:
+        for _ in range(600):
+            assert self.process.poll() is None, self.words()
+            try:
+                rig = RunningRig.connect(self.process.pid)
+            except NoRig:
+                time.sleep(0.05)
+                continue
+            if rig.status()["ticks"]:
+                return rig
+            rig.close()
+        pytest.fail("it cannot be reached")
+
+    def words(self) -> str:
+        return self.log.read_text(encoding="utf-8")
+
+    def hears(self, words: str) -> bool:
+        for _ in range(400):
+            if words in self.words():
+                return True
+            time.sleep(0.05)
+        return False
+
+    def end(self, with_signal: int) -> int:
+        self.process.send_signal(with_signal)
+        return self.process.wait(timeout=30.0)
+
+
+@pytest.fixture(scope="module")
+def run(place: Path) -> Iterator[Run]:
+    run = Run(place)
+    yield run
+    if run.process.poll() is None:
+        run.end(signal.SIGKILL)
+
+
+def test_it_is_tuned_stopped_and_goes_on(run: Run) -> None:
+    with run.connected() as rig:
+        assert rig.status()["rig"] == str(run.file)
+        assert rig.set(RATE, 150.0) == (f"{RATE} = 150.0",)
+        assert [change.key for change in rig.unsaved()] == [RATE]
+        rig.look_at(1.0, 0.3, 0.0)
+        assert rig.status()["why"] == "somebody chose this point"
+        rig.stop("finger")
+        assert rig.status()["stopped"] == "finger"
+        rig.resume()
+        assert rig.status()["stopped"] == ""
+        rig.save()
+    assert load_rig(str(run.file)).loop.rate_hz == 150.0
+    assert run.hears("stopped: finger; torque off")
+
+
+def test_the_file_edited_by_hand_is_taken_or_refused_whole(run: Run) -> None:
+    good = run.file.read_text(encoding="utf-8")
+    with run.connected() as rig:
+        run.file.write_text(good.replace("rate_hz: 150.0", "rate_hz: 5e5") + "x: 1\n")
+        assert run.hears("refused; the values from before stay")
+        assert "above 1000" in run.words() and "x: unknown" in run.words()
+        assert rig.get(RATE)[RATE] == 150.0
+        run.file.write_text(good.replace("rate_hz: 150.0", "rate_hz: 160.0"))
+        assert run.hears("read again, in force")
+        assert rig.get(RATE)[RATE] == 160.0
+        ticks = rig.status()["ticks"]
+        time.sleep(0.1)
+        assert rig.status()["ticks"] > ticks  # all the while it ran
+
+
+def test_ctrl_c_parks_and_removes_the_socket(run: Run) -> None:
+    with run.connected() as rig:
+        assert run.end(signal.SIGINT) == 0
+        with pytest.raises(DriverError, match="ended or hung up"):
+            rig.get()
+    assert "parked, torque off" in run.words() and "Traceback" not in run.words()
+    assert not sockets(folder(os.environ, os.getuid()))
+
+
+def test_a_killed_rig_is_no_rig_and_the_next_clears_up(place: Path) -> None:
+    killed = Run(place)
+    killed.connected().close()
+    killed.end(signal.SIGKILL)
+    socket_folder = folder(os.environ, os.getuid())
+    assert list(sockets(socket_folder)) == [killed.process.pid] and running() == []
+    second = Run(place)
+    second.connected().close()
+    assert list(sockets(socket_folder)) == [second.process.pid]
+    second.end(signal.SIGTERM)
