@@ -13,7 +13,7 @@ run: $(VENV)/.installed
 	$(BIN)/gazerig run --mock
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -n auto --dist loadgroup
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -106,16 +106,16 @@ def values(rig: Rig) -> dict[str, Value]:
     return {key: value for key, _, value in _leaves(_ROOT, rig, ())}
 
 
-def values_after(
-    before: Mapping[str, Value], rig: Rig, found: Mapping[str, Value]
-) -> dict[str, Value]:
-    """Give ``values(rig)`` from those of the rig before it and the differences between the two."""
-    single = all(
-        key in before and value is not None and not isinstance(value, Mapping)
+def values_after(known: Mapping[str, Value], before: Rig, after: Rig) -> dict[str, Value]:
+    """Give ``values(after)``; known: ``values(before)``, of which few will differ."""
+    found = differences(before, after)
+    same_entries = all(
+        list(getattr(before, over)) == list(getattr(after, over)) for over in _UNLISTED
+    ) and all(
+        key in known and value is not None and not isinstance(value, Mapping)
         for key, value in found.items()
     )
-    # Anything else may be an entry that came or went, and other keys with it.
-    return {**before, **found} if single else values(rig)
+    return {**known, **found} if same_entries else values(after)
 
 
 def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:

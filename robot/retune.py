@@ -219,26 +219,29 @@ class Retuner:
         """
         if (new.joints, new.guard) == (old.joints, old.guard):
             return ()
-        parts, joints = self.parts, self._lasting(new)
-        others = joints != self._lasting(old)
+        parts, joints, before = self.parts, self._lasting(new), self._lasting(old)
+        others = joints != before
         if others:
             for i, (factor, offset_rad) in parts.body.retune(joints).items():
                 parts.guard.recount(i, factor, offset_rad)
-        if new.guard != old.guard or limits(joints) != limits(self._lasting(old)):
+        if new.guard != old.guard or limits(joints) != limits(before):
             parts.guard.retune(new.guard, limits(joints))
         return _beyond(limits(joints), parts.body.reach()) if others else ()
 
     def _lasting(self, rig: Rig) -> dict[str, JointParams]:
         """Give the joints with the servos that the bus was opened with."""
         return {
-            name: replace(
-                rig.joints[name],
-                id=first.id,
-                model=first.model,
-                firmware_min=first.firmware_min,
-            )
+            name: _with_servo(rig.joints[name], first)
             for name, first in self._started.joints.items()
         }
+
+
+def _with_servo(joint: JointParams, first: JointParams) -> JointParams:
+    """Give a joint with the servo of another; the same one where it has that already."""
+    servo = first.id, first.model, first.firmware_min
+    if (joint.id, joint.model, joint.firmware_min) == servo:
+        return joint
+    return replace(joint, id=first.id, model=first.model, firmware_min=first.firmware_min)
 
 
 def _beyond(wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]) -> tuple[str, ...]:

@@ -255,7 +255,7 @@ class Tuning:
             return ()
         self._state = state._replace(
             rig=rig if found else before.rig,
-            values=values_after(before.values, rig, found) if found else before.values,
+            values=values_after(before.values, before.rig, rig) if found else before.values,
             version=before.version + 1,
         )
         return tuple(_told(key, value) for key, value in found.items())

@@ -17,9 +17,6 @@ from sim_mock.scene import Event, Person, Scene, Thing, there_and_back
 from sim_mock.scene_camera import SceneCamera, SceneCameraParams
 from sim_mock.scenes import scenes
 
-# One worker runs them all: what they share takes seconds to make.
-pytestmark = pytest.mark.xdist_group("behaviours")
-
 FACE: Vec3 = (1.0, 0.0, 0.2)
 HAND: Vec3 = (0.7, 0.2, 0.1)
 

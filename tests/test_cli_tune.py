@@ -160,9 +160,6 @@ def held(key: str) -> Any:
         return rig.get(key)[key]
 
 
-pytestmark = pytest.mark.xdist_group("a rig in another process")
-
-
 def test_get_shows_all_and_marks_what_is_not_saved() -> None:
     everything = gazerig("get").stdout.splitlines()
     assert len(everything) > 300 and everything[0].split() == ["key", "value", "unit", "default"]
@@ -258,7 +255,7 @@ def test_save_takes_a_path_from_the_folder_it_is_typed_in(
         # The copy is the rig's file from now on: it is the one that is watched.
         text = other.read_text(encoding="utf-8")
         other.write_text(text.replace("rate_hz: 150", "rate_hz: 160"), encoding="utf-8")
-        assert rig.hears("other.yaml was edited: read again")
+        assert rig.hears("other.yaml was edited: read again"), rig.log.read_text()
         assert held(RATE) == 160.0
 
 

@@ -20,9 +20,6 @@ from sim_mock.steps_aside import STEP_AT_S, STEP_S
 from sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
 from sim_mock.walks_past import HALF_WAY_M, WALK_M_S
 
-# One worker runs them all: what they share takes seconds to make.
-pytestmark = pytest.mark.xdist_group("closed_loop")
-
 RIG = load_rig("desk")
 ARRIVED_S = STEP_AT_S + STEP_S
 Column = NDArray[np.float64]

@@ -21,7 +21,6 @@ from robot.report.bands import BY_KEY
 from robot.report.compare import chance, compare, corrected, differences_of
 from robot.report.measured import Measured, mean, median
 
-pytestmark = pytest.mark.xdist_group("report")
 DICE = np.random.default_rng(11)
 
 
@@ -109,7 +108,7 @@ def test_two_recordings_and_one_on_the_command_line(tmp_path: Path) -> None:
     assert one.exit_code == 0, one.output
     page = (tmp_path / "one.html").read_text(encoding="utf-8")
     assert "over in two frames" in page and "literal_frame" in page
-    assert len(list((tmp_path / "hard_figures").glob("*.png"))) > 10
+    assert len(list((tmp_path / "one_figures").glob("*.png"))) > 10
 
 
 def test_a_run_against_itself_differs_in_nothing(tmp_path: Path) -> None:

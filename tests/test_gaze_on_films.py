@@ -23,9 +23,6 @@ from robot.intrinsics import intrinsics_of_lens, project
 from robot.loop import Tick, run
 from robot.summary import cyclopean
 
-# One worker runs them all: what they share takes seconds to make.
-pytestmark = pytest.mark.xdist_group("gaze_on_films")
-
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
 SECONDS, BEGIN_S, RATE_HZ = 24.0, 1.0, 10.0
 WIDTH, HEIGHT = 768, 576

@@ -16,14 +16,17 @@ from config.knobs import (
     knobs,
     value_of,
     values,
+    values_after,
 )
 from config.load import ConfigError, shipped_names
 from config.schema import Rig, load_rig
+from robot.body import JointParams
 from robot.orders import Value
 
 RIG = load_rig("desk")
 KNOBS = knobs(RIG, RIG)
 LENS = {"width_px": 640, "height_px": 480, "fx_px": 500.0, "fy_px": 500.0}
+WHOLE_LENS = {**LENS, "cx_px": 320.0, "cy_px": 240.0}
 
 
 def test_every_field_of_every_section_is_a_knob() -> None:
@@ -160,3 +163,66 @@ def test_any_number_within_its_bounds_comes_back_or_breaks_a_rule(data: st.DataO
         return
     assert value_of(other, knob.key) == value
     assert set(differences(RIG, other)) <= {knob.key}
+
+
+def test_a_changed_rig_shares_what_did_not_change_and_leaves_the_old_one_alone() -> None:
+    before = values(RIG)
+    other = changed(RIG, {"gaze.head.align": 0.61, "joints.neck_yaw.max_deg": 60.0})
+    assert values(RIG) == before
+    assert other.gaze.lids is RIG.gaze.lids and other.guard is RIG.guard
+    assert other.joints["neck_pitch"] is RIG.joints["neck_pitch"]
+    assert other.joints["neck_yaw"].max_deg == 60.0 and other.gaze.head.align == 0.61
+
+
+def test_only_what_changed_is_checked_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    checked: list[str] = []
+    once = JointParams.__post_init__
+
+    def counting(joint: JointParams) -> None:
+        checked.append(joint.model)
+        once(joint)
+
+    monkeypatch.setattr(JointParams, "__post_init__", counting)
+    changed(RIG, {"gaze.head.align": 0.61})
+    assert not checked
+    changed(RIG, {"joints.neck_yaw.max_deg": 60.0})
+    assert len(checked) == 1
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"gaze.head": {"align": 0.61}},
+        {"gaze": {"head": {"align": 0.61}}, "gaze.head.pull_least": 0.31},
+        {"camera.lens": WHOLE_LENS, "camera.lens.fx_px": 510.0},
+        {"camera.lens.width_px": 640, "camera.lens": WHOLE_LENS},
+        {"joints": {"neck_yaw": {"max_deg": 60.0}}, "joints.neck_yaw.min_deg": -60},
+        {"face_parts_mm.N": [1, 2, 3], "face_parts_mm.M": (1.0, 2.0, 3.0)},
+    ],
+)
+def test_changes_that_overlap_come_one_over_the_other(changes: dict[str, Value]) -> None:
+    made = changed(RIG, changes)
+    assert changed(RIG, differences(RIG, made)) == made != RIG
+    lens = made.camera.lens
+    assert "camera.lens" not in changes or (lens is not None and lens.width_px == 640)
+    assert all(isinstance(x, float) for x in made.face_parts_mm.get("N", ()))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"gaze.head.align": 0.61},
+        {"gaze.head": {"align": 0.61}},
+        {"park_deg.neck_yaw": None},
+        {"park_deg.neck_yaw": 4.0, "park_deg.neck_pitch": 3.0},
+        {"face_parts_mm.N": (1.0, 2.0, 3.0)},
+        {"camera.lens": WHOLE_LENS},
+        {"bus.port": "/dev/ttyACM1"},
+    ],
+)
+def test_values_follow_changes_there_and_back(changes: dict[str, Value]) -> None:
+    made = changed(RIG, changes)
+    there = values_after(values(RIG), RIG, made)
+    assert there == values(made) and list(there) == list(values(made))
+    back = values_after(there, made, RIG)
+    assert back == values(RIG) and list(back) == list(values(RIG))

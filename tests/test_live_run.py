@@ -20,7 +20,6 @@ from robot.remote_socket import folder, sockets
 
 RATE = "loop.rate_hz"
 ROOT = Path(__file__).parents[1]
-pytestmark = pytest.mark.xdist_group("a running rig")
 
 
 @pytest.fixture(scope="module")

@@ -169,7 +169,12 @@ class Browser:
         self.asked_for: list[str] = []
         with urllib.request.urlopen(f"http://127.0.0.1:{debugging_port}/json/list") as answer:
             tab = next(t for t in json.load(answer) if t["type"] == "page")
-        self._socket = connect(tab["webSocketDebuggerUrl"], max_size=None, ping_interval=None)
+        self._socket = connect(
+            tab["webSocketDebuggerUrl"],
+            max_size=None,
+            ping_interval=None,
+            close_timeout=0.5,  # the browser is killed in any case
+        )
         self._ask("Network.enable")
         shape = {"width": self.width_px, "height": height_px, "deviceScaleFactor": 1}
         self._ask("Emulation.setDeviceMetricsOverride", **shape, mobile=False)

@@ -15,15 +15,19 @@ from math import degrees
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
-from config.load import ConfigError
+from config.load import ConfigError, shipped
 from config.schema import load_rig
+from gaze.types import Vec3
 from robot.assemble import assemble
 from robot.audience import Audience, Told, Wished
 from robot.choice import Choice
 from robot.loop import LoopCount, Tick
 from robot.orders import Ask, LookAt
+from robot.page_view import _HALF_WIDTH as HALF_WIDTH
+from robot.page_view import VIEWS
 from robot.recording.run_info import RunInfo
 from robot.tuning import Tuning
 from robot.types import JOINTS
@@ -143,6 +147,17 @@ class Person:
             "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1
         )
 
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Move the mouse as a hand does: there first, then with the button down, step by step."""
+        (x, y), (to_x, to_y) = start, end
+        self._mouse("mouseMoved", x - 3.0, y, "none")
+        self._mouse("mouseMoved", x, y, "none")
+        self._mouse("mousePressed", x, y, "left")
+        for step in range(1, 6):
+            share = step / 5.0
+            self._mouse("mouseMoved", x + share * (to_x - x), y + share * (to_y - y), "left")
+        self._mouse("mouseReleased", to_x, to_y, "left")
+
     def press(self, key: str, code: str, number: int) -> None:
         for kind in ("keyDown", "keyUp"):
             self.tab._ask(  # type: ignore[attr-defined]
@@ -168,6 +183,19 @@ def saying(words: str, kind: str = "button, [role=tab], label") -> str:
 def beside(words: str, kind: str) -> str:
     """The control of a kind that a label names."""
     return f"({saying(words, 'label')})?.closest('.mantine-Flex-root').querySelector('{kind}')"
+
+
+def seen_at(p_world_m: Vec3, canvas: tuple[float, float, float, float]) -> tuple[float, float]:
+    """Where in the window a point of the first view is; canvas: left, top, width, height in px."""
+    eye, look_at = (np.array(place) for place in VIEWS["both"])
+    ahead = (look_at - eye) / np.linalg.norm(look_at - eye)
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    away = np.array(p_world_m) - eye
+    left, top, width, height = canvas
+    scale_px = 0.5 * width / HALF_WIDTH / (away @ ahead)
+    x, y = away @ right * scale_px, away @ np.cross(right, ahead) * scale_px
+    return left + 0.5 * width + x, top + 0.5 * height - y
 
 
 STOP = "document.querySelector('#rig-stop')"
@@ -273,6 +301,32 @@ def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]) -> No
     wait_for(lambda: rig.newest.target.kind != "puppet", "the head being free")
 
 
+def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -> None:
+    rig, person = at_the_rig
+    person.click(saying("lead"))
+    there = (0.7, 0.1, 0.3)
+    rig.robot.order(LookAt(there))
+    wait_for(lambda: rig.newest.target.p_world_m == there, "the head being led")
+    wait_for(lambda: person.reads("somebody chose this point"), "the page knowing of it")
+    person.click(beside("drag a target", "input"))
+    rect = "(() => { const r = document.querySelector('canvas').getBoundingClientRect();"
+    x, y, width, height = person.run(rect + "return [r.x, r.y, r.width, r.height]; })()")
+    canvas = (x, y, width, height)
+    arrow, farther = ((0.7, 0.1, 0.3 + up) for up in (0.08, 0.2))
+    before = len(rig.orders)
+
+    def dragged() -> bool:
+        person.drag(seen_at(arrow, canvas), seen_at(farther, canvas))
+        return any(isinstance(order, LookAt) for order in rig.orders[before:])
+
+    wait_for(dragged, "the target being dragged")
+    wait_for(lambda: rig.newest.target.p_world_m[2] > 0.38, "the head following")
+    # Along the arrow and nowhere else.
+    assert rig.newest.target.p_world_m[:2] == pytest.approx(there[:2], abs=1e-3)
+    person.click(saying("look freely again"))
+    wait_for(lambda: rig.newest.target.kind != "puppet", "the head being free")
+
+
 def test_a_parameter_is_found_changed_marked_and_put_back(
     at_the_rig: tuple[Rig, Person],
 ) -> None:
@@ -316,6 +370,33 @@ def test_what_breaks_a_rule_is_refused_in_words_and_goes_back(
     wait_for(lambda: person.reads("refused", "16383"), "the rule")
     wait_for(lambda: person.run(f"{field}.value") == before, "the control going back")
     assert rig.tuning.unsaved() == ()
+
+
+def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
+    at_the_rig: tuple[Rig, Person], tmp_path: Path
+) -> None:
+    rig, person = at_the_rig
+    rig.tuning.set({"park_deg.neck_pitch": -3.0})
+    person.click(saying("tuning"))
+    wait_for(lambda: person.reads("not saved"), "the mark")
+    file = tmp_path / "tuned at midnight.yaml"
+    person.click(beside("save as", "input"))
+    person.type(str(file))
+    person.press("\r", "Enter", 13)
+    wait_for(lambda: person.reads(f"saved in {file}", "all saved"), "the words")
+    assert load_rig(str(file)).park_deg["neck_pitch"] == -3.0
+    before = shipped("rigs", "desk").read_text(encoding="utf-8")
+    saved = file.read_text(encoding="utf-8")
+    comments = [line for line in before.splitlines() if line.startswith("#")]
+    assert comments and all(line in saved for line in comments)
+
+
+def test_a_character_is_laid_over_the_rig(at_the_rig: tuple[Rig, Person]) -> None:
+    rig, person = at_the_rig
+    person.click(saying("lead"))
+    person.click(saying("shy"))
+    wait_for(lambda: rig.tuning.character_name == "shy", "the character")
+    wait_for(lambda: person.reads("character shy"), "the page saying so")
 
 
 def test_without_the_token_there_is_one_line_and_with_it_the_page() -> None:

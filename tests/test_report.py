@@ -28,7 +28,6 @@ from robot.report.measured import Finding, Measured, judged, mean, median
 from robot.report.model import own, published
 from robot.report.page import band_words, gauge, number
 
-pytestmark = pytest.mark.xdist_group("report")
 RIG = load_rig("desk")
 EMPTY = Gathered(np.zeros((0, 29)), (), (), ())
 

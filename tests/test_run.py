@@ -39,7 +39,6 @@ def visitor() -> dict[str, Any]:
     return figures("--seconds", "44", "--seed", "1")
 
 
-@pytest.mark.xdist_group("visitor")
 def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
     promised = {
         "seconds", "wall_seconds", "ticks", "overruns", "faces_seen", "pictures", "fixations",
@@ -52,7 +51,6 @@ def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
     assert visitor["ticks"] == pytest.approx(44 * 200, abs=2)
 
 
-@pytest.mark.xdist_group("visitor")
 def test_the_head_looks_at_the_visitor(visitor: dict[str, Any]) -> None:
     share = visitor["target_share"]
     nobody = sum(share.get(kind, 0.0) for kind in ("rest", "search", "glance"))

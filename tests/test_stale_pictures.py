@@ -18,9 +18,6 @@ from robot.loop import Tick, run
 from robot.types import JOINTS
 from sim_mock.scene import Event, Person, Thing
 
-# One worker runs them all: what they share takes seconds to make.
-pytestmark = pytest.mark.xdist_group("stale_pictures")
-
 GONE_S, BACK_S, END_S = 2.0, 9.0, 12.0
 LOST, FOUND = "camera lost: trying it again", "camera back after 7.0 s"
 NECK = slice(JOINTS.index("neck_yaw"), JOINTS.index("neck_roll") + 1)

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from config.knobs import values
 from config.load import ConfigError
 from config.schema import load_rig
 from robot.assemble import Assembly, assemble
@@ -217,3 +218,46 @@ def test_lists_of_mappings_are_left_to_the_file(mine: Path) -> None:
     bench.tuning.set({"guard.collisions": (box,)})
     with pytest.raises(ConfigError, match="change it in the file"):
         bench.tuning.save()
+
+
+def test_a_dragged_slider_reads_no_file_and_makes_no_knob_anew(
+    mine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(str(mine))
+    knobs, files = bench.tuning.knobs(), bench.tuning.files()
+
+    def read(*words: object) -> None:
+        raise AssertionError(f"read: {words}")
+
+    monkeypatch.setattr("robot.tuning.layers_of", read)
+    monkeypatch.setattr("robot.tuning.load_rig", read)
+    for step in range(3):
+        bench.tuning.set({"gaze.lids.close_ms": 90.0 + step})
+        assert bench.tuning.files() == files and bench.tuning.knobs() is knobs
+        assert bench.tuning.values() == values(bench.made.retuner.rig)
+        assert [change.key for change in bench.tuning.unsaved()] == ["gaze.lids.close_ms"]
+
+
+def test_the_files_in_use_are_those_that_the_rig_names_now(mine: Path) -> None:
+    bench = Bench(str(mine))
+    assert [path.name for path in bench.tuning.files()] == ["mine.yaml", "robot.yaml"]
+    text = mine.read_text(encoding="utf-8")
+    mine.write_text(text.replace("profile: robot", "profile: mitake"), encoding="utf-8")
+    bench.tuning.reload(mine)
+    assert [path.name for path in bench.tuning.files()] == ["mine.yaml", "mitake.yaml"]
+    bench.tuning.character("shy")
+    assert [p.name for p in bench.tuning.files()] == ["mine.yaml", "mitake.yaml", "shy.yaml"]
+    assert bench.tuning.values() == values(bench.made.retuner.rig)
+
+
+def test_values_and_what_is_unsaved_go_by_what_was_saved_last(mine: Path) -> None:
+    bench = Bench(str(mine))
+    bench.tuning.set({"gaze.lids.close_ms": 90.0})
+    bench.tuning.save()
+    bench.tuning.set({"gaze.lids.close_ms": 95.0})
+    (change,) = bench.tuning.unsaved()
+    assert (change.old, change.new) == ("90.0", "95.0")
+    bench.tuning.revert()
+    assert bench.tuning.values()["gaze.lids.close_ms"] == 90.0
+    bench.tuning.values()["gaze.lids.close_ms"] = 1.0
+    assert bench.tuning.get("gaze.lids.close_ms") == {"gaze.lids.close_ms": 90.0}

@@ -5,15 +5,16 @@
 A simulated rig in real time, its servos behind a pseudo-terminal, with the page off and with
 0, 1 and 5 browsers that take all that comes. Printed a run: how far ticks are off their slots,
 skipped slots, and the processor time of the rig's and of the page's process, in per cent of
-one core. Then the same with one browser while nobody tunes, while a slider of the tuning is
-dragged, while another program sets a value ten times a second, and while it reads all of them
-ten times a second; in turn and three times over, as a machine is never quiet for long. Then the
-time until the page can be opened, until a browser has its first picture, and from a slider that
-is moved (and from a stop) to the goals on the bus.
+one core. Then, with one browser, seconds in which nobody tunes, the door is knocked at as
+often as by a slider, a slider of the tuning is dragged, another program sets a value ten times
+a second, or it reads all of them as often, in turn. Then the time until the page can be opened,
+until a browser has its first picture, and from a slider that is moved (and from a stop) to the
+goals on the bus.
 """
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -29,6 +30,8 @@ import numpy as np
 import viser
 import zstandard
 from websockets.sync.client import ClientConnection, connect
+from websockets.sync.connection import Connection
+from websockets.typing import Origin, Subprotocol
 
 from config.load import ConfigError
 from config.schema import load_rig
@@ -39,7 +42,7 @@ from robot.loop import LoopCount, Tick, run
 from robot.recording.run_info import RunInfo
 from robot.tuning import Tuning
 
-VISER = [f"viser-v{viser.__version__}"]
+VISER = [Subprotocol(f"viser-v{viser.__version__}")]
 TRIES = 30
 CAMERA = msgspec.msgpack.encode(
     {
@@ -60,7 +63,11 @@ CAMERA = msgspec.msgpack.encode(
 def browser(url: str) -> ClientConnection:
     """Connect as a browser does, with a camera, so that the page is drawn for it."""
     there = connect(
-        url.replace("http", "ws"), origin=url, subprotocols=VISER, max_size=None, compression=None
+        url.replace("http", "ws"),
+        origin=Origin(url),
+        subprotocols=VISER,
+        max_size=None,
+        compression=None,
     )
     there.send(CAMERA)
     return there
@@ -170,6 +177,14 @@ def watched(url: str, n: int) -> "subprocess.Popen[bytes]":
 
 
 HANDS = {
+    "no request": """
+import contextlib, time, urllib.error, urllib.request
+while True:
+    time.sleep(1 / 60)
+    asked = urllib.request.Request("{url}/rig/ask", b"no JSON", {{"Origin": "{url}"}})
+    with contextlib.suppress(urllib.error.HTTPError):
+        urllib.request.urlopen(asked).close()
+""",
     "drag": """
 import itertools, json, time, urllib.request
 for n in itertools.count():
@@ -195,7 +210,10 @@ while True:
     rig.get()
 """,
 }
-"""What somebody who tunes does, in a process of its own; a browser sends 60 times a second."""
+"""What somebody who tunes does, in a process of its own; a browser sends 60 times a second.
+
+What the door turns away never reaches the rig: it is what the sending itself costs the machine.
+"""
 
 
 def tuned(how: str, url: str) -> "subprocess.Popen[bytes]":
@@ -204,19 +222,43 @@ def tuned(how: str, url: str) -> "subprocess.Popen[bytes]":
     return subprocess.Popen([sys.executable, "-c", code])
 
 
-def tuning_rows(bench: Bench, url: str, seconds: float) -> None:
-    """What tuning costs, against the same moments without it."""
-    for _ in range(3):
-        for how in ("nobody", *HANDS):
-            hand = tuned(how, url) if how in HANDS else None
-            time.sleep(1.5)
+def tuning_rows(bench: Bench, url: str, rounds: int) -> None:
+    """What tuning costs: a second of each in turn, as a machine is never quiet for long."""
+    hands = {how: tuned(how, url) for how in HANDS}
+    time.sleep(3.0)  # until they have started
+    for hand in hands.values():
+        hand.send_signal(signal.SIGSTOP)
+    found: dict[str, list[Run]] = {how: [] for how in ("nobody", *HANDS)}
+    changes = dict.fromkeys(found, 0)
+    for _ in range(rounds):
+        for how, runs in found.items():
+            if how in hands:
+                assert hands[how].poll() is None, f"{how} has ended"
+                hands[how].send_signal(signal.SIGCONT)
+            time.sleep(0.3)
             before = len(bench.obeyed)
-            show(how, bench.measure(seconds))
-            if hand is not None:
-                assert hand.poll() is None, f"{how} has ended"
-                hand.kill()
-                hand.wait()
-                print(f"{(len(bench.obeyed) - before) / seconds:16.1f} changes a second in force")
+            runs.append(bench.measure(1.0))
+            changes[how] += len(bench.obeyed) - before
+            if how in hands:
+                hands[how].send_signal(signal.SIGSTOP)
+    for hand in hands.values():
+        hand.kill()
+        hand.wait()
+    for how, runs in found.items():
+        show_seconds(how, runs, changes[how] / rounds)
+
+
+def show_seconds(name: str, runs: list[Run], changes_per_s: float) -> None:
+    skipped = [run.overruns for run in runs]
+    p99 = np.median([np.percentile(run.off_slot_ms, 99) for run in runs])
+    rig, page = (np.median([r[i] for r in runs]) for i in (2, 3))
+    low, middle, high = np.percentile(skipped, (25, 50, 75))
+    print(
+        f"{name:12s} of {len(runs)} s each: {middle:3.0f} slots skipped ({low:.0f} to {high:.0f} "
+        f"in half of them) | off slot p99 {p99:5.2f} ms | rig {rig:4.1f} % page {page:4.1f} % "
+        f"of a core | {changes_per_s:4.1f} changes a second",
+        flush=True,
+    )
 
 
 def show(name: str, run: Run) -> None:
@@ -243,7 +285,7 @@ def first_picture(url: str) -> tuple[float, float]:
                 return script_s, time.monotonic() - start_s
 
 
-def slider_uuid(there: ClientConnection, label: str) -> str:
+def slider_uuid(there: Connection, label: str) -> str:
     while True:
         data = there.recv(timeout=30)
         assert isinstance(data, bytes)
@@ -313,7 +355,7 @@ def main(seconds: float) -> None:
             spectators.wait()
         spectators = watched(url, 1)
         time.sleep(2)
-        tuning_rows(bench, url, seconds)
+        tuning_rows(bench, url, round(2 * seconds))
         spectators.kill()
         spectators.wait()
         print(f"page there after {ready_s:.2f} s; a browser has the script after {script_s:.2f} s")
