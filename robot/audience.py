@@ -4,6 +4,7 @@ The page, the status line, other programs, the rig's files and the recording: ea
 has its own thread or process, and is told of a tick in next to no time.
 """
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -20,6 +21,8 @@ from robot.picking import Picking
 from robot.recording.recorder import Recorder
 from robot.recording.run_info import RunInfo
 from robot.snapshot import Snapshots
+
+_SWITCH_S = 0.0003
 
 STEER = "steer"
 """The menu of this name is the page's steps of a calibration (robot.page_controls)."""
@@ -99,6 +102,7 @@ class Audience:
         self._snapshots = Snapshots(made.loop.rate_hz, made.shown())
         self._onlooker = self._made_onlooker(status if wished.status_line else None)
         self._recorder = self._made_recorder(wished, told)
+        self._looking = False
         self._watchers = self._all_watchers()
 
     def _made_page(self, address: tuple[str, int], told: Told | None) -> Page:
@@ -172,6 +176,10 @@ class Audience:
 
     def open(self) -> None:
         """Open the doors, once the robot has started."""
+        if not self._fast:
+            # Who computes in another thread gives the interpreter back after so long, not the
+            # usual 5 ms, which is a whole slot of the loop.
+            sys.setswitchinterval(_SWITCH_S)
         if self._page is not None:
             self._page.open()
             self._page.offer(self._menus())
@@ -179,11 +187,17 @@ class Audience:
             self._live.open()
         if not self._fast:
             self._onlooker.start()
+            self._looking = True
 
     def tell(self, words: str) -> None:
         """Say something to everybody who looks at the page."""
         if self._page is not None:
             self._page.say(words)
+
+    def give_up(self) -> None:
+        """Leave no file behind of a robot that could not start."""
+        if self._recorder is not None:
+            self._recorder.close("it could not start")
 
     def events(self) -> tuple[str, ...]:
         """Say what has happened to those who watch."""
@@ -193,7 +207,7 @@ class Audience:
         """Close all, when the torque is off."""
         if self._live is not None:
             self._live.close()
-        if not self._fast:
+        if self._looking:
             self._onlooker.stop()
         if self._page is not None:
             self._page.close()

@@ -14,6 +14,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from drivers.errors import SetupError
+from robot.cli_run import host_port
 from robot.cli_terminal import FAULT, clear_errors, say, signals
 from robot.loop import Tick
 from robot.types import JOINTS
@@ -58,7 +59,7 @@ def replay(
             )
         else:
             with signals() as stopped:
-                well = _show(file, _address(page), play, seconds, stopped)
+                well = _show(file, host_port(page), play, seconds, stopped)
     if not well:
         raise typer.Exit(FAULT)
 
@@ -298,10 +299,3 @@ def _progress(words: str, total_s: float) -> Iterator[Callable[[float], None]]:
     with Progress(console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task(words, total=total_s)
         yield lambda at_s: bar.update(task, completed=at_s)
-
-
-def _address(text: str) -> tuple[str, int]:
-    host, _, port = text.rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise SetupError(f"--page {text}: not HOST:PORT, for example 127.0.0.1:8080")
-    return host, int(port)

@@ -1,6 +1,5 @@
 """One run from start to torque off: what the command line asks for, carried out."""
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +19,6 @@ from robot.loop import LoopCount, Robot, Tick
 from robot.loop import run as run_loop
 from robot.planner import Planner
 from robot.summary import Summary
-
-_SWITCH_S = 0.0003
 
 
 @dataclass(frozen=True)
@@ -154,11 +151,12 @@ def _run(
 
     began_s = wall.now_s()
     count = LoopCount(0, 0, "fault: unexpected error")
-    # Whoever computes in another thread gives the interpreter back after so long, not the usual
-    # 5 ms, which is a whole slot of the loop.
-    sys.setswitchinterval(_SWITCH_S)
     audience.open_files()
-    robot.start(made.clock)
+    try:
+        robot.start(made.clock)
+    except BaseException:
+        audience.give_up()
+        raise
     start_s = made.clock.now_s()
     for note in (*made.notes, *drawn_together(robot.body.bus.events())):
         say(note)
