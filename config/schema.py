@@ -32,8 +32,8 @@ from robot.body import JointParams
 from robot.frames import CameraParams
 from robot.kinematics import GeometryParams
 from robot.loop import LoopParams
-from robot.safety import Guard, GuardParams
-from robot.tracks import TrackParams
+from robot.safety.guard import Guard, GuardParams
+from robot.seeing.tracks import TrackParams
 from robot.types import JOINTS
 
 

@@ -36,7 +36,7 @@ from robot.emulated_rig import emulated_servos
 from robot.frames import CameraMount, CameraParams, NewestPose, PoseHistory, standing_still
 from robot.kinematics import Kinematics
 from robot.loop import LoopParams, Robot
-from robot.perception import Perception
+from robot.page.snapshot import ShownRig
 from robot.retune import (
     Parts,
     Placed,
@@ -47,9 +47,9 @@ from robot.retune import (
     limits,
     own_parts,
 )
-from robot.safety import Guard
-from robot.snapshot import ShownRig
-from robot.tracks import Tracker
+from robot.safety.guard import Guard
+from robot.seeing.perception import Perception
+from robot.seeing.tracks import Tracker
 from robot.types import JOINTS, JointAngles
 from sim_mock.ports import InProcessPort
 from sim_mock.pty_bus import PtyBus

@@ -10,22 +10,22 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from robot.assemble import Assembly
-from robot.live_control import FileTuning, LiveControl
 from robot.loop import LoopCount, Tick
-from robot.onlooker import InForce, Onlooker
 from robot.orders import Order, Resume, Stop, Tune
-from robot.page import Page
-from robot.page_feed import Fed, TuningFeed
-from robot.page_hear import PageHear
-from robot.picking import Picking
+from robot.page.feed import Fed, TuningFeed
+from robot.page.hear import PageHear
+from robot.page.link import Page
+from robot.page.onlooker import InForce, Onlooker
+from robot.page.picking import Picking
+from robot.page.snapshot import Snapshots
 from robot.recording.recorder import Recorder
 from robot.recording.run_info import RunInfo
-from robot.snapshot import Snapshots
+from robot.remote.live_control import FileTuning, LiveControl
 
 _SWITCH_S = 0.0003
 
 STEER = "steer"
-"""The menu of this name is the page's steps of a calibration (robot.page_controls)."""
+"""The menu of this name is the page's steps of a calibration (robot.page.controls)."""
 
 
 class LiveTuning(FileTuning, Fed, Protocol):

@@ -6,7 +6,7 @@ from math import ceil, floor, inf, pi, radians
 
 from drivers.dynamixel_table import MODELS
 from drivers.types import ServoBus, ServoReading, ServoSetup
-from robot.safety import JointLimit
+from robot.safety.guard import JointLimit
 from robot.types import JOINTS, JointAngles, JointState
 
 _STEPS_PER_RAD = 4096.0 / (2.0 * pi)  # all Dynamixel X servos

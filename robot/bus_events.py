@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 
-from robot.servo_report import runs
+from robot.bringup.servo_report import runs
 
 _SERVO = re.compile(r"servo (\d+)")
 

@@ -23,8 +23,8 @@ from gaze.types import Mat3, Vec3
 from robot.choice import Choice
 from robot.clock import Clock
 from robot.frames import CameraMount, CameraParams
-from robot.intrinsics import Intrinsics
-from robot.motion_finder import motion_finder, retuned
+from robot.seeing.intrinsics import Intrinsics
+from robot.seeing.motion_finder import motion_finder, retuned
 from sim_mock.film_camera import FilmCamera
 from sim_mock.pixel_camera import Exposure, PixelCamera, PixelCameraParams
 from sim_mock.scene import Scene

@@ -15,9 +15,9 @@ from drivers.errors import SetupError
 from drivers.face_detector import face_detector
 from drivers.face_params import FaceDetectorParams
 from gaze.types import PARTS, Floats
-from robot.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
 from robot.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
 from robot.heatmap_legend import with_legend
+from robot.seeing.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
 
 Picture = NDArray[np.uint8]
 

@@ -20,8 +20,8 @@ from robot.clock import Clock
 from robot.frames import PoseHistory
 from robot.kinematics import Kinematics
 from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune, check
-from robot.perception import Perception
-from robot.safety import Guard
+from robot.safety.guard import Guard
+from robot.seeing.perception import Perception
 from robot.types import JOINTS, JointAngles, JointState, Verdict
 
 

@@ -34,9 +34,9 @@ from robot.frames import CameraMount, CameraParams
 from robot.kinematics import Kinematics
 from robot.loop import LoopParams
 from robot.orders import Tune, Value
-from robot.perception import Perception
-from robot.safety import Guard, JointLimit
-from robot.tracks import Tracker
+from robot.safety.guard import Guard, JointLimit
+from robot.seeing.perception import Perception
+from robot.seeing.tracks import Tracker
 from robot.types import JOINTS, JointAngles
 
 EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from drivers.types import Picture
 from gaze.types import Mat3, Vec3
-from robot.charuco_board import CharucoBoard
-from robot.intrinsics import Intrinsics, rays
+from robot.calibrate.charuco_board import CharucoBoard
+from robot.seeing.intrinsics import Intrinsics, rays
 
 Floats = NDArray[np.float64]
 

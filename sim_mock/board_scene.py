@@ -14,9 +14,9 @@ import numpy as np
 from drivers.picture_source import Shot
 from gaze.angles import add, compose, rotate, rotate_back, sub
 from gaze.types import Angles3, HeadGeometry, Mat3, Vec3
-from robot.charuco_board import CharucoBoard
+from robot.calibrate.charuco_board import CharucoBoard
 from robot.frames import CameraMount, CameraParams
-from robot.intrinsics import Intrinsics, intrinsics_of_lens, rays
+from robot.seeing.intrinsics import Intrinsics, intrinsics_of_lens, rays
 from sim_mock.board_camera import BoardCamera, BoardCameraParams, true_lens
 
 # The board's own axes are optical ones, so this is a board that hangs upright before a

@@ -1,6 +1,6 @@
 """A person as a camera sees one: a drawn face of true size and pose, and a body below it.
 
-The face is that of robot.face_pose: its eyes, nose and mouth lie where the landmarks are, in
+The face is that of robot.seeing.face_pose: its eyes, nose and mouth lie where the landmarks are, in
 three dimensions, so that a face detector that was made for people finds them there. Not
 drawn: arms, expression, blinks; the eyes look straight ahead.
 """
@@ -14,7 +14,7 @@ import numpy as np
 
 from gaze.angles import rotation
 from gaze.types import Vec3
-from robot.face_pose import LANDMARKS_FACE_M
+from robot.seeing.face_pose import LANDMARKS_FACE_M
 from sim_mock.drawn_picture import Bytes, Colour, Floats, Picture3d, Sheet
 from sim_mock.scene import Person, Thing
 

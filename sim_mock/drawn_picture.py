@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaze.types import Mat3, Vec3
-from robot.intrinsics import Intrinsics
+from robot.seeing.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]

@@ -21,7 +21,7 @@ from drivers.types import Detections, FaceDetector, MovingBlob, Picture
 from gaze.angles import norm, sub
 from gaze.types import Mat3, Vec3
 from robot.frames import CameraMount
-from robot.intrinsics import Intrinsics, intrinsics_of_view
+from robot.seeing.intrinsics import Intrinsics, intrinsics_of_view
 from sim_mock.drawn_person import draw_person, draw_thing
 from sim_mock.drawn_picture import Picture3d
 from sim_mock.drawn_room import draw_room

@@ -15,8 +15,8 @@ import numpy as np
 from drivers.types import DetectedFace, Detections, MovingBlob
 from gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
 from gaze.types import Mat3, Vec3
-from robot.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
 from robot.frames import CameraMount
+from robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
 from sim_mock.scene import Person, Scene, Thing
 
 _FARTHEST_FACE_M = 4.0

@@ -3,7 +3,7 @@
 from gaze.angles import add, angle_between, rotate, rotation, scale, sub, unit, yaw_pitch
 from gaze.field_of_view import line_of_sight
 from gaze.types import Angles2, GazeState, Vec3
-from robot.face_pose import PARTS_FACE_M
+from robot.seeing.face_pose import PARTS_FACE_M
 from sim_mock.scene import Person
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot.body import JointParams
-from robot.calibration import (
+from robot.calibrate.calibration import (
     Calibration,
     CalibrationRefused,
     Marks,
@@ -19,7 +19,14 @@ from robot.calibration import (
     ends_of,
     middle,
 )
-from robot.stop_search import STEPS_PER_DEG, Stop, StopSearch, StopSearchParams, go, search
+from robot.calibrate.stop_search import (
+    STEPS_PER_DEG,
+    Stop,
+    StopSearch,
+    StopSearchParams,
+    go,
+    search,
+)
 from robot.types import JOINTS
 
 JOINT = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot.board_views import Held, ViewParams, coverage, held
-from robot.camera_calibration import (
+from robot.calibrate.board_views import Held, ViewParams, coverage, held
+from robot.calibrate.camera_calibration import (
     CameraCalibrationRefused,
     LensCalibration,
     LensCalibrationParams,
     calibrate_lens,
 )
-from robot.charuco_board import CharucoBoard, SeenBoard
-from robot.intrinsics import Intrinsics, intrinsics_of_view, project
+from robot.calibrate.charuco_board import CharucoBoard, SeenBoard
+from robot.seeing.intrinsics import Intrinsics, intrinsics_of_view, project
 from sim_mock.board_camera import BoardCamera, BoardCameraParams, true_lens
 from sim_mock.board_scene import held_pose
 

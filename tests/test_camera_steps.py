@@ -9,13 +9,13 @@ import pytest
 from drivers.errors import CameraError
 from drivers.picture_source import Shot
 from gaze.types import Angles3
-from robot.board_views import ViewParams
-from robot.camera_calibration import CameraCalibrationRefused, LensCalibrationParams
-from robot.camera_steps import LensSteps, NeckStepParams, neck_angles, neck_steps
-from robot.charuco_board import CharucoBoard
+from robot.calibrate.board_views import ViewParams
+from robot.calibrate.camera_calibration import CameraCalibrationRefused, LensCalibrationParams
+from robot.calibrate.camera_steps import LensSteps, NeckStepParams, neck_angles, neck_steps
+from robot.calibrate.charuco_board import CharucoBoard
+from robot.calibrate.hand_eye import camera_on_head
 from robot.clock import SimulatedClock
 from robot.frames import CameraParams
-from robot.hand_eye import camera_on_head
 from robot.kinematics import GeometryParams, Kinematics
 from sim_mock.board_scene import BoardScene
 

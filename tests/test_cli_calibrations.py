@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from robot.cli import app as whole
-from robot.cli_calibrations import app
+from robot.cli.calibrations import app
+from robot.cli.main import app as whole
 
 
 def run(*words: str) -> Any:

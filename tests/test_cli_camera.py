@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from robot.cli_camera import app
+from robot.cli.camera import app
 
 run = CliRunner().invoke
 

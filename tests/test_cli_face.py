@@ -23,12 +23,12 @@ from typer.testing import CliRunner
 from config.save import save_rig
 from config.schema import load_rig
 from drivers.errors import SetupError
-from robot import cli_face
 from robot.audience import only_stops
-from robot.cli_calibrations import app
-from robot.cli_keys import BUTTONS, PageKeys, key_and_count, keys_of
-from robot.face_pose import PARTS_FACE_M
+from robot.cli import face as cli_face
+from robot.cli.calibrations import app
+from robot.cli.keys import BUTTONS, PageKeys, key_and_count, keys_of
 from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop
+from robot.seeing.face_pose import PARTS_FACE_M
 
 ROOT = Path(__file__).parents[1]
 DESK = ROOT / "config" / "rigs" / "desk.yaml"
@@ -199,7 +199,7 @@ class Sitting:
     """The command on a pseudo-terminal, and what it has written so far."""
 
     def __init__(self, rig: Path, *words: str) -> None:
-        code = "from robot.cli import main; main()"
+        code = "from robot.cli.main import main; main()"
         words = ("calibrate", "face", str(rig), "--mock", "--yes", *words)
         self.said = ""
         self._end_s = time.monotonic() + 60.0

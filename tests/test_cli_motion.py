@@ -18,14 +18,14 @@ from typer.testing import CliRunner
 
 from config.save import save_rig
 from config.schema import load_rig
-from robot.cli_motion import app
+from robot.cli.motion import app
 from robot.types import JOINTS
 from sim_mock.pty_bus import PtyBus
 from sim_mock.servo_physics import ServoSpec
 
 ROOT = Path(__file__).parents[1]
 DESK = ROOT / "config" / "rigs" / "desk.yaml"
-COMMAND = [sys.executable, "-c", "from robot.cli_motion import app; app()"]
+COMMAND = [sys.executable, "-c", "from robot.cli.motion import app; app()"]
 
 
 def run(*words: str) -> Any:

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from drivers.recording_read import Recording
-from robot.cli_record import app
+from robot.cli.record import app
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from config.save import copy_shipped, save_rig
 from drivers.dynamixel_port import BlockingPort
 from drivers.dynamixel_ports import Host, SerialPort
 from drivers.dynamixel_registers import Registers
-from robot import cli_servos
+from robot.cli import servos as cli_servos
 from robot.types import JOINTS
 from sim_mock.pty_bus import PtyBus
 from sim_mock.servo import ServoSpec

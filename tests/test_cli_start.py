@@ -12,16 +12,16 @@ import typer
 from typer.core import TyperGroup
 
 from drivers.dynamixel_ports import SerialPort
-from robot.cli import app
-from robot.cli_examples import EXAMPLES
-from robot.cli_start import next_steps
+from robot.cli.examples import EXAMPLES
+from robot.cli.main import app
+from robot.cli.start import next_steps
 
 ADAPTER = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-U2D2")
 ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)
 
 
 def gazerig(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    code = "import sys; from robot.cli import main; sys.argv[0] = 'gazerig'; main()"
+    code = "import sys; from robot.cli.main import main; sys.argv[0] = 'gazerig'; main()"
     return subprocess.run(
         [sys.executable, "-c", code, *words],
         capture_output=True,
@@ -107,7 +107,7 @@ def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(tmp_path: Path
 
 def test_what_nobody_thought_of_is_one_line_too() -> None:
     code = (
-        "import sys; from robot import cli; sys.argv = ['gazerig', *sys.argv[1:]]\n"
+        "import sys; from robot.cli import main as cli; sys.argv = ['gazerig', *sys.argv[1:]]\n"
         "cli.next_steps = lambda *a: 1 / 0\ncli.main()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)

@@ -26,15 +26,15 @@ from config.schema import load_rig
 from drivers.errors import SetupError
 from robot.assemble import assemble
 from robot.choice import Choice
-from robot.cli_quick import QUICK, is_quick
-from robot.cli_tune import app, read_pairs, read_point, read_value, state_lines
-from robot.live_control import LiveControl
+from robot.cli.quick import QUICK, is_quick
+from robot.cli.tune import app, read_pairs, read_point, read_value, state_lines
 from robot.loop import Tick
 from robot.loop import run as run_loop
-from robot.remote import RunningRig, running
+from robot.remote.live_control import LiveControl
+from robot.remote.running_rig import RunningRig, running
 from robot.tuning import Tuning
 
-GAZERIG = "import sys; sys.argv[0] = 'gazerig'; from robot.cli_quick import main; main()"
+GAZERIG = "import sys; sys.argv[0] = 'gazerig'; from robot.cli.quick import main; main()"
 SPEED = "gaze.saccade.max_speed_deg_s"
 RATE = "loop.rate_hz"
 

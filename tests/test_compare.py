@@ -12,7 +12,7 @@ from config.schema import load_rig
 from config.text import rig_text, walk_text
 from robot.assemble import assemble
 from robot.choice import Choice
-from robot.cli_report import app
+from robot.cli.report import app
 from robot.loop import run
 from robot.recording.recorder import Recorder
 from robot.recording.run_info import RunInfo, versions

@@ -6,12 +6,12 @@ from drivers.dynamixel_ports import Access, Host, SerialPort
 from drivers.dynamixel_scan import Found
 from drivers.errors import PortError
 from drivers.types import ServoSetup
-from robot.checkup import check, check_all, look, mend, mend_latency
-from robot.doctor import READ, examine
-from robot.doctor_patient import Patient
-from robot.doctor_port import UDEV_RULE, PortFacts, examine_latency, examine_port
-from robot.findings import Finding, Fix, worst
-from robot.servo_report import grouped, remarks, summed_up, together
+from robot.bringup.checkup import check, check_all, look, mend, mend_latency
+from robot.bringup.doctor import READ, examine
+from robot.bringup.doctor_patient import Patient
+from robot.bringup.doctor_port import UDEV_RULE, PortFacts, examine_latency, examine_port
+from robot.bringup.findings import Finding, Fix, worst
+from robot.bringup.servo_report import grouped, remarks, summed_up, together
 from sim_mock.ports import InProcessPort
 from sim_mock.servo import ServoSpec
 from sim_mock.servo_chain import build_chain

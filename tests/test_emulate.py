@@ -13,11 +13,11 @@ from typer.testing import CliRunner
 
 from drivers.dynamixel_port import BlockingPort
 from drivers.errors import SetupError
-from robot.cli_emulate import app, parse_servos
+from robot.cli.emulate import app, parse_servos
 
 ROOT = Path(__file__).parents[1]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTTIN)
-COMMAND = [sys.executable, "-c", "from robot.cli_emulate import app; app()"]
+COMMAND = [sys.executable, "-c", "from robot.cli.emulate import app; app()"]
 
 
 class Emulator:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gaze.types import PARTS
-from robot.face_pose import (
+from robot.seeing.face_pose import (
     LANDMARKS_FACE_M,
     PARTS_FACE_M,
     FacePose,

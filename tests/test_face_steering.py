@@ -11,9 +11,9 @@ from gaze.angles import angle_between, rotation, sub
 from gaze.field_of_view import line_of_sight
 from gaze.types import Bodies, Face, Percept, Target
 from robot.assemble import Assembly, assemble
+from robot.calibrate.face_calibration import begun, point_world_m
+from robot.calibrate.face_steering import AIMED_DEG, STALE_S, WAIT_S, FaceSteering
 from robot.choice import Choice
-from robot.face_calibration import begun, point_world_m
-from robot.face_steering import AIMED_DEG, STALE_S, WAIT_S, FaceSteering
 from robot.loop import Tick
 from sim_mock.sits_still import SitsStill
 

@@ -19,8 +19,8 @@ from gaze.angles import add, angle_between, norm, scale, sub
 from gaze.types import Vec3
 from robot.assemble import Assembly, assemble
 from robot.choice import Choice
-from robot.intrinsics import intrinsics_of_lens, project
 from robot.loop import Tick, run
+from robot.seeing.intrinsics import intrinsics_of_lens, project
 from robot.summary import cyclopean
 
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"

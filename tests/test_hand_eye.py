@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from gaze.types import Angles3
-from robot.camera_calibration import CameraCalibrationRefused
-from robot.camera_steps import neck_angles
-from robot.charuco_board import CharucoBoard, SeenBoard
+from robot.calibrate.camera_calibration import CameraCalibrationRefused
+from robot.calibrate.camera_steps import neck_angles
+from robot.calibrate.charuco_board import CharucoBoard, SeenBoard
+from robot.calibrate.hand_eye import HandEye, HandEyeParams, NeckView, camera_on_head, turns_deg
 from robot.frames import CameraParams
-from robot.hand_eye import HandEye, HandEyeParams, NeckView, camera_on_head, turns_deg
-from robot.intrinsics import project
 from robot.kinematics import GeometryParams, Kinematics
+from robot.seeing.intrinsics import project
 from sim_mock.board_scene import BoardScene
 
 BOARD = CharucoBoard()

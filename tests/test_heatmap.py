@@ -8,7 +8,6 @@ import pytest
 
 from drivers.errors import SetupError
 from gaze.types import PARTS
-from robot.face_pose import PARTS_FACE_M
 from robot.heatmap import (
     density_s_m2,
     face_from,
@@ -16,6 +15,7 @@ from robot.heatmap import (
     share_per_part,
 )
 from robot.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
+from robot.seeing.face_pose import PARTS_FACE_M
 
 MEDIA = Path(__file__).parents[2] / "shared" / "media"
 CENTRES = np.array([PARTS_FACE_M[part][1:] for part in PARTS])

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.types import DetectedFace, Detections
-from robot.face_pose import LANDMARKS_FACE_M
 from robot.frames import CameraMount, CameraParams, LensParams, PoseHistory
-from robot.intrinsics import (
+from robot.kinematics import GeometryParams, Kinematics
+from robot.seeing.face_pose import LANDMARKS_FACE_M
+from robot.seeing.intrinsics import (
     Intrinsics,
     fits,
     intrinsics_of_lens,
@@ -21,9 +22,8 @@ from robot.intrinsics import (
     rays,
     undistorted,
 )
-from robot.kinematics import GeometryParams, Kinematics
-from robot.perception import Perception
-from robot.tracks import Tracker, TrackParams
+from robot.seeing.perception import Perception
+from robot.seeing.tracks import Tracker, TrackParams
 
 BENT = Intrinsics(480.0, 482.0, 327.0, 190.0, (-0.25, 0.09, 0.002, -0.001, -0.01))
 LENS = LensParams(640, 400, 480.0, 482.0, 327.0, 190.0, BENT.distortion)

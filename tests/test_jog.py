@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from config.schema import Rig, load_rig
 from drivers.dynamixel import DynamixelBus
 from drivers.errors import SetupError
-from robot.applied import Step
 from robot.assemble import gaze_parts
 from robot.body import Body
+from robot.bringup.applied import Step
+from robot.bringup.jog import JogParams, ManualControl, duration_s
+from robot.bringup.look_at import ends_reached, look_at
 from robot.clock import SimulatedClock
-from robot.jog import JogParams, ManualControl, duration_s
-from robot.look_at import ends_reached, look_at
-from robot.safety import Guard
+from robot.safety.guard import Guard
 from robot.types import JOINTS
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_chain import build_chain

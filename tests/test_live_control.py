@@ -10,9 +10,9 @@ import pytest
 from config.load import ConfigError, Fault
 from drivers.errors import SetupError
 from robot.clock import SimulatedClock
-from robot.live_control import LiveControl
 from robot.orders import Order
-from robot.remote import running
+from robot.remote.live_control import LiveControl
+from robot.remote.running_rig import running
 
 
 class Robot:

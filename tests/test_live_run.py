@@ -15,8 +15,8 @@ import pytest
 from config.save import copy_shipped
 from config.schema import load_rig
 from drivers.errors import DriverError
-from robot.remote import NoRig, RunningRig, running
-from robot.remote_socket import folder, sockets
+from robot.remote.running_rig import NoRig, RunningRig, running
+from robot.remote.sockets import folder, sockets
 
 RATE = "loop.rate_hz"
 ROOT = Path(__file__).parents[1]
@@ -39,7 +39,7 @@ class Run:
         self.file, self.log = place / "my.yaml", place / "log"
         if not self.file.exists():
             copy_shipped("desk", self.file)
-        code = "from robot.cli import main; main()"
+        code = "from robot.cli.main import main; main()"
         with self.log.open("w") as log:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", code, "run", str(self.file), "--mock", "--no-page"],

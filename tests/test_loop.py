@@ -14,12 +14,12 @@ from gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
 from gaze.types import PARTS
 from robot.assemble import Assembly, Choice, assemble
 from robot.clock import RealClock, SimulatedClock
-from robot.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
 from robot.frames import CameraMount, CameraParams, PoseHistory
 from robot.kinematics import GeometryParams, Kinematics
 from robot.loop import LoopParams, Tick, run
-from robot.perception import Perception
-from robot.tracks import Sighting, Tracker, TrackParams
+from robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
+from robot.seeing.perception import Perception
+from robot.seeing.tracks import Sighting, Tracker, TrackParams
 from robot.types import JOINTS, Verdict
 from sim_mock.visitor import Visitor
 

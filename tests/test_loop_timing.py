@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robot.loop_timing import OVER_S, LoopTiming
+from robot.page.loop_timing import OVER_S, LoopTiming
 from robot.types import Timing
 
 

@@ -30,8 +30,8 @@ import pytest
 from websockets.sync.client import connect
 
 from gaze.types import PART_NAMES, PARTS
-from robot.page import Page, pack, unpack
-from robot.page_picture import encode
+from robot.page.link import Page, pack, unpack
+from robot.page.picture import encode
 from robot.types import SeenBody, SeenFace, Snapshot
 
 T = TypeVar("T")

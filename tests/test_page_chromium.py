@@ -26,8 +26,8 @@ from robot.audience import Audience, Told, Wished
 from robot.choice import Choice
 from robot.loop import LoopCount, Tick
 from robot.orders import Ask, LookAt
-from robot.page_view import _HALF_WIDTH as HALF_WIDTH
-from robot.page_view import VIEWS
+from robot.page.view import _HALF_WIDTH as HALF_WIDTH
+from robot.page.view import VIEWS
 from robot.recording.run_info import RunInfo
 from robot.tuning import Tuning
 from robot.types import JOINTS

@@ -17,16 +17,16 @@ import viser
 
 from gaze.types import Vec3
 from robot.orders import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_json
-from robot.page import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
-from robot.page_controls import LeadView
-from robot.page_ear import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
-from robot.page_feed import TuningFeed
-from robot.page_hear import PageHear
-from robot.page_jog import JogView, measured_table
-from robot.page_knob import PageKnob, hint, knob_from, label, read, slides, step_of, written
-from robot.page_tell import Teller
-from robot.page_tuning import found, group_of
-from robot.page_view import News, drain
+from robot.page.controls import LeadView
+from robot.page.ear import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
+from robot.page.feed import TuningFeed
+from robot.page.hear import PageHear
+from robot.page.jog import JogView, measured_table
+from robot.page.knob import PageKnob, hint, knob_from, label, read, slides, step_of, written
+from robot.page.link import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
+from robot.page.tell import Teller
+from robot.page.tuning import found, group_of
+from robot.page.view import News, drain
 from robot.types import JOINTS, Snapshot
 
 PATIENCE_S = 20.0

@@ -22,8 +22,8 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from robot.orders import Stop, as_json
-from robot.page import Page
-from robot.page_picture import encode
+from robot.page.link import Page
+from robot.page.picture import encode
 from robot.types import Snapshot
 
 PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes

@@ -14,8 +14,8 @@ import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from robot.page_door import Door, compact, needs_token
-from robot.page_server import open_server
+from robot.page.door import Door, compact, needs_token
+from robot.page.server import open_server
 
 PATIENCE_S = 20.0
 VISER = [f"viser-v{viser.__version__}"]

@@ -8,11 +8,11 @@ import pytest
 
 from gaze.types import PARTS
 from robot.heatmap_face import on_canvas
-from robot.page_dwell import BIN_S, BINS, Dwell
-from robot.page_face_map import HIGH_PX, SHRINK, WIDE_PX, FaceMap, gaze_on_face
-from robot.page_fields import field_edge
-from robot.page_saccades import KEPT, MainSequence
-from robot.page_timeline import STRIP_S, Timeline
+from robot.page.dwell import BIN_S, BINS, Dwell
+from robot.page.face_map import HIGH_PX, SHRINK, WIDE_PX, FaceMap, gaze_on_face
+from robot.page.fields import field_edge
+from robot.page.saccades import KEPT, MainSequence
+from robot.page.timeline import STRIP_S, Timeline
 from robot.report.human import fastest_peak, slowest_peak
 from robot.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
 

@@ -7,17 +7,17 @@ import pytest
 import viser
 
 from gaze.types import Pull
-from robot.page_health import (
+from robot.page.health import (
     health,
     servo_table,
     strain_of_heat,
     strain_of_load,
     strain_of_voltage,
 )
-from robot.page_layers import Layers, LayersView
-from robot.page_panel import PanelView
-from robot.page_style import AMBER, RED
-from robot.page_why import pulls, winner
+from robot.page.layers import Layers, LayersView
+from robot.page.panel import PanelView
+from robot.page.style import AMBER, RED
+from robot.page.why import pulls, winner
 from robot.types import (
     Ghost,
     SeenCamera,

@@ -9,10 +9,10 @@ import pytest
 
 from drivers.types import DetectedFace, Detections, MovingBlob
 from gaze.angles import rotation
-from robot.page import MESSAGE_BYTES
-from robot.page_mesh import Mesh, cap, ellipsoid, lid, ring, turned
-from robot.page_people import fixated_part
-from robot.page_picture import (
+from robot.page.link import MESSAGE_BYTES
+from robot.page.mesh import Mesh, cap, ellipsoid, lid, ring, turned
+from robot.page.people import fixated_part
+from robot.page.picture import (
     FARTHEST_M,
     NEAREST_M,
     PICTURE_WIDTH_PX,
@@ -21,9 +21,9 @@ from robot.page_picture import (
     encode,
     ground,
 )
-from robot.page_place import along, quaternion, turned_up, upright_along
-from robot.page_status import drawn_together, status
-from robot.page_traces import GROUPS, MOST_POINTS, Traces, mean_deg
+from robot.page.place import along, quaternion, turned_up, upright_along
+from robot.page.status import drawn_together, status
+from robot.page.traces import GROUPS, MOST_POINTS, Traces, mean_deg
 from robot.types import JOINTS, SeenFace, Snapshot, Trail
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -17,8 +17,8 @@ from typing import TypeVar
 
 import pytest
 
-from robot.page import Page
-from robot.page_view import free_port as first_free_port
+from robot.page.link import Page
+from robot.page.view import free_port as first_free_port
 from robot.types import SeenFace, Snapshot
 
 T = TypeVar("T")
@@ -85,8 +85,8 @@ def page_process(parent: int) -> int | None:
             state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
         except OSError:  # it has ended meanwhile
             continue
-        if b"robot.page_view" in words and state != "Z":
-            _fd, its_parent, *_ = words[words.index(b"robot.page_view") + 1 :]
+        if b"robot.page.view" in words and state != "Z":
+            _fd, its_parent, *_ = words[words.index(b"robot.page.view") + 1 :]
             if int(its_parent) == parent:
                 return int(entry.name)
     return None
@@ -100,7 +100,7 @@ def in_time(work: Callable[[], None]) -> bool:
 
 
 def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
-    check = "import robot.page, sys; sys.exit(bool({'viser', 'cv2'} & set(sys.modules)))"
+    check = "import robot.page.link, sys; sys.exit(bool({'viser', 'cv2'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", check], cwd=REPOSITORY).returncode == 0
 
 
@@ -176,7 +176,7 @@ def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
 
 PARENT = """
 import os, sys, time
-from robot.page import Page
+from robot.page.link import Page
 page = Page("127.0.0.1", int(sys.argv[1]))
 page.open()
 while page.url() is None:

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from drivers.types import DetectedFace, Detections, MovingBlob
 from gaze.angles import rotation
 from gaze.types import Angles3, Mat3, Percept, Vec3
-from robot.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
 from robot.frames import CameraMount, CameraParams, PoseHistory
-from robot.head_turn_residual import HeadTurnResidual, Seen, turning_rad_s
-from robot.intrinsics import intrinsics_of_view, project
-from robot.perception import Perception
-from robot.sightings import Box, Reading
-from robot.tracks import Tracker, TrackParams
+from robot.seeing.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
+from robot.seeing.head_turn_residual import HeadTurnResidual, Seen, turning_rad_s
+from robot.seeing.intrinsics import intrinsics_of_view, project
+from robot.seeing.perception import Perception
+from robot.seeing.sightings import Box, Reading
+from robot.seeing.tracks import Tracker, TrackParams
 
 WIDTH, HEIGHT = 640, 400
 LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)

@@ -11,11 +11,11 @@ from drivers.face_params import FaceDetectorParams
 from drivers.types import DetectedFace, Picture
 from gaze.angles import angle_between, rotation, sub
 from gaze.types import Angles3, Mat3, Vec3
-from robot.face_pose import LANDMARKS_FACE_M, face_pose
 from robot.frames import CameraMount, CameraParams, PoseHistory
-from robot.intrinsics import intrinsics_of_view, project
-from robot.perception import Perception
-from robot.tracks import Tracker, TrackParams
+from robot.seeing.face_pose import LANDMARKS_FACE_M, face_pose
+from robot.seeing.intrinsics import intrinsics_of_view, project
+from robot.seeing.perception import Perception
+from robot.seeing.tracks import Tracker, TrackParams
 from sim_mock.drawn_person import LOOKS, draw_body, draw_head, draw_person, draw_thing
 from sim_mock.drawn_picture import Picture3d, Sheet
 from sim_mock.drawn_room import draw_room

@@ -16,15 +16,15 @@ from typer.testing import CliRunner
 from config.schema import load_rig
 from config.text import rig_text
 from drivers.errors import SetupError
-from robot import cli_replay
 from robot.assemble import assemble
 from robot.choice import Choice
+from robot.cli import replay as cli_replay
 from robot.clock import SimulatedClock
 from robot.loop import Tick, run
 from robot.orders import Ask
-from robot.page import PICTURE, REPLAY, SNAPSHOT, unpack
-from robot.page_ear import MESSAGE_BYTES
-from robot.page_replay import ReplayView, clock, event_list, strip
+from robot.page.ear import MESSAGE_BYTES
+from robot.page.link import PICTURE, REPLAY, SNAPSHOT, unpack
+from robot.page.replay import ReplayView, clock, event_list, strip
 from robot.recording.frames import Frames
 from robot.recording.gaze_angles import trace_of
 from robot.recording.player import State

@@ -16,7 +16,7 @@ from drivers.errors import SetupError
 from gaze.types import PARTS
 from robot.assemble import assemble
 from robot.choice import Choice
-from robot.cli_report import app, page_file
+from robot.cli.report import app, page_file
 from robot.loop import run
 from robot.report import bands, build, face, human
 from robot.report.about import About

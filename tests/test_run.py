@@ -17,7 +17,7 @@ import pytest
 MEDIA = Path(__file__).parents[2] / "shared" / "media"
 MODELS = Path(__file__).parents[2] / "shared" / "models"
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
-GAZERIG = [sys.executable, "-c", "from robot.cli import main; main()"]
+GAZERIG = [sys.executable, "-c", "from robot.cli.main import main; main()"]
 
 
 def gazerig(*words: str, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:

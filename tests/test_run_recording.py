@@ -27,7 +27,7 @@ from robot.assemble import Assembly, assemble
 from robot.choice import Choice
 from robot.loop import Tick, run
 from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune
-from robot.page_picture import encode
+from robot.page.picture import encode
 from robot.recording import moment as moments
 from robot.recording import run_format as fmt
 from robot.recording.picture_encoder import PictureEncoder

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.safety import Guard, GuardParams, JointLimit
+from robot.safety.guard import Guard, GuardParams, JointLimit
 from robot.types import JOINTS, JointState, Verdict
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))

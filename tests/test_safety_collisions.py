@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from config.bounds import judge
-from robot.safety import Guard, GuardParams, JointLimit
-from robot.safety_collisions import CollisionParams
+from robot.safety.collisions import CollisionParams
+from robot.safety.guard import Guard, GuardParams, JointLimit
 from robot.types import JOINTS, JointState, Verdict
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))

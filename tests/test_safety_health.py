@@ -5,8 +5,8 @@ from math import nan, radians
 import numpy as np
 import pytest
 
-from robot.safety import Guard, GuardParams, JointLimit
-from robot.safety_health import HealthParams
+from robot.safety.guard import Guard, GuardParams, JointLimit
+from robot.safety.health import HealthParams
 from robot.types import JOINTS, JointState, Verdict
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000), 70.0, 3.5, 7.0)

@@ -17,8 +17,8 @@ import pytest
 
 from robot.types import JOINTS, JointState
 
-ROOM = Path(__file__).parents[1] / "robot"
-PARTS = ("safety_motion", "safety_stuck", "safety_health", "safety_collisions", "safety")
+ROOM = Path(__file__).parents[1] / "robot" / "safety"
+PARTS = ("motion", "stuck", "health", "collisions", "guard")
 DT = 0.005
 YAW, PITCH, LID = 6, 7, 4
 JOINT = YAW
@@ -28,23 +28,23 @@ LOW, HIGH = radians(-60), radians(50)
 
 def built(part: str = "", old: str = "", new: str = "") -> ModuleType:
     """Load the guard's files from source, one of them changed, beside the real ones."""
-    real = {name: sys.modules.get(f"robot.{name}") for name in PARTS}
+    real = {name: sys.modules.get(f"robot.safety.{name}") for name in PARTS}
     try:
         for name in PARTS:
             source = (ROOM / f"{name}.py").read_text(encoding="utf-8")
             if name == part:
                 assert source.count(old) == 1, f"{old!r} stands {source.count(old)} times"
                 source = source.replace(old, new)
-            module = ModuleType(f"robot.{name}")
-            sys.modules[f"robot.{name}"] = module
+            module = ModuleType(f"robot.safety.{name}")
+            sys.modules[f"robot.safety.{name}"] = module
             exec(compile(source, f"{name}.py", "exec"), module.__dict__)
         return module
     finally:
         for name, module_before in real.items():
             if module_before is not None:
-                sys.modules[f"robot.{name}"] = module_before
+                sys.modules[f"robot.safety.{name}"] = module_before
             else:
-                del sys.modules[f"robot.{name}"]
+                del sys.modules[f"robot.safety.{name}"]
 
 
 class Bench:

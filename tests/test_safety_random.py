@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from robot.safety import Guard, GuardParams, JointLimit
-from robot.safety_collisions import CollisionParams
+from robot.safety.collisions import CollisionParams
+from robot.safety.guard import Guard, GuardParams, JointLimit
 from robot.types import JOINTS, JointState
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from robot.safety import Guard, GuardParams, JointLimit
-from robot.safety_collisions import CollisionParams
+from robot.safety.collisions import CollisionParams
+from robot.safety.guard import Guard, GuardParams, JointLimit
 from robot.types import JointState
 
 DT_S = 0.005

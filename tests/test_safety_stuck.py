@@ -6,8 +6,8 @@ from math import radians, sin
 import numpy as np
 import pytest
 
-from robot.safety import Guard, GuardParams, JointLimit
-from robot.safety_stuck import StuckParams
+from robot.safety.guard import Guard, GuardParams, JointLimit
+from robot.safety.stuck import StuckParams
 from robot.types import JOINTS, JointState, Verdict
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))

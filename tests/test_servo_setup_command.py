@@ -6,8 +6,8 @@ from drivers.dynamixel_scan import COMMON_FIRST, Found
 from drivers.dynamixel_table import BAUD_RATES
 from drivers.errors import PortError, ServoFault, ServoMissing
 from drivers.types import ServoSetup
-from robot.servo_reboot import Standing, restart
-from robot.servo_setup import assign, find_alone, search_order
+from robot.bringup.servo_reboot import Standing, restart
+from robot.bringup.servo_setup import assign, find_alone, search_order
 from sim_mock.ports import InProcessPort
 from sim_mock.servo import ServoSpec
 from sim_mock.servo_chain import build_chain, status

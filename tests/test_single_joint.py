@@ -8,11 +8,11 @@ import pytest
 from drivers.dynamixel_registers import Registers
 from drivers.errors import BusLost, ServoFault, ServoMissing
 from robot.body import JointParams
-from robot.calibrating import by_hand, by_motion
-from robot.calibration import CalibrationRefused
+from robot.bringup.single_joint import SingleJoint, Stopped
+from robot.calibrate.calibrating import by_hand, by_motion
+from robot.calibrate.calibration import CalibrationRefused
+from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
 from robot.clock import SimulatedClock
-from robot.single_joint import SingleJoint, Stopped
-from robot.stop_search import STEPS_PER_DEG, StopSearchParams
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_chain import build_chain
 from sim_mock.servo_physics import Physics, ServoSpec
@@ -50,7 +50,7 @@ class Bench:
         assert value is not None
         return value
 
-    # robot.calibrating.Person
+    # robot.calibrate.calibrating.Person
 
     def tell(self, line: str) -> None:
         self.said.append(line)

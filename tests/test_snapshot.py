@@ -12,9 +12,9 @@ from gaze.angles import angle_between
 from robot.assemble import Assembly, assemble, gaze_parts
 from robot.choice import Choice
 from robot.loop import Tick, run
-from robot.page import MESSAGE_BYTES, pack, unpack
+from robot.page.link import MESSAGE_BYTES, pack, unpack
+from robot.page.snapshot import Said, ShownRig, Snapshots, snapshot
 from robot.report.gaze_events import Blink, Fixation, GazeEvents, Saccade
-from robot.snapshot import Said, ShownRig, Snapshots, snapshot
 from robot.types import JOINTS, SeenBlink, SeenFixation, SeenSaccade, Snapshot
 
 RATE_HZ = 200.0

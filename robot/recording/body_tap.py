@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from drivers.errors import ServoFault, SetupError
 from robot.body import Body, JointParams
 from robot.recording.moment import Engaged, Heard, Measured, Refused
-from robot.safety import JointLimit
+from robot.safety.guard import JointLimit
 from robot.types import JointAngles, JointState
 
 

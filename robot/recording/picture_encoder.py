@@ -10,7 +10,7 @@ from math import inf
 
 from drivers.types import Picture
 from robot.loop import Tick
-from robot.page_picture import encode
+from robot.page.picture import encode
 
 
 class PictureEncoder:

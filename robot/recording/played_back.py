@@ -9,10 +9,10 @@ from drivers.types import Detections
 from gaze.types import Percept
 from robot.body import Body, JointParams
 from robot.frames import CameraMount, PoseHistory
-from robot.perception import Perception
 from robot.recording.moment import Engaged, Heard, Measured, Moment, Refused
-from robot.safety import JointLimit
-from robot.tracks import Tracker, TrackParams
+from robot.safety.guard import JointLimit
+from robot.seeing.perception import Perception
+from robot.seeing.tracks import Tracker, TrackParams
 from robot.types import JointAngles, JointState
 
 H = TypeVar("H", bound=Heard)

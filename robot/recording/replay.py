@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from robot.clock import Clock
-from robot.page import PICTURE, REPLAY
+from robot.page.link import PICTURE, REPLAY
 from robot.recording.frames import Frames
 from robot.recording.player import KINDS, Mark, Player, State
 
@@ -23,7 +23,7 @@ _MOST_WORDS = 150
 
 
 class Screen(Protocol):
-    """What shows the messages, as robot.page.Page does."""
+    """What shows the messages, as robot.page.link.Page does."""
 
     def send(self, message: bytes) -> bool:
         """Hand over a message; False where it is not taken now."""

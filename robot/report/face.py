@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gaze.types import PARTS, Floats
-from robot.face_pose import PARTS_FACE_M
 from robot.report import human
 from robot.report.gathered import Gathered
 from robot.report.measured import Measured, mean, median
+from robot.seeing.face_pose import PARTS_FACE_M
 
 N = len(PARTS)
 _EYES = (PARTS.index("LE"), PARTS.index("RE"))

@@ -30,7 +30,7 @@ from drivers.recording_format import encoded
 from drivers.recording_read import Recording
 from drivers.types import FaceDetector
 from drivers.video_file import VideoFile
-from robot.motion_finder import motion_finder
+from robot.seeing.motion_finder import motion_finder
 
 RATE_HZ, ROUNDS, SECONDS = 200.0, 12, 1.0
 STOP = threading.Event()

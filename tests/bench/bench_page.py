@@ -195,7 +195,7 @@ for n in itertools.count():
 """,
     "remote set": """
 import itertools, time
-from robot.remote import RunningRig
+from robot.remote.running_rig import RunningRig
 rig = RunningRig.connect({pid})
 for n in itertools.count():
     time.sleep(0.1)
@@ -203,7 +203,7 @@ for n in itertools.count():
 """,
     "remote get": """
 import time
-from robot.remote import RunningRig
+from robot.remote.running_rig import RunningRig
 rig = RunningRig.connect({pid})
 while True:
     time.sleep(0.1)

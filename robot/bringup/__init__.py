@@ -1,0 +1,1 @@
+"""Getting a real rig to move for the first time, and keeping it well."""

@@ -1,0 +1,266 @@
+"""Moving a rig slowly, joint by joint or all at once, for bringing it up and for own programs.
+
+No camera, no attention. Every goal goes through the guard, and whoever asks gets back
+what was really applied:
+
+    control = ManualControl(body, guard, RealClock())
+    control.start()
+    try:
+        moved = control.jog("neck_yaw", 20.0)
+        print(moved.of("neck_yaw"))
+    finally:
+        control.stop()
+
+Between two calls nothing is sent: the servos' own bus watchdog holds them, and the next
+call goes on from there.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import degrees, isfinite, radians, sqrt
+
+from drivers.errors import SetupError
+from gaze.quintic import Quintic
+from robot.body import Body
+from robot.bringup.applied import Moved, Notes, Step, outcome, standing
+from robot.clock import Clock
+from robot.safety.guard import Guard
+from robot.types import JOINTS, JointAngles, JointState
+
+_PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
+"""Of a fifth-order polynomial from rest to rest, over distance/time and distance/time^2."""
+
+
+@dataclass(frozen=True)
+class JogParams:
+    """How slowly to move, and when a goal counts as reached."""
+
+    speed_deg_s: float = field(
+        default=20.0,
+        metadata={
+            "low": 0.5,
+            "high": 200.0,
+            "unit": "deg/s",
+            "says": "top speed on the way; the guard's gentle speed holds as well",
+        },
+    )
+    accel_deg_s2: float = field(
+        default=100.0,
+        metadata={"low": 5.0, "high": 5000.0, "unit": "deg/s2", "says": "top acceleration"},
+    )
+    rate_hz: float = field(
+        default=100.0,
+        metadata={"low": 20.0, "high": 500.0, "unit": "Hz", "says": "goals a second"},
+    )
+    near_deg: float = field(
+        default=2.0,
+        metadata={"low": 0.1, "high": 20.0, "unit": "deg", "says": "nearer is arrived"},
+    )
+    patience_s: float = field(
+        default=2.0,
+        metadata={
+            "low": 0.1,
+            "high": 30.0,
+            "unit": "s",
+            "says": "time to come near after the way is over",
+        },
+    )
+
+
+Wish = Callable[[JointState, float, float], JointAngles]
+"""Gives the wish for measured joints, the time, and the time since the step before."""
+
+Done = Callable[[Step], str | None]
+"""Gives how it ended, None while it goes on."""
+
+
+def no_reason() -> str | None:
+    """Give no reason to stop."""
+    return None
+
+
+class ManualControl:
+    """A rig whose goals come from a person.
+
+    Args:
+        body, guard: of one rig; the guard's limits in the order of JOINTS.
+        clock: the host's, or a simulated one with the emulated bus.
+        params: how slowly.
+        stopped: asked at every step; gives why to stop, None while there is no reason.
+        watch: gets every step.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        guard: Guard,
+        clock: Clock,
+        params: JogParams | None = None,
+        stopped: Callable[[], str | None] = no_reason,
+        watch: Callable[[Step], None] | None = None,
+    ) -> None:
+        self.body = body
+        self._guard = guard
+        self._clock = clock
+        self._params = params if params is not None else JogParams()
+        self._stopped = stopped
+        self._watch = watch
+        self._goal: JointAngles = ()
+
+    @property
+    def goal_rad(self) -> JointAngles:
+        """Give the goals in force."""
+        return self._goal
+
+    def start(self) -> JointAngles:
+        """Open the bus and switch torque on where the joints are; give the goals in force.
+
+        Raises:
+            drivers.errors.SetupError: port or servos are not as configured.
+        """
+        self._goal = self.body.start()
+        self._guard.reset(self._clock.now_s(), self._goal)
+        return self._goal
+
+    def stop(self) -> None:
+        """Torque off and close the bus."""
+        self.body.stop()
+
+    def jog(self, joint: str, angle_deg: float) -> Moved:
+        """Move one joint slowly; the others hold where they are.
+
+        Raises:
+            drivers.errors.SetupError: there is no such joint, or the angle is no number.
+            drivers.errors.DriverError: the bus is gone.
+        """
+        return self.pose({joint: angle_deg})
+
+    def pose(self, angles_deg: Mapping[str, float]) -> Moved:
+        """Move several joints slowly, so that they arrive together; the others hold.
+
+        Raises:
+            drivers.errors.SetupError: there is no such joint, or an angle is no number.
+            drivers.errors.DriverError: the bus is gone.
+        """
+        refuse_unknown(angles_deg)
+        wish = tuple(
+            radians(angles_deg[name]) if name in angles_deg else held
+            for name, held in zip(JOINTS, self._goal, strict=True)
+        )
+        moving = tuple(i for i, name in enumerate(JOINTS) if name in angles_deg)
+        start_s = self._clock.now_s()
+        ways = [Quintic((g, 0.0, 0.0), w, 1.0) for g, w in zip(self._goal, wish, strict=True)]
+        far = max((abs(wish[i] - self._goal[i]) for i in moving), default=0.0)
+        takes_s = duration_s(far, self._params)
+
+        def on_the_way(_: JointState, t_s: float, __: float) -> JointAngles:
+            share = min(1.0, (t_s - start_s) / takes_s)
+            return tuple(way.at(share)[0] for way in ways)
+
+        def there(step: Step) -> str | None:
+            if step.t_s - start_s < takes_s:
+                return None
+            return standing(step, wish, moving, radians(self._params.near_deg))
+
+        longest_s = takes_s + self._params.patience_s
+        return self.follow(on_the_way, there, longest_s, wish, gently=True)
+
+    def hold(self, seconds: float) -> Moved:
+        """Hold the goals in force for so long.
+
+        Raises:
+            drivers.errors.DriverError: the bus is gone.
+        """
+        goal, end_s = self._goal, self._clock.now_s() + seconds
+
+        def over(step: Step) -> str | None:
+            return "arrived" if step.t_s >= end_s else None
+
+        return self.follow(
+            lambda *_: goal, lambda s: "arrived" if s.t_s >= end_s else None, seconds
+        )
+
+    def park(self, angles_deg: Mapping[str, float]) -> Moved:
+        """Move to a pose whatever asked for a stop; joints left out go to 0.
+
+        Raises:
+            drivers.errors.DriverError: the bus is gone.
+        """
+        stopped, self._stopped = self._stopped, no_reason
+        try:
+            return self.pose({name: angles_deg.get(name, 0.0) for name in JOINTS})
+        finally:
+            self._stopped = stopped
+
+    def follow(
+        self,
+        wish: Wish,
+        done: Done,
+        longest_s: float,
+        ends_on: JointAngles | None = None,
+        gently: bool = False,
+    ) -> Moved:
+        """Send wishes through the guard at the control rate until ``done`` says how it ended.
+
+        longest_s: after that it has ended "not there in time"
+        ends_on: the wish that the result is judged by; None: the last one
+        gently: the guard goes slowly all the way, not only at the start
+
+        Raises:
+            drivers.errors.DriverError: the bus is gone.
+        """
+        clock, period = self._clock, 1.0 / self._params.rate_hz
+        start_s = last_s = clock.now_s()
+        slot, notes, events = 0, Notes(), list(self.body.bus.events())
+        while True:
+            slot = max(slot + 1, int((clock.now_s() - start_s) / period))
+            clock.sleep_until(start_s + slot * period)
+            if gently:
+                self._guard.go_gently()
+            step = self._step(wish, last_s)
+            last_s = step.t_s
+            notes.take(step.verdict)
+            events += self.body.bus.events()
+            ended = done(step) or self._stopped()
+            ended = "limp" if step.verdict.level == "limp" else ended
+            if ended is None and step.t_s - start_s >= longest_s:
+                ended = "not there in time"
+            if ended is not None:
+                break
+        self._goal = step.verdict.command_rad
+        applied = outcome(step, step.wish_rad if ends_on is None else ends_on, notes)
+        level = step.verdict.level
+        return Moved(ended, step.t_s - start_s, applied, level, tuple(events), step)
+
+    def _step(self, wish: Wish, last_s: float) -> Step:
+        """Read, wish, guard, write."""
+        t_s = self._clock.now_s()
+        joints = self.body.read(t_s)
+        wished = wish(joints, t_s, t_s - last_s)
+        # Nobody looks through a camera here, so no picture can be too old.
+        verdict = self._guard.check(wished, joints, 0.0, t_s)
+        self.body.write(verdict.command_rad)
+        step = Step(t_s, wished, verdict, joints)
+        if self._watch is not None:
+            self._watch(step)
+        return step
+
+
+def duration_s(distance_rad: float, params: JogParams) -> float:
+    """Give the time of a way from rest to rest that keeps to speed and acceleration."""
+    far = degrees(abs(distance_rad))
+    slow = _PEAK_SPEED * far / params.speed_deg_s
+    return max(0.05, slow, sqrt(_PEAK_ACCEL * far / params.accel_deg_s2))
+
+
+def refuse_unknown(angles_deg: Mapping[str, float]) -> None:
+    """Refuse what is no joint or no angle.
+
+    Raises:
+        drivers.errors.SetupError: with what there is.
+    """
+    for name, angle in angles_deg.items():
+        if name not in JOINTS:
+            raise SetupError(f"no joint {name!r}; there is {', '.join(JOINTS)}")
+        if not isfinite(angle):
+            raise SetupError(f"{name}: {angle} is not an angle in degrees")

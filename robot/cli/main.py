@@ -1,0 +1,133 @@
+"""The command ``gazerig``: what people type, and what they read on the terminal."""
+
+import json
+import logging
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from config.load import load
+from config.schema import Rig, load_rig
+from drivers.dynamixel_ports import serial_ports
+from robot.cli import emulate as cli_emulate
+from robot.cli import motion as cli_motion
+from robot.cli import record as cli_record
+from robot.cli import replay as cli_replay
+from robot.cli import report as cli_report
+from robot.cli import run as cli_run
+from robot.cli import servos as cli_servos
+from robot.cli import tune as cli_tune
+from robot.cli.examples import add_examples
+from robot.cli.start import next_steps
+from robot.cli.terminal import (
+    DEBUG_LOGGER,
+    FAULT,
+    RigArgument,
+    clear_errors,
+    say,
+)
+from robot.remote.running_rig import running
+
+app = typer.Typer(
+    invoke_without_command=True,
+    pretty_exceptions_enable=False,
+)
+for part in (
+    cli_run,
+    cli_servos,
+    cli_motion,
+    cli_tune,
+    cli_record,
+    cli_replay,
+    cli_report,
+    cli_emulate,
+):
+    app.add_typer(part.app)
+
+
+@app.callback()
+def begin(
+    context: typer.Context,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show where an error comes from, with any command.")
+    ] = False,
+) -> None:
+    """Makes an animatronic head look at people the way people look at each other."""
+    if context.invoked_subcommand is None:
+        print(next_steps(serial_ports(), rig_files(), bool(running())))
+
+
+@app.command("fit-scanpath")
+def fit_scanpath(
+    recording: Annotated[Path, typer.Argument(help="CSV of gaze samples or labelled fixations.")],
+    parts: Annotated[
+        Path | None, typer.Option(help="YAML of part rectangles, needed for samples.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="YAML to write.")] = Path("walk.yaml"),
+    smoothing: Annotated[str, typer.Option(help="laplace, bootstrap or none.")] = "laplace",
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
+) -> None:
+    """Fit a walk over the face to an eye-tracker recording, as YAML that run takes."""
+    with clear_errors():
+        from robot import fit_scanpath as fitting
+        from robot.fixations import PartBoxes
+
+        boxes = load(parts, PartBoxes) if parts is not None else None
+        say(fitting.fit(recording, boxes, out, smoothing, seed))
+
+
+@app.command()
+def check(rig: RigArgument = "desk") -> None:
+    """Check a rig's YAML and nothing else: all faults at once, no servo is touched."""
+    with clear_errors():
+        found: Rig = load_rig(rig)
+        say(f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}")
+
+
+@app.command()
+def schema(
+    out: Annotated[Path | None, typer.Argument(help="File to write; default: print.")] = None,
+) -> None:
+    """Export the JSON Schema of rig files, for editors."""
+    from config.export import json_schema
+
+    text = json.dumps(json_schema(Rig), indent=2) + "\n"
+    if out is None:
+        print(text, end="")
+    else:
+        with clear_errors():
+            out.write_text(text, encoding="utf-8")
+
+
+add_examples(app)
+
+
+def main() -> None:
+    """Run the command line: an error is one line, and with --debug also where it comes from."""
+    words = sys.argv[1:]
+    if "--debug" in words:  # wherever people put it
+        words = [word for word in words if word != "--debug"]
+        logging.getLogger(DEBUG_LOGGER).setLevel(logging.DEBUG)
+    try:
+        app(words)
+    except Exception as error:
+        if logging.getLogger(DEBUG_LOGGER).isEnabledFor(logging.DEBUG):
+            raise
+        what = " ".join(str(error).split()) or "no words"
+        print(
+            f"unexpected: {type(error).__name__}: {what}; say it again with --debug and report "
+            "what it shows",
+            file=sys.stderr,
+        )
+        sys.exit(FAULT)
+
+
+def rig_files() -> list[Path]:
+    """Give the YAML files of this folder that look like rigs."""
+    return [
+        path
+        for path in Path(".").glob("*.yaml")
+        if path.is_file() and "joints:" in path.read_text(encoding="utf-8", errors="replace")
+    ]

@@ -1,0 +1,245 @@
+"""The commands jog, home and look-at: a rig moved slowly, without a camera."""
+
+import contextlib
+import select
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from math import inf
+from typing import Annotated
+
+import typer
+
+from config.schema import Rig, load_rig
+from drivers.dynamixel import DynamixelBus
+from drivers.dynamixel_port import BlockingPort
+from drivers.errors import DriverError
+from robot.body import Body
+from robot.bringup.applied import PASSING, Moved, Step
+from robot.bringup.jog import JogParams, ManualControl, refuse_unknown
+from robot.bringup.look_at import LookedAt, ends_reached, look_at, refuse_not_finite
+from robot.bus_events import drawn_together
+from robot.cli import calibrations as cli_calibrations
+from robot.cli import monitor as cli_monitor
+from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
+from robot.cli.wires import MockOption, PortOption, RigOption, wires
+from robot.clock import RealClock
+from robot.safety.guard import Guard
+from robot.types import JOINTS
+
+app = typer.Typer()
+app.add_typer(cli_calibrations.app)
+app.add_typer(cli_monitor.app)
+
+# A number below zero is an argument, not an option.
+_NEGATIVE = {"ignore_unknown_options": True}
+
+SpeedOption = Annotated[
+    float, typer.Option(metavar="DEG_S", min=0.5, max=200.0, help="Top speed on the way.")
+]
+HoldOption = Annotated[
+    bool, typer.Option("--hold", help="Stay there, torque on, until Enter or Ctrl-C.")
+]
+NoParkOption = Annotated[
+    bool, typer.Option("--no-park", help="Torque off where it stands, without parking first.")
+]
+
+
+@app.command(context_settings=_NEGATIVE)
+def jog(
+    joint: Annotated[str, typer.Argument(metavar="JOINT", help="A joint, e.g. neck_yaw.")],
+    deg: Annotated[float, typer.Argument(metavar="DEG", help="Where to, in degrees.")],
+    speed: SpeedOption = 20.0,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Stay there for S seconds.")] = 1.0,
+    hold: HoldOption = False,
+    no_park: NoParkOption = False,
+    rig: RigOption = "desk",
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Move one joint slowly while the others hold: gazerig jog neck_yaw 20."""
+    with clear_errors():
+        refuse_unknown({joint: deg})
+        loaded = load_rig(rig)
+    with _commanded(loaded, mock, port, speed, hold, not no_park) as control:
+        moved = control.jog(joint, deg)
+        _report(moved, (joint,))
+        _stay(control, seconds, hold)
+    _exit_unless(moved.arrived)
+
+
+@app.command()
+def home(
+    rig: RigArgument = "desk",
+    speed: SpeedOption = 20.0,
+    hold: HoldOption = False,
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Move slowly to the centre: all joints to 0 deg, lids open; then torque off."""
+    with clear_errors():
+        loaded = load_rig(rig)
+    centre = dict.fromkeys(JOINTS, 0.0)
+    centre["left_upper_lid"] = loaded.lid_joints.left_open_deg
+    centre["right_upper_lid"] = loaded.lid_joints.right_open_deg
+    with _commanded(loaded, mock, port, speed, hold, False) as control:
+        moved = control.pose(centre)
+        _report(moved, JOINTS)
+        _stay(control, 0.0, hold)
+    _exit_unless(moved.arrived)
+
+
+@app.command("look-at", context_settings=_NEGATIVE)
+def look_at_command(
+    x: Annotated[float, typer.Argument(metavar="X", help="Metres forward of the neck base.")],
+    y: Annotated[float, typer.Argument(metavar="Y", help="Metres to the left.")],
+    z: Annotated[float, typer.Argument(metavar="Z", help="Metres up.")],
+    seconds: Annotated[float, typer.Option(min=1.0, help="Look for S seconds.")] = 4.0,
+    hold: HoldOption = False,
+    no_park: NoParkOption = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of blinks.")] = 0,
+    rig: RigOption = "desk",
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Turn eyes and head to a point and tell how well they meet it: gazerig look-at 1 0.2 0.3."""
+    with clear_errors():
+        refuse_not_finite((x, y, z))
+        loaded = load_rig(rig)
+        # Imports vision as well, so only this command does, and before the torque is on: in
+        # that time the servos' watchdog would trip.
+        from robot.assemble import gaze_parts
+
+        kinematics, oculomotor = gaze_parts(loaded, seed)
+    with _commanded(loaded, mock, port, 20.0, hold, not no_park) as control:
+        looked = look_at(control, kinematics, oculomotor, (x, y, z), seconds)
+        good = _report_look(looked, loaded)
+        _stay(control, 0.0, hold)
+    _exit_unless(good)
+
+
+@contextlib.contextmanager
+def _commanded(
+    rig: Rig, mock: bool, port: str | None, speed: float, hold: bool, park: bool
+) -> Iterator[ManualControl]:
+    """Give a rig that holds where it is; whatever happens, it ends with the torque off."""
+    with clear_errors(), signals() as stopped, wires(rig, mock, port) as wire:
+        enter = _enter if hold and sys.stdin.isatty() else _never
+        control = _control(rig, wire.path, speed, lambda: stopped() or enter())
+        control.start()
+        try:
+            _tell(control.body.bus.events())
+            say(f"torque on: {len(JOINTS)} servos hold where they are; Ctrl-C switches it off")
+            yield control
+        finally:
+            _leave(control, rig, park)
+
+
+def _control(rig: Rig, path: str, speed: float, stopped: Callable[[], str | None]) -> ManualControl:
+    setups = [rig.joints[name].setup(name) for name in JOINTS]
+    bus = DynamixelBus(BlockingPort(path), setups, rig.bus.dynamixel)
+    guard = Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS))
+    gentle = rig.guard.gentle_speed_deg_s
+    if speed > gentle:
+        say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
+    params = JogParams(speed_deg_s=min(speed, gentle))
+    watch = _StatusLine().show if sys.stderr.isatty() else None
+    return ManualControl(Body(bus, rig.joints), guard, RealClock(), params, stopped, watch)
+
+
+class _StatusLine:
+    """Shows what stands in the way; written only when it changes."""
+
+    def __init__(self) -> None:
+        self._shown = ""
+
+    def show(self, step: Step) -> None:
+        reasons = [r for r in step.verdict.reasons if r.partition(": ")[2] not in PASSING]
+        line = ", ".join(reasons) or "on the way"
+        if line != self._shown:
+            self._shown = line
+            status(line)
+
+
+def _never() -> str | None:
+    return None
+
+
+def _enter() -> str | None:
+    """Tell whether Enter was pressed, without waiting."""
+    if not select.select([sys.stdin], [], [], 0.0)[0]:
+        return None
+    sys.stdin.readline()
+    return "Enter"
+
+
+def _stay(control: ManualControl, seconds: float, hold: bool) -> None:
+    if hold:
+        say("holding: Enter or Ctrl-C ends it")
+    if hold or seconds > 0.0:
+        _tell(control.hold(inf if hold else seconds).events)
+
+
+def _leave(control: ManualControl, rig: Rig, park: bool) -> None:
+    """The one way out: park where asked, torque off, close, and say what of it worked."""
+    how = ""
+    try:
+        if park:
+            parked = control.park(rig.park_deg)
+            how = "parked, " if parked.arrived else f"not parked ({_why(parked)}), "
+    except (DriverError, KeyboardInterrupt) as error:
+        how = f"not parked ({error or 'interrupted'}), "
+    try:
+        control.stop()
+        how += "torque off on all servos"
+    except DriverError as error:
+        how += f"torque-off could not be sent ({error}): the servos' watchdog stops them"
+    say(how)
+
+
+def _report(moved: Moved, asked: tuple[str, ...]) -> None:
+    """Say what was really applied, for the joints asked for and those that something befell."""
+    _tell(moved.events)
+    for applied in moved.joints:
+        if applied.joint in asked or applied.reasons:
+            say(str(applied))
+    say(f"{_why(moved)} after {moved.seconds:.1f} s")
+
+
+def _why(moved: Moved) -> str:
+    reasons = [f"{a.joint}: {', '.join(a.reasons)}" for a in moved.remarkable()]
+    return f"{moved.ended} ({'; '.join(reasons)})" if reasons else moved.ended
+
+
+def _report_look(looked: LookedAt, rig: Rig) -> bool:
+    """Say how well the eyes meet the point; tells whether both do within 2 deg."""
+    good = max(looked.left_error, looked.right_error) <= 2.0
+    ranges = rig.ranges
+    narrower = {
+        "eye_pan": ranges.eye_yaw_deg,
+        "eye_tilt": ranges.eye_pitch_deg,
+        "neck_yaw": ranges.neck_yaw_deg,
+    }
+    _tell(looked.moved.events)
+    yaw, pitch, roll = looked.head
+    say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
+    say(
+        f"gaze error: left eye {looked.left_error:.2f}, right eye {looked.right_error:.2f} deg "
+        f"of a point {looked.distance_m:.2f} m away"
+    )
+    say(f"vergence: {looked.vergence:.2f} deg, the point needs {looked.wished_vergence:.2f}")
+    for applied in looked.moved.remarkable():
+        say(f"limited: {applied}")
+    for line in () if good else ends_reached(rig.joints, narrower, looked.moved):
+        say(f"limited: {line}")
+    return good
+
+
+def _tell(events: Iterable[str]) -> None:
+    """Say what was done to which servo."""
+    for line in drawn_together(events):
+        say(line)
+
+
+def _exit_unless(good: bool) -> None:
+    if not good:
+        raise typer.Exit(FAULT)

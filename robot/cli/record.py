@@ -1,0 +1,112 @@
+"""The command ``gazerig record-camera``: what a camera gives, into a file to run from later."""
+
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from drivers.camera_params import WebcamParams
+from drivers.errors import SetupError
+from drivers.picture_source import PictureSource
+from robot.cli.terminal import clear_errors, say, signals, status
+from robot.clock import RealClock
+
+app = typer.Typer(add_completion=False)
+
+_NEVER = threading.Event()  # a picture comes soon enough to look for Ctrl-C in between
+
+
+@app.command("record-camera")
+def record_camera(
+    file: Annotated[Path, typer.Argument(help="File to write, usually .mcap.")],
+    oak: Annotated[bool, typer.Option(help="Record an OAK-D: colour, depth, lens.")] = False,
+    camera: Annotated[int | None, typer.Option(help="Record webcam N.")] = None,
+    video: Annotated[
+        Path | None, typer.Option(help="Record a film, as if it were a camera.")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.0, help="Stop after S seconds; else at Ctrl-C.")
+    ] = None,
+    width: Annotated[int, typer.Option(min=16, help="Width asked of the camera.")] = 640,
+    height: Annotated[
+        int | None, typer.Option(min=16, help="Height (default: 400 for --oak, else 480).")
+    ] = None,
+    rate: Annotated[float, typer.Option(min=1.0, help="Pictures a second asked for.")] = 30.0,
+    jpeg: Annotated[
+        int | None,
+        typer.Option(min=1, max=100, help="JPEG of this quality; default: PNG, which is exact."),
+    ] = None,
+    force: Annotated[bool, typer.Option(help="Write over an existing file.")] = False,
+) -> None:
+    """Record what a camera gives: gazerig record-camera seen.mcap --oak, then run --replay."""
+    with clear_errors():
+        source, name = _source(oak, camera, video, (width, height, rate))
+        with signals() as stopped:
+            _record(source, name, file, seconds, jpeg, force, stopped)
+
+
+def _source(
+    oak: bool, camera: int | None, video: Path | None, wishes: tuple[int, int | None, float]
+) -> tuple[PictureSource, str]:
+    """Make the one source that was asked for, and name it."""
+    asked = [n for n, v in (("oak", oak), ("camera", camera is not None), ("video", video)) if v]
+    if len(asked) != 1:
+        raise SetupError(
+            f"record-camera takes one of --oak, --camera N and --video FILE, not {len(asked)}"
+        )
+    width, height, rate_hz = wishes
+    # OpenCV and depthai are heavy: loaded when it is clear that there is something to do.
+    if oak:
+        from drivers.oak_camera import OakSource
+        from drivers.oak_params import OakParams
+
+        params = OakParams(width_px=width, height_px=height or 400, rate_hz=rate_hz)
+        return OakSource(params), "OAK-D"
+    if video is not None:
+        from drivers.video_file import VideoFile
+
+        return VideoFile(video), f"film {video.name}"
+    from drivers.webcam import Webcam
+
+    wanted = WebcamParams(width_px=width, height_px=height or 480, rate_hz=rate_hz)
+    return Webcam.of(camera or 0, wanted), f"webcam {camera}"
+
+
+def _record(
+    source: PictureSource,
+    name: str,
+    file: Path,
+    seconds: float | None,
+    jpeg: int | None,
+    force: bool,
+    stopped: Callable[[], str | None],
+) -> None:
+    """Record until told to stop, and say what is in the file."""
+    from drivers.camera_recorder import CameraRecorder
+
+    clock = RealClock()
+    recorder = CameraRecorder(source, file, {"source": name}, jpeg, force)
+    recorder.open()
+    began_s = clock.now_s()
+    try:
+        while stopped() is None and not recorder.failure:
+            past_s = clock.now_s() - began_s
+            if seconds is not None and past_s >= seconds:
+                break
+            shot = recorder.take(clock.now_s, _NEVER)
+            for line in recorder.events():
+                say(line)
+            depth = "with depth" if shot is not None and shot.depth_m is not None else "no depth"
+            if sys.stderr.isatty():
+                status(f"{past_s:7.1f} s  {recorder.written} pictures, {depth}: Ctrl-C ends")
+    finally:
+        recorder.close()
+        recorder.finish()
+        size_mb = file.stat().st_size / 1e6
+        left = f", {recorder.left_out} left out" if recorder.left_out else ""
+        say(f"{recorder.written} pictures ({size_mb:.1f} MB{left}) in {file}")
+    if recorder.failure:
+        raise SetupError(recorder.failure)

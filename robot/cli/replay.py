@@ -1,0 +1,301 @@
+"""The commands ``gazerig replay`` and ``gazerig export``: what is done with a recorded run."""
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from math import radians
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from drivers.errors import SetupError
+from robot.cli.run import host_port
+from robot.cli.terminal import FAULT, clear_errors, say, signals
+from robot.loop import Tick
+from robot.types import JOINTS
+
+if TYPE_CHECKING:
+    from robot.page.snapshot import ShownRig
+    from robot.recording.rerun import Rerun
+
+app = typer.Typer(add_completion=False)
+
+Recording = Annotated[
+    Path, typer.Argument(metavar="FILE", help="A recording of gazerig run --record.")
+]
+
+
+@app.command()
+def replay(
+    file: Recording,
+    page: Annotated[str, typer.Option(help="Where the page is served.")] = "127.0.0.1:8080",
+    play: Annotated[bool, typer.Option(help="Play at once, not only when asked.")] = False,
+    rerun: Annotated[
+        bool, typer.Option(help="Feed what was seen through the models of now; no page.")
+    ] = False,
+    rig: Annotated[
+        str | None, typer.Option(help="With --rerun: another rig than the recorded one.")
+    ] = None,
+    character: Annotated[str | None, typer.Option(help="With --rerun: another character.")] = None,
+    joints: Annotated[
+        str | None, typer.Option(help="With --rerun: recorded or emulated joints.")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.0, help="End after S seconds; else at Ctrl-C.")
+    ] = None,
+) -> None:
+    """Show a recorded run on the page, with a time slider; or run it again with --rerun."""
+    with clear_errors():
+        if rerun:
+            well = _rerun(file, rig, character, joints)
+        elif rig is not None or character is not None or joints is not None:
+            raise SetupError(
+                "--rig, --character and --joints need --rerun: a replay shows what was"
+            )
+        else:
+            with signals() as stopped:
+                well = _show(file, host_port(page), play, seconds, stopped)
+    if not well:
+        raise typer.Exit(FAULT)
+
+
+@app.command()
+def export(
+    file: Recording,
+    csv: Annotated[
+        bool, typer.Option("--csv", help="Tables of samples, events and fixations.")
+    ] = False,
+    bids: Annotated[bool, typer.Option("--bids", help="A BIDS data set (version 1.11.1).")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="For --csv the beginning of the names, for --bids the folder."),
+    ] = None,
+    subject: Annotated[
+        str | None, typer.Option(help="BIDS: name of the participant (default: the rig's).")
+    ] = None,
+    task: Annotated[
+        str | None, typer.Option(help="BIDS: name of the task (default: the scene's).")
+    ] = None,
+) -> None:
+    """Write a recorded run as eye-tracking tools read it: degrees, + left and + up."""
+    with clear_errors():
+        if csv == bids:
+            raise SetupError("export takes one of --csv and --bids")
+        if csv and (subject is not None or task is not None):
+            raise SetupError("--subject and --task name files of --bids")
+        _export(file, bids, out, subject, task)
+
+
+def _export(
+    file: Path, bids: bool, out: Path | None, subject: str | None, task: str | None
+) -> None:
+    """Write one kind of export and say what was written."""
+    from robot.recording.export_bids import About, write_bids
+    from robot.recording.export_csv import write_csv
+    from robot.recording.gaze_angles import trace_of
+    from robot.recording.gaze_labels import labels_of, stretches_of
+    from robot.recording.read import RunRecording
+
+    recording = RunRecording(file)
+    _warn(recording.note)
+    with _progress("reading", recording.duration_s) as read:
+        try:
+            trace = trace_of(_told(recording.ticks(), read))
+        except ValueError as error:
+            raise SetupError(f"{file}: {error}") from None
+    labels = labels_of(trace)
+    stretches = stretches_of(trace, labels)
+    if bids:
+        info = recording.info
+        about = About(
+            subject or Path(info.rig).stem,
+            task or info.scene or "live",
+            info.rate_hz,
+            info.started_utc,
+            ", ".join(f"{name} {version}" for name, version in sorted(info.versions.items())),
+        )
+        root = out or file.with_name(f"{file.stem}_bids")
+        made = write_bids(trace, labels, stretches, about, root)
+        say(f"{len(made)} files in {root}")
+    else:
+        made = write_csv(trace, labels, stretches, out or file.with_suffix(""))
+        say("\n".join(map(str, made)))
+    found = {kind: sum(s.event == kind for s in stretches) for kind in _EVENTS}
+    say(
+        f"{len(trace.time_s)} samples in {trace.time_s[-1]:.1f} s, "
+        + ", ".join(f"{n} {kind}s" for kind, n in found.items())
+        + f"; labels are the plan's, {1e3 * labels.lag_s:.0f} ms later, as the eyes follow it"
+    )
+
+
+_EVENTS = ("saccade", "fixation", "pursuit", "blink")
+
+
+def _show(
+    file: Path,
+    address: tuple[str, int],
+    play: bool,
+    seconds: float | None,
+    stopped: Callable[[], str | None],
+) -> bool:
+    """Serve the page until told to stop; False where the page died."""
+    from robot.clock import RealClock
+    from robot.page.link import Page
+    from robot.recording.frames import Frames
+    from robot.recording.player import State
+    from robot.recording.read import RunRecording
+    from robot.recording.replay import Replay
+
+    recording, clock = RunRecording(file), RealClock()
+    _warn(recording.note)
+    with _progress("reading", recording.duration_s) as read:
+        frames = Frames(
+            recording.ticks(),
+            recording.pictures(),
+            recording.info.rate_hz,
+            recording.info.character or "",
+            _built(recording.info.config_yaml),
+            read,
+        )
+    replaying = Replay(frames, clock)
+    page = Page(*address, replaying.hear)
+    began_s, urls = clock.now_s(), [""]
+
+    def over(_: State) -> bool:
+        if (note := page.notice()) is not None:
+            say(note)
+        url = page.url()
+        if url is not None and url != urls[-1]:
+            urls.append(url)
+            say(f"{frames.duration_s:.1f} s of {file} on {url}: Ctrl-C ends")
+        died = url is None and len(urls) > 1
+        past = seconds is not None and clock.now_s() - began_s >= seconds
+        return died or past or stopped() is not None
+
+    say(page.open())
+    if play:
+        replaying.ask({"play": True})
+    try:
+        replaying.run(page, over)
+        return page.url() is not None or len(urls) == 1
+    finally:
+        page.close()
+        frames.close()
+
+
+def _built(config_yaml: str) -> "ShownRig | None":
+    """Give how the recorded rig was built; None, with a word why, where nobody can tell."""
+    from config.load import ConfigError, load
+    from config.schema import Rig
+    from robot.assemble import gaze_parts
+    from robot.frames import CameraMount
+    from robot.page.snapshot import ShownRig
+
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "recorded.yaml"
+        file.write_text(config_yaml, encoding="utf-8")
+        try:
+            rig = load(file, Rig)
+        except ConfigError as error:
+            first = str(error).splitlines()[0].replace(f"{folder}/", "")
+            say(f"no ghost of the wish: the recorded configuration is no longer valid ({first})")
+            return None
+    return ShownRig(
+        gaze_parts(rig, 0)[0],
+        tuple(rig.joints[name].limit() for name in JOINTS),
+        rig.guard.health,
+        CameraMount(rig.camera),
+        radians(rig.camera.horizontal_field_deg),
+        rig.gaze.field_of_view,
+    )
+
+
+def _rerun(file: Path, rig: str | None, character: str | None, joints: str | None) -> bool:
+    """Run a recording again and print what came out; False where it should be the same and is not.
+
+    Only joints as recorded can come out the same; nothing else was then to change.
+    """
+    from robot.recording.read import RunRecording
+    from robot.recording.rerun import rerun
+
+    recording = RunRecording(file)
+    with _progress("running again", recording.duration_s) as read:
+        told, start_s = 0, 0.0
+
+        def note(tick: Tick) -> None:
+            nonlocal told, start_s
+            start_s = tick.t_s if told == 0 else start_s
+            told += 1
+            if told % 100 == 0:
+                read(tick.t_s - start_s)
+
+        result = rerun(recording, rig=rig, character=character, joints=joints, note=note)
+    for line in result.notes:
+        say(line)
+    say(agreement(result))
+    table = Table("", "recorded", "run again", title=f"{file.name} run again")
+    for name, was, now in beside(result.recorded, result.again):
+        table.add_row(name, was, now, style=None if was == now else "bold")
+    Console().print(table)
+    changed = rig is not None or character is not None
+    return result.same or result.joints != "recorded" or changed
+
+
+def agreement(result: "Rerun") -> str:
+    """Say in words how far a run done again is the one that was recorded."""
+    words = f"{result.agreeing} of {result.ticks} ticks are the same to the bit"
+    if result.first_difference_s is not None:
+        words += f"; the first other one at {result.first_difference_s:.3f} s: {result.differs}"
+    if result.tx_same is not None:
+        words += f"; the bytes on the bus are {'the same' if result.tx_same else 'others'}"
+    return f"joints {result.joints}: {words}"
+
+
+def beside(
+    was: Mapping[str, object], now: Mapping[str, object], within: str = ""
+) -> Iterator[tuple[str, str, str]]:
+    """Give the figures of two runs side by side: name and both in words."""
+    for name in dict.fromkeys((*was, *now)):
+        one, other = was.get(name), now.get(name)
+        if isinstance(one, Mapping) or isinstance(other, Mapping):
+            inner = [value if isinstance(value, Mapping) else {} for value in (one, other)]
+            yield from beside(inner[0], inner[1], f"{within}{name} ".replace("_", " "))
+        else:
+            yield f"{within}{name}".replace("_", " "), _words(one), _words(other)
+
+
+def _warn(note: str) -> None:
+    if note:
+        say(note)
+
+
+def _words(value: object) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, list | tuple):
+        return f"{len(value)} of them"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _told(ticks: Iterable[Tick], read: Callable[[float], None]) -> Iterator[Tick]:
+    """Pass ticks on, and tell how far they are."""
+    start_s = None
+    for number, tick in enumerate(ticks):
+        start_s = tick.t_s if start_s is None else start_s
+        if number % 100 == 0:
+            read(tick.t_s - start_s)
+        yield tick
+
+
+@contextmanager
+def _progress(words: str, total_s: float) -> Iterator[Callable[[float], None]]:
+    """Draw a bar on a terminal; nothing elsewhere."""
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task(words, total=total_s)
+        yield lambda at_s: bar.update(task, completed=at_s)

@@ -1,0 +1,312 @@
+"""The commands ``gazerig report`` and ``gazerig compare``: how human the gaze of a run was."""
+
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from config.load import ConfigError
+from drivers.errors import SetupError
+from robot.cli.terminal import clear_errors, say, signals
+
+if TYPE_CHECKING:
+    from config.schema import Rig
+    from gaze.scanpath import Walk
+    from robot.assemble import Assembly
+    from robot.choice import Choice
+    from robot.recording.read import RunRecording
+    from robot.report.about import About
+    from robot.report.gathered import Gathered, Gathering
+    from robot.report.measured import Finding
+
+app = typer.Typer(add_completion=False)
+
+_Tell = Callable[[str, float], None]
+
+_PAGES = {".html", ".htm"}
+
+
+class _Layers(NamedTuple):
+    """What a rig is laid together from."""
+
+    rig: str
+    character: str | None
+    profile: str | None
+
+
+@app.command()
+def report(
+    file: Annotated[
+        Path | None, typer.Argument(metavar="[FILE]", help="A recording of gazerig run --record.")
+    ] = None,
+    scene: Annotated[
+        str | None, typer.Option(help="Without a file: run this scene in simulated time.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=5.0, help="Length of that run.")] = 180.0,
+    rig: Annotated[str, typer.Option(help="The rig of that run.")] = "desk",
+    character: Annotated[str | None, typer.Option(help="A character laid over it.")] = None,
+    profile: Annotated[str | None, typer.Option(help="Its style of gaze.")] = None,
+    scanpath: Annotated[str | None, typer.Option(help="Face scanpath instead of its own.")] = None,
+    saccade: Annotated[str | None, typer.Option(help="Saccades instead of its own.")] = None,
+    conversation: Annotated[str | None, typer.Option(help="talk, listen or think.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all dice.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="The page to write; .html is added where it is missing.")
+    ] = None,
+) -> None:
+    """Say how human a run's gaze was: gazerig report run.mcap, then open report.html."""
+    with clear_errors():
+        if (file is None) == (scene is None):
+            raise SetupError("report takes a recording, or --scene NAME: one of them")
+        # Drawing and models are heavy; `--help` does without them.
+        from robot.report.build import report_of
+
+        with _progress() as tell:
+            if file is not None:
+                about, run = _recorded(file, file.stem, tell)
+            else:
+                from robot.choice import Choice
+
+                choice = Choice(True, True, seed, scene, scanpath=scanpath, saccade=saccade)
+                layers = _Layers(rig, character, profile)
+                about, run = _simulated(choice, layers, seconds, conversation, tell)
+            made = report_of(run, about, page_file(out or _beside(file, scene)), tell)
+        _tell_findings(made.findings)
+        say(f"{made.page}: the whole report; {len(made.pictures)} figures beside it")
+
+
+@app.command()
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="A", help="A recording.")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="Another recording.")],
+    out: Annotated[
+        Path, typer.Option(help="The page to write; .html is added where it is missing.")
+    ] = Path("compare.html"),
+) -> None:
+    """Put two runs side by side and say what differs by more than chance."""
+    with clear_errors():
+        from robot.recording.read import RunRecording
+        from robot.report.compare import LEVEL
+        from robot.report.compare import compare as comparing
+
+        recordings = RunRecording(first), RunRecording(second)
+        names = _names(first, second)
+        abouts = _about(recordings[0], names[0]), _about(recordings[1], names[1])
+        with _progress() as tell:
+            ticks = recordings[0].ticks(), recordings[1].ticks()
+            made = comparing(ticks, abouts, page_file(out), tell)
+        for difference in made.differences:
+            if difference.word == "more than chance":
+                a, b = difference.a, difference.b
+                unit = "" if a.band.unit in ("", "share") else f" {a.band.unit}"
+                how = " (the figure may be chance, its distribution is not)"
+                shape = how if difference.chance >= LEVEL else ""
+                say(f"{a.band.title}: {a.value:.3g} and {b.value:.3g}{unit}{shape}")
+        count = sum(d.word == "more than chance" for d in made.differences)
+        say(f"{made.page}: {count} of {len(made.differences)} measures differ by more than chance")
+
+
+def _recorded(file: Path, name: str, tell: _Tell) -> "tuple[About, Gathered]":
+    """Read a recorded run."""
+    from robot.recording.read import RunRecording
+    from robot.report.build import read
+
+    recording = RunRecording(file)
+    about = _about(recording, name)
+    return about, read(recording.ticks(), about, tell)
+
+
+def _simulated(
+    choice: "Choice",
+    layers: _Layers,
+    seconds: float,
+    conversation: str | None,
+    tell: _Tell,
+) -> "tuple[About, Gathered]":
+    """Run a scene in simulated time."""
+    from config.schema import load_rig, load_walk
+    from robot.assemble import assemble, chosen
+    from robot.report.gathered import Gathering
+
+    rig = load_rig(*layers)
+    made, gathering = assemble(rig, choice), Gathering()
+    _run(made, gathering, seconds, conversation, tell)
+    gaze = rig.gaze
+    if choice.scanpath is not None:
+        gaze = replace(gaze, scanpath=chosen(gaze.scanpath, "model", choice.scanpath, "--scanpath"))
+    if choice.saccade is not None:
+        gaze = replace(gaze, saccade=chosen(gaze.saccade, "profile", choice.saccade, "--saccade"))
+    given = zip(("rig", "character", "profile"), layers, strict=True)
+    facts = (
+        *((name, value) for name, value in given if value is not None),
+        ("scene", f"{choice.scene}, simulated"),
+        ("seed", str(choice.seed)),
+    )
+    walk = load_walk(gaze.scanpath.walk)
+    name = " ".join(filter(None, (choice.scene, layers.character, layers.profile)))
+    return _described(name, facts, replace(rig, gaze=gaze), walk), gathering.gathered()
+
+
+def _run(
+    made: "Assembly", gathering: "Gathering", seconds: float, conversation: str | None, tell: _Tell
+) -> None:
+    """Let the head look for so long; Ctrl-C ends the run early."""
+    from robot.loop import Tick, run
+    from robot.planner import Planner
+
+    words, scene = f"simulating {seconds:.0f} s", made.scene
+    planner = Planner(scene.behaviour, made.robot.ask) if scene is not None else None
+
+    def watch(tick: Tick) -> None:
+        gathering.note(tick)
+        if planner is not None:
+            planner.note(tick.t_s)
+
+    try:
+        if conversation is not None:
+            made.robot.ask("conversation", conversation)
+        with signals() as stopped:
+
+            def stop(at_s: float) -> str | None:
+                tell(words, min(1.0, at_s / seconds))
+                return stopped() or ("seconds" if at_s >= seconds else None)
+
+            made.robot.start(made.clock)
+            count = run(made.robot, made.clock, made.loop, stop, watch)
+            made.robot.stop()
+    except ValueError as error:
+        raise SetupError(str(error)) from None
+    finally:
+        made.close()
+    if count.stopped_by.startswith("fault"):
+        raise SetupError(f"the simulated run ended by a {count.stopped_by}")
+
+
+def _about(recording: "RunRecording", name: str) -> "About":
+    """Describe a recorded run."""
+    from robot.report.about import About
+
+    info = recording.info
+    known = (
+        ("recording", str(recording.path)),
+        ("rig", info.rig),
+        ("character", info.character or "none"),
+        ("profile", info.profile),
+        ("saw", f"scene {info.scene}" if info.scene else info.eyes),
+        ("servos", "emulated" if info.mock else "real"),
+        ("time", "simulated" if info.fast else "real"),
+        ("seed", str(info.seed)),
+        ("started", info.started_utc),
+        ("versions", ", ".join(f"{name} {v}" for name, v in sorted(info.versions.items()))),
+    )
+    warnings = (recording.note,) if recording.note else ()
+    try:
+        rig, walk = _configured(info.config_yaml, info.walk_yaml)
+    except ConfigError as error:
+        first = str(error).splitlines()[0]
+        cannot = f"the recorded configuration is not valid today, so no notes on it: {first}"
+        return About(name, known, warnings=(*warnings, cannot), duration_s=recording.duration_s)
+    made = _described(name, known, rig, walk)
+    return replace(made, warnings=warnings, duration_s=recording.duration_s)
+
+
+def _configured(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
+    """Read the configuration that a recording holds.
+
+    Raises:
+        config.load.ConfigError: it is not valid today.
+    """
+    from config.load import load
+    from config.schema import RULES, Rig, load_walk
+    from gaze.scanpath import Walk
+
+    with TemporaryDirectory() as folder:
+        rig_file, walk_file = Path(folder) / "recorded.yaml", Path(folder) / "walk.yaml"
+        rig_file.write_text(config_yaml, encoding="utf-8")
+        rig = load(rig_file, Rig, checks=RULES)
+        if not walk_yaml:
+            return rig, load_walk(rig.gaze.scanpath.walk)
+        walk_file.write_text(walk_yaml, encoding="utf-8")
+        return rig, load(walk_file, Walk)
+
+
+def _described(
+    name: str,
+    facts: tuple[tuple[str, str], ...],
+    rig: "Rig",
+    walk: "Walk",
+) -> "About":
+    """Add to a run's description the style of its gaze."""
+    from robot.report.about import About
+    from robot.report.model import own
+
+    gaze = rig.gaze
+    styles = (
+        f"saccade {gaze.saccade.profile}",
+        f"scanpath {gaze.scanpath.model}",
+    )
+    shown = (
+        ("saccades", gaze.saccade.profile),
+        ("face scanpath", f"{gaze.scanpath.model}, walk {gaze.scanpath.walk}"),
+    )
+    return About(name, (*facts, *shown), frozenset(styles), own(gaze.scanpath, walk))
+
+
+def _tell_findings(findings: "Sequence[Finding]") -> None:
+    """Say what is outside, and how many are not."""
+    for finding in findings:
+        if finding.verdict == "outside":
+            band = finding.band
+            unit = "" if band.unit in ("", "share") else f" {band.unit}"
+            say(
+                f"outside: {band.title}: {finding.value:.3g}, people {band.low:g} to "
+                f"{band.high:g}{unit} ({finding.measured.events} events)"
+            )
+    counts = Counter(finding.verdict for finding in findings)
+    say(
+        f"{counts['pass']} pass, {counts['outside']} outside, "
+        f"{counts['too few events']} with too few events"
+    )
+
+
+def _names(first: Path, second: Path) -> tuple[str, str]:
+    """Give two short names that differ."""
+    if first.stem != second.stem:
+        return first.stem, second.stem
+    return f"{first.stem} (A)", f"{second.stem} (B)"
+
+
+def page_file(out: Path) -> Path:
+    """Give the file of a page, whose name ends so that a browser opens it as one."""
+    if out.suffix.lower() in _PAGES:
+        return out
+    # Not with_suffix: what follows the dot of "evening-0.5" is no ending.
+    return out.with_name(f"{out.name}.html")
+
+
+def _beside(file: Path | None, scene: str | None) -> Path:
+    return file.with_suffix(".html") if file is not None else Path(f"report-{scene}.html")
+
+
+@contextmanager
+def _progress() -> Iterator[_Tell]:
+    """Draw a bar for each step on a terminal; nothing elsewhere."""
+    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not sys.stderr.isatty()) as bar:
+        steps: dict[str, TaskID] = {}
+
+        def tell(words: str, share: float) -> None:
+            if words not in steps:
+                steps[words] = bar.add_task(words, total=1.0)
+            bar.update(steps[words], completed=share)
+
+        yield tell

@@ -1,0 +1,214 @@
+"""The command run."""
+
+import json
+import os
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from config.load import ConfigError
+from config.schema import load_rig
+from config.text import rig_text, walk_text
+from drivers.errors import SetupError
+from robot.cli.examples import complete_scene, complete_shipped
+from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
+
+if TYPE_CHECKING:
+    from robot.assemble import Assembly
+    from robot.audience import Told
+    from robot.choice import Choice
+
+app = typer.Typer()
+
+
+@app.command()
+def run(
+    rig: RigArgument = "desk",
+    mock: Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")] = False,
+    port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            help="Look at a simulated scene (default with --mock: visitor).",
+            autocompletion=complete_scene,
+        ),
+    ] = None,
+    video: Annotated[Path | None, typer.Option(help="Look at a film or picture, looped.")] = None,
+    camera: Annotated[int | None, typer.Option(help="Look through webcam N.")] = None,
+    oak: Annotated[bool, typer.Option(help="Look through an OAK-D camera.")] = False,
+    replay: Annotated[
+        Path | None, typer.Option(help="Look at a recording of record-camera, again and again.")
+    ] = None,
+    pixels: Annotated[
+        bool, typer.Option(help="Draw the scene and find faces and motion in the pictures.")
+    ] = False,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all dice.")] = 0,
+    fast: Annotated[
+        bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock).")
+    ] = False,
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            help="Style of gaze: robot, or literal mitake, nakamoto.",
+            autocompletion=complete_shipped("profiles"),
+        ),
+    ] = None,
+    character: Annotated[
+        str | None,
+        typer.Option(
+            help="A character laid over the rig: shy, bold, sleepy, strong_boxer ...",
+            autocompletion=complete_shipped("characters"),
+        ),
+    ] = None,
+    rules: Annotated[
+        str | None,
+        typer.Option(
+            help="Rule set instead of the rig's: boxing, conversation.",
+            autocompletion=complete_shipped("rules"),
+        ),
+    ] = None,
+    behaviour: Annotated[
+        str | None, typer.Option(help="Behaviour in force at the start, one of the rig's rules.")
+    ] = None,
+    conversation: Annotated[
+        str | None, typer.Option(help="Looking away as in: talk, listen, think; none (default).")
+    ] = None,
+    scanpath: Annotated[
+        str | None, typer.Option(help="Face scanpath: markov, simple, face_tracking, random.")
+    ] = None,
+    saccade: Annotated[
+        str | None, typer.Option(help="Saccades: min_jerk, main_sequence, literal_frame.")
+    ] = None,
+    page: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Where the live page is served. Other machines reach it at 0.0.0.0:8080, and "
+            "only with the token in the address that is printed at start.",
+        ),
+    ] = "127.0.0.1:8080",
+    no_page: Annotated[bool, typer.Option(help="Without the live page.")] = False,
+    heatmap: Annotated[
+        Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
+    ] = None,
+    heatmap_face: Annotated[
+        Path | None, typer.Option(help="Picture of a face to lay the heat map over.")
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Record every tick, to replay and judge: FILE.mcap.")
+    ] = None,
+    record_pictures: Annotated[
+        float, typer.Option(min=0.0, max=60.0, help="Camera pictures a second in the recording.")
+    ] = 2.0,
+    force: Annotated[bool, typer.Option("--force", help="Write over an older recording.")] = False,
+    summary: Annotated[
+        str | None, typer.Option(help="Write figures as JSON to this file; - prints them.")
+    ] = None,
+) -> None:
+    """Run the head: gazerig run --mock, then open the page it names."""
+    with clear_errors():
+        # Vision and emulator are heavy; `check` and `--help` do without them.
+        from robot import session
+        from robot.assemble import assemble
+        from robot.audience import Wished
+
+        address = host_port(page)
+        wanted = session.Wanted(
+            mock=mock,
+            fast=fast,
+            seed=seed,
+            seconds=seconds,
+            scene=scene,
+            video=video,
+            camera=camera,
+            oak=oak,
+            replay=replay,
+            pixels=pixels,
+            scanpath=scanpath,
+            saccade=saccade,
+            rules=rules,
+            port=port,
+            asked=tuple(
+                (menu, choice)
+                for menu, choice in (("behaviour", behaviour), ("conversation", conversation))
+                if choice is not None
+            ),
+            heatmap=heatmap,
+            heatmap_face=heatmap_face,
+            watched=Wished(
+                page=None if no_page or fast else address,
+                status_line=not fast and sys.stderr.isatty(),
+                record=record,
+                over=force,
+            ),
+        )
+        choice = wanted.choice()
+        made = assemble(load_rig(rig, character, profile), choice)
+        told = _told(made, rig, character, profile, choice, record_pictures)
+        with signals() as stopped:
+            figures = session.run(made, wanted, stopped, say, status, told)
+        _write_summary(figures, summary)
+    if str(figures["stopped_by"]).startswith("fault"):
+        raise typer.Exit(FAULT)
+
+
+def _told(
+    made: "Assembly",
+    rig: str,
+    character: str | None,
+    profile: str | None,
+    choice: "Choice",
+    pictures_hz: float,
+) -> "Told":
+    """Gather what tuning and recording must know of the command line."""
+    from robot.audience import Told
+    from robot.recording.run_info import RunInfo, versions
+    from robot.tuning import Tuning
+
+    def info() -> RunInfo:
+        whole = made.retuner.rig
+        return RunInfo(
+            rig=rig,
+            profile=whole.profile,
+            character=character,
+            config_yaml=rig_text(whole),
+            walk_yaml=walk_text(whole.gaze.scanpath.walk),
+            seed=choice.seed,
+            rate_hz=whole.loop.rate_hz,
+            started_utc=datetime.now(UTC).isoformat(),
+            scene=choice.scene,
+            eyes=choice.eyes or f"scene {choice.scene}",
+            mock=choice.mock,
+            fast=choice.fast,
+            pictures_hz=pictures_hz,
+            versions=versions(),
+        )
+
+    tuning = Tuning(made.retuner, made.robot.order, rig, character, profile)
+    return Told(tuning, (ConfigError,), {"rig": rig, "pid": os.getpid()}, info)
+
+
+def host_port(text: str) -> tuple[str, int]:
+    """Read what is given as --page.
+
+    Raises:
+        drivers.errors.SetupError: it is no address.
+    """
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise SetupError(f"--page {text}: not HOST:PORT, for example 127.0.0.1:8080")
+    return host, int(port)
+
+
+def _write_summary(figures: dict[str, object], where: str | None) -> None:
+    if where is None:
+        return
+    text = json.dumps(figures, indent=2) + "\n"
+    if where == "-":
+        print(text, end="")
+    else:
+        Path(where).write_text(text, encoding="utf-8")

@@ -1,0 +1,399 @@
+"""Commands that tune and steer a rig which runs in another terminal: get, set, save, stop ..."""
+
+import json
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from config.load import ConfigError, read_yaml, shipped_names
+from drivers.errors import DriverError, SetupError
+from robot.cli.terminal import FAULT, clear_errors, say
+from robot.remote.running_rig import JsonValue, KnobInfo, RunningRig, running
+
+app = typer.Typer()
+_OLD_S = 1.0
+"""A loop that has not ticked for so long does not do as it should."""
+_LAST_SAID = 5
+_NEGATIVE = {"ignore_unknown_options": True}
+"""Click settings: -3 is a number, no option."""
+
+
+def complete_key(incomplete: str) -> list[str]:
+    """Complete a key of the running rig, or of the shipped one where none runs."""
+    try:
+        with RunningRig.connect() as rig:
+            return list(rig.get(incomplete))
+    except DriverError:
+        # Only here: the other commands leave all keys and rules to the rig that runs.
+        from config.knobs import knobs
+        from config.schema import load_rig
+
+        desk = load_rig("desk")
+        return [knob.key for knob in knobs(desk, desk) if knob.key.startswith(incomplete)]
+
+
+def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
+    """Complete keys and, in between, the values that a key may have."""
+    given = context.params.get("pairs") or []
+    if len(given) % 2 == 0:
+        return complete_key(incomplete)
+    try:
+        with RunningRig.connect() as rig:
+            knob = rig.knob(given[-1])
+    except DriverError:
+        return []
+    values = ("true", "false") if knob.kind == "bool" else tuple(map(_written, knob.choices))
+    return [value for value in values if value.startswith(incomplete)]
+
+
+def complete_character(incomplete: str) -> list[str]:
+    """Complete a shipped character."""
+    return [name for name in shipped_names("characters") if name.startswith(incomplete)]
+
+
+def complete_menu(incomplete: str) -> list[str]:
+    """Complete a menu of the running rig."""
+    return [menu for menu in _menus() if menu.startswith(incomplete)]
+
+
+def complete_choice(context: typer.Context, incomplete: str) -> list[str]:
+    """Complete what can be chosen from the menu that stands before it."""
+    choices = _menus().get(context.params.get("menu") or "", ())
+    return [choice for choice in choices if choice.startswith(incomplete)]
+
+
+def _menus() -> dict[str, tuple[str, ...]]:
+    """Give the running rig's menus, none where none runs: a shell shows no errors."""
+    try:
+        with RunningRig.connect() as rig:
+            return rig.menus()
+    except DriverError:
+        return {}
+
+
+PidOption = Annotated[
+    int | None,
+    typer.Option("--pid", metavar="N", help="Of several running rigs that of process N."),
+]
+
+
+@app.command()
+def get(
+    prefix: Annotated[
+        str,
+        typer.Argument(
+            metavar="KEY", help="A key, or how keys begin.", autocompletion=complete_key
+        ),
+    ] = "",
+    differs: Annotated[
+        bool, typer.Option("--differs", help="Only what differs from the defaults.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print key -> value as JSON.")] = False,
+    pid: PidOption = None,
+) -> None:
+    """Show the running rig's parameters: value, unit, default; * marks what is not saved."""
+    with clear_errors(), RunningRig.connect(pid) as rig:
+        values = rig.get(prefix)
+        found = [knob for knob in rig.knobs(prefix) if knob.key in values]
+        if differs:
+            other = {change.key for change in rig.differs()}
+            found = [knob for knob in found if knob.key in other]
+        if not found and not differs:
+            raise SetupError(f"{prefix}: no key begins so; gazerig get lists all")
+        if as_json:
+            print(json.dumps({knob.key: values[knob.key] for knob in found}, indent=2))
+            return
+        unsaved = {change.key for change in rig.unsaved()}
+    for line in _table(found, values, unsaved):
+        print(line)
+    if len(found) == 1:
+        print(_rule(found[0]))
+
+
+@app.command("set", context_settings=_NEGATIVE)
+def put(
+    pairs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="KEY VALUE [KEY VALUE ...]",
+            help="Values as in the YAML: 0.5, true, markov, [1, 2].",
+            autocompletion=complete_pair,
+        ),
+    ],
+    pid: PidOption = None,
+) -> None:
+    """Change parameters of the running rig at its next tick, all of them or none."""
+    with clear_errors():
+        changes = read_pairs(pairs)
+        with RunningRig.connect(pid) as rig:
+            notes = rig.set_many(changes)
+            unsaved = len(rig.unsaved())
+        _tell(notes)
+        if not notes:
+            say("all of that is in force already")
+        if unsaved:
+            say(f"not saved yet: {_count(unsaved)}; gazerig save keeps, gazerig revert takes back")
+
+
+@app.command()
+def save(
+    path: Annotated[
+        Path | None, typer.Argument(help="YAML file; default: the one the rig was started with.")
+    ] = None,
+    pid: PidOption = None,
+) -> None:
+    """Write what was set into the rig's YAML; comments stay, the old file is kept beside it."""
+    with clear_errors(), RunningRig.connect(pid) as rig:
+        saved = rig.save(path)
+    _tell(f"{change.key}: {change.old} -> {change.new}" for change in saved.changes)
+    if not saved.changes:
+        say(f"{saved.path} says all of it already: nothing to save")
+        return
+    kept = f"; as it was: {saved.backup}" if saved.backup is not None else ""
+    say(f"{saved.path}: {_count(len(saved.changes))} written{kept}")
+
+
+@app.command()
+def revert(pid: PidOption = None) -> None:
+    """Put back in force what the rig's file says."""
+    with clear_errors(), RunningRig.connect(pid) as rig:
+        notes = rig.revert()
+    _tell(notes)
+    say(f"{_count(len(notes))} taken back")
+
+
+@app.command()
+def character(
+    name: Annotated[
+        str, typer.Argument(help="One of the shipped ones.", autocompletion=complete_character)
+    ],
+    pid: PidOption = None,
+) -> None:
+    """Lay a character over the running rig in place of the present one."""
+    with clear_errors(), RunningRig.connect(pid) as rig:
+        _tell(rig.character(name))
+        say(f"character {name} is in force")
+
+
+@app.command()
+def ask(
+    menu: Annotated[
+        str | None,
+        typer.Argument(help="Without it, all menus are listed.", autocompletion=complete_menu),
+    ] = None,
+    choice: Annotated[
+        str | None,
+        typer.Argument(help="Without it, its choices are listed.", autocompletion=complete_choice),
+    ] = None,
+    pid: PidOption = None,
+) -> None:
+    """Ask the running head for a behaviour, or to talk, listen or think; or list all there is."""
+    with clear_errors(), RunningRig.connect(pid) as rig:
+        if menu is not None and choice is not None:
+            rig.ask(menu, choice)
+            say(f"{menu} {choice} is in force")
+            return
+        menus = rig.menus()
+        if menu is not None and menu not in menus:
+            raise SetupError(f"{menu}: no menu of this rig; there is {', '.join(menus)}")
+        shown = menus if menu is None else {menu: menus[menu]}
+        _tell(f"{name}: {_choices(choices)}" for name, choices in shown.items())
+
+
+@app.command()
+def status(
+    as_json: Annotated[bool, typer.Option("--json", help="Print all of it as JSON.")] = False,
+    pid: PidOption = None,
+) -> None:
+    """Say what the running rig does: target and why, guard, joints, what it said last."""
+    with clear_errors(), RunningRig.connect(pid) as rig:
+        now = rig.status()
+    if as_json:
+        print(json.dumps(now, indent=2))
+    else:
+        _tell(state_lines(now))
+
+
+@app.command(context_settings=_NEGATIVE)
+def look(
+    where: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="X Y Z | free", help="Metres ahead, left and up of the neck; or free."
+        ),
+    ],
+    pid: PidOption = None,
+) -> None:
+    """Let the running head look at a point, or freely again."""
+    with clear_errors():
+        point = read_point(where)
+        with RunningRig.connect(pid) as rig:
+            if point is None:
+                rig.look_freely()
+            else:
+                rig.look_at(*point)
+        say("it looks freely" if point is None else "it looks there until: gazerig look free")
+
+
+@app.command()
+def stop(
+    why: Annotated[str, typer.Argument(help="Reason, for the log.")] = "gazerig stop",
+    pid: PidOption = None,
+) -> None:
+    """Torque off at once, of every rig that runs here; nothing parks, the programs go on."""
+    with clear_errors():
+        rigs = running(pid)
+        if not rigs:
+            RunningRig.connect(pid)  # says why there is none
+        failed = False
+        for rig in rigs:
+            try:
+                with rig:
+                    rig.stop(why)
+            except DriverError as error:
+                failed = True
+                say(f"{rig.pid}: NOT KNOWN TO HAVE STOPPED, press the emergency stop: {error}")
+            else:
+                say(f"{rig.pid}: torque is off; gazerig resume goes on")
+    if failed:
+        raise typer.Exit(FAULT)
+
+
+@app.command()
+def resume(
+    yes: Annotated[bool, typer.Option("--yes", help="No hand is in the mechanism.")] = False,
+    pid: PidOption = None,
+) -> None:
+    """Put the torque on again after a stop, where the joints are, and go on slowly."""
+    with clear_errors(), RunningRig.connect(pid) as rig:
+        if not rig.status()["stopped"]:
+            say("it was not stopped: nothing to resume")
+            return
+        if not yes:
+            typer.confirm("The torque goes on and the head moves. Is no hand in it?", abort=True)
+        rig.resume()
+        say("torque is on; it goes on slowly")
+
+
+def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
+    """Read KEY VALUE KEY VALUE ... with values as YAML.
+
+    Raises:
+        drivers.errors.SetupError: a value is missing or no YAML, or a key stands twice.
+    """
+    if len(pairs) % 2:
+        raise SetupError(f"{pairs[-1]}: a value is missing; gazerig set KEY VALUE [KEY VALUE ...]")
+    keys = pairs[::2]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise SetupError(f"{key}: stands twice; give it one value")
+    return {key: read_value(key, text) for key, text in zip(keys, pairs[1::2], strict=True)}
+
+
+def read_value(key: str, text: str) -> Any:
+    """Read a value as it would stand after its key in the YAML file.
+
+    Raises:
+        drivers.errors.SetupError: it cannot stand there.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "value.yaml"
+        file.write_text(f"value: {text}\n", encoding="utf-8")
+        try:
+            held = read_yaml(file).data
+        except ConfigError as error:
+            raise SetupError(f"{key}: {error.faults[0].rule}") from None
+    if set(held) != {"value"}:
+        raise SetupError(f"{key}: {text!r} is more than one value; write lists as [1, 2]")
+    return held["value"]
+
+
+def read_point(words: Sequence[str]) -> tuple[float, float, float] | None:
+    """Read X Y Z in metres, or "free" as None.
+
+    Raises:
+        drivers.errors.SetupError: it is neither.
+    """
+    if list(words) == ["free"]:
+        return None
+    try:
+        x, y, z = map(float, words)
+    except ValueError:
+        raise SetupError(
+            f"{' '.join(words)}: give X Y Z in metres (ahead, left, up), or free"
+        ) from None
+    return x, y, z
+
+
+def state_lines(now: Mapping[str, Any]) -> list[str]:
+    """Say in a few lines what ``RunningRig.status`` gives."""
+    lines = [f"rig: {now.get('rig', '')}, process {now.get('pid', '')}"]
+    if not now["ticks"]:
+        return [*lines, "it has just been started: nothing is known yet"]
+    if now["stopped"]:
+        lines.append(f"STOPPED, torque off: {now['stopped']}; gazerig resume goes on")
+    if now["age_s"] > _OLD_S:
+        lines.append(f"the loop is held up: what follows is {now['age_s']:.1f} s old")
+    joints = ", ".join(f"{name} {deg:.1f}" for name, deg in now["joints_deg"].items())
+    unsaved = now["unsaved"]
+    return [
+        *lines,
+        f"looks at: {now['target']} - {now['why']} ({now['phase']})",
+        f"guard: {'; '.join((now['level'], *now['reasons']))}",
+        f"joints in deg: {joints}",
+        f"not saved: {_count(unsaved)}; gazerig save keeps" if unsaved else "all saved",
+        *(f"said: {words}" for words in now["said"][-_LAST_SAID:]),
+    ]
+
+
+def _choices(choices: Sequence[str]) -> str:
+    """Write a menu's choices, of which the one in force comes first."""
+    return ", ".join((f"{choices[0]} (in force)", *choices[1:]))
+
+
+def _table(found: Iterable[KnobInfo], values: dict[str, JsonValue], unsaved: set[str]) -> list[str]:
+    """Lay parameters out in columns, never cut: the lines are also read by programs."""
+    rows = [("", "key", "value", "unit", "default", "")]
+    for knob in found:
+        value = _written(values[knob.key])
+        default = _written(knob.default)
+        rows.append(
+            (
+                "*" if knob.key in unsaved else "",
+                knob.key,
+                value,
+                knob.unit,
+                "" if default == value else default,
+                "next start" if knob.live.startswith("next start") else "",
+            )
+        )
+    widths = [min(max(map(len, column)), 40) for column in zip(*rows, strict=True)]
+    return [
+        " ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def _rule(knob: KnobInfo) -> str:
+    """Say what one parameter is, what it may be, and when it changes."""
+    bounds = "" if knob.low is None or knob.high is None else f"{knob.low:g} .. {knob.high:g}"
+    choices = ", ".join(map(_written, knob.choices))
+    allowed = " ".join(part for part in (bounds, knob.unit if bounds else "") if part) or choices
+    return "; ".join(part for part in (knob.says, allowed, f"changes at the {knob.live}") if part)
+
+
+def _written(value: object) -> str:
+    """Write a value as it can be given to ``set``."""
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def _count(number: int) -> str:
+    return f"{number} value" if number == 1 else f"{number} values"
+
+
+def _tell(notes: Iterable[str]) -> None:
+    for note in notes:
+        print(note)

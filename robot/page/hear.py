@@ -1,0 +1,132 @@
+"""What people ask for on the page, handed to the rig: orders, tuning, clicks in the picture."""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import cast
+
+from drivers.errors import DriverError
+from gaze.types import Vec3
+from robot.orders import LookAt, Order, Tune, Value, from_json
+from robot.remote.requests import Saved, Tuning
+
+_LATER = "next start"
+"""Of what a change did, people are told what it did not; the controls show the rest."""
+
+Point = Callable[[float, float], Vec3 | None]
+"""Place in the picture, 0..1 from the left and from the top -> point in the world."""
+
+
+class PageHear:
+    """Carries out one request of the page and gives what there is to say about it."""
+
+    def __init__(
+        self,
+        order: Callable[[Order], None],
+        tuning: Tuning | None = None,
+        point: Point | None = None,
+        steer: Callable[[str], str | None] | None = None,
+        replay: Callable[[Mapping[str, object]], str | None] | None = None,
+        depth: Callable[[bool], None] | None = None,
+        refusals: tuple[type[Exception], ...] = (),
+        saved: Callable[[Path], None] | None = None,
+    ) -> None:
+        """Take who obeys.
+
+        tuning, point, steer, replay, depth: None where there is no such thing to ask for
+        refusals: what ``tuning`` raises where a value breaks a rule, besides ValueError
+        saved: is told each file that was written
+        """
+        self._order = order
+        self._tuning = tuning
+        self._point = point
+        self._steer = steer
+        self._replay = replay
+        self._depth = depth
+        self._refusals: tuple[type[Exception], ...] = (
+            ValueError, DriverError, OSError, *refusals,
+        )  # fmt: skip
+        self._saved = saved
+
+    def __call__(self, data: Mapping[str, object]) -> str | None:
+        """Do what is asked; None where nothing needs to be said, else words or a refusal."""
+        try:
+            return self._do(data)
+        except self._refusals as error:
+            return f"refused: {error}"
+
+    def _do(self, data: Mapping[str, object]) -> str | None:
+        match data:
+            case {"order": _}:
+                self._obey(data)
+                return None
+            case {"tune": dict(asked)}:
+                return self._tune(asked)
+            case {"pick": {"x": int() | float() as x, "y": int() | float() as y}}:
+                return self._pick(float(x), float(y))
+            case {"steer": str(way)} if self._steer is not None:
+                return self._steer(way)
+            case {"show": {"depth": bool(on)}} if self._depth is not None:
+                self._depth(on)
+                return None
+            case {"replay": dict(asked)} if self._replay is not None:
+                return self._replay(asked)
+        raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} cannot be asked for here")
+
+    def _obey(self, data: Mapping[str, object]) -> None:
+        order = from_json(dict(data))
+        if isinstance(order, Tune):
+            # An order's values count as checked, and only the tuning checks them.
+            raise ValueError("parameters are changed by tuning, which knows their rules")
+        self._order(order)
+
+    def _pick(self, x: float, y: float) -> str | None:
+        point = self._point(x, y) if self._point is not None else None
+        if point is None:
+            return "refused: there is no camera picture to look into yet"
+        self._order(LookAt(point))
+        return None
+
+    def _tune(self, asked: Mapping[str, object]) -> str | None:
+        tuning = self._tuning
+        if tuning is None:
+            raise ValueError("these parameters cannot be changed while the rig runs")
+        match asked:
+            case {"set": dict(changes)}:
+                notes = tuning.set(cast(Mapping[str, Value], _frozen(changes)))
+                return _lines(note for note in notes if _LATER in str(note))
+            case {"save": str() | None as path}:
+                return self._save(tuning, path)
+            case {"revert": True}:
+                return _lines(tuning.revert()) or "all is as in the file again"
+            case {"differs": True}:
+                lines = [f"{c.key}: {c.new} (default {c.old})" for c in tuning.differs()]
+                return "\n".join(lines) or "all is as by default"
+            case {"character": str(name)}:
+                return _lines(tuning.character(name)) or f"the character is {name}"
+        raise ValueError("tuning takes set, save, revert, differs or character")
+
+    def _save(self, tuning: Tuning, path: str | None) -> str:
+        file = Path(path).expanduser() if path else None
+        if file is not None and not file.is_absolute():
+            raise ValueError(f"{path}: give the whole path; the rig has a folder of its own")
+        saved: Saved = tuning.save(file)
+        if self._saved is not None:
+            self._saved(saved.path)
+        kept = f", what was there is in {saved.backup}" if saved.backup is not None else ""
+        return f"saved in {saved.path}{kept}"
+
+
+def _lines(notes: object) -> str | None:
+    """Make one text of what a person should know, None of nothing."""
+    if not isinstance(notes, Iterable) or isinstance(notes, str):
+        return None
+    return "\n".join(map(str, notes)) or None
+
+
+def _frozen(value: object) -> object:
+    """Make tuples of JSON's lists, as the reader of files does."""
+    if isinstance(value, list):
+        return tuple(map(_frozen, value))
+    if isinstance(value, dict):
+        return {key: _frozen(item) for key, item in value.items()}
+    return value

@@ -1,0 +1,1 @@
+"""What reaches a running rig from other programs and from its files."""

@@ -1,0 +1,231 @@
+"""Pairs of joint ranges that may not be taken together: a lid and a frame, chin and chest.
+
+Of every pair one joint, the keeper, keeps out of its range: it has a wall in front of it
+at which it can always stop. The other is free. The keeper changes only when the other joint
+is out too, by its command and as measured, so no path between two commands crosses
+the forbidden box however long a tick is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import degrees, isfinite, radians
+from typing import NamedTuple
+
+from robot.safety.motion import JointLimit, Motion
+from robot.types import JOINTS, JointAngles
+
+_ROUNDING_RAD = 1e-9
+
+
+@dataclass(frozen=True)
+class CollisionParams:
+    """Two joints that touch when both are in these ranges."""
+
+    first: str = field(metadata={"choices": JOINTS, "unit": "", "says": "a joint"})
+    first_min_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "from this angle"}
+    )
+    first_max_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "to this one"}
+    )
+    second: str = field(metadata={"choices": JOINTS, "unit": "", "says": "the other joint"})
+    second_min_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "from this angle"}
+    )
+    second_max_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "to this one"}
+    )
+
+    def __post_init__(self) -> None:
+        """Check that these are two ranges of two joints.
+
+        Raises:
+            ValueError: they are not; the message says why.
+        """
+        for name in (self.first, self.second):
+            if name not in JOINTS:
+                raise ValueError(f"unknown joint {name!r}; known are {', '.join(JOINTS)}")
+        if self.first == self.second:
+            raise ValueError(f"first and second are both {self.first}; name two joints")
+        for key in ("first", "second"):
+            low, high = getattr(self, f"{key}_min_deg"), getattr(self, f"{key}_max_deg")
+            if not low < high:
+                raise ValueError(f"{key}_min_deg {low} must be below {key}_max_deg {high}")
+
+
+class _Span(NamedTuple):
+    """One joint's half of a forbidden box, and the walls a margin outside it."""
+
+    joint: int
+    low: float
+    high: float
+    below: float
+    above: float
+
+
+class Collisions:
+    """Puts up walls so that no forbidden box is ever entered.
+
+    exits: joints on their way out of a box they began in -> where they go
+    still: joints that wait for these
+    """
+
+    def __init__(
+        self,
+        params: Sequence[CollisionParams],
+        margin_deg: float,
+        limits: tuple[JointLimit, ...],
+    ) -> None:
+        """Take the forbidden pairs of ranges.
+
+        margin_deg: distance from them that is kept; servos round and lag
+
+        Raises:
+            ValueError: a pair leaves no pose at all inside the limits.
+        """
+        self._pairs = [
+            (
+                _span(one.first, one.first_min_deg, one.first_max_deg, margin_deg),
+                _span(one.second, one.second_min_deg, one.second_max_deg, margin_deg),
+            )
+            for one in params
+        ]
+        for pair in self._pairs:
+            if not any(_room(span, limits[span.joint]) for span in pair):
+                raise ValueError(_no_pose(pair, margin_deg, limits))
+        self._keeper = [0] * len(self._pairs)
+        self.exits: dict[int, float] = {}
+        self.still: set[int] = set()
+
+    def go_on(self, before: "Collisions") -> None:
+        """Leave the pairs that were watched before to the same keepers."""
+        kept = dict(zip(before._pairs, before._keeper, strict=True))
+        self._keeper = [kept.get(pair, 0) for pair in self._pairs]
+
+    def __bool__(self) -> bool:
+        """Tell whether there is any pair to watch."""
+        return bool(self._pairs)
+
+    def look(
+        self, motion: Motion, wish: JointAngles, position: JointAngles, held: Sequence[bool]
+    ) -> None:
+        """Put up this tick's walls, and say who has to leave a box first.
+
+        wish: where the joints want to go, any numbers at all
+        position: as measured
+        held: joints that cannot be sent anywhere
+        """
+        for i in range(len(motion.limits)):
+            motion.let_be(i)
+        self.exits.clear()
+        self.still.clear()
+        inside = []
+        for k, pair in enumerate(self._pairs):
+            if not self._keep_out(k, pair, motion, wish, position):
+                inside.append(pair)
+        for pair in inside:
+            self._lead_out(pair, motion, held)
+        self.still.difference_update(self.exits)
+
+    def _keep_out(
+        self,
+        k: int,
+        pair: tuple[_Span, _Span],
+        motion: Motion,
+        wish: JointAngles,
+        position: JointAngles,
+    ) -> bool:
+        """Wall off the keeper of a pair; tell whether there is one."""
+        keeper = self._keeper[k]
+        if not _side(pair[keeper], motion):
+            keeper = 1 - keeper
+            if not _side(pair[keeper], motion):
+                return False
+        elif _side(pair[1 - keeper], motion):
+            other = pair[1 - keeper]
+            eager = _crosses(pair[keeper], motion, wish)
+            if eager and not _crosses(other, motion, wish) and _is_out(other, position):
+                keeper = 1 - keeper
+            elif not _is_out(pair[keeper], position):
+                # The keeper lags, or somebody has pushed it in: the other waits outside.
+                _wall_off(other, motion)
+        self._keeper[k] = keeper
+        _wall_off(pair[keeper], motion)
+        return True
+
+    def _lead_out(self, pair: tuple[_Span, _Span], motion: Motion, held: Sequence[bool]) -> None:
+        """Send one joint of a pair that began in its box out by the shortest way."""
+        ways = [
+            (abs(exit_rad - motion.command[span.joint]), span.joint, exit_rad)
+            for span in pair
+            if not held[span.joint]
+            for exit_rad in (span.below, span.above)
+            if motion.low[span.joint] <= exit_rad <= motion.high[span.joint]
+            and self._agrees(span.joint, exit_rad, motion)
+        ]
+        self.still.update(span.joint for span in pair)
+        if ways:
+            _, joint, exit_rad = min(ways)
+            now = motion.command[joint]
+            farther = [exit_rad, self.exits.get(joint, exit_rad)]
+            self.exits[joint] = max(farther, key=lambda angle: abs(angle - now))
+
+    def _agrees(self, joint: int, exit_rad: float, motion: Motion) -> bool:
+        """Tell whether a joint that leaves another box as well goes the same way."""
+        now = motion.command[joint]
+        return (self.exits.get(joint, exit_rad) - now) * (exit_rad - now) >= 0.0
+
+
+def _span(name: str, low_deg: float, high_deg: float, margin_deg: float) -> _Span:
+    low, high, margin = radians(low_deg), radians(high_deg), radians(margin_deg)
+    return _Span(JOINTS.index(name), low, high, low - margin, high + margin)
+
+
+def _room(span: _Span, limit: JointLimit) -> bool:
+    """Tell whether a joint can be outside its half of the box."""
+    return limit.low_rad <= span.below or limit.high_rad >= span.above
+
+
+def _no_pose(pair: tuple[_Span, _Span], margin_deg: float, limits: tuple[JointLimit, ...]) -> str:
+    halves = [
+        f"{JOINTS[span.joint]} {degrees(span.low):g}..{degrees(span.high):g} deg of "
+        f"{degrees(limits[span.joint].low_rad):g}..{degrees(limits[span.joint].high_rad):g}"
+        for span in pair
+    ]
+    return (
+        f"the collision of {' with '.join(halves)} leaves no pose, with its margin of "
+        f"{margin_deg:g} deg; narrow one of the two"
+    )
+
+
+def _side(span: _Span, motion: Motion) -> int:
+    """Tell on which side a joint is and can stay: -1 below, 1 above, 0 neither."""
+    if motion.keeps_below(span.joint, span.below):
+        return -1
+    return 1 if motion.keeps_above(span.joint, span.above) else 0
+
+
+def _wall_off(span: _Span, motion: Motion) -> None:
+    """Keep a joint on the side where it is."""
+    i = span.joint
+    if _side(span, motion) < 0:
+        motion.high[i] = min(motion.high[i], span.below)
+    else:
+        motion.low[i] = max(motion.low[i], span.above)
+
+
+def _crosses(span: _Span, motion: Motion, wish: JointAngles) -> bool:
+    """Tell whether a joint's way to its wish leads into its half of the box."""
+    i = span.joint
+    if not isfinite(wish[i]):
+        return False
+    limit = motion.limits[i]
+    now, then = motion.command[i], min(max(wish[i], limit.low_rad), limit.high_rad)
+    return min(now, then) < span.above - _ROUNDING_RAD and (
+        max(now, then) > span.below + _ROUNDING_RAD
+    )
+
+
+def _is_out(span: _Span, position: JointAngles) -> bool:
+    """Tell whether a joint is measured outside its half of the box."""
+    return not span.low <= position[span.joint] <= span.high

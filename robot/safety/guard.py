@@ -1,0 +1,474 @@
+"""The guard between wish and bus: knows limits, measurements and ages, nothing of gaze.
+
+Whatever is wished, what leaves is finite, inside every joint's range, within its speed
+and its acceleration, always able to stop before the end of the range, and in no pose in
+which joints collide. What is hot, overloaded, short of voltage or stuck slows down or
+stops, each joint by itself. Radians.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import isfinite, radians
+from typing import Literal, NamedTuple
+
+from robot.safety.collisions import CollisionParams, Collisions
+from robot.safety.health import Health, HealthParams
+from robot.safety.motion import JointLimit as JointLimit
+from robot.safety.motion import Motion
+from robot.safety.stuck import Stuck, StuckParams
+from robot.types import JOINTS, JointAngles, JointState, Level, Verdict
+
+# A loop that was stopped for seconds goes on from where it was, not where it would be by now.
+_LONGEST_TICK_S = 0.1
+_NEAR_RAD = radians(1.0)
+_ROUNDING_RAD = 1e-9
+_LEVELS: tuple[Level, ...] = ("ok", "limited", "hold", "limp")
+
+
+@dataclass(frozen=True)
+class GuardParams:
+    """Ages beyond which nothing moves, slow passages, and what the servos bear."""
+
+    stale_joints_ms: float = field(
+        default=150.0,
+        metadata={
+            "low": 5.0,
+            "high": 5000.0,
+            "unit": "ms",
+            "says": "a joint whose last answer is older holds still",
+        },
+    )
+    stale_picture_ms: float = field(
+        default=1500.0,
+        metadata={
+            "low": 50.0,
+            "high": 60000.0,
+            "unit": "ms",
+            "says": "the neck holds still when the last picture is older",
+        },
+    )
+    gentle_ms: float = field(
+        default=1000.0,
+        metadata={
+            "low": 0.0,
+            "high": 60000.0,
+            "unit": "ms",
+            "says": "shortest time of slow motion after torque-on",
+        },
+    )
+    gentle_speed_deg_s: float = field(
+        default=60.0,
+        metadata={
+            "low": 1.0,
+            "high": 500.0,
+            "unit": "deg/s",
+            "says": "speed after torque-on and while parking",
+        },
+    )
+    gentle_accel_deg_s2: float = field(
+        default=300.0,
+        metadata={
+            "low": 1.0,
+            "high": 50000.0,
+            "unit": "deg/s2",
+            "says": "acceleration after torque-on and while parking",
+        },
+    )
+    health: HealthParams = field(
+        default_factory=HealthParams, metadata={"says": "what the servos bear"}
+    )
+    stuck: StuckParams = field(
+        default_factory=StuckParams, metadata={"says": "joints that are told to move and do not"}
+    )
+    collision_margin_deg: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.1,
+            "high": 20.0,
+            "unit": "deg",
+            "says": "distance kept from collisions; servos round and lag",
+        },
+    )
+    collisions: tuple[CollisionParams, ...] = field(
+        default=(),
+        metadata={"says": "pairs of joint ranges that may not be taken together"},
+    )
+
+
+class _Hold(NamedTuple):
+    """Why a joint does not follow its wish, and what it does instead.
+
+    goal: where it goes; None: it comes to a stop
+    slowly: it goes there slowly
+    again: how it begins when this is over
+    """
+
+    reason: str
+    goal: float | None = None
+    slowly: bool = False
+    again: Literal["at once", "slowly"] = "at once"
+
+
+class Guard:
+    """Checks every command, one tick after the other."""
+
+    def __init__(
+        self,
+        params: GuardParams,
+        limits: tuple[JointLimit, ...],
+        reach: Callable[[], tuple[JointLimit, ...]] | None = None,
+    ) -> None:
+        """Take one limit a joint, in the order of JOINTS.
+
+        reach: gives the ranges and speeds that the servos themselves keep to, which hold
+            beside limits that are changed; None: all
+
+        Raises:
+            ValueError: a collision leaves no pose inside the limits.
+        """
+        self._take(params)
+        self._wanted, self._reach = limits, reach
+        self._neck = tuple(name.startswith("neck") for name in JOINTS)
+        self._motion = Motion(self._within_reach())
+        self._limits = self._motion.limits
+        self._waiting: set[int] = set()
+        self._outside: set[int] = set()
+        self._health = Health(params.health, limits)
+        self._stuck = Stuck(params.stuck, len(limits))
+        self._collisions = Collisions(params.collisions, params.collision_margin_deg, limits)
+        self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
+
+    def _take(self, params: GuardParams) -> None:
+        self._params = params
+        self._gentle_speed = radians(params.gentle_speed_deg_s)
+        self._gentle_accel = radians(params.gentle_accel_deg_s2)
+
+    def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
+        """Take other limits without a jump; what has been counted and found stays.
+
+        A joint that moves so that it cannot keep its new limit comes to rest under the old
+        one first. A joint that is outside its new range then is led inside slowly.
+
+        Raises:
+            ValueError: a collision leaves no pose inside the limits; nothing has changed.
+        """
+        collisions = Collisions(params.collisions, params.collision_margin_deg, limits)
+        collisions.go_on(self._collisions)
+        self._collisions = collisions
+        self._take(params)
+        self._health.retune(params.health)
+        self._stuck.retune(params.stuck)
+        self._wanted = limits
+        self._waiting = {
+            i for i, limit in enumerate(self._within_reach()) if limit != self._limits[i]
+        }
+        for i in range(len(limits)):
+            self._motion.let_be(i)  # walls of a collision that is gone
+
+    def recount(self, i: int, factor: float, offset_rad: float) -> None:
+        """Count a joint's angles otherwise, as its zero, sign or ratio was changed.
+
+        Where the joint is sent does not change; where it should be may, so it goes slowly.
+        What was x is factor x + offset_rad from now on.
+        """
+        self._motion.recount(i, factor, offset_rad)
+        self._stuck.forget(i)
+        self._retreat[i] = None
+        self._slow_down(i)
+
+    def _within_reach(self) -> tuple[JointLimit, ...]:
+        """Give the limits in force, once joints have come to rest: those that servos keep."""
+        if self._reach is None:
+            return self._wanted
+        pairs = zip(self._wanted, self._reach(), strict=True)
+        return tuple(
+            wanted._replace(
+                low_rad=min(max(wanted.low_rad, reach.low_rad), reach.high_rad),
+                high_rad=max(min(wanted.high_rad, reach.high_rad), reach.low_rad),
+                speed_rad_s=min(wanted.speed_rad_s, reach.speed_rad_s),
+            )
+            for wanted, reach in pairs
+        )
+
+    def _begin(self, i: int, angle_rad: float) -> None:
+        """Begin with one joint at a goal that is in force on the bus, at rest."""
+        low, high = self._limits[i][:2]
+        if self._reach is not None:
+            reach = self._reach()[i]
+            low, high = min(low, reach.low_rad), max(high, reach.high_rad)
+        self._motion.restart(i, min(max(angle_rad, low), high))
+        self._note_outside(i)
+
+    def _note_outside(self, i: int) -> None:
+        """See whether a joint has to be led into its range."""
+        limit, now = self._limits[i], self._motion.command[i]
+        if limit.low_rad - _ROUNDING_RAD <= now <= limit.high_rad + _ROUNDING_RAD:
+            self._outside.discard(i)
+        else:
+            self._outside.add(i)
+        self._motion.let_be(i)
+
+    def _change(self) -> None:
+        """Go on with what a retune has begun."""
+        if self._waiting:
+            self._adopt()
+        for i in sorted(self._outside):
+            self._note_outside(i)
+
+    def _adopt(self) -> None:
+        """Put new limits in force for the joints that can keep them."""
+        limits = self._within_reach()
+        for i in sorted(self._waiting):
+            # Walls were put up for the old acceleration.
+            free = not self._collisions and self._motion.keeps(i, limits[i])
+            if self._motion.speed[i] == 0.0 or free:
+                self._motion.take(i, limits[i])
+                self._waiting.discard(i)
+                self._note_outside(i)
+
+    def reset(self, t_s: float, command_rad: JointAngles) -> None:
+        """Begin from the goals that are in force on the bus, at rest, gently."""
+        self._t_s = t_s
+        for i, limit in enumerate(self._within_reach()):
+            self._limits[i] = limit
+        self._waiting.clear()
+        self._held = [False] * len(self._limits)
+        self._retrying = [False] * len(self._limits)
+        self._retreat: list[float | None] = [None] * len(self._limits)
+        self._health.reset()
+        for i, angle in enumerate(command_rad):
+            self._begin(i, angle)
+            self._stuck.forget(i)
+        self.go_gently()
+
+    def go_gently(self) -> None:
+        """Move slowly for a while, and each joint until it has once met its wish."""
+        self._gentle = [True] * len(self._limits)
+        self._gentle_until_s = [self._t_s + self._params.gentle_ms / 1e3] * len(self._limits)
+
+    @property
+    def limits(self) -> tuple[JointLimit, ...]:
+        """Give the limits in force, which new ones take the place of once joints keep them."""
+        return tuple(self._limits)
+
+    @property
+    def gentle(self) -> bool:
+        """Tell whether any joint is still on its slow way."""
+        return any(self._gentle)
+
+    def check(
+        self, wish_rad: JointAngles, joints: JointState, picture_age_s: float, t_s: float
+    ) -> Verdict:
+        """Give what may be sent now.
+
+        wish_rad: any numbers at all
+        picture_age_s: age of the newest picture; infinity before the first
+        """
+        if True in joints.rearmed:
+            self._rearm(joints)
+        since_s = t_s - self._t_s
+        if not (since_s > 0.0 and isfinite(since_s)):
+            return self._standstill(wish_rad)
+        self._t_s = t_s
+        if self._waiting or self._outside:
+            self._change()
+        dt_s = min(since_s, _LONGEST_TICK_S)
+        self._health.step(joints, dt_s)
+        if self._collisions:
+            self._collisions.look(self._motion, wish_rad, joints.position_rad, self._held)
+        stale_s = t_s - self._params.stale_joints_ms / 1e3
+        blind = not picture_age_s <= self._params.stale_picture_ms / 1e3
+        usual = self._all_well(joints)
+        far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
+        columns = zip(wish_rad, joints.position_rad, joints.measured_s, strict=True)
+        why: dict[int, str] = {}
+        ranks: dict[int, int] = {}
+        for i, (wish, position, at_s) in enumerate(columns):
+            unseen = blind and self._neck[i]
+            near = -far <= command[i] - position <= far and not watched[i]
+            well = near and at_s >= stale_s and not unseen and (usual or self._well(i, joints))
+            if well and self._motion.follow(i, wish, dt_s):
+                continue  # nearly every wish is a good one and is passed on as it is
+            rank, reason = self._pass(i, wish, joints, at_s >= stale_s, unseen, dt_s)
+            if reason:
+                why[i], ranks[i] = reason, rank
+        return self._verdict(wish_rad, why, ranks)
+
+    def _standstill(self, wish_rad: JointAngles) -> Verdict:
+        """Move nothing, as no time has passed."""
+        why = ("time stands still",) * len(self._limits)
+        reasons = ("all: time stands still",)
+        return Verdict(tuple(self._motion.command), "hold", reasons, wish_rad, why, reasons)
+
+    def _verdict(
+        self, wish_rad: JointAngles, why: dict[int, str], ranks: dict[int, int]
+    ) -> Verdict:
+        command = tuple(self._motion.command)
+        if not why:
+            return Verdict(command, "ok", (), wish_rad)
+        worst = max(ranks.values())
+        reasons = {i: f"{JOINTS[i]}: {reason}" for i, reason in why.items()}
+        return Verdict(
+            command,
+            _LEVELS[worst],
+            tuple(reasons.values()),
+            wish_rad,
+            tuple([why.get(i, "") for i in range(len(command))]),
+            tuple([reasons[i] for i in reasons if ranks[i] == worst]),
+        )
+
+    def _all_well(self, joints: JointState) -> bool:
+        """Tell whether nothing but limits, ages and distances need be looked at."""
+        return not (
+            not self._health.fine
+            or True in self._gentle
+            or True in self._held
+            or self._collisions.exits
+            or self._collisions.still
+            or self._waiting
+            or self._outside
+            or False in joints.torque
+            or any(joints.fault)
+        )
+
+    def _well(self, i: int, joints: JointState) -> bool:
+        """Tell the same of one joint."""
+        return not (
+            self._gentle[i]
+            or self._held[i]
+            or self._health.share[i] < 1.0
+            or self._health.held[i]
+            or i in self._collisions.exits
+            or i in self._collisions.still
+            or i in self._waiting
+            or i in self._outside
+            or (joints.torque and not joints.torque[i])
+            or (joints.fault and joints.fault[i])
+        )
+
+    def _rearm(self, joints: JointState) -> None:
+        """Begin where the bus has put the goals of joints whose torque came on anew."""
+        for i, (angle, anew) in enumerate(zip(joints.position_rad, joints.rearmed, strict=True)):
+            if anew and isfinite(angle):
+                self._begin(i, angle)
+                self._stuck.forget(i)
+                self._retreat[i] = None
+                self._slow_down(i)
+
+    def _slow_down(self, i: int) -> None:
+        """Let one joint go on slowly, as after torque-on."""
+        self._gentle[i] = True
+        self._gentle_until_s[i] = self._t_s + self._params.gentle_ms / 1e3
+
+    def _pass(
+        self, i: int, wish: float, joints: JointState, fresh: bool, unseen: bool, dt_s: float
+    ) -> tuple[int, str]:
+        """Move one joint; give the rank of the level and the reason, if there is one."""
+        position = joints.position_rad[i]
+        fault = joints.fault[i] if joints.fault else ""
+        fresh = fresh and isfinite(position)
+        hold = self._servo_hold(i, joints, fault, fresh)
+        self._held[i] = hold is not None
+        if hold is None:
+            self._retreat[i] = None
+            hold = self._outer_hold(i, wish, unseen)
+        if fault:  # what still moves, moves to its parking place
+            self._slow_down(i)
+        if hold is not None:
+            self._stand(i, hold, dt_s)
+            rank, reason = 2, hold.reason
+        else:
+            reason = self._go(i, wish, position, dt_s)
+            rank = 1 if reason else 0
+        return (3, fault) if fault else (rank, reason)
+
+    def _servo_hold(self, i: int, joints: JointState, fault: str, fresh: bool) -> _Hold | None:
+        """Say why a joint's servo cannot or must not go where it is sent."""
+        position = joints.position_rad[i]
+        powered = joints.torque[i] if joints.torque else not fault
+        if not powered:
+            # Where it is when the torque comes back, its command is already.
+            self._stuck.forget(i)
+            return _Hold("torque off", position if isfinite(position) else None, again="slowly")
+        if "encoder" in fault:
+            return _Hold(fault)
+        if self._is_stuck(i, joints, fresh):
+            return self._give_way(i, "not moving", position, fresh)
+        strain = self._health.held[i]
+        if strain == "overloaded":
+            return self._give_way(i, strain, position, fresh)
+        if not fresh:
+            return _Hold("stale joints")
+        return _Hold(strain, again="slowly") if strain else None
+
+    def _outer_hold(self, i: int, wish: float, unseen: bool) -> _Hold | None:
+        """Say what else keeps a joint from its wish."""
+        if i in self._waiting:
+            return _Hold("new limits")
+        if i in self._collisions.exits:
+            return _Hold("self-collision", self._collisions.exits[i], slowly=True, again="slowly")
+        if i in self._collisions.still:
+            return _Hold("self-collision", again="slowly")
+        if i in self._outside:
+            limit = self._limits[i]
+            end = limit.low_rad if self._motion.command[i] < limit.low_rad else limit.high_rad
+            return _Hold("outside its new range", end, True, "slowly")
+        if not isfinite(wish):
+            return _Hold("not finite")
+        return _Hold("stale picture") if unseen else None
+
+    def _is_stuck(self, i: int, joints: JointState, fresh: bool) -> bool:
+        """Tell whether a joint is told to move and does not."""
+        if self._stuck.holds(i, self._t_s):
+            return True
+        command, position = self._motion.command[i], joints.position_rad[i]
+        if fresh and self._stuck.found(i, command, position, joints.measured_s[i], self._t_s):
+            self._retrying[i] = True
+            return True
+        return False
+
+    def _give_way(self, i: int, reason: str, position: float, fresh: bool) -> _Hold:
+        """Take the command back to where the joint is, and again if it is pushed away.
+
+        Not all the time: a neck would sink under its own weight.
+        """
+        back = self._retreat[i]
+        if fresh and (back is None or abs(back - position) > self._stuck.far_rad):
+            self._retreat[i] = back = position
+        return _Hold(reason, back, again="slowly")
+
+    def _stand(self, i: int, hold: _Hold, dt_s: float) -> None:
+        """Bring a joint to a stop, or to where it should be meanwhile."""
+        if hold.again == "slowly":
+            self._slow_down(i)
+        if hold.goal is None:
+            self._motion.brake(i, dt_s)
+        elif hold.slowly:
+            self._motion.seek(i, hold.goal, dt_s, self._gentle_speed, self._gentle_accel)
+        else:
+            limit = self._limits[i]
+            self._motion.seek(i, hold.goal, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
+
+    def _go(self, i: int, wish: float, position: float, dt_s: float) -> str:
+        """Move a joint towards its wish as far as it may; give why it fell short."""
+        motion, limit, share = self._motion, self._limits[i], self._health.share[i]
+        began = motion.command[i]
+        target = min(max(wish, motion.low[i]), motion.high[i])
+        top, soft = share * limit.speed_rad_s, share * limit.accel_rad_s2
+        if self._gentle[i]:
+            lead = self._stuck.lead_rad
+            pull = min(max(wish, position - lead), position + lead) if self._retrying[i] else wish
+            motion.seek(i, pull, dt_s, min(top, self._gentle_speed), min(soft, self._gentle_accel))
+            if abs(target - motion.command[i]) < _NEAR_RAD and self._t_s >= self._gentle_until_s[i]:
+                self._gentle[i] = self._retrying[i] = False
+        elif share < 1.0 or not motion.follow(i, wish, dt_s):
+            motion.chase(i, wish, dt_s, top, soft)
+        if abs(wish - target) > _ROUNDING_RAD:
+            outside = not limit.low_rad <= wish <= limit.high_rad
+            return "out of range" if outside else "self-collision"
+        if self._gentle[i]:
+            return "starting slowly"
+        if abs(target - motion.command[i]) <= _ROUNDING_RAD:
+            return ""
+        fast = abs(target - began) > limit.speed_rad_s * dt_s
+        return self._health.why[i] or ("too fast" if fast else "too hard")

@@ -1,0 +1,214 @@
+"""What servos bear: heat, load and voltage slow a joint down before they stop it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Literal
+
+from robot.safety.motion import JointLimit
+from robot.types import JointState
+
+Strain = Literal["", "hot", "overloaded", "voltage"]
+_Column = tuple[float | None, ...]
+_COOLER_C = 2.0  # temperatures come in whole degrees: without this a joint would stutter
+
+
+@dataclass(frozen=True)
+class HealthParams:
+    """From where servos are slowed down and stopped, before they switch themselves off."""
+
+    warm_c: float = field(
+        default=15.0,
+        metadata={
+            "low": 1.0,
+            "high": 60.0,
+            "unit": "degC",
+            "says": "slower from so far below the temperature at which the servo gives up",
+        },
+    )
+    hot_c: float = field(
+        default=5.0,
+        metadata={
+            "low": 0.0,
+            "high": 40.0,
+            "unit": "degC",
+            "says": "standing still from so far below it",
+        },
+    )
+    slowest: float = field(
+        default=0.2,
+        metadata={
+            "low": 0.01,
+            "high": 1.0,
+            "unit": "",
+            "says": "share of speed and acceleration that is left just before standing still",
+        },
+    )
+    lasting_load: float = field(
+        default=0.5,
+        metadata={
+            "low": 0.05,
+            "high": 0.95,
+            "unit": "",
+            "says": "share of the stall torque that may last; more is counted by its square "
+            "(I2t), as the motor's heat goes",
+        },
+    )
+    overload_ms: float = field(
+        default=700.0,
+        metadata={
+            "low": 50.0,
+            "high": 60000.0,
+            "unit": "ms",
+            "says": "full load for so long stops a joint; slower from half of that",
+        },
+    )
+    voltage_margin_v: float = field(
+        default=0.3,
+        metadata={
+            "low": 0.0,
+            "high": 5.0,
+            "unit": "V",
+            "says": "slower when the voltage is so near the servo's own limits",
+        },
+    )
+    voltage_ms: float = field(
+        default=500.0,
+        metadata={
+            "low": 0.0,
+            "high": 60000.0,
+            "unit": "ms",
+            "says": "standing still when it is outside for longer",
+        },
+    )
+
+    def __post_init__(self) -> None:
+        """Check that there is a way from warm to hot.
+
+        Raises:
+            ValueError: there is none.
+        """
+        if self.hot_c >= self.warm_c:
+            raise ValueError(f"hot_c {self.hot_c} must be below warm_c {self.warm_c}")
+
+
+class Health:
+    """Strain of every joint.
+
+    share: part of its speed and acceleration that a joint may use
+    why: what that part is due to
+    held: what keeps a joint still altogether
+    fine: nothing of all this applies to any joint
+    """
+
+    def __init__(self, params: HealthParams, limits: tuple[JointLimit, ...]) -> None:
+        """Find all joints well."""
+        self._limits = limits
+        self._take(params)
+        self.reset()
+
+    def _take(self, params: HealthParams) -> None:
+        self._params = params
+        self._full = (1.0 - params.lasting_load**2) * params.overload_ms / 1e3
+        self._outside_full_s = params.voltage_ms / 1e3
+
+    def reset(self) -> None:
+        """Find all joints well until they say otherwise."""
+        count = len(self._limits)
+        self.share = [1.0] * count
+        self.why: list[Strain] = [""] * count
+        self.held: list[Strain] = [""] * count
+        self.fine = True
+        self._counting = False
+        self._heated = [0.0] * count  # load^2 above the lasting one, times seconds
+        self._outside_s = [0.0] * count
+        self._hot = [False] * count
+        self._overloaded = [False] * count
+        self._no_volts = [False] * count
+        self._seen: tuple[_Column, _Column] = ((), ())
+
+    def retune(self, params: HealthParams) -> None:
+        """Bear more or less; the heat that has been counted stays."""
+        self._take(params)
+        self._heated = [min(heat, self._full) for heat in self._heated]
+        self._outside_s = [min(s, self._outside_full_s) for s in self._outside_s]
+        self._seen = ((), ())  # what the servos said last is judged anew
+        self._counting = True
+
+    def step(self, joints: JointState, dt_s: float) -> None:
+        """Take what the servos tell; what they do not tell strains nothing."""
+        load, lasting = joints.load, self._params.lasting_load
+        strained = bool(load) and not (max(load) <= lasting and min(load) >= -lasting)
+        before = self._seen
+        seen = self._seen = (joints.temperature_c, joints.voltage_v)
+        if not strained and seen == before and not self._counting:
+            return
+        columns = [(now, old) for now, old in zip(seen, before, strict=True) if now != old]
+        for i in range(len(self._limits)):
+            if (
+                (strained and not -lasting <= load[i] <= lasting)
+                or self._heated[i]
+                or self._outside_s[i]
+                or any(not now or not old or now[i] != old[i] for now, old in columns)
+            ):
+                self._judge(i, joints, dt_s)
+        self._counting = any(self._heated) or any(self._outside_s)
+        self.fine = min(self.share) == 1.0 and not any(self.held)
+
+    def _judge(self, i: int, joints: JointState, dt_s: float) -> None:
+        heat = self._heat(i, _told(joints.temperature_c, i))
+        load = self._load(i, _told(joints.load, i), dt_s)
+        volts = self._volts(i, _told(joints.voltage_v, i), dt_s)
+        share = min(heat, load, volts)
+        slowest = self._params.slowest
+        self.share[i] = slowest + (1.0 - slowest) * share
+        if share == 1.0:
+            self.why[i] = ""
+        else:
+            self.why[i] = "hot" if heat == share else "overloaded" if load == share else "voltage"
+        if self._overloaded[i]:
+            self.held[i] = "overloaded"
+        else:
+            self.held[i] = "hot" if self._hot[i] else "voltage" if self._no_volts[i] else ""
+
+    def _heat(self, i: int, celsius: float | None) -> float:
+        """Give what is left, from 1 when warm to 0 when hot."""
+        if celsius is None:
+            return 1.0
+        warm = self._limits[i].hottest_c - self._params.warm_c
+        hot = self._limits[i].hottest_c - self._params.hot_c
+        self._hot[i] = celsius >= (hot - _COOLER_C if self._hot[i] else hot)
+        return min(max((hot - celsius) / (hot - warm), 0.0), 1.0)
+
+    def _load(self, i: int, load: float | None, dt_s: float) -> float:
+        """Give what is left, from 1 at half the bearable heat of the motor to 0 at all of it.
+
+        Heat goes with the square of the current; it is given off as fast as the lasting
+        load makes it.
+        """
+        if load is not None:
+            gained = (load * load - self._params.lasting_load**2) * dt_s
+            self._heated[i] = min(max(self._heated[i] + gained, 0.0), self._full)
+        filled = self._heated[i] / self._full
+        self._overloaded[i] = filled >= (0.5 if self._overloaded[i] else 1.0)
+        return min(max(2.0 - 2.0 * filled, 0.0), 1.0)
+
+    def _volts(self, i: int, volts: float | None, dt_s: float) -> float:
+        """Give what is left, from 1 inside the margin to 0 at the servo's own limit."""
+        if volts is None:
+            return 1.0
+        room = min(volts - self._limits[i].lowest_v, self._limits[i].highest_v - volts)
+        outside_s = self._outside_s[i] + (dt_s if room < 0.0 else -dt_s)
+        self._outside_s[i] = min(max(outside_s, 0.0), self._outside_full_s)
+        # A sagging supply recovers when the joint stops: it goes on after as long a rest.
+        spent = outside_s >= self._outside_full_s and room < 0.0
+        self._no_volts[i] = spent or (self._no_volts[i] and self._outside_s[i] > 0.0)
+        if room >= self._params.voltage_margin_v:
+            return 1.0
+        return max(room / self._params.voltage_margin_v, 0.0) if room > 0.0 else 0.0
+
+
+def _told(column: Sequence[float | None], i: int) -> float | None:
+    """Give one joint's value, None where it is not known."""
+    value = column[i] if column else None
+    return value if value is not None and isfinite(value) else None
