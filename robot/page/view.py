@@ -57,7 +57,7 @@ _HALF_WIDTH = 0.84  # tangent of half the horizontal field of view: 80 deg
 _FOV_STEP_RAD = 0.01
 # Name of the view: where the camera is and what it looks at.
 VIEWS = {
-    "both": ((0.86, -1.62, 0.66), (0.50, 0.0, 0.10)),
+    "both": ((0.80, -1.32, 0.54), (0.50, 0.0, 0.10)),
     "rig": ((0.34, -0.11, 0.19), (0.0, 0.0, 0.11)),
     "over its shoulder": ((-0.52, 0.22, 0.42), (0.60, 0.0, 0.16)),
 }
