@@ -87,6 +87,13 @@ class _Ready(NamedTuple):
     walk: Walk | None
 
 
+_ALIKE = (
+    "field_of_view", "bottom_up", "top_down", "attention", "idle", "aversion", "saccade", "pursuit",
+    "breathing", "lids",
+)  # fmt: skip
+"""Sections of the gaze whose part of the same name needs nothing but its own parameters."""
+
+
 class Retuner:
     """Puts changes into the parts of a robot; a robot.loop.Robot's ``tune``.
 
@@ -120,7 +127,7 @@ class Retuner:
     @property
     def horizontal_field_deg(self) -> float:
         """Give the camera's field of view as it is believed."""
-        return self._placed.camera(self.rig).horizontal_field_deg
+        return self.camera.horizontal_field_deg
 
     def prepare(self, base: Rig, rig: Rig) -> Tune:
         """Make the order that turns one rig into another that was checked; from any thread.
@@ -130,10 +137,8 @@ class Retuner:
         Raises:
             config.load.ConfigError: the walk that the rig names is at fault.
         """
-        before, name = base.gaze.scanpath.walk, rig.gaze.scanpath.walk
-        walk = load_walk(name) if name != before else None
         order = Tune(tuple(differences(base, rig).items()))
-        self._ready[id(order.changes)] = _Ready(order.changes, base, rig, walk)
+        self._ready[id(order.changes)] = _ready(order, base, rig)
         return order
 
     def __call__(self, order: Tune, t_s: float) -> tuple[str, ...]:
@@ -144,17 +149,11 @@ class Retuner:
         ready = self._ready.pop(id(order.changes), None)
         if ready is None or ready.changes is not order.changes or ready.base is not self.rig:
             try:
-                ready = self._checked(order)
+                ready = _ready(order, self.rig, changed(self.rig, dict(order.changes)))
             except ConfigError as error:
                 return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         said = self._put(ready.rig, ready.walk or self._walk)
         return (*(_told(key, value) for key, value in order.changes), *said)
-
-    def _checked(self, order: Tune) -> _Ready:
-        rig, before = changed(self.rig, dict(order.changes)), self.rig.gaze.scanpath.walk
-        name = rig.gaze.scanpath.walk
-        walk = load_walk(name) if name != before else None
-        return _Ready(order.changes, self.rig, rig, walk)
 
     def _put(self, rig: Rig, walk: Walk) -> tuple[str, ...]:
         """Hand the parameters that differ to their parts."""
@@ -165,28 +164,11 @@ class Retuner:
 
     def _put_gaze(self, old: Rig, new: Rig, walk: Walk) -> None:
         parts, was, now = self.parts, old.gaze, new.gaze
-        if now.field_of_view != was.field_of_view:
-            parts.field_of_view.retune(now.field_of_view)
-        if now.bottom_up != was.bottom_up:
-            parts.bottom_up.retune(now.bottom_up)
-        if now.top_down != was.top_down:
-            parts.top_down.retune(now.top_down)
-        if now.attention != was.attention:
-            parts.attention.retune(now.attention)
-        if now.idle != was.idle:
-            parts.idle.retune(now.idle)
-        if now.aversion != was.aversion:
-            parts.aversion.retune(now.aversion)
+        for name in _ALIKE:
+            if getattr(now, name) != getattr(was, name):
+                getattr(parts, name).retune(getattr(now, name))
         if now.scanpath != was.scanpath or walk != self._walk:
             parts.scanpath.retune(now.scanpath, walk)
-        if now.saccade != was.saccade:
-            parts.saccade.retune(now.saccade)
-        if now.pursuit != was.pursuit:
-            parts.pursuit.retune(now.pursuit)
-        if now.breathing != was.breathing:
-            parts.breathing.retune(now.breathing)
-        if now.lids != was.lids:
-            parts.lids.retune(now.lids)
         bounds = (new.joints, new.ranges) != (old.joints, old.ranges)
         if now.oculomotor != was.oculomotor or (bounds and eye_limits(new) != eye_limits(old)):
             parts.oculomotor.retune(now.oculomotor, eye_limits(new))
@@ -242,6 +224,17 @@ def _with_servo(joint: JointParams, first: JointParams) -> JointParams:
     if (joint.id, joint.model, joint.firmware_min) == servo:
         return joint
     return replace(joint, id=first.id, model=first.model, firmware_min=first.firmware_min)
+
+
+def _ready(order: Tune, base: Rig, rig: Rig) -> _Ready:
+    """Put a checked change together, with the face walk where it is another one.
+
+    Raises:
+        config.load.ConfigError: the walk that the rig names is at fault.
+    """
+    name = rig.gaze.scanpath.walk
+    walk = load_walk(name) if name != base.gaze.scanpath.walk else None
+    return _Ready(order.changes, base, rig, walk)
 
 
 def _beyond(wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]) -> tuple[str, ...]:

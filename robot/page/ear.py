@@ -21,7 +21,7 @@ _URGENT = b'{"order":'
 _CHANGE = b'{"tune":{"set":'
 _OVER = b""
 _CHANGES_EVERY_S = 0.1
-"""Checking a change takes some 5 ms of Python that the control loop has to share."""
+"""A change costs a few ms of processor in all, which the control loop has to share."""
 _CLOSE_PATIENCE_S = 2.0
 
 

@@ -334,7 +334,6 @@ def stop_ms(bench: Bench, url: str) -> np.ndarray:
 
 
 def main(seconds: float) -> None:
-    sys.setswitchinterval(0.0003)  # as robot.session does
     bench = Bench(page=False)
     time.sleep(2)
     show("page off", bench.measure(seconds))
