@@ -3,16 +3,15 @@
 from collections.abc import Mapping, Sequence
 from math import ceil
 
+from drivers.bus_journal import Journal, call
+from drivers.bus_reconnect import Reconnect
 from drivers.dynamixel_care import Care
 from drivers.dynamixel_health import Health
-from drivers.dynamixel_journal import Journal, call
 from drivers.dynamixel_line import Line
 from drivers.dynamixel_packets import SyncWrite
 from drivers.dynamixel_params import DynamixelParams as DynamixelParams
-from drivers.dynamixel_port import BusPort
 from drivers.dynamixel_reader import Heard, Reader, Whole
 from drivers.dynamixel_readings import Readings
-from drivers.dynamixel_reconnect import Reconnect
 from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_revival import Revival
 from drivers.dynamixel_roll import Roll
@@ -29,6 +28,7 @@ from drivers.dynamixel_table import (
 from drivers.dynamixel_torque import switch_off
 from drivers.dynamixel_views import alone_turns, direct_turns, indirect_turns
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
+from drivers.serial_port import BusPort
 from drivers.types import BusHealth, ServoReading, ServoSetup
 
 RESTART_S = 0.1
@@ -39,7 +39,7 @@ class DynamixelBus:
     """A chain of Dynamixel servos in position mode; implements drivers.types.ServoBus.
 
     Args:
-        port: drivers.dynamixel_port.BlockingPort, or an emulated port with its methods.
+        port: drivers.serial_port.BlockingPort, or an emulated port with its methods.
         setups: the servos, in the order of every sequence given and taken.
         params: how to speak with them.
     """

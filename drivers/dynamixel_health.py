@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping
 
-from drivers.dynamixel_journal import Journal, call
+from drivers.bus_journal import Journal, call
 from drivers.dynamixel_table import name_errors
 from drivers.types import ServoSetup
 

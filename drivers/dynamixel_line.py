@@ -17,8 +17,8 @@ from drivers.dynamixel_packets import (
     sync_read,
 )
 from drivers.dynamixel_patience import Patience
-from drivers.dynamixel_port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 from drivers.dynamixel_table import REGISTERS
+from drivers.serial_port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 
 TRIES, HURRIED = 3, 4.0
 

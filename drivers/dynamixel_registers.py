@@ -6,9 +6,9 @@ from typing import NamedTuple
 from dynamixel_sdk import COMM_SUCCESS
 
 from drivers.dynamixel_packets import ALERT, ERROR_NUMBER, SyncWrite
-from drivers.dynamixel_port import BusPort
 from drivers.dynamixel_sdk_packets import SdkPackets
 from drivers.dynamixel_table import REGISTERS
+from drivers.serial_port import BusPort
 
 TRIES = 3
 

@@ -6,8 +6,8 @@ becomes the present position, and only then comes the torque.
 
 from collections.abc import Collection, Mapping, Sequence
 
+from drivers.bus_journal import Journal
 from drivers.dynamixel_health import Health
-from drivers.dynamixel_journal import Journal
 from drivers.dynamixel_line import Line
 from drivers.dynamixel_setup import Fitting, speed_units
 from drivers.dynamixel_table import MODELS, STEPS_PER_TURN

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from drivers.dynamixel_journal import Journal, call
+from drivers.bus_journal import Journal, call
 from drivers.dynamixel_line import Line
 from drivers.dynamixel_registers import Identity, Registers
 from drivers.dynamixel_table import MODELS

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from drivers.dynamixel_packets import BROADCAST, ERROR_NUMBER, Status, instruction, statuses
-from drivers.dynamixel_port import BusPort
 from drivers.dynamixel_table import BAUD_RATES, MODELS
+from drivers.serial_port import BusPort
 
 FACTORY_BAUD = 57_600
 COMMON_FIRST = (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600, 4_500_000)

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from drivers.dynamixel_journal import Journal, call, title
+from drivers.bus_journal import Journal, call, title
 from drivers.dynamixel_line import Line
 from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_table import (

@@ -1,7 +1,8 @@
 """Values and protocols of the drivers.
 
-A servo bus speaks its servos' own steps (Dynamixel: 4096 a turn, 0.088 deg); what a
-step means at a joint is known by robot.body alone. Times are host monotonic seconds.
+A servo bus speaks its servos' own steps (Dynamixel, Feetech STS: 4096 a turn, 0.088 deg;
+a hobby servo on a Maestro: a quarter of a microsecond of pulse width); what a step means
+at a joint is known by robot.body alone. Times are host monotonic seconds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,6 +38,8 @@ class ServoReading(NamedTuple):
     rearmed: True in the first reading after the torque came on anew with the present
         position as goal (a restarted servo, a port that was unplugged): whoever plans
         goals begins there
+    measured: False where the servo tells nothing and position and velocity are its goal
+        moved by the speed it is known to have
     """
 
     position_steps: int
@@ -50,6 +53,7 @@ class ServoReading(NamedTuple):
     temperature_c: float | None = None
     voltage_v: float | None = None
     rearmed: bool = False
+    measured: bool = True
 
 
 class BusHealth(NamedTuple):
@@ -68,8 +72,16 @@ class ServoSetup(NamedTuple):
     max_speed_steps_s: armed in the servo's own profile
     name: what people call it, e.g. "neck_yaw", for messages; "" where it has no name
     firmware_min: oldest firmware that will do
-    gains: registers Position P, I and D Gain (84, 82, 80), None where they stay as they are
-    strength: PWM Limit (36) as a share of full drive, None where it stays as it is
+    gains: the servo's P, I and D of position (Dynamixel: registers 84, 82, 80; STS: 21, 23,
+        22), None where they stay as they are
+    strength: share of full drive that it may use (Dynamixel: PWM Limit (36); STS: Torque
+        Limit (48)), None where it stays as it is
+    max_accel_steps_s2: armed in the servo's own profile where its kind has one beside goals
+        that are planned already (Maestro); None: unlimited
+    rest_steps: where a servo that cannot tell its position is taken to be when its pulses
+        begin: its place before torque went off; None where it is not needed
+    own_speed_steps_s: how fast such a servo itself moves, from its data sheet; None: as fast
+        as max_speed_steps_s
     """
 
     id: int
@@ -81,6 +93,9 @@ class ServoSetup(NamedTuple):
     firmware_min: int = 0
     gains: tuple[int, int, int] | None = None
     strength: float | None = None
+    max_accel_steps_s2: float | None = None
+    rest_steps: int | None = None
+    own_speed_steps_s: float | None = None
 
 
 class ServoBus(Protocol):

@@ -12,8 +12,8 @@ from config.schema import Rig, load_rules, load_walk
 from drivers.camera_depth import depth_at
 from drivers.camera_poses import PoseRing
 from drivers.dynamixel import DynamixelBus
-from drivers.dynamixel_port import BlockingPort, BusPort
 from drivers.errors import SetupError
+from drivers.serial_port import BlockingPort, BusPort
 from gaze.attention import Attention
 from gaze.aversion import Aversion
 from gaze.bottom_up import BottomUp

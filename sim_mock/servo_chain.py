@@ -6,9 +6,9 @@ e-Manual, Protocol 2.0 and X series.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
 
 from drivers.dynamixel_table import BAUD_RATES, EEPROM_END
+from sim_mock.device import Reply
 from sim_mock.line_faults import Faults
 from sim_mock.servo import Servo, ServoSpec
 from sim_mock.servo_fast_read import fast_reply
@@ -43,13 +43,6 @@ MIN_WATCHDOG_MS = 20
 BAUD_AT = 8
 TWIN_AWAY_STEPS = 257
 """A second servo with a taken id stands so far from the first, so that they differ."""
-
-
-class Reply(NamedTuple):
-    """What an instruction is answered with; ``end``: where it ended among the bytes sent."""
-
-    end: int
-    pieces: list[Piece]
 
 
 class ServoChain:

@@ -14,7 +14,8 @@ turnaround, reported as 20..50 us, is 0 unless asked for.
 
 from collections import deque
 
-from sim_mock.servo_chain import Reply, ServoChain
+from sim_mock.device import Reply
+from sim_mock.servo_chain import ServoChain
 from sim_mock.servo_packets import HEADER
 
 BITS_PER_BYTE = 10

@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from config.save import copy_shipped, save_rig
-from drivers.dynamixel_port import BlockingPort
-from drivers.dynamixel_ports import Host, SerialPort
 from drivers.dynamixel_registers import Registers
+from drivers.serial_port import BlockingPort
+from drivers.serial_ports import Host, SerialPort
 from robot.cli import servos as cli_servos
 from robot.types import JOINTS
 from sim_mock.pty_bus import PtyBus

@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.core import TyperGroup
 
-from drivers.dynamixel_ports import SerialPort
+from drivers.serial_ports import SerialPort
 from robot.cli.examples import EXAMPLES
 from robot.cli.main import app
 from robot.cli.start import next_steps

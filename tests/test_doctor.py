@@ -2,9 +2,9 @@
 
 import pytest
 
-from drivers.dynamixel_ports import Access, Host, SerialPort
 from drivers.dynamixel_scan import Found
 from drivers.errors import PortError
+from drivers.serial_ports import Access, Host, SerialPort
 from drivers.types import ServoSetup
 from robot.bringup.checkup import check, check_all, look, mend, mend_latency
 from robot.bringup.doctor import READ, examine

@@ -9,8 +9,8 @@ from dynamixel_sdk import PacketHandler
 
 from drivers.dynamixel import DynamixelBus, DynamixelParams
 from drivers.dynamixel_packets import instruction
-from drivers.dynamixel_port import BlockingPort
 from drivers.errors import ServoMissing
+from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from sim_mock.ports import InProcessPort
 from sim_mock.pty_bus import PtyBus

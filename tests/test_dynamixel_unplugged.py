@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from drivers.dynamixel import DynamixelBus, DynamixelParams
-from drivers.dynamixel_port import BlockingPort
+from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from sim_mock.pty_bus import PtyBus
 from sim_mock.servo import ServoSpec
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[1]
 DRIVER = """
 import sys, time
 from drivers.dynamixel import DynamixelBus, DynamixelParams
-from drivers.dynamixel_port import BlockingPort
+from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 200.0) for i in (1, 2, 3)]
 bus = DynamixelBus(BlockingPort(sys.argv[1]), setups, DynamixelParams(reply_timeout_ms=100.0))

@@ -11,8 +11,8 @@ import pytest
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler
 from typer.testing import CliRunner
 
-from drivers.dynamixel_port import BlockingPort
 from drivers.errors import SetupError
+from drivers.serial_port import BlockingPort
 from robot.cli.emulate import app, parse_servos
 
 ROOT = Path(__file__).parents[1]

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, GroupSyncWrite, PacketHandler
 
-from drivers.dynamixel_port import BlockingPort
 from drivers.errors import BusLost, PortError
+from drivers.serial_port import BlockingPort
 from sim_mock.pty_bus import PtyBus
 from sim_mock.servo import ServoSpec
 

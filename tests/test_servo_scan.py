@@ -2,15 +2,6 @@
 
 import os
 
-from drivers.dynamixel_ports import (
-    Host,
-    access,
-    holders,
-    latency_file,
-    latency_ms,
-    serial_ports,
-    set_latency,
-)
 from drivers.dynamixel_scan import (
     COMMON_FIRST,
     Found,
@@ -23,6 +14,15 @@ from drivers.dynamixel_scan import (
     scan,
 )
 from drivers.dynamixel_table import BAUD_RATES
+from drivers.serial_ports import (
+    Host,
+    access,
+    holders,
+    latency_file,
+    latency_ms,
+    serial_ports,
+    set_latency,
+)
 from sim_mock.ports import InProcessPort
 from sim_mock.servo import ServoSpec
 from sim_mock.servo_chain import build_chain

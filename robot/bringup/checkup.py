@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drivers.dynamixel_port import BusPort
-from drivers.dynamixel_ports import WISHED_LATENCY_MS, Host, latency_file, latency_ms, set_latency
 from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_scan import COMMON_FIRST, Found, everybody, garbled, ping, scan
 from drivers.errors import DriverError, PortError
+from drivers.serial_port import BusPort
+from drivers.serial_ports import WISHED_LATENCY_MS, Host, latency_file, latency_ms, set_latency
 from drivers.types import ServoSetup
 from robot.bringup.doctor import examine, take
 from robot.bringup.doctor_patient import name_servo

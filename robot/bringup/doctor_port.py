@@ -6,7 +6,7 @@ Source of the latency timer: ROBOTIS e-Manual, U2D2 (FTDI adaptors wait 16 ms by
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from drivers.dynamixel_ports import (
+from drivers.serial_ports import (
     WISHED_LATENCY_MS,
     Access,
     Host,

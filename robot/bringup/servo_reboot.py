@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drivers.dynamixel_port import BusPort
 from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_scan import Found, ping, reboot
 from drivers.dynamixel_table import name_errors
 from drivers.errors import ServoMissing
+from drivers.serial_port import BusPort
 
 BACK_S = 3.0
 """A servo that is not back after so long will not come; they take about 0.4 s."""

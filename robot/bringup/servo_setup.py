@@ -8,7 +8,6 @@ of their own write).
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from drivers.dynamixel_port import BusPort
 from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_scan import (
     COMMON_FIRST,
@@ -21,6 +20,7 @@ from drivers.dynamixel_scan import (
 )
 from drivers.dynamixel_table import BAUD_RATES, MODELS
 from drivers.errors import PortError, ServoFault, ServoMissing
+from drivers.serial_port import BusPort
 from drivers.types import ServoSetup
 from robot.bringup.doctor_patient import name_servo
 

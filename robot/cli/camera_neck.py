@@ -7,8 +7,8 @@ from typing import Any
 
 from config.schema import Rig
 from drivers.dynamixel import DynamixelBus
-from drivers.dynamixel_port import BlockingPort
 from drivers.errors import DriverError, SetupError
+from drivers.serial_port import BlockingPort
 from gaze.types import Angles3
 from robot.body import Body
 from robot.calibrate.camera_calibration import CameraCalibrationRefused

@@ -10,7 +10,7 @@ import typer
 
 from config.load import load
 from config.schema import Rig, load_rig
-from drivers.dynamixel_ports import serial_ports
+from drivers.serial_ports import serial_ports
 from robot.cli import emulate as cli_emulate
 from robot.cli import motion as cli_motion
 from robot.cli import record as cli_record

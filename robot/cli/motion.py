@@ -11,8 +11,8 @@ import typer
 
 from config.schema import Rig, load_rig
 from drivers.dynamixel import DynamixelBus
-from drivers.dynamixel_port import BlockingPort
 from drivers.errors import DriverError
+from drivers.serial_port import BlockingPort
 from robot.body import Body
 from robot.bringup.applied import PASSING, Moved, Step
 from robot.bringup.jog import JogParams, ManualControl, refuse_unknown

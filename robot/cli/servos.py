@@ -12,12 +12,12 @@ from rich.progress import Progress
 from rich.table import Table
 
 from config.schema import Rig, load_rig
-from drivers.dynamixel_port import BlockingPort
-from drivers.dynamixel_ports import Host, SerialPort, serial_ports
 from drivers.dynamixel_scan import COMMON_FIRST, FACTORY_BAUD, Round
 from drivers.dynamixel_scan import scan as scan_port
 from drivers.dynamixel_table import BAUD_RATES
 from drivers.errors import DriverError, SetupError
+from drivers.serial_port import BlockingPort
+from drivers.serial_ports import Host, SerialPort, serial_ports
 from drivers.types import ServoSetup
 from robot.bringup import checkup as checkup
 from robot.bringup import servo_reboot as servo_reboot

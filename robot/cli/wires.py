@@ -7,9 +7,9 @@ from typing import Annotated, NamedTuple
 import typer
 
 from config.schema import Rig
-from drivers.dynamixel_port import BlockingPort
 from drivers.dynamixel_registers import Registers
 from drivers.errors import PortError, SetupError
+from drivers.serial_port import BlockingPort
 from robot.emulated_rig import emulated_servos
 from sim_mock.pty_bus import PtyBus
 from sim_mock.servo_physics import ServoSpec

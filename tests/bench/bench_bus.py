@@ -22,7 +22,7 @@ from rich.table import Table
 from rustypot import Xl330PyController
 
 from drivers.dynamixel import DynamixelBus, DynamixelParams
-from drivers.dynamixel_port import BlockingPort
+from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from sim_mock.ports import InProcessPort
 from sim_mock.pty_bus import PtyBus

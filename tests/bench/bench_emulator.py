@@ -17,7 +17,7 @@ from fastcrc.crc16 import umts
 from rich.console import Console
 from rich.table import Table
 
-from drivers.dynamixel_port import BlockingPort
+from drivers.serial_port import BlockingPort
 from sim_mock.pty_bus import PtyBus
 from sim_mock.servo_chain import ServoChain, build_chain
 from sim_mock.servo_line import ServoLine

@@ -10,9 +10,9 @@ import pytest
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
 from serial.tools import list_ports
 
-from drivers import dynamixel_port
-from drivers.dynamixel_port import BlockingPort, explain
+from drivers import serial_port
 from drivers.errors import BusLost, PortError
+from drivers.serial_port import BlockingPort, explain
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_a_line_that_takes_nothing_is_lost_after_a_while(line):
 
 def test_the_sdk_gives_up_in_time_and_its_flag_is_free(line, monkeypatch):
     _, port = line
-    monkeypatch.setattr(dynamixel_port, "SDK_MARGIN_S", 0.002)
+    monkeypatch.setattr(serial_port, "SDK_MARGIN_S", 0.002)
     _, result, _ = PacketHandler(2.0).ping(port, 1)
     assert result == COMM_RX_TIMEOUT
     assert not port.is_using

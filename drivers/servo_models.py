@@ -1,0 +1,70 @@
+"""Every servo model that a joint can have: on which kind of bus, and in which steps it counts."""
+
+from math import inf
+from typing import Literal, NamedTuple, get_args
+
+from drivers.dynamixel_table import MODELS as DYNAMIXEL
+from drivers.dynamixel_table import STEPS_PER_TURN
+from drivers.feetech_table import MODELS as FEETECH
+from drivers.maestro_params import HOBBY, US_STEPS
+
+BusKind = Literal["dynamixel", "feetech", "maestro"]
+BUS_KINDS: tuple[BusKind, ...] = get_args(BusKind)
+
+
+class ServoFacts(NamedTuple):
+    """What people and joints must know of a servo model.
+
+    bus: kind of bus it is on
+    steps_per_turn: of its shaft; lowest, highest: first and last step it can be sent to
+    unit, unit_steps: what people measure its place in, "steps" or "us", and how many steps
+        that is
+    measured: it tells its position; one that does not has no other readings either
+    hottest_c, lowest_v, highest_v: where it switches itself off, as far as it does
+    """
+
+    bus: BusKind
+    steps_per_turn: float
+    lowest: int
+    highest: int
+    unit: str = "steps"
+    unit_steps: float = 1.0
+    measured: bool = True
+    hottest_c: float = 70.0
+    lowest_v: float = 0.0
+    highest_v: float = inf
+
+
+SERVOS: dict[str, ServoFacts] = {
+    **{
+        name: ServoFacts(
+            "dynamixel",
+            STEPS_PER_TURN,
+            0,
+            STEPS_PER_TURN - 1,
+            hottest_c=float(model.temperature_limit),
+            lowest_v=0.1 * model.min_voltage,
+            highest_v=0.1 * model.max_voltage,
+        )
+        for name, model in DYNAMIXEL.items()
+    },
+    **{
+        name: ServoFacts(
+            "feetech",
+            model.steps_per_turn,
+            0,
+            model.steps_per_turn - 1,
+            hottest_c=float(model.temperature_limit),
+            lowest_v=0.1 * model.min_voltage,
+            highest_v=0.1 * model.max_voltage,
+        )
+        for name, model in FEETECH.items()
+    },
+    **{
+        name: ServoFacts(
+            "maestro", model.steps_per_turn, model.lowest, model.highest, "us", US_STEPS, False
+        )
+        for name, model in HOBBY.items()
+    },
+}
+"""By the name that a rig's YAML gives a model."""

@@ -1,0 +1,70 @@
+"""What a line asks of whatever is emulated at its other end: bytes in, pieces of answers out."""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from sim_mock.servo_packets import Piece
+from sim_mock.wire_faults import ActiveFaults
+
+
+class Reply(NamedTuple):
+    """What an instruction is answered with; ``end``: where it ended among the bytes sent."""
+
+    end: int
+    pieces: list[Piece]
+
+
+class DeviceFaults(Protocol):
+    """The faults of one device and its line.
+
+    wire: those of the line
+    """
+
+    wire: ActiveFaults
+
+    def on(self, kind: str) -> bool:
+        """Tell whether echo, babble, unplug, deny or block is on now."""
+        ...
+
+    def command(self, text: str) -> str:
+        """Carry out a line such as ``lose 3 count 2``; gives what was done.
+
+        Raises:
+            ValueError: names the word that is wrong and what would be right.
+        """
+        ...
+
+
+class Device(Protocol):
+    """The device side of a serial protocol; it opens nothing, and its clock is an argument.
+
+    heed_baud: only a client at its baud rate is heard
+    """
+
+    now_s: Callable[[], float]
+    heed_baud: bool
+
+    @property
+    def faults(self) -> DeviceFaults:
+        """Give the faults of the device and its line."""
+        ...
+
+    def hears(self, client_baud: int) -> bool:
+        """Tell whether a client at this baud rate is understood."""
+        ...
+
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Reply]:
+        """Take bytes off the wire and give what is answered to each instruction in them."""
+        ...
+
+    def choose(self, case: str, value: str) -> None:
+        """Choose what the device does where documents and devices differ.
+
+        Raises:
+            ValueError: there is no such case or value.
+        """
+        ...
+
+    def positions_steps(self) -> tuple[float, ...]:
+        """Give the true positions now, in the order of its servos."""
+        ...
