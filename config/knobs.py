@@ -20,7 +20,7 @@ from config.load import ConfigError, Entry, Fault, weighed
 from config.schema import RULES, Rig
 from gaze.types import PARTS
 from robot.orders import Value
-from robot.types import JOINTS
+from robot.types import in_order
 
 NEXT_TICK = "next tick"
 NEXT_START = "next start"
@@ -33,6 +33,10 @@ _AT_START: dict[str, str] = {
     "joints.*.id": "the servos are looked for with it when the bus is opened",
     "joints.*.model": "the servos are looked for with it when the bus is opened",
     "joints.*.firmware_min": "the servos are looked for with it when the bus is opened",
+    "joints.*.bus": "the servos are looked for with it when the bus is opened",
+    "joints.*.linkage": "a push rod's places are taken over while its servo holds nothing",
+    "joints.*.servo_deg_s": "the servos' places are reckoned with it from the first goal",
+    "buses.*": "the servo buses are opened with it",
     "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
     "joints.*.strength": "servos are set up while their torque is off; a stop and a resume will do",
     "camera.mount": "who looks at the pictures must know from the first whether they turn",
@@ -40,8 +44,8 @@ _AT_START: dict[str, str] = {
     "oak.*": _AT_OPENING,
     "camera_care.*": _AT_OPENING,
 }
-_UNLISTED: dict[str, tuple[str, ...]] = {"park_deg": JOINTS, "face_parts_mm": PARTS}
-"""Entries that a file may leave out."""
+_UNLISTED = ("park_deg", "face_parts_mm")
+"""Mappings whose entries a file may leave out."""
 _LEFT_OUT: dict[str, Value] = {"park_deg": 0.0}
 """What a left-out entry stands for; None where no value of its own does."""
 
@@ -75,7 +79,10 @@ class Knob(NamedTuple):
 
 def knobs(rig: Rig, defaults: Rig) -> tuple[Knob, ...]:
     """List the parameters of a rig in the order of its file."""
-    return tuple(_knob(key, shape, _at(defaults, key)) for key, shape, _ in _leaves(_ROOT, rig, ()))
+    return tuple(
+        _knob(key, shape, _at(defaults, key))
+        for key, shape, _ in _leaves(_ROOT, rig, (), _unlisted(rig))
+    )
 
 
 def value_of(rig: Rig, key: str) -> Value:
@@ -91,7 +98,7 @@ def value_of(rig: Rig, key: str) -> Value:
             value = held[step]
             continue
         over = ".".join(steps[:done])
-        if over in _UNLISTED and step in _UNLISTED[over] and done == len(steps) - 1:
+        if step in _unlisted(rig).get(over, ()) and done == len(steps) - 1:
             return _LEFT_OUT.get(over)
         names = tuple(held or ())
         near = closest(step, names) or ";"
@@ -103,7 +110,7 @@ def value_of(rig: Rig, key: str) -> Value:
 
 def values(rig: Rig) -> dict[str, Value]:
     """Give key -> value of every knob."""
-    return {key: value for key, _, value in _leaves(_ROOT, rig, ())}
+    return {key: value for key, _, value in _leaves(_ROOT, rig, (), _unlisted(rig))}
 
 
 def values_after(known: Mapping[str, Value], before: Rig, after: Rig) -> dict[str, Value]:
@@ -211,18 +218,26 @@ def _opened(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
 
 
 _ROOT = Shape("params", params=Rig)
+_Unlisted = Mapping[str, tuple[str, ...]]
+"""Key of a mapping -> the entries that it may have."""
 
 
-def _leaves(shape: Shape, value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Shape, Value]]:
+def _unlisted(rig: Rig) -> _Unlisted:
+    return {"park_deg": in_order(rig.joints), "face_parts_mm": PARTS}
+
+
+def _leaves(
+    shape: Shape, value: Any, path: tuple[str, ...], unlisted: _Unlisted
+) -> Iterator[tuple[str, Shape, Value]]:
     """Walk down to where values stand, with what may stand there."""
     key = ".".join(path)
     if shape.params is not None and value is not None:
         for name, field in shapes_of(shape.params).items():
-            yield from _leaves(field, getattr(value, name), (*path, name))
+            yield from _leaves(field, getattr(value, name), (*path, name), unlisted)
     elif shape.form == "mapping" and shape.inner is not None:
         inner = dataclasses.replace(shape.inner, says=shape.says, unit=shape.unit)
-        for step in (*value, *(s for s in _UNLISTED.get(key, ()) if s not in value)):
-            yield from _leaves(inner, value.get(step, _LEFT_OUT.get(key)), (*path, step))
+        for step in (*value, *(s for s in unlisted.get(key, ()) if s not in value)):
+            yield from _leaves(inner, value.get(step, _LEFT_OUT.get(key)), (*path, step), unlisted)
     else:
         yield key, shape, plain(value)
 

@@ -86,6 +86,7 @@ class Readings:
                     t,
                     u,
                     False,
+                    True,
                 ),
             )
             for p, v, c, ma, load, on, fault, t, u in zip(

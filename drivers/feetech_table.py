@@ -1,10 +1,53 @@
 """Control table of the Feetech STS servos as data.
 
-Source: Feetech memory table STS3215. Units: position 1 step = 1/4096 turn; speed steps/s;
-acceleration 100 steps/s^2; load 0.1 %; voltage 0.1 V; temperature 1 degC; current 6.5 mA.
+Units: position 1 step = 1/4096 turn; speed steps/s; acceleration 100 steps/s^2; load and
+torque limits 0.1 %; voltage 0.1 V; temperature 1 degC; current 6.5 mA; return delay 2 us;
+protection times 10 ms. Numbers with a sign are sign and magnitude: one bit says "below 0".
+Two bytes lie low byte first.
+
+Sources: Feetech memory table STS3215, and the tables of public clients where it is silent.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
+
+Access = Literal["r", "rw"]
+
+STEPS_PER_TURN = 4096
+ACCELERATION_UNIT_STEPS_S2 = 100.0
+CURRENT_UNIT_MA = 6.5
+LOAD_UNIT = 0.001
+RETURN_DELAY_UNIT_S = 2e-6
+TORQUE_FULL = 1000
+"""Units of Torque Limit and Max Torque at 100 %."""
+
+FASTEST, HARDEST = 32767, 254
+"""Largest values of Goal Speed and Acceleration; 0 in either means: as fast as it can."""
+
+BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)
+"""Bit/s by the value of Baud Rate (6)."""
+
+HIGHEST_ID = 253
+
+EEPROM_END = 40
+"""Addresses below are kept without power, if the lock (55) was open when they were written."""
+
+SET_MIDDLE = 128
+"""Written to Torque Enable (40): the present place becomes 2048, kept in the offset (31)."""
+
+MULTI_TURN = 0x10
+"""Bit of Phase (18): positions go on counting beyond a turn."""
+
+STATUS_ERRORS = {
+    0x01: "input voltage",
+    0x02: "encoder",
+    0x04: "overheating",
+    0x08: "overcurrent",
+    0x20: "overload",
+}
+"""Bits of the error byte in every answer, and of Status (65). They come and go: nothing latches.
+
+Overload protection leaves a part of the torque (34) until a goal leads away from what holds
+the joint."""
 
 
 class FeetechModel(NamedTuple):
@@ -35,3 +78,170 @@ MODELS = {
         FeetechModel("sts3215-12v", 777, 4096, 70, 40, 140, 2.94, 12.0, 2.7, 45.0),
     )
 }
+
+
+class Register(NamedTuple):
+    """One entry of the control table.
+
+    initial: factory value of the EEPROM area, start value of the RAM area; None where the
+        device itself decides
+    low, high: what may be written; None where there is no range of its own
+    sign: the bit that says "below 0"; None where there is no sign
+    """
+
+    name: str
+    address: int
+    size: int = 1
+    access: Access = "r"
+    initial: int | None = None
+    low: int | None = None
+    high: int | None = None
+    sign: int | None = None
+
+    @property
+    def area(self) -> Literal["eeprom", "ram"]:
+        """Name the memory the register lives in."""
+        return "eeprom" if self.address < EEPROM_END else "ram"
+
+    def encode(self, value: int) -> bytes:
+        """Give a value as it is written.
+
+        Raises:
+            ValueError: it does not fit.
+        """
+        raw = value if self.sign is None else to_sign_magnitude(value, self.sign)
+        if not 0 <= raw < 1 << 8 * self.size:
+            raise ValueError(f"{self.name}: {value} does not fit into {self.size} byte")
+        return raw.to_bytes(self.size, "little")
+
+    def decode(self, data: bytes) -> int:
+        """Give the value that bytes stand for."""
+        raw = int.from_bytes(data, "little")
+        return raw if self.sign is None else from_sign_magnitude(raw, self.sign)
+
+
+def to_sign_magnitude(value: int, sign: int) -> int:
+    """Give a number as magnitude with its sign in bit ``sign``.
+
+    Raises:
+        ValueError: the magnitude does not fit below that bit.
+    """
+    if abs(value) >= 1 << sign:
+        raise ValueError(f"{value} does not fit into {sign} bits and a sign")
+    return -value | 1 << sign if value < 0 else value
+
+
+def from_sign_magnitude(raw: int, sign: int) -> int:
+    """Give the number that a magnitude with its sign in bit ``sign`` stands for."""
+    magnitude = raw & (1 << sign) - 1
+    return -magnitude if raw >> sign & 1 else magnitude
+
+
+# fmt: off
+_ALL: tuple[Register, ...] = (
+    Register("firmware_major",           0, 1, initial=3),
+    Register("firmware_minor",           1, 1, initial=10),
+    Register("endianness",               2, 1, initial=0),
+    Register("model_number",             3, 2),
+    Register("id",                       5, 1, "rw", 1, 0, HIGHEST_ID),
+    Register("baud_rate",                6, 1, "rw", 0, 0, 7),
+    Register("return_delay_time",        7, 1, "rw", 0, 0, 254),
+    # 0: only pings and reads are answered; 1: everything.
+    Register("status_return_level",      8, 1, "rw", 1, 0, 1),
+    # Both 0: no limits and many turns.
+    Register("min_position_limit",       9, 2, "rw", 0, 0, 4094),
+    Register("max_position_limit",      11, 2, "rw", 4095, 0, 4095),
+    Register("temperature_limit",       13, 1, "rw", 70, 0, 100),
+    Register("max_voltage_limit",       14, 1, "rw", 80, 0, 254),
+    Register("min_voltage_limit",       15, 1, "rw", 40, 0, 254),
+    # Copied to Torque Limit (48) at every start.
+    Register("max_torque",              16, 2, "rw", 1000, 0, TORQUE_FULL),
+    Register("phase",                   18, 1, "rw", 12, 0, 254),
+    # Bits as STATUS_ERRORS: which of them take the torque away, and which light the LED.
+    Register("unloading_condition",     19, 1, "rw", 44, 0, 254),
+    Register("led_alarm_condition",     20, 1, "rw", 47, 0, 254),
+    Register("position_p_gain",         21, 1, "rw", 32, 0, 254),
+    Register("position_d_gain",         22, 1, "rw", 32, 0, 254),
+    Register("position_i_gain",         23, 1, "rw", 0, 0, 254),
+    Register("minimum_startup_force",   24, 2, "rw", 16, 0, 1000),
+    Register("cw_dead_zone",            26, 1, "rw", 1, 0, 32),
+    Register("ccw_dead_zone",           27, 1, "rw", 1, 0, 32),
+    Register("protection_current",      28, 2, "rw", 500, 0, 511),
+    Register("angular_resolution",      30, 1, "rw", 1, 1, 3),
+    Register("position_offset",         31, 2, "rw", 0, -2047, 2047, 11),
+    # 0 position, 1 speed, 2 open loop, 3 stepwise.
+    Register("operating_mode",          33, 1, "rw", 0, 0, 3),
+    Register("protective_torque",       34, 1, "rw", 20, 0, 100),
+    Register("protection_time",         35, 1, "rw", 200, 0, 254),
+    Register("overload_torque",         36, 1, "rw", 80, 0, 100),
+    Register("velocity_p_gain",         37, 1, "rw", 10, 0, 100),
+    Register("overcurrent_time",        38, 1, "rw", 200, 0, 254),
+    Register("velocity_i_gain",         39, 1, "rw", 10, 0, 254),
+    Register("torque_enable",           40, 1, "rw", 0, 0, SET_MIDDLE),
+    Register("acceleration",            41, 1, "rw", 0, 0, HARDEST),
+    Register("goal_position",           42, 2, "rw", None, -30719, 30719, 15),
+    Register("goal_time",               44, 2, "rw", 0, 0, 1000),
+    Register("goal_speed",              46, 2, "rw", 0, -FASTEST, FASTEST, 15),
+    Register("torque_limit",            48, 2, "rw", None, 0, TORQUE_FULL),
+    Register("lock",                    55, 1, "rw", 1, 0, 1),
+    Register("present_position",        56, 2, sign=15),
+    Register("present_velocity",        58, 2, sign=15),
+    Register("present_load",            60, 2, sign=10),
+    Register("present_input_voltage",   62, 1),
+    Register("present_temperature",     63, 1),
+    Register("registered_instruction",  64, 1),
+    Register("status",                  65, 1),
+    Register("moving",                  66, 1),
+    Register("present_current",         69, 2, sign=15),
+    # Set in the factory.
+    Register("moving_threshold",        80, 1, initial=1),
+    Register("dts",                     81, 1, initial=1),
+    Register("velocity_unit_factor",    82, 1, initial=50),
+    Register("hts",                     83, 1, initial=1),
+    Register("max_velocity_limit",      84, 1, initial=80),
+    Register("max_acceleration",        85, 1, initial=100),
+    Register("acceleration_factor",     86, 1, initial=1),
+)
+# fmt: on
+
+TABLE_END = 87
+"""First address that is none."""
+
+REGISTERS: dict[str, Register] = {register.name: register for register in _ALL}
+"""Registers by name with the values all models share; addresses hold for every model."""
+
+
+def registers_of(model: FeetechModel) -> tuple[Register, ...]:
+    """List a model's registers with its own initial values."""
+    own = {
+        "model_number": model.number,
+        "temperature_limit": model.temperature_limit,
+        "max_voltage_limit": model.max_voltage,
+        "min_voltage_limit": model.min_voltage,
+        "torque_limit": REGISTERS["max_torque"].initial,
+    }
+    return tuple(
+        register._replace(initial=own[register.name]) if register.name in own else register
+        for register in _ALL
+    )
+
+
+def name_errors(status: int) -> tuple[str, ...]:
+    """Name the bits of an error byte that are set."""
+    bits = [1 << bit for bit in range(8) if status >> bit & 1]
+    return tuple(STATUS_ERRORS.get(bit, f"error bit {bit:#04x}") for bit in bits)
+
+
+def speed_units(speed_steps_s: float) -> int:
+    """Give a speed in units of Goal Speed, at least 1: there 0 means no limit."""
+    return max(1, min(FASTEST, int(speed_steps_s)))
+
+
+def acceleration_units(accel_steps_s2: float | None) -> int:
+    """Give an acceleration in units of Acceleration, never more than asked for but at least 1.
+
+    None: 0, as fast as it can.
+    """
+    if accel_steps_s2 is None:
+        return 0
+    return max(1, min(HARDEST, int(accel_steps_s2 / ACCELERATION_UNIT_STEPS_S2)))

@@ -19,6 +19,7 @@ class ServoFacts(NamedTuple):
     steps_per_turn: of its shaft; lowest, highest: first and last step it can be sent to
     unit, unit_steps: what people measure its place in, "steps" or "us", and how many steps
         that is
+    middle: of its travel, in that unit
     measured: it tells its position; one that does not has no other readings either
     hottest_c, lowest_v, highest_v: where it switches itself off, as far as it does
     """
@@ -29,6 +30,7 @@ class ServoFacts(NamedTuple):
     highest: int
     unit: str = "steps"
     unit_steps: float = 1.0
+    middle: int = STEPS_PER_TURN // 2
     measured: bool = True
     hottest_c: float = 70.0
     lowest_v: float = 0.0
@@ -62,7 +64,7 @@ SERVOS: dict[str, ServoFacts] = {
     },
     **{
         name: ServoFacts(
-            "maestro", model.steps_per_turn, model.lowest, model.highest, "us", US_STEPS, False
+            "maestro", model.steps_per_turn, model.lowest, model.highest, "us", US_STEPS, 1500, False
         )
         for name, model in HOBBY.items()
     },

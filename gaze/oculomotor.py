@@ -15,7 +15,7 @@ from gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
 from gaze.field_of_view import line_of_sight
 from gaze.flight import Flight, scattered
 from gaze.head import Head
-from gaze.lids import Lids
+from gaze.lids import Lids, Openings
 from gaze.pursuit import Pursuit
 from gaze.saccade import Saccade
 from gaze.shift import ShiftParams, ShiftRule
@@ -205,7 +205,7 @@ class Oculomotor:
         head: Angles3,
         left: Angles2,
         right: Angles2,
-        lids: tuple[float, float, bool],
+        lids: Openings,
         seen: _Seen,
     ) -> GazeCommand:
         moving = norm(seen.velocity) > _MOVING_M_S
@@ -214,13 +214,16 @@ class Oculomotor:
             head,
             left,
             right,
-            *lids[:2],
+            lids.left,
+            lids.right,
             phase,
-            lids[2],
+            lids.blink,
             self._gaze,
             self.saccades,
             self.fixations,
             self._lids.blinks,
+            lids.lower_left,
+            lids.lower_right,
         )
 
     def _swayed(self, head: Angles3, t_s: float) -> Angles3:

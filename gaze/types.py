@@ -161,7 +161,8 @@ class GazeState(NamedTuple):
     eye_left_rad, eye_right_rad: (yaw, pitch) in the head
     R_world_head, p_world_head_m: pose of the head frame
     p_world_eye_left_m, p_world_eye_right_m: centres of rotation of the eyes
-    lid_left, lid_right: opening, 0 shut .. 1 open
+    lid_left, lid_right: opening of the upper lids, 0 shut .. 1 open
+    lower_left, lower_right: the same of the lower lids
     """
 
     head_rad: Angles3
@@ -174,16 +175,19 @@ class GazeState(NamedTuple):
     p_world_eye_right_m: Vec3
     lid_left: float
     lid_right: float
+    lower_left: float = 1.0
+    lower_right: float = 1.0
 
 
 class GazeCommand(NamedTuple):
     """What the models wish for this tick.
 
     head_rad: (yaw, pitch, roll); eye_left_rad, eye_right_rad: (yaw, pitch) in the head
-    lid_left, lid_right: opening, 0 shut .. 1 open
+    lid_left, lid_right: opening of the upper lids, 0 shut .. 1 open
     phase:    what the eyes are doing; blink: whether a blink is under way
     gaze_point_world_m: where both eyes are meant to point now
     saccades, fixations, blinks: counts since the reset
+    lower_left, lower_right: opening of the lower lids, 0 shut .. 1 open
     """
 
     head_rad: Angles3
@@ -197,6 +201,8 @@ class GazeCommand(NamedTuple):
     saccades: int
     fixations: int
     blinks: int
+    lower_left: float = 1.0
+    lower_right: float = 1.0
 
 
 class HeadGeometry(Protocol):

@@ -1,7 +1,7 @@
 """Real or simulated parts to one robot: the only room that sees config and sim_mock."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from math import radians
 from typing import NamedTuple, TypeVar
@@ -11,7 +11,6 @@ import numpy as np
 from config.schema import Rig, load_rules, load_walk
 from drivers.camera_depth import depth_at
 from drivers.camera_poses import PoseRing
-from drivers.dynamixel import DynamixelBus
 from drivers.errors import SetupError
 from drivers.serial_port import BlockingPort, BusPort
 from gaze.attention import Attention
@@ -32,30 +31,24 @@ from robot.body import Body
 from robot.cameras import HeadPose, real_camera, scene_camera
 from robot.choice import Choice
 from robot.clock import Clock, RealClock, SimulatedClock
-from robot.emulated_rig import emulated_servos
+from robot.emulated_rig import emulated_lines, place_of
 from robot.frames import CameraMount, CameraParams, NewestPose, PoseHistory, standing_still
-from robot.kinematics import Kinematics
+from robot.kinematics import NECK, Kinematics
 from robot.loop import LoopParams, Robot
 from robot.page.snapshot import ShownRig
-from robot.retune import (
-    Parts,
-    Placed,
-    Retuner,
-    eye_limits,
-    head_limits,
-    lid_angles,
-    limits,
-    own_parts,
-)
+from robot.retune import Parts, Placed, Retuner
+from robot.rig_angles import eye_limits, head_limits, lid_ends, limits, own_parts, park_rad
+from robot.rig_bus import bus_names, ports_of, rig_bus
 from robot.safety.guard import Guard
 from robot.seeing.perception import Perception
 from robot.seeing.tracks import Tracker
-from robot.types import JOINTS, JointAngles
+from robot.types import JointAngles
+from sim_mock.device import Device
+from sim_mock.emulated import build
 from sim_mock.ports import InProcessPort
-from sim_mock.pty_bus import PtyBus
+from sim_mock.pty_bus import PtyBuses
 from sim_mock.scene import Scene
 from sim_mock.scenes import scenes
-from sim_mock.servo_chain import ServoChain, build_chain
 
 P = TypeVar("P", ScanpathParams, SaccadeParams)
 
@@ -111,10 +104,10 @@ class Assembly(NamedTuple):
 
 
 class _Wires(NamedTuple):
-    """The servo port and, where it is emulated in this process, the chain behind it."""
+    """The ports by the names of their buses, and what is emulated behind them in this process."""
 
-    port: BusPort
-    chain: ServoChain | None
+    ports: Mapping[str, BusPort]
+    devices: Mapping[str, Device]
     digest: Callable[[], str | None]
     close: Callable[[], None]
 
@@ -142,18 +135,15 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
     poses = remembering(kinematics, tell=_teller(kinematics, mount, turns))
     wires = _wires(rig, choice, clock)
     try:
-        bus = DynamixelBus(
-            wires.port, [rig.joints[name].setup(name) for name in JOINTS], rig.bus.dynamixel
-        )
-        body = Body(bus, rig.joints)
+        body = Body(rig_bus(rig, wires.ports), rig.joints, park_rad(rig))
         lids = Lids(rig.gaze.lids, lid_dice)
-        where = _true_head(wires.chain, rig, poses)
+        where = _true_head(wires.devices, rig, poses)
         tracker = Tracker(rig.tracks)
         moves = _movers(rig)
         decides = _deciders(rig, idle_dice)
         parts = Parts(
             body=body,
-            guard=Guard(rig.guard, limits(rig.joints), body.reach),
+            guard=Guard(rig.guard, limits(rig.joints), body.names, body.reach),
             kinematics=kinematics,
             camera=scene_camera(rig, choice, scene, mount, where, camera_dice)
             if scene is not None
@@ -247,7 +237,7 @@ def _scene(rig: Rig, name: str) -> Scene:
 
 
 def _kinematics(rig: Rig) -> Kinematics:
-    return Kinematics(rig.geometry, *lid_angles(rig))
+    return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
 
 
 def _camera_params(
@@ -266,17 +256,20 @@ def _camera_params(
 def _wires(rig: Rig, choice: Choice, clock: Clock) -> _Wires:
     """Give the real port, an emulated bus in this process, or one on a pseudo-terminal."""
     if not choice.mock:
-        port = choice.port if choice.port is not None else rig.bus.port
-        return _Wires(BlockingPort(port), None, _no_digest, _nothing)
-    specs = emulated_servos(rig)
+        paths = ports_of(rig, choice.port)
+        return _Wires(_opened_by(paths), {}, _no_digest, _nothing)
+    lines = emulated_lines(rig)
     if not choice.fast:
-        bus = PtyBus()
-        return _Wires(
-            BlockingPort(bus.start(specs, baud=rig.bus.dynamixel.baud)), None, _no_digest, bus.stop
-        )
+        buses = PtyBuses()
+        return _Wires(_opened_by(buses.start(lines)), {}, _no_digest, buses.stop)
     sent = hashlib.sha256()
-    chain = build_chain(specs, clock.now_s, baud=rig.bus.dynamixel.baud)
-    return _Wires(InProcessPort(chain, sent.update), chain, sent.hexdigest, _nothing)
+    devices = {name: build(line, clock.now_s) for name, line in lines.items()}
+    ports = {name: InProcessPort(device, sent.update) for name, device in devices.items()}
+    return _Wires(ports, devices, sent.hexdigest, _nothing)
+
+
+def _opened_by(paths: Mapping[str, str]) -> dict[str, BusPort]:
+    return {name: BlockingPort(path) for name, path in paths.items()}
 
 
 def _no_digest() -> str | None:
@@ -300,19 +293,28 @@ def _teller(
     return tell
 
 
-def _true_head(chain: ServoChain | None, rig: Rig, poses: PoseHistory) -> HeadPose:
+def _true_head(devices: Mapping[str, Device], rig: Rig, poses: PoseHistory) -> HeadPose:
     """Give where the emulated head is: from the servos themselves where they are at hand.
 
     It is built as the rig says now, whatever is believed of it later.
     """
-    if chain is None:
+    if not devices:
         return poses.head_pose
-    kinematics, joints = _kinematics(rig), [rig.joints[name] for name in JOINTS]
+    kinematics, buses = _kinematics(rig), bus_names(rig)
+    axes = [rig.joints.get(name) for name in NECK]
+    places = {name: place_of(rig, name) for name in NECK if name in rig.joints}
+    found = [
+        None if joint is None else (joint.made(), joint.bus, places[name])
+        for name, joint in zip(NECK, axes, strict=True)
+    ]
+    still = not places
 
     def now(_: float) -> tuple[Mat3, Vec3]:
-        steps = zip(joints, chain.positions_steps(), strict=True)
-        q = [joint.angle_rad(step) for joint, step in steps]
-        return kinematics.head_pose((q[6], q[7], q[8]))
+        steps = {} if still else {bus: devices[bus].positions_steps() for bus in buses}
+        yaw, pitch, roll = (
+            0.0 if one is None else one[0].angle_rad(steps[one[1]][one[2]]) for one in found
+        )
+        return kinematics.head_pose((yaw, pitch, roll))
 
     return now
 

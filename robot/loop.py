@@ -22,7 +22,7 @@ from robot.kinematics import Kinematics
 from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune, check
 from robot.safety.guard import Guard
 from robot.seeing.perception import Perception
-from robot.types import JOINTS, JointAngles, JointState, Verdict
+from robot.types import JointAngles, JointState, Verdict
 
 
 class Tick(NamedTuple):
@@ -155,6 +155,11 @@ class Robot:
             if order.choice not in menus[order.menu]:
                 there = ", ".join(menus[order.menu])
                 raise ValueError(f"no {order.menu} {order.choice!r}; there is {there}")
+        if isinstance(order, Jog):
+            for name, _ in order.angles_rad:
+                if name not in self.body.names:
+                    there = ", ".join(self.body.names)
+                    raise ValueError(f"this rig has no joint {name!r}; there is {there}")
         self._orders.append(order)
 
     def ask(self, menu: str, choice: str) -> None:
@@ -223,7 +228,7 @@ class Robot:
         self._settled = gaze.phase != "saccade"
         wish = self._jogged or self._kinematics.inverse(gaze)
         if self.stopped:
-            verdict = _at_rest(joints, wish, self.stopped)
+            verdict = _at_rest(joints, wish, self.stopped, self.body.names)
         else:
             # What a person chose to look at is there whatever the camera shows.
             led = bool(self._jogged) or self._looked_at is not None
@@ -320,9 +325,9 @@ class Robot:
                 self._guard.go_gently()
             self._jogged = ()
             return
-        angles = dict(zip(JOINTS, self._jogged or self._last, strict=True))
+        angles = dict(zip(self.body.names, self._jogged or self._last, strict=True))
         angles.update(angles_rad)
-        self._jogged = tuple(angles[name] for name in JOINTS)
+        self._jogged = tuple(angles[name] for name in self.body.names)
         # A slider can be torn from end to end in no time.
         self._guard.go_gently()
 
@@ -349,11 +354,13 @@ class Robot:
         self._oculomotor.reset(t_s, self._kinematics.forward(self.body.read(t_s)))
 
 
-def _at_rest(joints: JointState, wish_rad: JointAngles, why: str) -> Verdict:
+def _at_rest(
+    joints: JointState, wish_rad: JointAngles, why: str, names: tuple[str, ...]
+) -> Verdict:
     """Say that nothing is sent, as somebody stopped the robot."""
     reason = f"all: stopped ({why})"
-    each = ("stopped",) * len(JOINTS)
-    return Verdict(joints.position_rad, "limp", (reason,), wish_rad, each, (reason,))
+    each = ("stopped",) * len(names)
+    return Verdict(joints.position_rad, "limp", (reason,), wish_rad, each, (reason,), names)
 
 
 def _not_tunable(order: Tune, t_s: float) -> tuple[str, ...]:

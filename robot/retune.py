@@ -5,9 +5,8 @@ whose parameters differ are touched. What cannot change while the rig runs (see
 config.knobs) keeps the value it started with until the next start.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from math import radians
 from typing import NamedTuple
 
 from config.knobs import NEXT_START, changed, differences, live
@@ -27,20 +26,18 @@ from gaze.pursuit import Pursuit
 from gaze.saccade import Saccade
 from gaze.scanpath import Scanpath, Walk
 from gaze.top_down import TopDown
-from gaze.types import Angles2, Vec3
-from robot.body import Body, JointParams
+from robot.body import Body
 from robot.cameras import retune_camera
 from robot.frames import CameraMount, CameraParams
+from robot.joint import JointParams
 from robot.kinematics import Kinematics
 from robot.loop import LoopParams
 from robot.orders import Tune, Value
+from robot.rig_angles import eye_limits, head_limits, lid_ends, limits, own_parts, park_pose
 from robot.safety.guard import Guard, JointLimit
 from robot.seeing.perception import Perception
 from robot.seeing.tracks import Tracker
-from robot.types import JOINTS, JointAngles
-
-EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
-"""Of the left and the right eye: ((yaw low, high), (pitch low, high)), radians."""
+from robot.types import JointAngles
 
 
 class Parts(NamedTuple):
@@ -179,7 +176,7 @@ class Retuner:
         parts = self.parts
         bends = (new.geometry, new.lid_joints) != (old.geometry, old.lid_joints)
         if bends:
-            parts.kinematics.retune(new.geometry, *lid_angles(new))
+            parts.kinematics.retune(new.geometry, lid_ends(new))
         said = self._put_joints(old, new)
         if bends or new.ranges != old.ranges:
             parts.guard.go_gently()  # wishes are elsewhere all at once
@@ -208,7 +205,9 @@ class Retuner:
                 parts.guard.recount(i, factor, offset_rad)
         if new.guard != old.guard or limits(joints) != limits(before):
             parts.guard.retune(new.guard, limits(joints))
-        return _beyond(limits(joints), parts.body.reach()) if others else ()
+        if not others:
+            return ()
+        return _beyond(parts.body.names, limits(joints), parts.body.reach())
 
     def _lasting(self, rig: Rig) -> dict[str, JointParams]:
         """Give the joints with the servos that the bus was opened with."""
@@ -218,12 +217,16 @@ class Retuner:
         }
 
 
+_OF_THE_SERVO = ("id", "model", "firmware_min", "bus", "linkage", "servo_deg_s")
+"""What of a joint stays as it was when the bus was opened."""
+
+
 def _with_servo(joint: JointParams, first: JointParams) -> JointParams:
     """Give a joint with the servo of another; the same one where it has that already."""
-    servo = first.id, first.model, first.firmware_min
-    if (joint.id, joint.model, joint.firmware_min) == servo:
+    kept = {key: getattr(first, key) for key in _OF_THE_SERVO}
+    if all(getattr(joint, key) == value for key, value in kept.items()):
         return joint
-    return replace(joint, id=first.id, model=first.model, firmware_min=first.firmware_min)
+    return replace(joint, **kept)
 
 
 def _ready(order: Tune, base: Rig, rig: Rig) -> _Ready:
@@ -237,11 +240,13 @@ def _ready(order: Tune, base: Rig, rig: Rig) -> _Ready:
     return _Ready(order.changes, base, rig, walk)
 
 
-def _beyond(wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]) -> tuple[str, ...]:
+def _beyond(
+    joints: tuple[str, ...], wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]
+) -> tuple[str, ...]:
     """Say which joints may go farther or faster than their servos were set up to."""
     more = [
         name
-        for name, wish, most in zip(JOINTS, wanted, reach, strict=True)
+        for name, wish, most in zip(joints, wanted, reach, strict=True)
         if wish.low_rad < most.low_rad - 1e-6
         or wish.high_rad > most.high_rad + 1e-6
         or wish.speed_rad_s > most.speed_rad_s + 1e-6
@@ -249,51 +254,6 @@ def _beyond(wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]) -> tu
     if not more:
         return ()
     return (f"{', '.join(more)}: all of the range and speed come with a stop and a resume",)
-
-
-def limits(joints: Mapping[str, JointParams]) -> tuple[JointLimit, ...]:
-    """Give the joints' limits in the order of JOINTS."""
-    return tuple(joints[name].limit() for name in JOINTS)
-
-
-def park_pose(rig: Rig) -> JointAngles:
-    """Give the pose before torque goes off."""
-    return tuple(radians(rig.park_deg.get(name, 0.0)) for name in JOINTS)
-
-
-def own_parts(rig: Rig) -> dict[str, Vec3]:
-    """Give the rig's own places of face parts in metres."""
-    return {code: (x / 1e3, y / 1e3, z / 1e3) for code, (x, y, z) in rig.face_parts_mm.items()}
-
-
-def lid_angles(rig: Rig) -> tuple[Angles2, Angles2]:
-    """Give the (left, right) lid joint angles shut, and open."""
-    lids = rig.lid_joints
-    shut = radians(lids.left_shut_deg), radians(lids.right_shut_deg)
-    return shut, (radians(lids.left_open_deg), radians(lids.right_open_deg))
-
-
-def eye_limits(rig: Rig) -> EyeLimits:
-    """Give the eyes' ranges: the narrower of the joints' and the profile's."""
-    return (_eye(rig, "left"), _eye(rig, "right"))
-
-
-def head_limits(rig: Rig) -> tuple[float, tuple[Angles2, Angles2]]:
-    """Give the smallest eye limit and the neck's ((yaw low, high), (pitch low, high))."""
-    smallest = min(abs(end) for eye in eye_limits(rig) for span in eye for end in span)
-    neck = _span(rig, "neck_yaw", rig.ranges.neck_yaw_deg), _span(rig, "neck_pitch", 180.0)
-    return smallest, neck
-
-
-def _eye(rig: Rig, side: str) -> tuple[Angles2, Angles2]:
-    yaw = _span(rig, f"{side}_eye_pan", rig.ranges.eye_yaw_deg)
-    return yaw, _span(rig, f"{side}_eye_tilt", rig.ranges.eye_pitch_deg)
-
-
-def _span(rig: Rig, name: str, most_deg: float) -> Angles2:
-    """Give a joint's range within +-most_deg, in radians."""
-    joint = rig.joints[name]
-    return radians(max(joint.min_deg, -most_deg)), radians(min(joint.max_deg, most_deg))
 
 
 def _told(key: str, value: Value) -> str:

@@ -1,8 +1,9 @@
 """Values of the machine: joints as wished, permitted and measured, and what the page is shown.
 
-Radians, metres, seconds; joints in the order of JOINTS.
+Radians, metres, seconds; joints in the order of JOINTS, those that the rig has.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -13,15 +14,28 @@ JOINTS = (
     "left_eye_tilt",
     "right_eye_pan",
     "right_eye_tilt",
+    "eyes_pan",
+    "eyes_tilt",
     "left_upper_lid",
     "right_upper_lid",
+    "left_lower_lid",
+    "right_lower_lid",
     "neck_yaw",
     "neck_pitch",
     "neck_roll",
 )
+"""Every joint that a head can have. A rig has some of them: eyes that turn each by itself
+or both by one linkage (``eyes_pan``, ``eyes_tilt``), any of the lids, any axes of the neck."""
 
 JointAngles = tuple[float, ...]
-"""One angle a joint, in the order of JOINTS."""
+"""One angle a joint, in the order of the rig's joints (``in_order``)."""
+
+
+def in_order(names: Iterable[str]) -> tuple[str, ...]:
+    """Give a rig's joints in the order in which all sequences of joints have them."""
+    there = set(names)
+    return tuple(name for name in JOINTS if name in there)
+
 
 Level = Literal["ok", "limited", "hold", "limp"]
 
@@ -40,6 +54,8 @@ class JointState(NamedTuple):
     load: share of the servo's stall torque, signed, -1..1
     temperature_c, voltage_v: None before the first reading
     rearmed: the torque came on anew with the measured position as goal
+    measured: False where the servo tells nothing: position and velocity are its goal moved
+        by the speed it is known to have
     """
 
     position_rad: JointAngles
@@ -52,6 +68,7 @@ class JointState(NamedTuple):
     temperature_c: tuple[float | None, ...] = ()
     voltage_v: tuple[float | None, ...] = ()
     rearmed: tuple[bool, ...] = ()
+    measured: tuple[bool, ...] = ()
 
 
 class Applied(NamedTuple):
@@ -75,6 +92,7 @@ class Verdict(NamedTuple):
     wish_rad: what was asked for
     why: one reason a joint, "" where it was not changed; empty when ok
     gravest: those of the reasons that make the level what it is
+    joints: the names of the joints
     """
 
     command_rad: JointAngles
@@ -83,6 +101,7 @@ class Verdict(NamedTuple):
     wish_rad: JointAngles = ()
     why: tuple[str, ...] = ()
     gravest: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
 
     def applied(self, joint: str) -> Applied:
         """Give what became of one joint's wish.
@@ -90,9 +109,9 @@ class Verdict(NamedTuple):
         Raises:
             ValueError: there is no such joint; the message lists those there are.
         """
-        if joint not in JOINTS:
-            raise ValueError(f"unknown joint {joint!r}; known are {', '.join(JOINTS)}")
-        i = JOINTS.index(joint)
+        if joint not in self.joints:
+            raise ValueError(f"no joint {joint!r}; there is {', '.join(self.joints)}")
+        i = self.joints.index(joint)
         return Applied(self.wish_rad[i], self.command_rad[i], self.why[i] if self.why else "")
 
 
@@ -128,6 +147,7 @@ class Ghost(NamedTuple):
     p_world_eyes_m: tuple[Vec3, Vec3]
     gaze_world: tuple[Vec3, Vec3]
     lids: tuple[float, float]
+    lower_lids: tuple[float, float] | None = None
 
 
 class SeenCamera(NamedTuple):
@@ -231,10 +251,13 @@ SeenEvent = SeenSaccade | SeenFixation | SeenBlink
 class Snapshot:
     """One frozen look at the running rig, for people to watch.
 
-    measured_rad, wish_rad, permitted_rad: joint angles in the order of JOINTS
+    joints: names of the joints; measured_rad, wish_rad, permitted_rad: their angles
+    reckoned: joints whose servos tell nothing: what stands for a measurement is their goal
+        moved by the speed they are known to have
     R_world_head, p_world_head_m: measured head frame
     p_world_eyes_m: left and right eye centres; gaze_world: their unit lines of sight
-    lids: left and right opening 0..1, measured
+    lids: left and right opening 0..1, measured; lower_lids: that of the lower lids, None
+        where the rig has none
     target_name: e.g. "face 3: left eye"; why: why it won
     rate_hz: control rate of the last second; health: bus figures in words
     behaviour: the behaviour in force; pulls: what pulls the gaze, strongest first
@@ -287,3 +310,6 @@ class Snapshot:
     worst: Level = "ok"
     trail: tuple[Trail, ...] = ()
     events: tuple[SeenEvent, ...] = ()
+    joints: tuple[str, ...] = ()
+    reckoned: tuple[str, ...] = ()
+    lower_lids: tuple[float, float] | None = None

@@ -36,13 +36,14 @@ class DeviceFaults(Protocol):
 
 
 class Device(Protocol):
-    """The device side of a serial protocol; it opens nothing, and its clock is an argument.
-
-    heed_baud: only a client at its baud rate is heard
-    """
+    """The device side of a serial protocol; it opens nothing, and its clock is an argument."""
 
     now_s: Callable[[], float]
-    heed_baud: bool
+
+    @property
+    def heed_baud(self) -> bool:
+        """Tell whether only a client at its baud rate is heard."""
+        ...
 
     @property
     def faults(self) -> DeviceFaults:

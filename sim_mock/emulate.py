@@ -1,9 +1,11 @@
-"""An emulated servo bus on a pseudo-terminal, in a process of its own.
+"""Emulated servos and boards on pseudo-terminals, in a process of their own.
 
-``python -m sim_mock.emulate '{"servos": [[1, "xl330-m077", 2048]], ...}'`` prints one
-JSON line with the terminal's path and serves clients that come and go. It takes commands
-as lines on standard input and answers each with one JSON line: {"ok": ...} or
-{"error": ...}. Imports nothing heavy, so that it is up within a tenth of a second.
+``python -m sim_mock.emulate '{"buses": [{"device": {"kind": "dynamixel", "servos":
+[[1, "xl330-m077", 2048]]}}]}'`` prints one JSON line a bus with its terminal's path and
+serves clients that come and go. It takes commands as lines on standard input and answers
+each with one JSON line: {"ok": ...} or {"error": ...}. Where there are several buses, a
+command begins with the name of its own: ``neck: lose 3``; without one it is for the bus
+that has none. Imports nothing heavy, so that it is up within a tenth of a second.
 
 A server in a thread of the client's own process would fight it for the interpreter lock.
 """
@@ -15,48 +17,20 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import ServoChain, build_chain
-from sim_mock.servo_line import ServoLine
-from sim_mock.terminal import Terminal
-
-GAP_MS = 50.0
-"""On a real line 1.5 ms; here the host's scheduler may tear a packet apart for longer."""
-
-SPIN_S = 0.0001
-"""The kernel wakes a sleeper up to so late: the rest until bytes are due is spun away."""
-
-IDLE_S = 0.5
-"""So often it is looked whether a signal came, while nothing else happens."""
-LOOK_S = 0.005
-"""How often faults that end by themselves are looked at."""
+from sim_mock.emulated import unpacked
+from sim_mock.terminal_line import BusSettings, TerminalLine
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What to emulate.
+    """What to emulate; until_eof: end when standard input does."""
 
-    servos: id, model, start position in steps and firmware of each
-    baud: the servos' rate, clients at another are not heard; None: every client is
-    wire_time, turnaround_us: as in sim_mock.servo_line
-    link: name under which the terminal can be opened, also after it was unplugged
-    until_eof: end when standard input does
-    choices: cases of sim_mock.servo_habits by name
-    """
-
-    servos: tuple[ServoSpec, ...]
-    baud: int | None = None
-    wire_time: bool = False
-    turnaround_us: float = 0.0
-    link: str | None = None
+    buses: tuple[BusSettings, ...]
     until_eof: bool = False
-    choices: Mapping[str, str] = field(default_factory=dict)
-    seed: int = 0
 
 
 class Stopped(Exception):
@@ -64,118 +38,49 @@ class Stopped(Exception):
 
 
 class Server:
-    """Passes bytes between a terminal and a line until told to stop."""
+    """Serves every bus on a terminal of its own until told to stop."""
 
     def __init__(self, settings: Settings, say: Callable[[str], None]) -> None:
         self._settings = settings
         self._say = say
-        self.chain: ServoChain = build_chain(
-            settings.servos, time.monotonic, baud=settings.baud, seed=settings.seed
-        )
-        for case, value in {"packet-gap-ms": str(GAP_MS), **settings.choices}.items():
-            self.chain.choose(case, value)
-        self.line = ServoLine(self.chain, settings.wire_time, settings.turnaround_us * 1e-6)
-        link = None if settings.link is None else Path(os.path.abspath(settings.link))
-        self.terminal = Terminal(link, settings.baud)
-        self._held = self._forbidden = False
+        warn = None if settings.until_eof else _warn
+        self.lines: list[TerminalLine] = []
         self._typed = b""
-        self._warned: int | None = None
         self.over = False
         """To be set by a signal: an exception alone may be swallowed where it arises."""
+        names = [bus.name for bus in settings.buses]
+        if not names or len(set(names)) < len(names):
+            raise ValueError(f"every bus needs a name of its own; there is {names}")
+        try:
+            for bus in settings.buses:
+                self.lines.append(TerminalLine(bus, time.monotonic, say, warn))
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Take all terminals away."""
+        for line in self.lines:
+            line.close()
 
     def serve(self, commands: int | None) -> None:
         """Serve until ``commands`` ends, where the settings say so, or a signal stops it."""
         try:
             while not self.over:
-                master, watch = self.terminal.master, self.terminal.watch
-                leaving = -1 if watch is None else watch.fd
-                watched = [fd for fd in (master, leaving, commands) if fd is not None and fd >= 0]
-                ready, _, _ = select.select(watched, (), (), self._patience_s())
+                watched = [fd for line in self.lines for fd in line.watched()]
+                if commands is not None:
+                    watched.append(commands)
+                patience_s = min([line.patience_s() for line in self.lines])
+                ready, _, _ = select.select(watched, (), (), patience_s)
                 now_s = time.monotonic()
-                if watch is not None and leaving in ready and watch.look():
-                    self.terminal.release()
                 if commands in ready and not self._take_commands(commands):
                     if self._settings.until_eof:
                         return
                     commands = None
-                if master in ready and master == self.terminal.master:
-                    self._take_bytes(now_s)
-                if self.line.busy:
-                    self._deliver()
-                if self.chain.faults.wire.any or self._held or self._forbidden:
-                    self._follow_faults()
-                elif not self.terminal.plugged:
-                    self._plug()
+                for line in self.lines:
+                    line.serve(ready, now_s)
         finally:
-            self.terminal.unplug()
-
-    def _patience_s(self) -> float:
-        """Give how long nothing needs to be done but for what arrives."""
-        due_s = self.line.next_due_s()
-        if due_s is not None:
-            return max(0.0, due_s - SPIN_S - time.monotonic())
-        return LOOK_S if self.chain.faults.wire.any else IDLE_S
-
-    def _take_bytes(self, now_s: float) -> None:
-        """Give the client's bytes to the line, and back what is answered at once."""
-        data = self.terminal.read()
-        careful = self.chain.heed_baud or self.line.wire_time
-        baud = self.terminal.client_baud() if careful else 0
-        answer = self.line.send(data, baud or 1, now_s)
-        if answer:
-            self.terminal.write(answer)
-        if self.chain.heed_baud and not self._settings.until_eof:
-            self._warn(baud)
-
-    def _deliver(self) -> None:
-        """Hand over what is due; the last moment before that is waited for exactly."""
-        due_s = self.line.next_due_s()
-        if due_s is not None:
-            if due_s - time.monotonic() > SPIN_S:
-                return
-            while time.monotonic() < due_s:
-                pass
-        data = self.line.arrived()
-        if data and self.terminal.plugged:
-            self.terminal.write(data)
-
-    def _warn(self, baud: int) -> None:
-        """Tell a person, once for each rate, that a client speaks at the wrong one."""
-        if baud == self._warned or self.chain.hears(baud):
-            return
-        self._warned = baud
-        heard = f"a client speaks at {baud} bit/s; the servos listen at {self._settings.baud}"
-        sys.stderr.write(heard + "\n")
-
-    # --- faults of the adapter
-
-    def _follow_faults(self) -> None:
-        """Make the terminal as the faults in force say."""
-        faults = self.chain.faults
-        if faults.on("unplug") == self.terminal.plugged:
-            if self.terminal.plugged:
-                self._unplug()
-            else:
-                self._plug()
-        if not self.terminal.plugged:
-            return
-        if faults.on("block") != self._held:
-            self._held = not self._held
-            self.terminal.hold(self._held)
-        if faults.on("deny") != self._forbidden:
-            self._forbidden = not self._forbidden
-            self.terminal.forbid(self._forbidden)
-
-    def _unplug(self) -> None:
-        self.terminal.unplug()
-        self.line.forget()
-        self._held = self._forbidden = False
-
-    def _plug(self) -> None:
-        before = self.terminal.path
-        self.terminal.plug()
-        if self.terminal.path != before:
-            self._say(json.dumps({"path": self.terminal.path}))
+            self.close()
 
     # --- commands
 
@@ -194,14 +99,19 @@ class Server:
         return bool(came)
 
     def _obey(self, text: str) -> str:
-        try:
-            done = self.chain.faults.command(text)
-        except ValueError as error:
-            return json.dumps({"error": str(error)})
-        self._follow_faults()
-        if done.startswith("{"):
-            return json.dumps({"ok": "status", **json.loads(done)})
-        return json.dumps({"ok": done})
+        """Let the bus that is named first carry out a command, or the one without a name."""
+        named = {line.settings.name or "": line for line in self.lines}
+        for name, line in named.items():
+            if text.startswith(f"{name}:"):
+                return line.obey(text[len(name) + 1 :].strip())
+        first = next(iter(named))
+        if "" in named or len(named) == 1:
+            return named.get("", named[first]).obey(text)
+        return json.dumps({"error": f"name the bus first ({', '.join(named)}): {first}: {text}"})
+
+
+def _warn(text: str) -> None:
+    sys.stderr.write(text + "\n")
 
 
 def run(settings: Settings, say: Callable[[str], None], heed_ctrl_c: bool) -> None:
@@ -224,7 +134,8 @@ def run(settings: Settings, say: Callable[[str], None], heed_ctrl_c: bool) -> No
     try:
         server = Server(settings, say)
         servers.append(server)
-        say(json.dumps({"path": server.terminal.path, "baud": settings.baud}))
+        for line in server.lines:
+            say(line.where())
         server.serve(sys.stdin.fileno() if sys.stdin is not None else None)
     except (Stopped, BrokenPipeError):
         return
@@ -236,11 +147,19 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
+def settings_of(told: Mapping[str, Any]) -> Settings:
+    """Give the settings that travelled as JSON.
+
+    Raises:
+        ValueError, TypeError: there is no such device, or it has no such setting.
+    """
+    buses = [BusSettings(**{**bus, "device": unpacked(bus["device"])}) for bus in told["buses"]]
+    return Settings(tuple(buses), told.get("until_eof", False))
+
+
 def main() -> None:
     """Serve what the settings on the command line say."""
-    given: dict[str, Any] = json.loads(sys.argv[1])
-    given["servos"] = tuple(ServoSpec(*spec) for spec in given["servos"])
-    run(Settings(**given), say, heed_ctrl_c=False)
+    run(settings_of(json.loads(sys.argv[1])), say, heed_ctrl_c=False)
 
 
 if __name__ == "__main__":

@@ -1,59 +1,66 @@
-"""All that can go wrong on an emulated bus, on request: on the line, in a servo, at the plug.
+"""All that can go wrong on an emulated line, whatever device is at its other end.
 
 Every method does one thing and says what it did. What happens to answers lasts for
-``count`` of them, for ``seconds`` of the chain's time, or until ``clear``; the id None
+``count`` of them, for ``seconds`` of the device's time, or until ``clear``; the id None
 stands for every servo. ``command`` takes the same as a line of text.
 """
 
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
-from sim_mock.servo import Servo
-from sim_mock.wire_faults import ActiveFaults, Fault
-
-_REPORTED = {
-    "position": ("present_position", 132, 4),
-    "goal": ("goal_position", 116, 4),
-    "torque": ("torque_enable", 64, 1),
-    "error": ("hardware_error_status", 70, 1),
-    "temperature_c": ("present_temperature", 146, 1),
-    "voltage_01v": ("present_input_voltage", 144, 2),
-}
+from sim_mock.device import Reply
+from sim_mock.fault_words import Commands
+from sim_mock.servo_packets import HEADER, Piece
+from sim_mock.wire_faults import NOBODY, ActiveFaults, Fault
 
 
-class Chain(Protocol):
-    """What faults need of the chain they strike."""
+class Struck(Protocol):
+    """What faults need of the device they strike."""
 
     now_s: Callable[[], float]
 
-    def here(self, servo_id: int) -> Servo:
-        """Give a servo by id, brought up to now."""
-        ...
+    def here(self, servo_id: int) -> object:
+        """Give what has this id, brought up to now.
 
-    def ids(self) -> tuple[int, ...]:
-        """List the ids."""
-        ...
-
-    def join(self, servo_id: int) -> None:
-        """Put a second servo with this id on the chain."""
-        ...
-
-    def refresh(self) -> None:
-        """Look again at ids and bauds that were changed behind the chain's back."""
+        Raises:
+            KeyError: nothing has it; the message lists those that there are.
+        """
         ...
 
     def choose(self, case: str, value: str) -> None:
-        """Choose what servos do where documents and devices differ."""
+        """Choose what the device does where documents and devices differ."""
         ...
 
 
-class Faults:
-    """The faults of one chain."""
+class LineFaults(ABC):
+    """The faults of a line and the device behind it; a device adds its own.
 
-    def __init__(self, chain: Chain, seed: int = 0) -> None:
+    Args:
+        chain: the device.
+        commands: what can be asked for as text.
+        seed: of the dice that faults throw.
+        header: what its packets begin with: ``fragment`` and ``babble`` send it.
+    """
+
+    noun = "servo"
+    """What an id belongs to, for messages."""
+
+    def __init__(
+        self, chain: Struck, commands: Commands, seed: int = 0, header: bytes = HEADER
+    ) -> None:
         self._chain = chain
-        self.wire = ActiveFaults(seed)
+        self.commands = commands
+        self.wire = ActiveFaults(seed, header)
+
+    @abstractmethod
+    def reports(self) -> list[dict[str, object]]:
+        """Give the state of every servo, for ``status``."""
+
+    def board(self) -> dict[str, object]:
+        """Give what else ``status`` tells, where there is more than servos."""
+        return {}
 
     def command(self, text: str) -> str:
         """Carry out a line such as ``lose 3 count 2``; gives what was done.
@@ -61,9 +68,11 @@ class Faults:
         Raises:
             ValueError: names the word that is wrong and what would be right.
         """
-        from sim_mock.fault_commands import obey
+        return self.commands.obey(self, text)
 
-        return obey(self, text)
+    def who(self, servo_id: int | None) -> str:
+        """Name a servo for people."""
+        return "everybody" if servo_id is None else f"{self.noun} {servo_id}"
 
     def _begin(
         self,
@@ -89,7 +98,8 @@ class Faults:
         self, servo_id: int | None, count: int | None = None, seconds: float | None = None
     ) -> str:
         """Let a servo stay silent though it obeys."""
-        return self._begin("lose", servo_id, f"{who(servo_id)} does not answer", count, seconds)
+        says = f"{self.who(servo_id)} does not answer"
+        return self._begin("lose", servo_id, says, count, seconds)
 
     def delay(
         self,
@@ -99,7 +109,7 @@ class Faults:
         seconds: float | None = None,
     ) -> str:
         """Let answers come late; in a group those behind wait as well."""
-        says = f"{who(servo_id)} answers {ms:g} ms late"
+        says = f"{self.who(servo_id)} answers {ms:g} ms late"
         return self._begin("delay", servo_id, says, count, seconds, (ms,))
 
     def truncate(
@@ -110,14 +120,14 @@ class Faults:
         seconds: float | None = None,
     ) -> str:
         """Let only the first bytes of answers arrive."""
-        says = f"only {kept} bytes arrive of what {who(servo_id)} answers"
+        says = f"only {kept} bytes arrive of what {self.who(servo_id)} answers"
         return self._begin("truncate", servo_id, says, count, seconds, (kept,))
 
     def duplicate(
         self, servo_id: int | None, count: int | None = None, seconds: float | None = None
     ) -> str:
         """Let answers arrive twice."""
-        says = f"what {who(servo_id)} answers arrives twice"
+        says = f"what {self.who(servo_id)} answers arrives twice"
         return self._begin("duplicate", servo_id, says, count, seconds)
 
     def corrupt(
@@ -129,7 +139,7 @@ class Faults:
     ) -> str:
         """Flip one bit of answers, counted from the first byte's lowest; by dice where None."""
         numbers = () if bit is None else (float(bit),)
-        says = f"a bit flips in what {who(servo_id)} answers"
+        says = f"a bit flips in what {self.who(servo_id)} answers"
         return self._begin("corrupt", servo_id, says, count, seconds, numbers)
 
     def drop(
@@ -140,7 +150,7 @@ class Faults:
         seconds: float | None = None,
     ) -> str:
         """Let one byte of answers be lost, 0 for the first, -1 for the last."""
-        says = f"byte {byte} is lost of what {who(servo_id)} answers"
+        says = f"byte {byte} is lost of what {self.who(servo_id)} answers"
         return self._begin("drop", servo_id, says, count, seconds, (byte,))
 
     def stall(
@@ -151,7 +161,7 @@ class Faults:
         seconds: float | None = None,
     ) -> str:
         """Let answers stop half-way for a while."""
-        says = f"{who(servo_id)} stops for {ms:g} ms half-way through its answer"
+        says = f"{self.who(servo_id)} stops for {ms:g} ms half-way through its answer"
         return self._begin("stall", servo_id, says, count, seconds, (ms,))
 
     def noise(
@@ -175,7 +185,7 @@ class Faults:
         seconds: float | None = None,
     ) -> str:
         """Put a header without a packet before the real one."""
-        says = f"a loose header FF FF FD 00 before what {who(servo_id)} answers"
+        says = f"a loose header before what {self.who(servo_id)} answers"
         return self._begin("fragment", servo_id, says, count, seconds)
 
     def reorder(self, count: int | None = None, seconds: float | None = None) -> str:
@@ -192,7 +202,7 @@ class Faults:
         seconds: float | None = None,
     ) -> str:
         """Let answers carry another id, with a right CRC."""
-        says = f"{who(servo_id)} answers as {other}"
+        says = f"{self.who(servo_id)} answers as {other}"
         return self._begin("wrong_id", servo_id, says, count, seconds, (other,))
 
     def short(
@@ -203,7 +213,7 @@ class Faults:
         seconds: float | None = None,
     ) -> str:
         """Let answers hold fewer parameter bytes, with a right CRC and no error."""
-        says = f"{who(servo_id)} answers {fewer} bytes too few"
+        says = f"{self.who(servo_id)} answers {fewer} bytes too few"
         return self._begin("short", servo_id, says, count, seconds, (fewer,))
 
     def long(
@@ -214,7 +224,7 @@ class Faults:
         seconds: float | None = None,
     ) -> str:
         """Let answers hold more parameter bytes, with a right CRC and no error."""
-        says = f"{who(servo_id)} answers {more} bytes too many"
+        says = f"{self.who(servo_id)} answers {more} bytes too many"
         return self._begin("long", servo_id, says, count, seconds, (more,))
 
     def refuse(
@@ -225,7 +235,7 @@ class Faults:
         seconds: float | None = None,
     ) -> str:
         """Let answers carry an error number and no parameters."""
-        says = f"{who(servo_id)} answers with error {number} and no data"
+        says = f"{self.who(servo_id)} answers with error {number} and no data"
         return self._begin("refuse", servo_id, says, count, seconds, (number,))
 
     # --- what the line does
@@ -264,87 +274,6 @@ class Faults:
             return self._begin(kind, None, says, None, seconds)
         return f"no longer: {says}"
 
-    # --- what happens to a servo
-
-    def collide(self, servo_id: int) -> str:
-        """Put a second servo with the same id on the bus: both answer at once."""
-        self._chain.join(servo_id)
-        return f"two servos have id {servo_id} now"
-
-    def overload(self, servo_id: int) -> str:
-        """Let a servo's overload protection trip."""
-        return self._fail(servo_id, "overload")
-
-    def overheat(self, servo_id: int) -> str:
-        """Let a servo's overheating protection trip."""
-        return self._fail(servo_id, "overheating")
-
-    def encoder(self, servo_id: int) -> str:
-        """Let a servo find its encoder broken."""
-        return self._fail(servo_id, "encoder")
-
-    def shock(self, servo_id: int) -> str:
-        """Let a servo find an electrical shock."""
-        return self._fail(servo_id, "electrical shock")
-
-    def brown_out(self, servo_id: int) -> str:
-        """Let a servo restart as a dip of the supply makes it: no status tells."""
-        self._chain.here(servo_id).brown_out()
-        return f"servo {servo_id} restarts"
-
-    def reset(self, servo_id: int) -> str:
-        """Let a servo be as from the factory: id 1, 57600 baud."""
-        error = self._chain.here(servo_id).factory_reset(0xFF)
-        if error:
-            raise ValueError(f"servo {servo_id} refuses with error {error}: its torque is on")
-        self._chain.refresh()
-        return f"servo {servo_id} is as from the factory: id 1, 57600 bit/s"
-
-    def voltage(self, servo_id: int | None, volts: float) -> str:
-        """Supply a servo, or all, with another voltage."""
-        for servo in self._servos(servo_id):
-            servo.supply_v = volts
-        return f"{who(servo_id)} has {volts:g} V"
-
-    def temperature(self, servo_id: int | None, celsius: float) -> str:
-        """Give a servo's motor a temperature, from which it drifts on by itself."""
-        for servo in self._servos(servo_id):
-            servo.temperature_c = celsius
-        return f"{who(servo_id)} has {celsius:g} degC"
-
-    def stick(self, servo_id: int | None) -> str:
-        """Jam a joint where it is."""
-        for servo in self._servos(servo_id):
-            servo.hold_fast(True)
-        return f"{who(servo_id)} is stuck"
-
-    def free(self, servo_id: int | None) -> str:
-        """Let a jammed joint go."""
-        for servo in self._servos(servo_id):
-            servo.hold_fast(False)
-        return f"{who(servo_id)} is free"
-
-    def load(self, servo_id: int | None, nm: float) -> str:
-        """Hang a constant torque on a joint."""
-        for servo in self._servos(servo_id):
-            servo.pull(nm)
-        return f"{who(servo_id)} carries {nm:g} Nm"
-
-    def turn(self, servo_id: int | None, steps: float) -> str:
-        """Turn a joint by hand."""
-        for servo in self._servos(servo_id):
-            servo.turn(steps)
-        return f"{who(servo_id)} was turned by {steps:g} steps"
-
-    def _servos(self, servo_id: int | None) -> list[Servo]:
-        """Give a servo, or all (None), brought up to now."""
-        ids = self._chain.ids() if servo_id is None else (servo_id,)
-        return [self._chain.here(one) for one in ids]
-
-    def _fail(self, servo_id: int, error: str) -> str:
-        self._chain.here(servo_id).fail(error)
-        return f"servo {servo_id} has latched: {error}"
-
     # --- all
 
     def on(self, kind: str) -> bool:
@@ -366,22 +295,18 @@ class Faults:
 
     def status(self) -> str:
         """Give all servos and the faults in force as one line of JSON."""
-        servos = [self._report(servo_id) for servo_id in self._chain.ids()]
         faults = [
             f"{fault.kind} {'all' if fault.servo_id is None else fault.servo_id}"
             for fault in self.wire.listed(self._chain.now_s())
         ]
-        return json.dumps({"servos": servos, "faults": faults})
+        return json.dumps({"servos": self.reports(), **self.board(), "faults": faults})
 
-    def _report(self, servo_id: int) -> dict[str, object]:
-        servo = self._chain.here(servo_id)
-        report: dict[str, object] = {"id": servo_id, "model": servo.model.name}
-        for key, (_, address, size) in _REPORTED.items():
-            raw = servo.read(address, size) or b""
-            report[key] = int.from_bytes(raw, "little", signed=size == 4)
-        return report
-
-
-def who(servo_id: int | None) -> str:
-    """Name a servo for people."""
-    return "everybody" if servo_id is None else f"servo {servo_id}"
+    def around(self, replies: list[Reply], data: bytes) -> list[Reply]:
+        """Let the host hear itself and a babbling node, where the line has such faults."""
+        now_s = self._chain.now_s()
+        if self.wire.on("echo", now_s):
+            replies.insert(0, Reply(len(data), [Piece(NOBODY, data)]))
+        babble = self.wire.babble(now_s)
+        if babble:
+            replies.insert(0, Reply(0, [Piece(NOBODY, babble)]))
+        return replies

@@ -1,7 +1,8 @@
-"""A serial port without a wire: the SDK's PortHandler over an emulated chain in this process.
+"""A serial port without a wire: over an emulated device in this process.
 
-Time is the chain's: an answer that does not come costs none. Where the line has wire time
-or faults make answers late, they arrive when the chain's clock gets there; ``sleep_until``
+Drivers use it as a drivers.serial_port.BusPort, ROBOTIS' SDK as its PortHandler. Time is
+the device's: an answer that does not come costs none. Where the line has wire time or
+faults make answers late, they arrive when the device's clock gets there; ``sleep_until``
 lets waiting move that clock. Baud rate: that of ``setBaudRate``.
 """
 
@@ -11,10 +12,14 @@ from collections.abc import Callable
 
 from dynamixel_sdk import PortHandler
 
-from drivers.dynamixel_table import BAUD_RATES
+from drivers.dynamixel_table import BAUD_RATES as DYNAMIXEL_BAUDS
 from drivers.errors import BusLost, PortError
-from sim_mock.servo_chain import ServoChain
+from drivers.feetech_table import BAUD_RATES as FEETECH_BAUDS
+from sim_mock.device import Device
 from sim_mock.servo_line import ServoLine
+
+KNOWN_BAUDS = frozenset((*DYNAMIXEL_BAUDS, *FEETECH_BAUDS))
+"""Rates of servos, beside those that the SDK knows of adapters."""
 
 BITS_PER_BYTE = 10
 WRITE_S = 0.25
@@ -22,18 +27,18 @@ WRITE_S = 0.25
 
 
 class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
-    """The host's end of an emulated chain.
+    """The host's end of an emulated device.
 
     Args:
-        chain: the servos; their clock is the port's clock.
+        chain: a chain of servos, or a board; its clock is the port's clock.
         tap: gets every byte string the host sends.
-        sleep_until: moves the chain's clock on, for waiting; without it nobody waits.
+        sleep_until: moves that clock on, for waiting; without it nobody waits.
         wire_time: bytes take their time on the line, return delays count.
     """
 
     def __init__(
         self,
-        chain: ServoChain,
+        chain: Device,
         tap: Callable[[bytes], None] | None = None,
         name: str = "emulated servos",
         sleep_until: Callable[[float], None] | None = None,
@@ -54,7 +59,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     # --- what a driver's control loop uses
 
     def write(self, data: bytes) -> None:
-        """Send bytes; what the servos answer waits to be read.
+        """Send bytes; what is answered waits to be read.
 
         Raises:
             drivers.errors.BusLost: unplugged, or the adapter takes nothing.
@@ -106,7 +111,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             self._waiting += self.line.arrived()
 
     def _wait(self, until_s: float) -> None:
-        """Let the chain's clock reach a time, where somebody can move it."""
+        """Let the device's clock reach a time, where somebody can move it."""
         if self._sleep_until is not None and until_s > self.now_s():
             self._sleep_until(until_s)
         self._see()
@@ -114,8 +119,8 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     # --- what the SDK uses
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open at a baud rate; False where neither adapters nor servos know it."""
-        known = baudrate in BAUD_RATES or self.getCFlagBaud(baudrate) > 0
+        """Open at a baud rate; False where neither adapters nor any device know it."""
+        known = baudrate in KNOWN_BAUDS or self.getCFlagBaud(baudrate) > 0
         return known and self.setupPort(baudrate)
 
     def setupPort(self, cflag_baud: int) -> bool:
@@ -160,7 +165,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return len(data)
 
     def getCurrentTime(self) -> float:
-        """Give the chain's time in milliseconds."""
+        """Give the device's time in milliseconds."""
         return self.now_s() * 1000.0
 
     def setPacketTimeout(self, packet_length: int) -> None:

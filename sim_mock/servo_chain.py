@@ -9,9 +9,10 @@ from collections.abc import Callable, Iterable, Sequence
 
 from drivers.dynamixel_table import BAUD_RATES, EEPROM_END
 from sim_mock.device import Reply
-from sim_mock.line_faults import Faults
+from sim_mock.fault_commands import COMMANDS
 from sim_mock.servo import Servo, ServoSpec
 from sim_mock.servo_fast_read import fast_reply
+from sim_mock.servo_faults import Faults
 from sim_mock.servo_framing import Framing, Instruction
 from sim_mock.servo_habits import AfterMissing, Habits, chosen
 from sim_mock.servo_instructions import (
@@ -68,7 +69,7 @@ class ServoChain:
         self.now_s = now_s
         self.habits = habits or Habits()
         self.heed_baud = heed_baud
-        self.faults = Faults(self, seed)
+        self.faults = Faults(self, COMMANDS, seed)
         self._wire = self.faults.wire
         self._framing = Framing(self.habits.packet_gap_s, now_s())
         self._now_s = now_s()
@@ -166,16 +167,7 @@ class ServoChain:
             return self._garbage(data)
         found = self._framing.feed(data, now_s, self.habits.stuffing == "strict")
         replies = [Reply(i.end, pieces) for i in found if (pieces := self._execute(i))]
-        return self._amid_others(replies, data) if self._wire.any else replies
-
-    def _amid_others(self, replies: list[Reply], data: bytes) -> list[Reply]:
-        """Let the host hear itself and a babbling node, where the line has such faults."""
-        if self._wire.on("echo", self._now_s):
-            replies.insert(0, Reply(len(data), [Piece(-1, data)]))
-        babble = self._wire.babble(self._now_s)
-        if babble:
-            replies.insert(0, Reply(0, [Piece(-1, babble)]))
-        return replies
+        return self.faults.around(replies, data) if self._wire.any else replies
 
     def _garbage(self, data: bytes) -> list[Reply]:
         """Answer a client that no servo understands: nothing, or the ruins of its own bytes."""

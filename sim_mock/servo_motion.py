@@ -8,9 +8,9 @@ is read does not depend on how often it is read.
 """
 
 from math import inf, pi, sin
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from drivers.dynamixel_table import STEPS_PER_TURN, Model
+from drivers.dynamixel_table import STEPS_PER_TURN
 from sim_mock.servo_physics import Physics
 from sim_mock.servo_profile import Profile, SpeedProfile
 
@@ -28,6 +28,22 @@ SLOWEST = 1e-4
 
 RESOLUTION = 0.5
 """The encoder sees no smaller error: the I part rests inside it, in steps."""
+
+
+class Motor(Protocol):
+    """What the shaft must know of the servo's motor and gear, all at ``rated_v``."""
+
+    @property
+    def stall_torque_nm(self) -> float: ...
+
+    @property
+    def stall_current_a(self) -> float: ...
+
+    @property
+    def no_load_rpm(self) -> float: ...
+
+    @property
+    def rated_v(self) -> float: ...
 
 
 class Loop(NamedTuple):
@@ -71,13 +87,13 @@ class Shaft:
         "effort", "joint", "profile", "quiet", "supply", "u", "v", "volts", "x",
     )  # fmt: skip
 
-    def __init__(self, model: Model, physics: Physics, position_steps: float) -> None:
+    def __init__(self, model: Motor, physics: Physics, position_steps: float) -> None:
         stall_nm = model.stall_torque_nm
         top_rad_s = model.no_load_rpm * pi / 30.0
         inertia = physics.rotor_s * stall_nm / top_rad_s + physics.load_kg_m2
         # Speed in steps/ms that the stall torque adds in 1 ms.
         self._accel = accel = stall_nm / inertia * STEPS_PER_RAD * MS_S * MS_S
-        top = model.no_load_steps_s * MS_S
+        top = model.no_load_rpm / 60.0 * STEPS_PER_TURN * MS_S
         # Friction is part of the data sheet's no-load speed: the motor alone would be faster.
         self._rate = (1.0 - physics.coulomb_share - physics.viscous_share) / top
         viscous = physics.viscous_share / top

@@ -42,9 +42,11 @@ class ActiveFaults:
     """The faults in force, and what they do to answers and bytes.
 
     ``any`` is False while nothing is wrong: then nobody needs to ask.
+    header: what packets on this line begin with
     """
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, header: bytes = HEADER) -> None:
+        self._header = header
         self._faults: list[Fault] = []
         self._dice = Random(seed)
         self._babbled_s = 0.0
@@ -169,7 +171,7 @@ class ActiveFaults:
         if not pieces:
             return out
         if self.take("fragment", pieces[0].servo_id, now_s):
-            out.insert(0, Piece(NOBODY, HEADER))
+            out.insert(0, Piece(NOBODY, self._header))
         before = self.take("noise_before", None, now_s)
         if before is not None:
             out.insert(0, Piece(NOBODY, self._noise(before)))
@@ -189,5 +191,6 @@ class ActiveFaults:
         length = min(BABBLE_MOST, int((now_s - self._babbled_s) * BABBLE_BYTES_S))
         if length > 0:
             self._babbled_s = now_s
-        words = (HEADER + self._dice.randbytes(4) for _ in range(length // 8 + 1))
+        size = len(self._header) + 4
+        words = (self._header + self._dice.randbytes(4) for _ in range(length // size + 1))
         return b"".join(words)[:length]

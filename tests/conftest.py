@@ -1,9 +1,18 @@
-"""Property tests draw the same examples every time; HYPOTHESIS_PROFILE=search draws others."""
+"""What all tests share: steady examples, and programs that start with compiled modules.
+
+Property tests draw the same examples every time; HYPOTHESIS_PROFILE=search draws others.
+"""
 
 import os
+import sys
 
 from hypothesis import settings
 
 settings.register_profile("steady", derandomize=True)
 settings.register_profile("search", derandomize=False)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
+
+# Where Python is told to keep no compiled modules, every program that a test starts compiles
+# the whole source again: one second of processor time each, in more than a hundred programs.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False

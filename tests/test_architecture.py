@@ -33,6 +33,8 @@ TOP = {
     "robot.cli.motion",
     "robot.cli.wires",
     "robot.emulated_rig",
+    "robot.rig_angles",
+    "robot.rig_bus",
     "robot.cli.monitor",
     "robot.cli.servos",
     "robot.cli.terminal",

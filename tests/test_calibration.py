@@ -4,10 +4,10 @@ from dataclasses import replace
 from math import radians
 
 import pytest
+from desk import JOINTS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot.body import JointParams
 from robot.calibrate.calibration import (
     Calibration,
     CalibrationRefused,
@@ -27,7 +27,7 @@ from robot.calibrate.stop_search import (
     go,
     search,
 )
-from robot.types import JOINTS
+from robot.joint import JointParams
 
 JOINT = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 TURN = 4096

@@ -5,6 +5,7 @@ from math import radians
 
 import numpy as np
 import pytest
+from desk import JOINTS, LIDS
 
 from drivers.errors import CameraError
 from drivers.picture_source import Shot
@@ -20,7 +21,7 @@ from robot.kinematics import GeometryParams, Kinematics
 from sim_mock.board_scene import BoardScene
 
 BOARD = CharucoBoard()
-KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), (-0.4, -0.4), (0.4, 0.4))
+KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), JOINTS, LIDS)
 CAMERA = CameraParams()
 RANGES = ((-1.2, 1.2), (-0.5, 0.5), (-0.35, 0.35))
 FEW = NeckStepParams(pictures=2, patience_s=1.0)

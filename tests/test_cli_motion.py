@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import IO, Any
 
 import pytest
+from desk import JOINTS
 from typer.testing import CliRunner
 
 from config.save import save_rig
 from config.schema import load_rig
 from robot.cli.motion import app
-from robot.types import JOINTS
 from sim_mock.pty_bus import PtyBus
 from sim_mock.servo_physics import ServoSpec
 

@@ -5,6 +5,7 @@ import re
 from datetime import datetime
 
 import pytest
+from desk import JOINTS
 from typer.testing import CliRunner
 
 from config.save import copy_shipped, save_rig
@@ -12,7 +13,6 @@ from drivers.dynamixel_registers import Registers
 from drivers.serial_port import BlockingPort
 from drivers.serial_ports import Host, SerialPort
 from robot.cli import servos as cli_servos
-from robot.types import JOINTS
 from sim_mock.pty_bus import PtyBus
 from sim_mock.servo import ServoSpec
 

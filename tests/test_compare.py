@@ -14,8 +14,10 @@ from robot.assemble import assemble
 from robot.choice import Choice
 from robot.cli.report import app
 from robot.loop import run
+from robot.recording.read import RunRecording
 from robot.recording.recorder import Recorder
 from robot.recording.run_info import RunInfo, versions
+from robot.report import build
 from robot.report.about import About
 from robot.report.bands import BY_KEY
 from robot.report.compare import chance, compare, corrected, differences_of
@@ -90,40 +92,61 @@ def record(path: Path, seconds: float, saccade: str) -> None:
     made.close()
 
 
-def test_two_recordings_and_one_on_the_command_line(tmp_path: Path) -> None:
-    a, b = tmp_path / "soft.mcap", tmp_path / "hard.mcap"
-    record(a, 22.0, "min_jerk")
-    record(b, 22.0, "literal_frame")
+@pytest.fixture(scope="module")
+def soft(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("runs") / "soft.mcap"
+    record(path, 22.0, "min_jerk")
+    return path
+
+
+@pytest.fixture(scope="module")
+def hard(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("runs") / "hard.mcap"
+    record(path, 22.0, "literal_frame")
+    return path
+
+
+@pytest.fixture
+def few_drawings(monkeypatch: pytest.MonkeyPatch) -> int:
+    """Draw the first three figures alone: all of them take longest, and are drawn elsewhere."""
+    monkeypatch.setattr(build, "DRAWINGS", build.DRAWINGS[:3])
+    return 3
+
+
+def test_two_recordings_on_the_command_line(soft: Path, hard: Path, tmp_path: Path) -> None:
     out, runner = tmp_path / "both.html", CliRunner()
-    done = runner.invoke(app, ["compare", str(a), str(b), "--out", str(tmp_path / "both")])
+    done = runner.invoke(app, ["compare", str(soft), str(hard), "--out", str(tmp_path / "both")])
     assert done.exit_code == 0, done.output
     page = unescape(out.read_text(encoding="utf-8"))
-    assert "soft" in page and "hard" in page and page.count("data:image/png;base64,") > 10
+    assert "soft" in page and "hard" in page
+    assert page.count("data:image/png;base64,") == len(build.DRAWINGS) > 10
     rows = {row["key"]: row for row in json.loads(out.with_suffix(".json").read_text("utf-8"))}
     assert rows["peak_small"]["word"] == "more than chance"
     assert rows["peak_small"]["verdicts"] == ["pass", "outside"]
     assert rows["vergence"]["word"] == "may be chance"
     assert "peak speed inside the human band" in done.output
-    one = runner.invoke(app, ["report", str(b), "--out", str(tmp_path / "one")])
+
+
+def test_one_recording_on_the_command_line(hard: Path, few_drawings: int, tmp_path: Path) -> None:
+    one = CliRunner().invoke(app, ["report", str(hard), "--out", str(tmp_path / "one")])
     assert one.exit_code == 0, one.output
     page = (tmp_path / "one.html").read_text(encoding="utf-8")
     assert "over in two frames" in page and "literal_frame" in page
-    assert len(list((tmp_path / "one_figures").glob("*.png"))) > 10
+    assert len(list((tmp_path / "one_figures").glob("*.png"))) == few_drawings
 
 
-def test_a_run_against_itself_differs_in_nothing(tmp_path: Path) -> None:
-    made = assemble(load_rig("desk"), Choice(True, True, 0, "face-to-face"))
-    ticks = []
-    made.robot.start(made.clock)
-    run(made.robot, made.clock, made.loop, lambda s: "over" if s > 14.0 else None, ticks.append)
-    made.robot.stop()
-    made.close()
-    abouts = About("this", duration_s=14.0), About("again", duration_s=14.0)
+def test_a_run_against_itself_differs_in_nothing(
+    soft: Path, few_drawings: int, tmp_path: Path
+) -> None:
+    ticks = list(RunRecording(soft).ticks())
+    abouts = About("this", duration_s=22.0), About("again", duration_s=22.0)
     told: list[str] = []
     found = compare(
         (ticks, ticks), abouts, tmp_path / "same.html", lambda words, share: told.append(words)
     )
     assert any(d.word == "may be chance" for d in found.differences)
     assert not any(d.word == "more than chance" for d in found.differences)
-    assert "Nothing differs by more than chance" in found.page.read_text("utf-8")
+    page = found.page.read_text("utf-8")
+    assert "Nothing differs by more than chance" in page
+    assert page.count("data:image/png;base64,") == few_drawings
     assert told[0] == "reading the run" and told[-1] == "drawing figures"

@@ -13,7 +13,9 @@ from typer.testing import CliRunner
 
 from drivers.errors import SetupError
 from drivers.serial_port import BlockingPort
-from robot.cli.emulate import app, parse_servos
+from robot.cli.emulate import app
+from sim_mock.emulated import DynamixelLine, StsLine
+from sim_mock.servo_words import line_of, parse_servos
 
 ROOT = Path(__file__).parents[1]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTTIN)
@@ -23,10 +25,10 @@ COMMAND = [sys.executable, "-c", "from robot.cli.emulate import app; app()"]
 class Emulator:
     """The command in a process of its own."""
 
-    def __init__(self, *options, **how):
+    def __init__(self, *options, command=COMMAND, **how):
         how = {"stdin": subprocess.PIPE, **how}
         self.process = subprocess.Popen(
-            [*COMMAND, *options], cwd=ROOT, stdout=subprocess.PIPE, text=True, **how
+            [*command, *options], cwd=ROOT, stdout=subprocess.PIPE, text=True, **how
         )
         self.ready = self.hear()
         self.path = self.ready["path"]
@@ -52,6 +54,18 @@ def connect(path, baud=1_000_000):
     port = BlockingPort(str(path))
     port.setBaudRate(baud)
     return port
+
+
+STS_PING, STS_PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
+
+
+def asked(path, data, length, baud=1_000_000):
+    """Send bytes to a path and give what is answered."""
+    port = connect(path, baud)
+    port.write(data)
+    answer = port.read_until(length, port.now_s() + 1.0)
+    port.closePort()
+    return answer
 
 
 def ping(port, servo_id):
@@ -119,10 +133,88 @@ def test_a_link_that_is_left_over_is_replaced(tmp_path):
     assert emulator.end() == 0
 
 
+def test_servos_of_feetech_on_one_line(tmp_path):
+    link = tmp_path / "servos"
+    emulator = Emulator(
+        "--servos", "1-6:sts3215", "--link", str(link), "--set", "broadcast-ping=mix"
+    )
+    assert emulator.ready == {"path": str(link), "baud": 1_000_000}
+    assert asked(link, STS_PING, 6) == STS_PONG
+    told = emulator.type("status")
+    assert [(servo["id"], servo["model"]) for servo in told["servos"]] == [
+        (i, "sts3215") for i in range(1, 7)
+    ]
+    assert "overload-ends" in emulator.type("help")["ok"]
+    assert emulator.end() == 0
+
+
+def test_a_maestro_with_hobby_servos():
+    emulator = Emulator("--maestro", "12", "--device", "5")
+    assert emulator.ready["baud"] is None
+    assert asked(emulator.path, bytes.fromhex("840B702E900B"), 2, 9600) == b"\x70\x17"
+    assert asked(emulator.path, bytes.fromhex("AA0521"), 2, 57_600) == b"\0\0"
+    assert len(emulator.type("status")["servos"]) == 12
+    assert "script" in emulator.type("help")["ok"]
+    assert emulator.end() == 0
+
+
+def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
+    emulator = Emulator("--servos", "1:sts3215", "--baud", "500000", stderr=subprocess.PIPE)
+    for _ in range(2):
+        port = connect(emulator.path)
+        port.write(STS_PING)
+        assert port.read_until(1, port.now_s() + 0.05) == b""
+        port.closePort()
+    assert asked(emulator.path, STS_PING, 6, 500_000) == STS_PONG
+    assert emulator.end() == 0
+    with emulator.process.stderr as told:
+        assert told.read() == "a client speaks at 1000000 bit/s; the servos listen at 500000\n"
+
+
+MIXED = {
+    "": StsLine(parse_servos("1:sts3215", 10), 1_000_000),
+    "eyes": DynamixelLine(parse_servos("1-2:xl330-m077", 53), 57_600),
+}
+
+
+def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path):
+    code = (
+        "import robot.cli.emulate as command; from test_emulate import MIXED; "
+        "command.emulated_lines = lambda rig: MIXED; command.app()"
+    )
+    link = tmp_path / "head"
+    emulator = Emulator(
+        *("--rig", "desk", "--link", str(link), "--set", "wrong-baud=silence"),
+        command=[sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(ROOT / "tests")},
+    )
+    assert emulator.ready == {"bus": "", "path": str(link), "baud": 1_000_000}
+    assert emulator.hear() == {"bus": "eyes", "path": f"{link}-eyes", "baud": 57_600}
+    assert asked(link, STS_PING, 6) == STS_PONG
+    port = connect(f"{link}-eyes", 57_600)
+    assert ping(port, 2) == (1190, COMM_SUCCESS)
+    port.closePort()
+    assert emulator.type("eyes: lose 2 count 1")["bus"] == "eyes"
+    assert emulator.type("eyes:status")["faults"] == ["lose 2"]
+    assert [servo["model"] for servo in emulator.type("status")["servos"]] == ["sts3215"]
+    assert emulator.end() == 0
+    assert not os.path.lexists(link) and not os.path.lexists(f"{link}-eyes")
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [
         ((), "name the servos: --servos 1-6:xl330-m077"),
+        (("--servos", "1:sts3215", "--maestro", "6"), "name the servos"),
+        (("--servos", "1:sts3215,2:xl330-m077"), "start a second `gazerig emulate`"),
+        (("--servos", "1:sts3215", "--baud", "2000000"), "STS servos know 1000000"),
+        (("--servos", "1:sts3215", "--set", "bad-crc=reply"), "there is after-missing"),
+        (("--servos", "1:sts3215", "--crc"), "--crc: only with --maestro"),
+        (("--rig", "desk", "--device", "3"), "--device: only with --maestro"),
+        (("--maestro", "7"), "--maestro 7: a board has 6, 12, 18, 24 channels"),
+        (("--maestro", "6", "--baud", "12"), "a Maestro's pins know 9600"),
+        (("--maestro", "6", "--firmware", "3"), "does not tell its version"),
+        (("--maestro", "6", "--set", "mode=usb"), "it can be usb-dual-port"),
         (("--servos", "1:xl330-m077", "--rig", "desk"), "name the servos"),
         (("--rig", "nobody"), "there are desk"),
         (("--servos", "1:xl330-m077", "--baud", "12"), "--baud 12: servos know 9600"),
@@ -157,6 +249,9 @@ def test_bad_input_is_one_clear_line(options, says, monkeypatch):
         ("a:xl330-m077", "not IDS:MODEL"),
         ("5-3:xl330-m077", "ids run upwards"),
         ("250-253:xl330-m077", "from 0 to 252"),
+        ("250-254:sts3215", "from 0 to 253"),
+        ("1:hobby", "a hobby servo hangs on a board: --maestro 12"),
+        ("1:sts3215,7:xc330-m288", "sts3215 (id 1) speaks Feetech's and xc330-m288 (id 7)"),
         ("1:xl331", "unknown model; there is xl330-m077"),
         ("1-3:xl330-m077,2:xc330-m288", "id 2 is taken by a xl330-m077"),
     ],
@@ -175,3 +270,13 @@ def test_servos_are_read():
         (2, "xl330-m077", 2048, 45),
         (9, "xc330-m288", 17, 45),
     ]
+
+
+def test_the_models_decide_the_kind_of_line():
+    specs = parse_servos("3:STS3215@7,253:sts3215-12v", 10)
+    assert line_of("3:STS3215@7,253:sts3215-12v", 10, 500_000) == StsLine(specs, 500_000)
+    assert [(s.id, s.model, s.start_steps) for s in specs] == [
+        (3, "sts3215", 7),
+        (253, "sts3215-12v", 2048),
+    ]
+    assert isinstance(line_of("1:xl330-m077", None, 57_600), DynamixelLine)

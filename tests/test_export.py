@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from desk import JOINTS, LIDS
 
 from config.schema import load_rig
 from gaze.angles import rotation
@@ -68,7 +69,7 @@ def face() -> Run:
 
 def pose(left_deg: tuple[float, float], right_deg: tuple[float, float], yaw: float) -> GazeState:
     """Eyes in the head, and the head's yaw."""
-    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), (-0.4, -0.4), (0.4, 0.4))
+    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
     degs = (*left_deg, *right_deg, 0.0, 0.0, yaw, 0.0, 0.0)
     return kinematics.forward(JointState(tuple(map(radians, degs)), (0.0,) * 9, (0.0,) * 9, ()))
 

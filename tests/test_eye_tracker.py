@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from desk import JOINTS, LIDS
 
 from gaze.angles import add, scale, unit, yaw_pitch
 from gaze.field_of_view import line_of_sight
@@ -70,7 +71,7 @@ def walk(rng: np.random.Generator) -> list[tuple[float, Vec3, Vec3]]:
 
 def look_about(seed: int, saccade: SaccadeParams) -> Trace:
     rng = np.random.default_rng(seed)
-    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), (-0.4, -0.4), (0.4, 0.4))
+    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
     span, neck = (-radians(35.0), radians(35.0)), (-radians(70.0), radians(70.0))
     oculomotor = Oculomotor(
         OculomotorParams(eye_lag_ms=1000.0 / RATE_HZ),

@@ -4,13 +4,13 @@ from math import radians
 from pathlib import Path
 
 import pytest
+from desk import JOINTS, LIDS
 from hypothesis import given
 from hypothesis import strategies as st
 
 from config.load import ConfigError
 from config.schema import load_rig
 from gaze.angles import rotate
-from robot.body import JointParams
 from robot.frames import (
     CameraMount,
     CameraParams,
@@ -19,9 +19,10 @@ from robot.frames import (
     mounted_at,
     standing_still,
 )
+from robot.joint import JointParams
 from robot.kinematics import GeometryParams, Kinematics
 
-KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), (-0.4, -0.4), (0.4, 0.4))
+KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
 
 
 def test_poses_are_interpolated_at_the_instant_asked_for() -> None:

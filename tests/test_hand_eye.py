@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from desk import JOINTS, LIDS
 
 from gaze.types import Angles3
 from robot.calibrate.camera_calibration import CameraCalibrationRefused
@@ -19,7 +20,7 @@ from robot.seeing.intrinsics import project
 from sim_mock.board_scene import BoardScene
 
 BOARD = CharucoBoard()
-KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), (-0.4, -0.4), (0.4, 0.4))
+KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), JOINTS, LIDS)
 # The desk rig's neck.
 RANGES = ((-1.2, 1.2), (-0.5, 0.5), (-0.35, 0.35))
 

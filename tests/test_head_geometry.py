@@ -4,6 +4,7 @@ from math import radians
 
 import numpy as np
 import pytest
+from desk import JOINTS
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,7 +15,12 @@ from robot.kinematics import GeometryParams, Kinematics
 from robot.types import JointState
 
 KINEMATICS = Kinematics(
-    GeometryParams(62.0, 38.0, 51.0), (radians(-25), radians(25)), (radians(20), radians(-20))
+    GeometryParams(62.0, 38.0, 51.0),
+    JOINTS,
+    {
+        "left_upper_lid": (radians(-25), radians(20)),
+        "right_upper_lid": (radians(25), radians(-20)),
+    },
 )
 degree = st.floats(-1.0, 1.0)
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from math import degrees, nan, radians
 
 import pytest
+from desk import JOINTS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,6 @@ from robot.bringup.jog import JogParams, ManualControl, duration_s
 from robot.bringup.look_at import ends_reached, look_at
 from robot.clock import SimulatedClock
 from robot.safety.guard import Guard
-from robot.types import JOINTS
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_chain import build_chain
 from sim_mock.servo_physics import ServoSpec
@@ -39,7 +39,7 @@ class Bench:
         self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
         setups = [rig.joints[name].setup(name) for name in JOINTS]
         bus = DynamixelBus(self.port, setups, rig.bus.dynamixel)
-        guard = Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS))
+        guard = Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS), JOINTS)
         self.steps: list[Step] = []
         self.why: str | None = None
         self.control = ManualControl(

@@ -20,7 +20,7 @@ from config.knobs import (
 )
 from config.load import ConfigError, shipped_names
 from config.schema import Rig, load_rig
-from robot.body import JointParams
+from robot.joint import JointParams
 from robot.orders import Value
 
 RIG = load_rig("desk")

@@ -5,6 +5,7 @@ from math import radians
 
 import numpy as np
 import pytest
+from desk import JOINTS, LIDS
 
 from gaze.head import Head, HeadParams
 from gaze.lids import LidMode, LidParams, Lids, Side
@@ -121,7 +122,7 @@ def test_e53_no_blink_storm(literal: bool) -> None:
 
 @pytest.mark.parametrize("literal", [False, True])
 def test_e53_no_blink_storm_with_the_head_held_aside(literal: bool) -> None:
-    kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), (-0.4, -0.4), (0.4, 0.4))
+    kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), JOINTS, LIDS)
     span = (-radians(55.0), radians(55.0))
     model = Oculomotor(
         OculomotorParams(),

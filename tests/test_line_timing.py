@@ -7,8 +7,10 @@ from fastcrc.crc16 import umts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sim_mock.maestro_board import build_board
 from sim_mock.servo_chain import build_chain
 from sim_mock.servo_line import ServoLine
+from sim_mock.sts_chain import build_sts
 
 
 def instruction(servo_id, code, params=b""):
@@ -140,3 +142,54 @@ def test_nothing_overtakes_and_nothing_is_lost(sendings, delay):
         last_s = wire.now_s = max(due_s, wire.now_s)
         got += wire.line.arrived()
     assert got == expected
+
+
+# --- the other kinds
+
+
+def sts_packet(servo_id, code, params=b""):
+    body = bytes((servo_id, len(params) + 2, code)) + params
+    return b"\xff\xff" + body + bytes((~sum(body) & 0xFF,))
+
+
+class Device:
+    """Any device on a line with wire time, and a clock that is set by hand."""
+
+    def __init__(self, build, turnaround_s=0.0):
+        self.now_s = 0.0
+        self.device = build(lambda: self.now_s)
+        self.line = ServoLine(self.device, True, turnaround_s)
+
+    answers = Wire.answers
+
+
+def sts(now_s):
+    chain = build_sts([(i, "sts3215", 2048) for i in IDS], now_s)
+    chain.exchange(sts_packet(0xFE, 3, bytes((7, 0))))
+    return chain
+
+
+STS_READ = sts_packet(0xFE, 0x82, bytes((56, 15, *IDS)))
+STS_PARTS = [6 + 15] * len(IDS)
+
+
+@pytest.mark.parametrize("baud", [115_200, 500_000, 1_000_000])
+@pytest.mark.parametrize("turnaround_us", [0, 30])
+def test_a_sync_read_of_feetech_servos_takes_what_the_formula_says(baud, turnaround_us):
+    wire = Device(sts, turnaround_us * 1e-6)
+    answers = wire.answers(STS_READ, baud)
+    assert sum(len(data) for _, data in answers) == sum(STS_PARTS)
+    expected = (len(STS_READ) + sum(STS_PARTS)) * 10 / baud + len(IDS) * turnaround_us * 1e-6
+    assert answers[-1][0] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("baud", [9600, 115_200])
+def test_a_boards_bare_answers_wait_for_its_turnaround_too(baud):
+    wire = Device(lambda now_s: build_board(6, now_s), 100e-6)
+    errors, place = bytes((0xA1,)), bytes((0x90, 3))
+    first, second = wire.answers(errors + place, baud)
+    byte_s = 10 / baud
+    assert first[0] == pytest.approx(byte_s + 100e-6 + 2 * byte_s)
+    begun = max(first[0], 3 * byte_s)
+    assert second[0] == pytest.approx(begun + 100e-6 + 2 * byte_s)
+    assert (len(first[1]), len(second[1])) == (2, 2)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from desk import JOINTS, LIDS
 
 from config.schema import load_rig
 from drivers.types import DetectedFace, Detections, MovingBlob
@@ -20,7 +21,7 @@ from robot.loop import LoopParams, Tick, run
 from robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
 from robot.seeing.perception import Perception
 from robot.seeing.tracks import Sighting, Tracker, TrackParams
-from robot.types import JOINTS, Verdict
+from robot.types import Verdict
 from sim_mock.visitor import Visitor
 
 
@@ -147,7 +148,7 @@ def test_clocks() -> None:
     real.sleep_until(before)
 
 
-KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), (-0.4, -0.4), (0.4, 0.4))
+KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
 MOUNT = CameraMount(CameraParams())
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_table import MODELS
-from robot.body import JointParams
 from robot.bringup.monitor import Monitor, as_json, load_share, look
 from robot.clock import SimulatedClock
+from robot.joint import JointParams
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_chain import build_chain
 from sim_mock.servo_physics import ServoSpec

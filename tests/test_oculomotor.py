@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from desk import JOINTS, LIDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -69,7 +70,7 @@ class Rig:
         breathing: Breathing | None = None,
         dice: int | None = None,
     ) -> None:
-        self.kinematics = Kinematics(geometry, (-0.4, -0.4), (0.4, 0.4))
+        self.kinematics = Kinematics(geometry, JOINTS, LIDS)
         span = (-radians(eye_deg), radians(eye_deg))
         neck = (-radians(neck_deg), radians(neck_deg))
         self.oculomotor = Oculomotor(

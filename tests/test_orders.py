@@ -6,6 +6,7 @@ from math import degrees, inf, nan, pi, radians
 from typing import Any
 
 import pytest
+from desk import JOINTS
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,7 +16,6 @@ from robot.choice import Choice
 from robot.loop import Tick, run
 from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune, as_json, check, from_json
 from robot.session import leave
-from robot.types import JOINTS
 
 YAW = JOINTS.index("neck_yaw")
 

@@ -17,6 +17,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from desk import JOINTS
 
 from config.load import ConfigError, shipped
 from config.schema import load_rig
@@ -30,7 +31,6 @@ from robot.page.view import _HALF_WIDTH as HALF_WIDTH
 from robot.page.view import VIEWS
 from robot.recording.run_info import RunInfo
 from robot.tuning import Tuning
-from robot.types import JOINTS
 
 
 def load_browser() -> ModuleType:

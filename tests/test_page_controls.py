@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import pytest
 import viser
+from desk import JOINTS
 
 from gaze.types import Vec3
 from robot.orders import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_json
@@ -27,7 +28,7 @@ from robot.page.link import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
 from robot.page.tell import Teller
 from robot.page.tuning import found, group_of
 from robot.page.view import News, drain
-from robot.types import JOINTS, Snapshot
+from robot.types import Snapshot
 
 PATIENCE_S = 20.0
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

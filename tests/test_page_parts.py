@@ -6,6 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from desk import JOINTS
 
 from drivers.types import DetectedFace, Detections, MovingBlob
 from gaze.angles import rotation
@@ -24,7 +25,7 @@ from robot.page.picture import (
 from robot.page.place import along, quaternion, turned_up, upright_along
 from robot.page.status import drawn_together, status
 from robot.page.traces import GROUPS, MOST_POINTS, Traces, mean_deg
-from robot.types import JOINTS, SeenFace, Snapshot, Trail
+from robot.types import SeenFace, Snapshot, Trail
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

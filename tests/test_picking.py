@@ -5,6 +5,7 @@ from typing import cast
 
 import numpy as np
 import pytest
+from desk import JOINTS
 
 from drivers.types import Detections
 from gaze.angles import norm, sub
@@ -26,8 +27,8 @@ def looking(
     """A head that was turned so when the picture was taken, and has turned on since."""
     kinematics = Kinematics(
         GeometryParams(pitch_axis_height_mm=90.0, eyes_ahead_mm=30.0, eyes_above_mm=50.0),
-        (0.0, 0.0),
-        (0.5, 0.5),
+        JOINTS,
+        {"left_upper_lid": (0.0, 0.5), "right_upper_lid": (0.0, 0.5)},
     )
     poses = PoseHistory(kinematics)
     for t_s in (0.9, 1.0):
@@ -56,8 +57,8 @@ def face_at(p_world_m: Vec3) -> Face:
 def test_without_a_picture_there_is_nothing_to_pick() -> None:
     kinematics = Kinematics(
         GeometryParams(pitch_axis_height_mm=90.0, eyes_ahead_mm=30.0, eyes_above_mm=50.0),
-        (0.0, 0.0),
-        (0.5, 0.5),
+        JOINTS,
+        {"left_upper_lid": (0.0, 0.5), "right_upper_lid": (0.0, 0.5)},
     )
     picking = Picking(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)
     assert picking.point(0.5, 0.5) is None

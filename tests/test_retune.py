@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from desk import JOINTS
 
 from config.knobs import NEXT_START, Knob, changed, knobs, value_of
 from config.load import ConfigError, shipped, shipped_names
@@ -19,7 +20,6 @@ from robot.assemble import Assembly, assemble
 from robot.choice import Choice
 from robot.loop import Tick, run
 from robot.orders import Jog, Resume, Stop, Tune, Value, as_json, from_json
-from robot.types import JOINTS
 
 RIG = load_rig("desk")
 DT_S = 1.0 / 200.0

@@ -5,10 +5,10 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from desk import JOINTS
 
 from config.load import ConfigError, shipped, shipped_names
 from config.schema import Rig, load_rig, load_rules, load_walk
-from robot.types import JOINTS
 
 DESK = shipped("rigs", "desk")
 

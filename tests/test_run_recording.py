@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import orjson
 import pytest
+from desk import JOINTS
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
@@ -36,7 +37,6 @@ from robot.recording.recorder import Recorder
 from robot.recording.run_info import RunEnd, RunInfo, as_text, end_of, info_of, versions
 from robot.recording.viewer_messages import quaternion
 from robot.recording.writer_process import PIECE_BYTES
-from robot.types import JOINTS
 
 STARTED = "2026-01-31T23:59:59.250000+00:00"
 

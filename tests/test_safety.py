@@ -6,11 +6,12 @@ from math import cos, inf, nan, radians
 
 import numpy as np
 import pytest
+from desk import JOINTS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robot.safety.guard import Guard, GuardParams, JointLimit
-from robot.types import JOINTS, JointState, Verdict
+from robot.types import JointState, Verdict
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))
@@ -24,7 +25,7 @@ def measured(t_s: float, position: tuple[float, ...] = (0.0,) * 9) -> JointState
 
 
 def ready(start: tuple[float, ...] = (0.0,) * 9, limits: tuple[JointLimit, ...] = LIMITS) -> Guard:
-    guard = Guard(GuardParams(), limits)
+    guard = Guard(GuardParams(), limits, JOINTS)
     guard.reset(0.0, start)
     guard._gentle = [False] * 9  # the slow start has tests of its own
     return guard
@@ -202,7 +203,7 @@ def test_a_stale_picture_holds_the_neck_and_not_the_eyes() -> None:
 
 
 def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish() -> None:
-    guard = Guard(GuardParams(gentle_speed_deg_s=60.0, gentle_accel_deg_s2=300.0), LIMITS)
+    guard = Guard(GuardParams(gentle_speed_deg_s=60.0, gentle_accel_deg_s2=300.0), LIMITS, JOINTS)
     guard.reset(0.0, (0.5,) * 9)
     path, t = [0.5], 0.0
     while guard.gentle and t < 3.0:
@@ -232,7 +233,7 @@ def test_going_gently_in_flight_brakes_within_the_joints_own_strength() -> None:
 
 
 def test_a_start_outside_the_range_is_brought_to_its_edge() -> None:
-    guard = Guard(GuardParams(), LIMITS)
+    guard = Guard(GuardParams(), LIMITS, JOINTS)
     guard.reset(0.0, (2.0,) * 9)
     assert guard.check((2.0,) * 9, measured(DT), 0.0, DT).command_rad[0] == EYE.high_rad
 

@@ -5,11 +5,12 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
+from desk import JOINTS
 
 from config.bounds import judge
 from robot.safety.collisions import CollisionParams
 from robot.safety.guard import Guard, GuardParams, JointLimit
-from robot.types import JOINTS, JointState, Verdict
+from robot.types import JointState, Verdict
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))
@@ -24,7 +25,7 @@ class World:
     """Joints one tick behind their commands."""
 
     def __init__(self, *pairs: CollisionParams, **start_deg: float) -> None:
-        self.guard = Guard(GuardParams(collisions=pairs), LIMITS)
+        self.guard = Guard(GuardParams(collisions=pairs), LIMITS, JOINTS)
         self.pairs = pairs
         start = tuple(radians(start_deg.get(name, 0.0)) for name in JOINTS)
         self.guard.reset(0.0, start)

@@ -4,10 +4,11 @@ from math import nan, radians
 
 import numpy as np
 import pytest
+from desk import JOINTS
 
 from robot.safety.guard import Guard, GuardParams, JointLimit
 from robot.safety.health import HealthParams
-from robot.types import JOINTS, JointState, Verdict
+from robot.types import JointState, Verdict
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000), 70.0, 3.5, 7.0)
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500), 70.0, 3.5, 7.0)
@@ -21,7 +22,7 @@ class World:
     """Joints that are where their commands were one tick ago, and whose servos say things."""
 
     def __init__(self) -> None:
-        self.guard = Guard(GuardParams(gentle_ms=0.0), LIMITS)
+        self.guard = Guard(GuardParams(gentle_ms=0.0), LIMITS, JOINTS)
         self.guard.reset(0.0, (0.0,) * 9)
         self.guard._gentle = [False] * 9
         self.t_s = 0.0
@@ -226,7 +227,7 @@ def test_a_latched_fault_is_limp_with_its_words(torque: dict[str, bool]) -> None
 
 
 def test_the_gravest_reasons_stand_by_themselves() -> None:
-    guard = Guard(GuardParams(), LIMITS)  # all begin slowly
+    guard = Guard(GuardParams(), LIMITS, JOINTS)  # all begin slowly
     fault = tuple("overload" if k == JOINT else "" for k in range(9))
     joints = JointState((0.0,) * 9, (0.0,) * 9, (DT,) * 9, (), (), fault)
     verdict = guard.check((0.5,) * 9, joints, 0.0, DT)

@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from desk import JOINTS
 
-from robot.types import JOINTS, JointState
+from robot.types import JointState
 
 ROOM = Path(__file__).parents[1] / "robot" / "safety"
 PARTS = ("motion", "stuck", "health", "collisions", "guard")
@@ -52,7 +53,7 @@ class Bench:
 
     def __init__(self, m: ModuleType, start_deg: float = 0.0, gentle: bool = False, **params: Any):
         limit = m.JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
-        self.guard = m.Guard(m.GuardParams(**params), (limit,) * 9)
+        self.guard = m.Guard(m.GuardParams(**params), (limit,) * 9, JOINTS)
         self.guard.reset(0.0, (radians(start_deg),) * 9)
         if not gentle:
             self.guard._gentle = [False] * 9
@@ -370,7 +371,7 @@ def collision_lag(m: ModuleType) -> None:
 def slow_joint(m: ModuleType) -> None:
     limit = m.JointLimit(LOW, HIGH, radians(20.0), radians(100.0))  # below the gentle ones
     pair = m.CollisionParams("neck_pitch", -20.0, 5.0, "left_upper_lid", -20.0, 15.0)
-    guard = m.Guard(m.GuardParams(collisions=(pair,)), (limit,) * 9)
+    guard = m.Guard(m.GuardParams(collisions=(pair,)), (limit,) * 9, JOINTS)
     guard.reset(0.0, (0.0,) * 9)
     path, speed = [(0.0,) * 9], np.zeros(9)
     for k in range(1, 300):

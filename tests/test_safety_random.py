@@ -11,13 +11,14 @@ from math import inf, nan, radians
 
 import numpy as np
 import pytest
+from desk import JOINTS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from robot.safety.collisions import CollisionParams
 from robot.safety.guard import Guard, GuardParams, JointLimit
-from robot.types import JOINTS, JointState
+from robot.types import JointState
 
 Array = NDArray[np.float64]
 Row = tuple[float, ...]
@@ -46,7 +47,7 @@ class Trial:
     def __init__(self, limits: tuple[JointLimit, ...], boxes: tuple[CollisionParams, ...]) -> None:
         self.limits = np.array(limits)
         self.boxes = boxes
-        self.guard = Guard(GuardParams(collisions=boxes, gentle_ms=100.0), limits)
+        self.guard = Guard(GuardParams(collisions=boxes, gentle_ms=100.0), limits, JOINTS)
         self.low, self.high = self.limits[:, 0], self.limits[:, 1]
         self.begin_p: list[Row] = []
         self.begin_v: list[Row] = []

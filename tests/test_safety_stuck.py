@@ -5,10 +5,11 @@ from math import radians, sin
 
 import numpy as np
 import pytest
+from desk import JOINTS
 
 from robot.safety.guard import Guard, GuardParams, JointLimit
 from robot.safety.stuck import StuckParams
-from robot.types import JOINTS, JointState, Verdict
+from robot.types import JointState, Verdict
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))
@@ -22,7 +23,7 @@ class World:
 
     def __init__(self, joint: int, lag_s: float = 0.02, band_deg: float = 0.0) -> None:
         self.joint = joint
-        self.guard = Guard(GuardParams(), LIMITS)
+        self.guard = Guard(GuardParams(), LIMITS, JOINTS)
         self.guard.reset(0.0, (0.0,) * 9)
         self.guard._gentle = [False] * 9
         self.t_s = 0.0
@@ -144,7 +145,7 @@ def test_a_slow_start_is_no_jam() -> None:
 @pytest.mark.parametrize("off_deg", np.linspace(2.5, 3.5, 21).tolist())
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_the_distance_is_swept_densely(off_deg: float, way: float) -> None:
-    guard = Guard(GuardParams(), LIMITS)
+    guard = Guard(GuardParams(), LIMITS, JOINTS)
     guard.reset(0.0, (0.0,) * 9)
     guard._gentle = [False] * 9
     found = False
@@ -158,7 +159,7 @@ def test_the_distance_is_swept_densely(off_deg: float, way: float) -> None:
 
 @pytest.mark.parametrize("creep_deg_s", [1.0, 2.5, 3.0, 3.7, 4.0, 6.0, -1.0, -6.0, -20.0])
 def test_only_motion_towards_the_command_counts(creep_deg_s: float) -> None:
-    guard = Guard(GuardParams(), LIMITS)
+    guard = Guard(GuardParams(), LIMITS, JOINTS)
     guard.reset(0.0, (0.6,) * 9)
     guard._gentle = [False] * 9
     found = False
@@ -178,7 +179,7 @@ def test_a_silent_joint_is_stale_and_not_stuck() -> None:
 
 
 def test_a_stuck_joint_lets_the_others_move() -> None:
-    guard = Guard(GuardParams(), LIMITS)
+    guard = Guard(GuardParams(), LIMITS, JOINTS)
     guard.reset(0.0, (0.0,) * 9)
     command, verdict = (0.0,) * 9, None
     for k in range(1, 500):

@@ -1,4 +1,4 @@
-"""The vendor's SDK, unchanged, on the in-process port."""
+"""The in-process port: the vendor's SDK, unchanged, on Dynamixel servos; bytes on the others."""
 
 import pytest
 from dynamixel_sdk import (
@@ -10,8 +10,11 @@ from dynamixel_sdk import (
     PacketHandler,
 )
 
+from drivers.errors import BusLost, PortError
+from sim_mock.emulated import DynamixelLine, MaestroLine, StsLine, build
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_chain import build_chain
+from sim_mock.servo_physics import ServoSpec
 
 STEADY_STEPS = 12
 """Friction keeps a servo with factory gains so far from its goal."""
@@ -101,3 +104,66 @@ def test_reading_part_of_an_answer_leaves_the_rest(world):
     assert (first, world.port.getBytesAvailable()) == (b"\xff\xff\xfd\x00", 10)
     assert world.port.drain() == 10
     assert world.port.read_until(4, 0.0) == b""
+
+
+# --- any device
+
+
+KINDS = {
+    "dynamixel": (
+        DynamixelLine((ServoSpec(1, "xl330-m288"),), 57_600),
+        bytes.fromhex("FFFFFD0001030001194E"),
+        14,
+    ),
+    "feetech": (StsLine((ServoSpec(1, "sts3215"),), 500_000), bytes.fromhex("FFFF010201FB"), 6),
+    "maestro": (MaestroLine(6, baud=9600), bytes.fromhex("9001"), 2),
+}
+
+
+@pytest.fixture(params=KINDS)
+def kind(request):
+    line, question, length = KINDS[request.param]
+    now = [0.0]
+    device = build(line, lambda: now[0])
+
+    def sleep_until(t_s):
+        now[0] = max(now[0], t_s)
+
+    port = InProcessPort(device, sleep_until=sleep_until)
+    return port, line.baud, question, length
+
+
+def test_every_device_answers_at_its_own_rate(kind):
+    port, baud, question, length = kind
+    port.setBaudRate(baud)
+    port.write(question)
+    assert len(port.read_until(length, 1.0)) == length
+    assert port.now_s() == 0.0
+    port.setBaudRate(baud * 2 if baud != 57_600 else 115_200)
+    port.write(question)
+    assert port.read_until(1, 0.01) == b""
+
+
+def test_every_device_can_be_unplugged_and_come_back(kind):
+    port, baud, question, length = kind
+    port.setBaudRate(baud)
+    port.faults.command("unplug")
+    with pytest.raises(BusLost, match="plug the adapter in"):
+        port.write(question)
+    with pytest.raises(PortError):
+        port.setBaudRate(baud)
+    port.faults.command("plug")
+    port.setBaudRate(baud)
+    port.write(question)
+    assert len(port.read_until(length, 1.0)) == length
+
+
+def test_every_device_may_answer_late(kind):
+    port, baud, question, length = kind
+    port.setBaudRate(baud)
+    port.faults.command("delay all 20 count 1")
+    port.write(question)
+    assert port.read_until(length, 0.01) == b""
+    assert port.now_s() == pytest.approx(0.01)
+    assert len(port.read_until(length, 1.0)) == length
+    assert port.now_s() == pytest.approx(0.02)

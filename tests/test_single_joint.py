@@ -7,12 +7,12 @@ import pytest
 
 from drivers.dynamixel_registers import Registers
 from drivers.errors import BusLost, ServoFault, ServoMissing
-from robot.body import JointParams
 from robot.bringup.single_joint import SingleJoint, Stopped
 from robot.calibrate.calibrating import by_hand, by_motion
 from robot.calibrate.calibration import CalibrationRefused
 from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
 from robot.clock import SimulatedClock
+from robot.joint import JointParams
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_chain import build_chain
 from sim_mock.servo_physics import Physics, ServoSpec

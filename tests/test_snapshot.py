@@ -6,6 +6,7 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
+from desk import JOINTS
 
 from config.schema import Rig, load_rig
 from gaze.angles import angle_between
@@ -15,7 +16,7 @@ from robot.loop import Tick, run
 from robot.page.link import MESSAGE_BYTES, pack, unpack
 from robot.page.snapshot import Said, ShownRig, Snapshots, snapshot
 from robot.report.gaze_events import Blink, Fixation, GazeEvents, Saccade
-from robot.types import JOINTS, SeenBlink, SeenFixation, SeenSaccade, Snapshot
+from robot.types import SeenBlink, SeenFixation, SeenSaccade, Snapshot
 
 RATE_HZ = 200.0
 TICKS_BETWEEN = 8

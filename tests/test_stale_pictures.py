@@ -6,6 +6,7 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
+from desk import JOINTS
 
 from config.schema import Rig, load_rig
 from drivers.types import Camera, Detections
@@ -15,7 +16,6 @@ from robot import assemble as assembling
 from robot.assemble import Assembly, assemble
 from robot.choice import Choice
 from robot.loop import Tick, run
-from robot.types import JOINTS
 from sim_mock.scene import Event, Person, Thing
 
 GONE_S, BACK_S, END_S = 2.0, 9.0, 12.0

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from math import degrees, radians
 from typing import NamedTuple
 
-from robot.types import JOINTS, JointAngles, JointState, Level, Verdict
+from robot.types import JointAngles, JointState, Level, Verdict
 
 PASSING = ("starting slowly", "too hard", "too fast")
 """Reasons that say how a goal is approached, not that it cannot be reached."""
@@ -98,7 +98,8 @@ class Notes:
 
 def outcome(step: Step, wish: JointAngles, notes: Notes) -> tuple[Applied, ...]:
     """Give every joint's part of how a movement ended."""
-    rows = zip(JOINTS, wish, step.verdict.command_rad, step.joints.position_rad, strict=True)
+    verdict = step.verdict
+    rows = zip(verdict.joints, wish, verdict.command_rad, step.joints.position_rad, strict=True)
     return tuple(
         Applied(name, degrees(wished), degrees(permitted), degrees(measured), notes.of(name))
         for name, wished, permitted, measured in rows
@@ -115,7 +116,9 @@ def standing(step: Step, wish: JointAngles, moving: Iterable[int], near_rad: flo
             return None
         if abs(at - wish[i]) <= near_rad:
             continue
-        passing = any(f"{JOINTS[i]}: {reason}" in step.verdict.reasons for reason in PASSING)
+        passing = any(
+            f"{step.verdict.joints[i]}: {reason}" in step.verdict.reasons for reason in PASSING
+        )
         if passing or abs(at - command[i]) > near_rad:
             return None
         held = True

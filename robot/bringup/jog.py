@@ -25,7 +25,7 @@ from robot.body import Body
 from robot.bringup.applied import Moved, Notes, Step, outcome, standing
 from robot.clock import Clock
 from robot.safety.guard import Guard
-from robot.types import JOINTS, JointAngles, JointState
+from robot.types import JointAngles, JointState
 
 _PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
 """Of a fifth-order polynomial from rest to rest, over distance/time and distance/time^2."""
@@ -83,7 +83,7 @@ class ManualControl:
     """A rig whose goals come from a person.
 
     Args:
-        body, guard: of one rig; the guard's limits in the order of JOINTS.
+        body, guard: of one rig.
         clock: the host's, or a simulated one with the emulated bus.
         params: how slowly.
         stopped: asked at every step; gives why to stop, None while there is no reason.
@@ -142,12 +142,13 @@ class ManualControl:
             drivers.errors.SetupError: there is no such joint, or an angle is no number.
             drivers.errors.DriverError: the bus is gone.
         """
-        refuse_unknown(angles_deg)
+        names = self.body.names
+        refuse_unknown(angles_deg, names)
         wish = tuple(
             radians(angles_deg[name]) if name in angles_deg else held
-            for name, held in zip(JOINTS, self._goal, strict=True)
+            for name, held in zip(names, self._goal, strict=True)
         )
-        moving = tuple(i for i, name in enumerate(JOINTS) if name in angles_deg)
+        moving = tuple(i for i, name in enumerate(names) if name in angles_deg)
         start_s = self._clock.now_s()
         ways = [Quintic((g, 0.0, 0.0), w, 1.0) for g, w in zip(self._goal, wish, strict=True)]
         far = max((abs(wish[i] - self._goal[i]) for i in moving), default=0.0)
@@ -188,7 +189,7 @@ class ManualControl:
         """
         stopped, self._stopped = self._stopped, no_reason
         try:
-            return self.pose({name: angles_deg.get(name, 0.0) for name in JOINTS})
+            return self.pose({name: angles_deg.get(name, 0.0) for name in self.body.names})
         finally:
             self._stopped = stopped
 
@@ -253,14 +254,14 @@ def duration_s(distance_rad: float, params: JogParams) -> float:
     return max(0.05, slow, sqrt(_PEAK_ACCEL * far / params.accel_deg_s2))
 
 
-def refuse_unknown(angles_deg: Mapping[str, float]) -> None:
-    """Refuse what is no joint or no angle.
+def refuse_unknown(angles_deg: Mapping[str, float], joints: tuple[str, ...]) -> None:
+    """Refuse what is no joint of the rig or no angle.
 
     Raises:
         drivers.errors.SetupError: with what there is.
     """
     for name, angle in angles_deg.items():
-        if name not in JOINTS:
-            raise SetupError(f"no joint {name!r}; there is {', '.join(JOINTS)}")
+        if name not in joints:
+            raise SetupError(f"no joint {name!r}; there is {', '.join(joints)}")
         if not isfinite(angle):
             raise SetupError(f"{name}: {angle} is not an angle in degrees")

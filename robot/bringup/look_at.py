@@ -9,9 +9,9 @@ from gaze.angles import angle_between, norm, sub
 from gaze.field_of_view import line_of_sight
 from gaze.oculomotor import Oculomotor
 from gaze.types import GazeState, Target, Vec3
-from robot.body import JointParams
 from robot.bringup.applied import Moved, Step
 from robot.bringup.jog import ManualControl
+from robot.joint import JointParams
 from robot.kinematics import Kinematics
 from robot.types import JointAngles, JointState
 

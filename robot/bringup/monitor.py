@@ -18,7 +18,7 @@ from drivers.dynamixel_table import (
     Model,
     name_errors,
 )
-from robot.body import JointParams
+from robot.joint import JointParams
 
 # 116 goal position | 120 tick, 122 moving, 123 status, 124 pwm | 126 current, 128 velocity,
 # 132 position | 136, 140 trajectory | 144 voltage, 146 temperature: no gap between them

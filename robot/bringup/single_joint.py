@@ -16,10 +16,10 @@ from drivers.dynamixel_table import (
     name_errors,
 )
 from drivers.errors import BusLost, DriverError, ServoFault, ServoMissing
-from robot.body import JointParams
 from robot.bringup.monitor import load_share
 from robot.calibrate.stop_search import STEPS_PER_DEG, Stop, StopSearchParams, go, search
 from robot.clock import Clock
+from robot.joint import JointParams
 
 PERIOD_S = 0.02
 """A search looks 50 times a second where the line is quick enough."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from drivers.dynamixel_table import STEPS_PER_TURN
 from drivers.errors import SetupError
-from robot.body import JointParams
+from robot.joint import JointParams
 
 SMALLEST_RANGE_DEG = 5.0
 """A joint that moves less than this was not really moved."""

@@ -22,7 +22,6 @@ from robot.cli.person import Lines, TerminalPerson
 from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
 from robot.cli.wires import MockOption, PortOption, Wires, registers, wires
 from robot.clock import RealClock
-from robot.types import JOINTS
 
 
 class By(StrEnum):
@@ -75,7 +74,7 @@ def calibrate_joints(
     """Find zero, sign and range of each joint and write them into the rig's YAML."""
     with clear_errors(), signals() as stopped:
         loaded = load_rig(rig)
-        names = _names(joint)
+        names = _names(loaded, joint)
         if dry_run and clear_offset:
             raise SetupError("--dry-run and --clear-offset exclude each other: that is a write")
         if not dry_run:
@@ -119,7 +118,7 @@ def _measure(
     """Calibrate one joint after the other; gives what was found and which were refused."""
     found: dict[str, Calibration] = {}
     refused: list[str] = []
-    with registers(rig, wire.path) as (regs, _):
+    with registers(wire.paths[""], rig.bus.baud) as (regs, _):
         for name in names:
             single = SingleJoint(name, rig.joints[name], regs, RealClock(), stopped)
             person.hand = _hand(wire, single.joint.id)
@@ -142,12 +141,12 @@ def _measure_one(single: SingleJoint, how: _How, person: TerminalPerson) -> Cali
     return by_motion(single, person, how.margin_deg, how.search, how.zero.value)
 
 
-def _names(asked: list[str] | None) -> tuple[str, ...]:
+def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     """Give the joints to calibrate, in the order of the rig."""
     for name in asked or ():
-        if name not in JOINTS:
-            raise SetupError(f"--joint {name}: no such joint; there is {', '.join(JOINTS)}")
-    return tuple(name for name in JOINTS if not asked or name in asked)
+        if name not in rig.joints:
+            raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
+    return tuple(name for name in rig.names if not asked or name in asked)
 
 
 def refuse_unwritable(rig: str, out: Path | None) -> None:
@@ -166,12 +165,11 @@ def refuse_unwritable(rig: str, out: Path | None) -> None:
 
 def _hand(wire: Wires, servo_id: int) -> Callable[[int], None] | None:
     """Give what turns an emulated servo by some steps; None on real wires."""
-    bus = wire.bus
-    if bus is None:
+    if wire.buses is None:
         return None
 
     def turn(steps: int) -> None:
-        bus.command(f"turn {servo_id} {steps}")
+        wire.command(f"turn {servo_id} {steps}", "")
 
     return turn
 

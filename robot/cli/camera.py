@@ -25,11 +25,12 @@ from robot.calibrate.camera_steps import LensSteps, Neck, NeckStep, neck_angles,
 from robot.calibrate.charuco_board import BoardParams, CharucoBoard
 from robot.calibrate.charuco_page import RULER_MM, write_page
 from robot.calibrate.hand_eye import HandEye, HandEyeParams, camera_on_head
-from robot.cli.camera_neck import NECK, agrees, go_on, moving_neck
+from robot.cli.camera_neck import agrees, go_on, moving_neck
 from robot.cli.terminal import RigArgument, clear_errors, say, signals, status
 from robot.clock import RealClock
 from robot.frames import CameraParams
-from robot.kinematics import Kinematics
+from robot.kinematics import NECK, Kinematics
+from robot.rig_angles import lid_ends, neck_span
 from robot.seeing.intrinsics import intrinsics_of_lens
 from sim_mock.board_scene import BoardScene
 
@@ -262,8 +263,7 @@ def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEye
             f"{camera.lens.height_px}: calibrate it anew (--what all)"
         )
     lens = intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), width, height)
-    joints = [job.rig.joints[name] for name in NECK]
-    yaw, pitch, roll = ((radians(j.min_deg), radians(j.max_deg)) for j in joints)
+    yaw, pitch, roll = (neck_span(job.rig, name) for name in NECK)
     planned = neck_angles((yaw, pitch, roll), lens, width, height)
     views = []
     for step in neck_steps(neck, eye.look, eye.now_s, job.board, job.kinematics, planned):
@@ -304,12 +304,7 @@ def _first(job: _Job, eye: _Eye) -> Shot:
 
 
 def _kinematics(rig: Rig) -> Kinematics:
-    lids = rig.lid_joints
-    return Kinematics(
-        rig.geometry,
-        (radians(lids.left_shut_deg), radians(lids.right_shut_deg)),
-        (radians(lids.left_open_deg), radians(lids.right_open_deg)),
-    )
+    return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
 
 
 def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardParams:

@@ -6,26 +6,23 @@ from math import degrees
 from typing import Any
 
 from config.schema import Rig
-from drivers.dynamixel import DynamixelBus
 from drivers.errors import DriverError, SetupError
-from drivers.serial_port import BlockingPort
 from gaze.types import Angles3
 from robot.body import Body
 from robot.calibrate.camera_calibration import CameraCalibrationRefused
 from robot.cli.terminal import say
 from robot.clock import RealClock
+from robot.kinematics import NECK
+from robot.rig_angles import limits, park_rad
+from robot.rig_bus import rig_bus
 from robot.safety.guard import Guard
-from robot.types import JOINTS
 from sim_mock.board_scene import BoardScene
-
-NECK = tuple(name for name in JOINTS if name.startswith("neck_"))
 
 Stopped = Callable[[], str | None]
 """Gives why to stop, None while there is no reason."""
 
 _GENTLE_DEG_S = 15.0
 _SETTLE_S = 0.4
-_FIRST = JOINTS.index(NECK[0])
 
 
 class JoggedNeck:
@@ -39,7 +36,9 @@ class JoggedNeck:
     def turn(self, head_rad: Angles3) -> None:
         """Move gently; where the guard holds it back, what is measured counts."""
         go_on(self._stopped)
-        goal = {name: degrees(a) for name, a in zip(NECK, head_rad, strict=True)}
+        there = self._control.body.names
+        axes = zip(NECK, head_rad, strict=True)
+        goal = {name: degrees(a) for name, a in axes if name in there}
         moved = self._control.pose(goal)
         if moved.ended == "limp":
             raise SetupError("the torque went off on the way: see gazerig doctor, then begin anew")
@@ -49,7 +48,8 @@ class JoggedNeck:
         """Hold, and note where the head is."""
         moved = self._control.hold(seconds)
         go_on(self._stopped)
-        self._angles = moved.last.joints.position_rad[_FIRST : _FIRST + 3]
+        at = dict(zip(self._control.body.names, moved.last.joints.position_rad, strict=True))
+        self._angles = (at.get(NECK[0], 0.0), at.get(NECK[1], 0.0), at.get(NECK[2], 0.0))
         if self._mock is not None:
             self._mock.head_rad = self._angles
 
@@ -72,6 +72,11 @@ def moving_neck(
     from robot.bringup.jog import JogParams, ManualControl  # type: ignore[import-not-found, unused-ignore]
     from robot.cli.wires import wires  # type: ignore[import-not-found, unused-ignore]
 
+    if any(name not in rig.joints for name in NECK[:2]):
+        raise CameraCalibrationRefused(
+            "where the camera sits is found by turning the neck left, right, up and down, and "
+            "this rig's does not: measure its place and write it into camera.position_mm"
+        )
     say("hang the board upright, 0.5 to 1 m before the head, where it cannot move; the head")
     say("will look at it from several sides: keep your fingers away; Ctrl-C stops it")
     if mock is not None:
@@ -79,11 +84,10 @@ def moving_neck(
     elif not agrees(stopped, yes, "does the board hang, and is the head free to move?"):
         raise CameraCalibrationRefused("left out as you wished: nothing was written")
     with wires(rig, mock is not None, port) as wire:
-        setups = [rig.joints[name].setup() for name in JOINTS]
-        bus = DynamixelBus(BlockingPort(wire.path), setups, rig.bus.dynamixel)
-        guard = Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS))
+        body = Body(rig_bus(rig, wire.opened_by()), rig.joints, park_rad(rig))
+        guard = Guard(rig.guard, limits(rig.joints), rig.names)
         params = JogParams(speed_deg_s=_GENTLE_DEG_S)
-        control = ManualControl(Body(bus, rig.joints), guard, RealClock(), params, stopped)
+        control = ManualControl(body, guard, RealClock(), params, stopped)
         control.start()
         try:
             neck = JoggedNeck(control, mock, stopped)

@@ -1,50 +1,69 @@
 """The command ``gazerig emulate``: servos on a pseudo-terminal, for any program to open."""
 
 import json
-import re
 import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from config.schema import load_rig
-from drivers.dynamixel_table import BAUD_RATES, MODELS
 from drivers.errors import SetupError
+from drivers.servo_models import BusKind
 from robot.cli.terminal import clear_errors
-from robot.types import JOINTS
+from robot.emulated_rig import emulated_lines
 from sim_mock.emulate import Settings, run
 from sim_mock.emulate import say as say_line
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_habits import cases
+from sim_mock.emulated import BAUDS, CASES, CHANNELS, Emulated, MaestroLine
+from sim_mock.servo_words import DEFAULT_FIRMWARE, EXAMPLE, line_of
+from sim_mock.terminal_line import BusSettings
 
 app = typer.Typer()
 
 DEFAULT_BAUD = 1_000_000
-DEFAULT_FIRMWARE = ServoSpec(1, "xl330-m077").firmware
-MIDDLE = 2048
-HIGHEST_ID = 252
-EXAMPLE = "1-6:xl330-m077,7-9:xc330-m288"
-
-_PART = re.compile(r"(\d+)(?:-(\d+))?:([^@]+)(?:@(\d+))?")
+DEFAULT_DEVICE = MaestroLine().device
+_WHO: dict[BusKind, tuple[str, str]] = {
+    "dynamixel": ("Dynamixel servos", "servos know"),
+    "feetech": ("STS servos", "STS servos know"),
+    "maestro": ("a Maestro", "a Maestro's pins know"),
+}
+"""Each kind as it is named, and as it stands before its baud rates."""
 
 
 @app.command()
 def emulate(
     servos: Annotated[
         str | None,
-        typer.Option(metavar="IDS:MODEL,...", help=f"The servos, for example {EXAMPLE}."),
+        typer.Option(
+            metavar="IDS:MODEL,...",
+            help=f"The servos of one line, for example {EXAMPLE}, or 1-6:sts3215.",
+        ),
+    ] = None,
+    maestro: Annotated[
+        int | None,
+        typer.Option(
+            metavar="CHANNELS",
+            help="A Pololu Maestro with a hobby servo on each of its 6, 12, 18 or 24 channels.",
+        ),
     ] = None,
     rig: Annotated[
-        str | None, typer.Option(help="The servos and the baud rate of a rig instead.")
+        str | None, typer.Option(help="All buses of a rig instead, each with its own terminal.")
     ] = None,
     link: Annotated[
         Path | None,
-        typer.Option(help="Name under which to open it; kept over unplug and plug."),
+        typer.Option(
+            help="Name under which to open it; kept over unplug and plug. "
+            "A rig's further buses add their own names: LINK-NAME."
+        ),
     ] = None,
     baud: Annotated[
         int | None,
-        typer.Option(help=f"Baud rate of the servos in bit/s (default {DEFAULT_BAUD})."),
+        typer.Option(
+            help=f"Baud rate of the servos in bit/s (default {DEFAULT_BAUD}, or the rig's), "
+            "or of a Maestro's pins (default: its USB port, which takes any)."
+        ),
     ] = None,
     any_baud: Annotated[
         bool, typer.Option("--any-baud", help="Hear clients at every baud rate.")
@@ -53,14 +72,34 @@ def emulate(
         bool, typer.Option("--wire-time", help="Bytes take their time on the line.")
     ] = False,
     turnaround_us: Annotated[
-        float, typer.Option(min=0.0, max=10_000.0, help="With wire time: before each status.")
+        float, typer.Option(min=0.0, max=10_000.0, help="With wire time: before each answer.")
     ] = 0.0,
     firmware: Annotated[
-        int, typer.Option(min=1, max=255, help="Firmware version of all servos.")
-    ] = DEFAULT_FIRMWARE,
+        int | None,
+        typer.Option(
+            min=1,
+            max=255,
+            help=f"Firmware version of all servos (default {DEFAULT_FIRMWARE}); of STS servos "
+            "the number behind 3.",
+        ),
+    ] = None,
+    device: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=127, help=f"With --maestro: its device number (default {DEFAULT_DEVICE})."
+        ),
+    ] = None,
+    crc: Annotated[
+        bool, typer.Option("--crc", help="With --maestro: it wants a CRC behind every command.")
+    ] = False,
     case: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="CASE=VALUE", help=f"Choices: {', '.join(cases())}."),
+        typer.Option(
+            "--set",
+            metavar="CASE=VALUE",
+            help="Choices. "
+            + " ".join(f"Of {_WHO[kind][0]}: {', '.join(CASES[kind])}." for kind in CASES),
+        ),
     ] = None,
     until_eof: Annotated[
         bool, typer.Option("--until-eof", help="End when standard input ends.")
@@ -71,71 +110,107 @@ def emulate(
     Type `help` for the commands; Ctrl-C ends it.
     """
     with clear_errors():
-        if (servos is None) == (rig is None):
-            raise SetupError(f"name the servos: --servos {EXAMPLE}, or --rig NAME")
-        specs, rate = _of_rig(rig, firmware) if rig else (parse_servos(servos or "", firmware), 0)
-        settings = Settings(
-            servos=specs,
-            baud=None if any_baud else _known_baud(baud or rate or DEFAULT_BAUD),
-            wire_time=wire_time,
-            turnaround_us=turnaround_us,
-            link=None if link is None else str(link),
-            until_eof=until_eof,
-            choices=_choices(case or []),
-        )
+        if sum(one is not None for one in (servos, maestro, rig)) != 1:
+            raise SetupError(f"name the servos: --servos {EXAMPLE}, or --maestro 12, or --rig NAME")
+        _see_what_fits(maestro is not None, firmware, device, crc)
+        if servos is not None:
+            devices: Mapping[str, Emulated] = {"": line_of(servos, firmware, DEFAULT_BAUD)}
+        elif maestro is not None:
+            devices = {"": _board(maestro, device, crc)}
+        else:
+            devices = _of_rig(rig or "", firmware)
+        if baud is not None and len(devices) > 1:
+            raise SetupError("--baud: the buses of this rig have rates of their own; see its file")
+        buses = [
+            BusSettings(
+                _at(one, baud, any_baud),
+                name if len(devices) > 1 else None,
+                wire_time,
+                turnaround_us,
+                _link(link, name),
+            )
+            for name, one in devices.items()
+        ]
+        served = Settings(_chosen(buses, case or []), until_eof)
         try:
-            run(settings, _plain if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
+            run(served, _plain if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
         except ValueError as error:
             raise SetupError(str(error)) from None
 
 
-def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
-    """Read servos such as ``1-6:xl330-m077,7:xc330-m288@1024`` (@: start position in steps).
+def _see_what_fits(board: bool, firmware: int | None, device: int | None, crc: bool) -> None:
+    """Refuse options that mean nothing for what is emulated.
 
     Raises:
-        SetupError: names the part that is wrong and what would be right.
+        SetupError: names the option.
     """
-    specs: dict[int, ServoSpec] = {}
-    for part in text.split(","):
-        found = _PART.fullmatch(part.strip())
-        if found is None:
-            raise SetupError(f"--servos {part!r}: not IDS:MODEL, for example {EXAMPLE}")
-        first, last = int(found[1]), int(found[2] or found[1])
-        model, start = found[3].lower(), int(found[4] or MIDDLE)
-        if not first <= last <= HIGHEST_ID:
-            raise SetupError(f"--servos {part!r}: ids run upwards, from 0 to {HIGHEST_ID}")
-        if model not in MODELS:
-            raise SetupError(f"--servos {part!r}: unknown model; there is {', '.join(MODELS)}")
-        for servo_id in range(first, last + 1):
-            if servo_id in specs:
-                raise SetupError(
-                    f"--servos {part!r}: id {servo_id} is taken by a {specs[servo_id].model}; "
-                    "ids must differ (the command `collide` makes a collision)"
-                )
-            specs[servo_id] = ServoSpec(servo_id, model, start, firmware)
-    return tuple(specs.values())
+    if board and firmware is not None:
+        raise SetupError("--firmware: a Maestro does not tell its version over this line")
+    if not board and (crc or device is not None):
+        raise SetupError(f"{'--crc' if crc else '--device'}: only with --maestro")
 
 
-def _of_rig(name: str, firmware: int) -> tuple[tuple[ServoSpec, ...], int]:
-    """Give the servos of a rig, each in the middle of its joint's range, and their baud rate."""
-    rig = load_rig(name)
-    joints = [rig.joints[joint] for joint in JOINTS]
-    specs = [ServoSpec(j.id, j.model, round(j.steps(0.0)), firmware) for j in joints]
-    return tuple(specs), rig.bus.dynamixel.baud
+def _board(channels: int, device: int | None, crc: bool) -> MaestroLine:
+    if channels not in CHANNELS:
+        sizes = ", ".join(map(str, CHANNELS))
+        raise SetupError(f"--maestro {channels}: a board has {sizes} channels")
+    return MaestroLine(channels, DEFAULT_DEVICE if device is None else device, crc)
 
 
-def _known_baud(baud: int) -> int:
-    if baud not in BAUD_RATES:
-        raise SetupError(f"--baud {baud}: servos know {', '.join(map(str, BAUD_RATES))}")
-    return baud
+def _of_rig(name: str, firmware: int | None) -> dict[str, Emulated]:
+    """Give what is on every bus of a rig by the bus's name, "" for the only one."""
+    lines = {bus: _aged(one, firmware) for bus, one in emulated_lines(load_rig(name)).items()}
+    return lines if len(lines) > 1 else {"": one for one in lines.values()}
 
 
-def _choices(given: list[str]) -> dict[str, str]:
-    pairs = [text.partition("=") for text in given]
-    for text, (_, equals, value) in zip(given, pairs, strict=True):
-        if not equals or not value:
-            raise SetupError(f"--set {text}: not CASE=VALUE; cases: {', '.join(cases())}")
-    return {name: value for name, _, value in pairs}
+def _aged(line: Emulated, firmware: int | None) -> Emulated:
+    """Give all servos of a line one firmware; None: that which they have."""
+    if firmware is None or isinstance(line, MaestroLine):
+        return line
+    return replace(line, servos=tuple(s._replace(firmware=firmware) for s in line.servos))
+
+
+def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
+    """Give a device at another baud rate, None for its own.
+
+    Raises:
+        SetupError: it does not know this rate.
+    """
+    known = BAUDS[device.kind]
+    if baud is not None and baud not in known:
+        rates = ", ".join(map(str, known))
+        raise SetupError(f"--baud {baud}: {_WHO[device.kind][1]} {rates}")
+    if baud is None and not any_baud:
+        return device
+    return replace(device, baud=None if any_baud else baud)
+
+
+def _link(link: Path | None, bus: str) -> str | None:
+    """Give the link to a bus; names tell those of a rig apart."""
+    if link is None:
+        return None
+    return f"{link}-{bus}" if bus else str(link)
+
+
+def _chosen(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSettings, ...]:
+    """Give every bus the choices that its kind knows.
+
+    Raises:
+        SetupError: one is no choice, or nobody knows its case.
+    """
+    known = {case: None for bus in buses for case in CASES[bus.device.kind]}
+    choices = {}
+    for text in given:
+        name, _, value = text.partition("=")
+        if not name or not value:
+            raise SetupError(f"--set {text}: not CASE=VALUE; cases: {', '.join(known)}")
+        if name.replace("_", "-") not in known:
+            raise SetupError(f"--set {text}: unknown case; there is {', '.join(known)}")
+        choices[name.replace("_", "-")] = value
+    return tuple(
+        replace(bus, choices={k: v for k, v in choices.items() if k in CASES[bus.device.kind]})
+        for bus in buses
+    )
 
 
 def _plain(line: str) -> None:

@@ -41,7 +41,12 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "record-camera": (
         ("record-camera seen.mcap --oak", "keep pictures, depth and times of a camera"),
     ),
-    "emulate": (("emulate --servos 1-9:xl330-m077", "servos on a pseudo-terminal"),),
+    "emulate": (
+        ("emulate --servos 1-9:xl330-m077", "servos on a pseudo-terminal"),
+        ("emulate --servos 1-6:sts3215", "servos of Feetech"),
+        ("emulate --maestro 12", "a Pololu Maestro with twelve hobby servos"),
+        ("emulate --rig my.yaml", "every bus of a rig, each on its own terminal"),
+    ),
     "fit-scanpath": (
         ("fit-scanpath gaze.csv --parts boxes.yaml", "a walk from an eye tracker's samples"),
     ),

@@ -11,12 +11,11 @@ from rich.live import Live
 from rich.table import Table
 
 from config.schema import load_rig
-from robot.body import JointParams
 from robot.bringup.monitor import Look, Monitor, Sample, as_json
 from robot.cli.terminal import RigArgument, clear_errors, signals
 from robot.cli.wires import MockOption, PortOption, registers, wires
 from robot.clock import RealClock
-from robot.types import JOINTS
+from robot.joint import JointParams
 
 app = typer.Typer()
 
@@ -36,8 +35,11 @@ def monitor(
     """Watch all servos; reads alone: nothing is written, torque stays as it is."""
     with clear_errors(), signals() as stopped:
         found, clock = load_rig(rig), RealClock()
-        with wires(found, mock, port) as wire, registers(found, wire.path, tries=1) as (regs, line):
-            joints = {name: found.joints[name] for name in JOINTS}
+        with (
+            wires(found, mock, port) as wire,
+            registers(wire.paths[""], found.bus.baud, tries=1) as (regs, line),
+        ):
+            joints = {name: found.joints[name] for name in found.names}
             watch = Monitor(regs, joints, line.now_s)
             samples = _samples(watch, clock, rate, 0.0 if once else seconds, stopped)
             if as_lines:

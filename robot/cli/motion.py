@@ -4,15 +4,13 @@ import contextlib
 import select
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from math import inf
+from math import degrees, inf
 from typing import Annotated
 
 import typer
 
 from config.schema import Rig, load_rig
-from drivers.dynamixel import DynamixelBus
 from drivers.errors import DriverError
-from drivers.serial_port import BlockingPort
 from robot.body import Body
 from robot.bringup.applied import PASSING, Moved, Step
 from robot.bringup.jog import JogParams, ManualControl, refuse_unknown
@@ -21,10 +19,11 @@ from robot.bus_events import drawn_together
 from robot.cli import calibrations as cli_calibrations
 from robot.cli import monitor as cli_monitor
 from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
-from robot.cli.wires import MockOption, PortOption, RigOption, wires
+from robot.cli.wires import MockOption, PortOption, RigOption, Wires, wires
 from robot.clock import RealClock
+from robot.rig_angles import lid_ends, limits, park_rad
+from robot.rig_bus import rig_bus
 from robot.safety.guard import Guard
-from robot.types import JOINTS
 
 app = typer.Typer()
 app.add_typer(cli_calibrations.app)
@@ -58,8 +57,8 @@ def jog(
 ) -> None:
     """Move one joint slowly while the others hold: gazerig jog neck_yaw 20."""
     with clear_errors():
-        refuse_unknown({joint: deg})
         loaded = load_rig(rig)
+        refuse_unknown({joint: deg}, loaded.names)
     with _commanded(loaded, mock, port, speed, hold, not no_park) as control:
         moved = control.jog(joint, deg)
         _report(moved, (joint,))
@@ -78,12 +77,11 @@ def home(
     """Move slowly to the centre: all joints to 0 deg, lids open; then torque off."""
     with clear_errors():
         loaded = load_rig(rig)
-    centre = dict.fromkeys(JOINTS, 0.0)
-    centre["left_upper_lid"] = loaded.lid_joints.left_open_deg
-    centre["right_upper_lid"] = loaded.lid_joints.right_open_deg
+    centre = dict.fromkeys(loaded.names, 0.0)
+    centre.update({name: degrees(wide) for name, (_, wide) in lid_ends(loaded).items()})
     with _commanded(loaded, mock, port, speed, hold, False) as control:
         moved = control.pose(centre)
-        _report(moved, JOINTS)
+        _report(moved, loaded.names)
         _stay(control, 0.0, hold)
     _exit_unless(moved.arrived)
 
@@ -124,26 +122,27 @@ def _commanded(
     """Give a rig that holds where it is; whatever happens, it ends with the torque off."""
     with clear_errors(), signals() as stopped, wires(rig, mock, port) as wire:
         enter = _enter if hold and sys.stdin.isatty() else _never
-        control = _control(rig, wire.path, speed, lambda: stopped() or enter())
+        control = _control(rig, wire, speed, lambda: stopped() or enter())
         control.start()
         try:
             _tell(control.body.bus.events())
-            say(f"torque on: {len(JOINTS)} servos hold where they are; Ctrl-C switches it off")
+            say(f"torque on: {len(rig.names)} servos hold where they are; Ctrl-C switches it off")
             yield control
         finally:
             _leave(control, rig, park)
 
 
-def _control(rig: Rig, path: str, speed: float, stopped: Callable[[], str | None]) -> ManualControl:
-    setups = [rig.joints[name].setup(name) for name in JOINTS]
-    bus = DynamixelBus(BlockingPort(path), setups, rig.bus.dynamixel)
-    guard = Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS))
+def _control(
+    rig: Rig, wire: Wires, speed: float, stopped: Callable[[], str | None]
+) -> ManualControl:
+    body = Body(rig_bus(rig, wire.opened_by()), rig.joints, park_rad(rig))
+    guard = Guard(rig.guard, limits(rig.joints), rig.names)
     gentle = rig.guard.gentle_speed_deg_s
     if speed > gentle:
         say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
     params = JogParams(speed_deg_s=min(speed, gentle))
     watch = _StatusLine().show if sys.stderr.isatty() else None
-    return ManualControl(Body(bus, rig.joints), guard, RealClock(), params, stopped, watch)
+    return ManualControl(body, guard, RealClock(), params, stopped, watch)
 
 
 class _StatusLine:

@@ -17,7 +17,6 @@ from drivers.errors import SetupError
 from robot.cli.run import host_port
 from robot.cli.terminal import FAULT, clear_errors, say, signals
 from robot.loop import Tick
-from robot.types import JOINTS
 
 if TYPE_CHECKING:
     from robot.page.snapshot import ShownRig
@@ -207,7 +206,7 @@ def _built(config_yaml: str) -> "ShownRig | None":
             return None
     return ShownRig(
         gaze_parts(rig, 0)[0],
-        tuple(rig.joints[name].limit() for name in JOINTS),
+        tuple(rig.joints[name].limit() for name in rig.names),
         rig.guard.health,
         CameraMount(rig.camera),
         radians(rig.camera.horizontal_field_deg),

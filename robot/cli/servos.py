@@ -29,7 +29,7 @@ from robot.bringup.servo_report import as_plain, grouped, remarks, servo_plain, 
 from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, status
 from robot.cli.wires import MockOption, PortOption, wires
 from robot.clock import RealClock
-from robot.types import JOINTS
+from sim_mock.emulated import DynamixelLine
 from sim_mock.servo_physics import ServoSpec
 
 app = typer.Typer()
@@ -52,8 +52,9 @@ def open_port(
     baud: int | None = None,
 ) -> Iterator[BlockingPort]:
     """Give the port to use, closed again at the end; options as for cli_wires.wires."""
-    with wires(rig, mock, port, servos, baud) as wire:
-        line = BlockingPort(wire.path)
+    devices = None if servos is None else {"": DynamixelLine(tuple(servos), baud)}
+    with wires(rig, mock, port, devices) as wire:
+        line = BlockingPort(wire.paths[""])
         try:
             yield line
         finally:
@@ -62,7 +63,7 @@ def open_port(
 
 def rig_setups(rig: Rig) -> list[ServoSetup]:
     """Give what the bus must know of a rig's servos."""
-    return [rig.joints[name].setup(name) for name in JOINTS]
+    return [rig.joints[name].setup(name) for name in rig.names]
 
 
 def console() -> Console:
@@ -259,9 +260,9 @@ def setup(
     """Give each servo its id and baud rate, one servo connected at a time, told in steps."""
     with clear_errors():
         model = load_rig(rig)
-        names = _known_joints(joint or JOINTS)
+        names = _known_joints(joint or model.names, model.names)
         say(
-            f"{rig}: {len(names)} of {len(JOINTS)} servos to set up for "
+            f"{rig}: {len(names)} of {len(model.names)} servos to set up for "
             f"{model.bus.dynamixel.baud} bit/s. Switch the servo supply off before you plug or "
             "unplug one."
         )
@@ -275,10 +276,10 @@ def setup(
         say(f"done: {len(names) - len(left)} of {len(names)}. Next: gazerig doctor {rig}")
 
 
-def _known_joints(names: Sequence[str]) -> tuple[str, ...]:
+def _known_joints(names: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
     for name in names:
-        if name not in JOINTS:
-            raise SetupError(f"--joint {name}: unknown; joints are {', '.join(JOINTS)}")
+        if name not in known:
+            raise SetupError(f"--joint {name}: unknown; joints are {', '.join(known)}")
     return tuple(names)
 
 
@@ -291,7 +292,7 @@ def _step(rig: Rig, name: str, port: str | None, mock: bool, yes: bool) -> bool:
     """Set one joint's servo up, again and again until it is done or skipped."""
     joint = rig.joints[name]
     # A servo as it comes from the factory.
-    fresh = [ServoSpec(FACTORY_ID, joint.model, joint.zero_step)]
+    fresh = [ServoSpec(FACTORY_ID, joint.model, joint.zero)]
     while True:
         if not yes and not _go_on("   Enter: it is connected; s: skip this one; Ctrl-C: end "):
             return False
@@ -359,12 +360,12 @@ def _servo_id(rig: Rig, text: str) -> int:
         return rig.joints[text].id
     if text.isdecimal() and int(text) <= 252:
         return int(text)
-    raise SetupError(f"{text}: neither an id from 0 to 252 nor a joint ({', '.join(JOINTS)})")
+    raise SetupError(f"{text}: neither an id from 0 to 252 nor a joint ({', '.join(rig.names)})")
 
 
 def _reboot(wires: BlockingPort, rig: Rig, servo_id: int, baud: int, yes: bool) -> bool:
     """Restart one servo; tells whether it has latched an error again."""
-    names = [f"{name} (servo {servo_id})" for name in JOINTS if rig.joints[name].id == servo_id]
+    names = [f"{name} (servo {servo_id})" for name in rig.names if rig.joints[name].id == servo_id]
     name = names[0] if names else f"servo {servo_id}"
     servo_reboot.present(wires, servo_id, baud)
     before = servo_reboot.standing(wires, servo_id)

@@ -1,7 +1,7 @@
-"""The way to the servos that commands share: a rig, its port, another port, or an emulated bus."""
+"""The way to the servos that commands share: a rig, its ports, other ports, or emulated buses."""
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Annotated, NamedTuple
 
 import typer
@@ -10,59 +10,81 @@ from config.schema import Rig
 from drivers.dynamixel_registers import Registers
 from drivers.errors import PortError, SetupError
 from drivers.serial_port import BlockingPort
-from robot.emulated_rig import emulated_servos
-from sim_mock.pty_bus import PtyBus
-from sim_mock.servo_physics import ServoSpec
+from robot.emulated_rig import emulated_lines
+from robot.rig_bus import bus_names, ports_of
+from sim_mock.emulated import Emulated
+from sim_mock.pty_bus import PtyBuses
 
 MockOption = Annotated[
     bool, typer.Option("--mock", help="Emulated servo bus instead of the rig's.")
 ]
-PortOption = Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")]
+PortOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PORT", help="Serial port instead of the rig's; NAME=PORT for a further bus."
+    ),
+]
 RigOption = Annotated[
     str, typer.Option(metavar="RIG", help="A rig's YAML file, or the name of a shipped rig.")
 ]
 
 
 class Wires(NamedTuple):
-    """A serial port by path, and the emulated bus behind it where there is one."""
+    """Serial ports by the names of their buses, and what is emulated behind them, if it is."""
 
-    path: str
-    bus: PtyBus | None
+    paths: Mapping[str, str]
+    buses: PtyBuses | None
+
+    def opened_by(self) -> dict[str, BlockingPort]:
+        """Give the ports, not opened yet."""
+        return {name: BlockingPort(path) for name, path in self.paths.items()}
+
+    def command(self, text: str, bus: str) -> None:
+        """Let something happen to what is emulated on a bus; does nothing on real wires.
+
+        Raises:
+            ValueError: names the word that is wrong and what would be right.
+        """
+        if self.buses is not None:
+            self.buses.command(text, bus)
 
 
 @contextlib.contextmanager
 def wires(
-    rig: Rig,
-    mock: bool,
-    port: str | None,
-    servos: Sequence[ServoSpec] | None = None,
-    baud: int | None = None,
+    rig: Rig, mock: bool, port: str | None, devices: Mapping[str, Emulated] | None = None
 ) -> Iterator[Wires]:
-    """Give the port to open; an emulated bus ends with the block.
+    """Give the ports to open; emulated buses end with the block.
 
-    servos, baud: emulated ones instead of the rig's
+    devices: what is emulated on some buses instead of the rig's servos
 
     Raises:
-        drivers.errors.SetupError: the options exclude each other.
+        drivers.errors.SetupError: the options exclude each other, or name no bus of the rig.
     """
     if mock and port is not None:
         raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
     if not mock:
-        yield Wires(port if port is not None else rig.bus.port, None)
+        yield Wires(ports_of(rig, port), None)
         return
-    with PtyBus() as bus:
-        chain = servos if servos is not None else emulated_servos(rig)
-        yield Wires(bus.start(chain, baud=baud or rig.bus.dynamixel.baud), bus)
+    with PtyBuses() as buses:
+        lines = {**emulated_lines(rig), **(devices or {})}
+        yield Wires(buses.start(lines), buses)
+
+
+def bus_label(rig: Rig, name: str) -> str:
+    """Call a bus by its name where a rig has several: "the bus", "bus lids"."""
+    if len(bus_names(rig)) == 1:
+        return "the bus"
+    return f"bus {name}" if name else "the main bus"
 
 
 @contextlib.contextmanager
-def registers(rig: Rig, path: str, tries: int = 3) -> Iterator[tuple[Registers, BlockingPort]]:
-    """Open a port for single registers at the rig's baud rate; nothing is sent.
+def registers(path: str, baud: int, tries: int = 3) -> Iterator[tuple[Registers, BlockingPort]]:
+    """Open a port for single registers of Dynamixel servos; nothing is sent.
 
     Raises:
         drivers.errors.PortError: it is absent, busy, not permitted, or has no such rate.
     """
-    port, baud = BlockingPort(path), rig.bus.dynamixel.baud
+    port = BlockingPort(path)
     if not port.setBaudRate(baud):
         raise PortError(f"{path} cannot run at {baud} bit/s: choose 57600 or 1000000")
     try:

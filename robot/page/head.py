@@ -11,7 +11,7 @@ import viser
 from viser import transforms
 
 from gaze.angles import add, norm, rotate, rotate_back, sub
-from gaze.types import Vec3
+from gaze.types import Mat3, Vec3
 from robot.page.mesh import Mesh, cap, ellipsoid, lid, ring, turned
 from robot.page.place import Turn, along, put, quaternion, turn_to, turned_up, upright_along
 from robot.types import Snapshot
@@ -40,31 +40,41 @@ _AHEAD = np.array((((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),))
 SHELL_MIDDLE_M = (-0.078, 0.0, 0.004)
 SHELL_HALF_AXES_M = (0.084, 0.074, 0.098)
 _NECK_TOP_M = (-0.062, 0.0, -0.075)
-# Edge of the upper lid above the eye's equator, shut and wide open; the lower lid is still.
+# Edges of the lids above the eye's equator: where they meet, and each wide open. A lower lid
+# that no servo moves stands where they meet.
 _SHUT_RAD = radians(-24.0)
 _OPEN_RAD = radians(48.0)
+_LOWER_OPEN_RAD = radians(-46.0)
+
+SIDES = ("left", "right")
 
 
 class _Eye(NamedTuple):
+    side: str
     ball: viser.FrameHandle
     sight: viser.LineSegmentsHandle
     lids: viser.FrameHandle
     upper: viser.FrameHandle
+    lower: viser.MeshHandle
 
 
 class HeadView:
-    """The rig in the scene."""
+    """The rig in the scene, with those parts that its joints move."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Put neck, head and eyes into the scene, at rest."""
+        """Put neck, head and eyes into the scene, at rest, as if every joint were there."""
         self._scene = scene
-        self._add_stand()
+        self._joints: tuple[str, ...] = ()
+        self._stand = self._add_stand()
+        self._post = self._add("/post", turned([(0.022, 0.0), (0.022, 1.0)]), _METAL)
+        self._post.visible = False
         self._neck = self._add("/neck", turned([(0.024, 0.0), (0.020, 1.0)]), _TRIM)
         self._head = scene.add_frame("/head", show_axes=False)
         self._add_shell()
-        self._eyes = (self._add_eye("left"), self._add_eye("right"))
+        self._eyes = tuple(self._add_eye(side) for side in SIDES)
         self._colour = _SIGHT["fixate"]
-        self._neck_m = 1.0
+        self._neck_m = self._post_m = 1.0
+        self._necked = True
 
     def _add(
         self, name: str, mesh: Mesh, colour: Colour, at_m: Vec3 = (0.0, 0.0, 0.0)
@@ -79,11 +89,14 @@ class HeadView:
             position=at_m,
         )
 
-    def _add_stand(self) -> None:
+    def _add_stand(self) -> tuple[viser.MeshHandle, ...]:
+        """Add foot, column and the joint on it; give what only a rig with a neck has."""
         foot = [(0.0, 0.0), (0.085, 0.0), (0.085, 0.0), (0.080, 0.014), (0.080, 0.014)]
         column = [(0.034, 0.022), (0.030, 0.05), (0.028, -FLOOR_M), (0.0, -FLOOR_M)]
-        self._add("/stand", turned(foot + column), _METAL, (0.0, 0.0, FLOOR_M))
-        self._add("/joint", cap(0.031, pi, 24), _TRIM)
+        return (
+            self._add("/stand", turned(foot + column), _METAL, (0.0, 0.0, FLOOR_M)),
+            self._add("/joint", cap(0.031, pi, 24), _TRIM),
+        )
 
     def _add_shell(self) -> None:
         self._add("/head/shell", ellipsoid(SHELL_HALF_AXES_M, 0.86, 33), _SHELL, SHELL_MIDDLE_M)
@@ -111,9 +124,9 @@ class HeadView:
         sight = self._scene.add_line_segments(
             f"{name}/sight", _AHEAD, _SIGHT["fixate"], thickness=2.0, thickness_units="screen"
         )
-        return _Eye(ball, sight, *self._add_lids(side))
+        return _Eye(side, ball, sight, *self._add_lids(side))
 
-    def _add_lids(self, side: str) -> tuple[viser.FrameHandle, viser.FrameHandle]:
+    def _add_lids(self, side: str) -> tuple[viser.FrameHandle, viser.FrameHandle, viser.MeshHandle]:
         name = f"/head/lids_{side}"
         lids = self._scene.add_frame(name, show_axes=False)
         upper = self._scene.add_frame(f"{name}/upper", show_axes=False)
@@ -123,28 +136,68 @@ class HeadView:
         rim = self._add(f"{name}/rim", ring(1.14 * EYE_RADIUS_M, 0.0026), _TRIM, (0.001, 0.0, 0.0))
         outwards = radians(26.0) if side == "left" else radians(-26.0)
         rim.wxyz = transforms.SO3.from_z_radians(outwards).wxyz
-        return lids, upper
+        return lids, upper, lower
 
     def show(self, snapshot: Snapshot) -> None:
         """Move everything to where it was measured."""
+        if snapshot.joints != self._joints:
+            self._have(snapshot.joints)
         R_world_head, p_world_head_m = snapshot.R_world_head, snapshot.p_world_head_m
         put(self._head, p_world_head_m, quaternion(R_world_head))
-        self._stretch_neck(add(p_world_head_m, rotate(R_world_head, _NECK_TOP_M)))
+        self._hold_up(R_world_head, p_world_head_m)
         colour = _SIGHT.get(snapshot.phase, _SIGHT["fixate"])
         sides = zip(
-            self._eyes, snapshot.p_world_eyes_m, snapshot.gaze_world, snapshot.lids, strict=True
+            self._eyes,
+            snapshot.p_world_eyes_m,
+            snapshot.gaze_world,
+            snapshot.lids,
+            self._lower(snapshot),
+            strict=True,
         )
-        for eye, p_world_m, gaze_world, opening in sides:
+        for eye, p_world_m, gaze_world, opening, lower in sides:
             p_head_m = rotate_back(R_world_head, sub(p_world_m, p_world_head_m))
             put(eye.ball, p_head_m, along(rotate_back(R_world_head, gaze_world)))
             put(eye.lids, p_head_m)
             turn_to(eye.upper, lid_turn(opening))
+            turn_to(eye.lower, lower_lid_turn(lower))
             # As far as the target is: the lines meet there only if the eyes truly fixate it.
             eye.sight.scale = round(dist(p_world_m, snapshot.p_world_target_m), 2)
         if colour != self._colour:
             self._colour = colour
             for eye in self._eyes:
                 eye.sight.colors = np.array(colour, np.uint8)
+
+    def _have(self, joints: tuple[str, ...]) -> None:
+        """Draw what these joints move, and what stands still beside it."""
+        self._joints = joints
+        self._necked = any(joint.startswith("neck_") for joint in joints)
+        for part in (*self._stand, self._neck):
+            part.visible = self._necked
+        self._post.visible = not self._necked
+        for eye in self._eyes:
+            eye.upper.visible = f"{eye.side}_upper_lid" in joints
+            # An upper lid shuts upon a lower one, moved or not.
+            eye.lower.visible = eye.upper.visible or f"{eye.side}_lower_lid" in joints
+
+    def _lower(self, snapshot: Snapshot) -> list[float]:
+        """Give how far the lower lids are open; one that nothing moves stands where they meet."""
+        openings = snapshot.lower_lids or (0.0, 0.0)
+        return [
+            opening if f"{side}_lower_lid" in self._joints else 0.0
+            for side, opening in zip(SIDES, openings, strict=True)
+        ]
+
+    def _hold_up(self, R_world_head: Mat3, p_world_head_m: Vec3) -> None:
+        """Put a neck, or where there is none a post, between the table and the head."""
+        if self._necked:
+            self._stretch_neck(add(p_world_head_m, rotate(R_world_head, _NECK_TOP_M)))
+            return
+        x, y, z = add(p_world_head_m, SHELL_MIDDLE_M)
+        length = max(0.01, round(z - 0.9 * SHELL_HALF_AXES_M[2] - FLOOR_M, 4))
+        put(self._post, (x, y, FLOOR_M))
+        if length != self._post_m:
+            self._post_m = length
+            self._post.scale = (1.0, 1.0, length)
 
     def _stretch_neck(self, top_m: Vec3) -> None:
         """Lay the column, which stands along z, onto the way from base to head."""
@@ -158,3 +211,8 @@ class HeadView:
 def lid_turn(opening: float) -> Turn:
     """Give the turn of an upper lid that is open so far, 0..1."""
     return turned_up(_SHUT_RAD + opening * (_OPEN_RAD - _SHUT_RAD))
+
+
+def lower_lid_turn(opening: float) -> Turn:
+    """Give the turn of a lower lid that is open so far, 0..1."""
+    return turned_up(_SHUT_RAD + opening * (_LOWER_OPEN_RAD - _SHUT_RAD))

@@ -5,7 +5,7 @@ from typing import Literal
 
 from robot.page.status import OLD_PICTURE_S
 from robot.page.style import AMBER, GREEN, GREY, LEVELS, RED, frame, heading, note, pill
-from robot.types import JOINTS, Servos, Snapshot, Timing
+from robot.types import Servos, Snapshot, Timing
 
 Strain = Literal["", "near", "over"]
 """How a figure stands to its limit."""
@@ -20,6 +20,10 @@ _GROUNDS: dict[Strain, str] = {
 }  # noqa: E501
 _TABLE = "width:100%;font-size:12px;border-collapse:collapse;line-height:1.55"
 _RIGHT = "text-align:right;padding:0 4px"
+_NOTHING = "text-align:center;padding:0 4px;opacity:.6;font-style:italic"
+
+NO_FEEDBACK = "no feedback"
+"""Said in the place of figures that a servo does not tell."""
 
 
 def health(snapshot: Snapshot) -> str:
@@ -30,7 +34,7 @@ def health(snapshot: Snapshot) -> str:
     return frame(
         f"<div style='min-height:3em'>{pill(f'guard: {level}', LEVELS[level])}{said}</div>"
         + heading("servos")
-        + servo_table(snapshot.servos)
+        + servo_table(snapshot.servos, snapshot.joints, snapshot.reckoned)
         + heading("loop and picture")
         + _timing(snapshot.timing)
         + _picture(snapshot.picture_age_s)
@@ -39,39 +43,54 @@ def health(snapshot: Snapshot) -> str:
     )
 
 
-def servo_table(servos: Servos) -> str:
-    """Give a row a joint: temperature, load, voltage, ticks without an answer, faults."""
+def servo_table(servos: Servos, joints: tuple[str, ...], reckoned: tuple[str, ...] = ()) -> str:
+    """Give a row a joint: temperature, load, voltage, ticks without an answer, faults.
+
+    reckoned: joints whose servos tell nothing
+    """
     if not servos.age_s:
         return note("nothing is known of the servos yet")
     names = ("", "&deg;C", "load", "V", "silent", "")
     head = "".join(f"<th style='font-weight:400;opacity:.7;{_RIGHT}'>{name}</th>" for name in names)
-    rows = "".join(_row(servos, i) for i in range(len(servos.age_s)))
+    rows = "".join(_row(servos, i, name, name in reckoned) for i, name in enumerate(joints))
     explained = (
         "amber: the guard slows the joint down; red: it stands still, or the servo is silent or "
         "at fault. silent: ticks without an answer"
     )
+    if reckoned:
+        explained += (
+            f". {NO_FEEDBACK}: the servo tells nothing, neither where it is nor how it does; a "
+            "joint that jams or a rod that came off is not noticed"
+        )
     return f"<table style='{_TABLE}'><tr>{head}</tr>{rows}</table>{note(explained)}"
 
 
-def _row(servos: Servos, i: int) -> str:
+def _row(servos: Servos, i: int, joint: str, reckoned: bool) -> str:
+    silent = servos.unanswered[i] if servos.unanswered else None
+    late: Strain = "over" if servos.age_s[i] > _OLD_S else ""
+    figures = f"<td colspan='3' style='{_NOTHING}'>{NO_FEEDBACK}</td>"
+    said = _said(servos, i)
+    colour = RED if said != "torque off" else GREY
+    more = f"<div style='color:{colour};font-weight:600;font-size:11px'>{escape(said)}</div>"
+    return (
+        f"<tr style='border-top:1px solid #8882'><td>{escape(joint.replace('_', ' '))}"
+        f"{more if said else ''}</td>{figures if reckoned else _figures(servos, i)}"
+        f"{_cell('-' if silent is None else str(silent), late)}<td></td></tr>"
+    )
+
+
+def _figures(servos: Servos, i: int) -> str:
+    """Give temperature, load and voltage."""
     warmth, load, volts = (
         _at(servos.temperature_c, i),
         _at(servos.load, i),
         _at(servos.voltage_v, i),
     )
-    silent = servos.unanswered[i] if servos.unanswered else None
-    age_s = servos.age_s[i]
-    cells = (
-        _cell("-" if warmth is None else f"{warmth:.0f}", strain_of_heat(servos, i)),
-        _cell("-" if load is None else f"{100.0 * load:+.0f} %", strain_of_load(servos, i)),
-        _cell("-" if volts is None else f"{volts:.1f}", strain_of_voltage(servos, i)),
-        _cell("-" if silent is None else str(silent), "over" if age_s > _OLD_S else ""),
+    return (
+        _cell("-" if warmth is None else f"{warmth:.0f}", strain_of_heat(servos, i))
+        + _cell("-" if load is None else f"{100.0 * load:+.0f} %", strain_of_load(servos, i))
+        + _cell("-" if volts is None else f"{volts:.1f}", strain_of_voltage(servos, i))
     )
-    said = _said(servos, i)
-    colour = RED if said != "torque off" else GREY
-    more = f"<div style='color:{colour};font-weight:600;font-size:11px'>{escape(said)}</div>"
-    name = f"<td>{JOINTS[i].replace('_', ' ')}{more if said else ''}</td>"
-    return f"<tr style='border-top:1px solid #8882'>{name}{''.join(cells)}<td></td></tr>"
 
 
 def _said(servos: Servos, i: int) -> str:

@@ -1,6 +1,7 @@
 """Sliders that put joints at angles, each with the joint's limits and its measured angle."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from html import escape
 from math import degrees, radians
 
 import viser
@@ -16,6 +17,8 @@ _FOLLOWS_DEG = 0.15
 _FREE_AFTER_S = 0.5
 """A jogged joint whose wish is another for this long is no longer jogged."""
 _SAME_DEG = 0.3
+MEASURED, RECKONED = "measured", "reckoned (not measured)"
+_RIGHT = "text-align:right"
 _TABLE_EVERY = 5  # with every fifth picture, some 5 times a second: figures are to be read
 
 
@@ -86,8 +89,10 @@ class JogView:
         if snapshot.t_s < self._now_s:  # the rig's clock was started anew
             self._held.clear()
         self._now_s = snapshot.t_s
+        places = {joint: i for i, joint in enumerate(snapshot.joints)}
         for joint, slider in self._sliders.items():
-            i = JOINTS.index(joint)
+            if (i := places.get(joint)) is None:
+                continue
             self._note_held(joint, degrees(snapshot.wish_rad[i]), bool(snapshot.stopped))
             angle_deg = degrees(snapshot.measured_rad[i])
             if joint not in self._held and abs(slider.value - angle_deg) > _FOLLOWS_DEG:
@@ -113,16 +118,41 @@ class JogView:
 
 
 def measured_table(snapshot: Snapshot) -> str:
-    """List every joint's wish and measured angle in degrees, as HTML."""
+    """List every joint's wish and measured angle in degrees, as HTML.
+
+    What nobody measures stands in a column of its own: a reckoned angle looks like any other.
+    """
+    reckoned = frozenset(snapshot.reckoned)
+    columns = ["wish"]
+    if not reckoned.issuperset(snapshot.joints):
+        columns.append(MEASURED)
+    if reckoned:
+        columns.append(RECKONED)
+    joints = zip(snapshot.joints, snapshot.wish_rad, snapshot.measured_rad, strict=True)
     rows = "".join(
-        f"<tr><td>{joint.replace('_', ' ')}</td>"
-        f"<td style='text-align:right'>{degrees(wish):.1f}</td>"
-        f"<td style='text-align:right'>{degrees(now):.1f}</td></tr>"
-        for joint, wish, now in zip(JOINTS, snapshot.wish_rad, snapshot.measured_rad, strict=True)
+        _row(
+            escape(joint.replace("_", " ")),
+            [degrees(wish), *_under(columns[1:], joint in reckoned, degrees(now))],
+        )
+        for joint, wish, now in joints
     )
+    head = "".join(f"<td style='{_RIGHT}'>{words}</td>" for words in columns)
     return (
         "<table style='margin:4px 12px;font-size:12px;width:calc(100% - 24px);"
         "font-variant-numeric:tabular-nums'><tr style='opacity:.6'><td>degrees</td>"
-        "<td style='text-align:right'>wish</td><td style='text-align:right'>measured</td></tr>"
-        f"{rows}</table>"
+        f"{head}</tr>{rows}</table>"
     )
+
+
+def _under(columns: Sequence[str], reckoned: bool, angle_deg: float) -> list[float | None]:
+    """Put an angle under what it is."""
+    kind = RECKONED if reckoned else MEASURED
+    return [angle_deg if column == kind else None for column in columns]
+
+
+def _row(name: str, angles_deg: Sequence[float | None]) -> str:
+    cells = "".join(
+        f"<td style='{_RIGHT}'>{'' if angle is None else f'{angle:.1f}'}</td>"
+        for angle in angles_deg
+    )
+    return f"<tr><td>{name}</td>{cells}</tr>"

@@ -48,7 +48,8 @@ def hint(knob: PageKnob) -> str:
         parts.append(f"from {knob.low:g} to {knob.high:g}{unit}")
     if knob.choices:
         parts.append("one of " + ", ".join(map(str, knob.choices)))
-    parts.append(f"default {written(knob, knob.default)}{unit}")
+    if knob.default is not None or knob.optional:  # else the shipped rig has no such joint or bus
+        parts.append(f"default {written(knob, knob.default)}{unit}")
     parts.append(f"in force at the {knob.live}")
     return "; ".join(parts)
 

@@ -54,6 +54,7 @@ class PanelView:
         self._traces_view = TracesView(gui, window.add_tab("traces"))
         self._statistics = window.add_tab("statistics")
         with self._statistics:
+            self._of_what = gui.add_html("", order=0)
             self._saccades = gui.add_html("", order=1)
             self._dwells = gui.add_html("", order=2)
             self._add_map_title()
@@ -95,6 +96,7 @@ class PanelView:
             self._winner.content = winner(snapshot)
             self._pulls.content = pulls(snapshot)
             self._health.content = health(snapshot)
+            self._of_what.content = of_what(snapshot)
         if self._shown % _TRACES_EVERY == 0:
             self._traces_view.show(self._traces)
         if self._shown % _STRIP_EVERY == 0:
@@ -119,7 +121,7 @@ class PanelView:
         self._picture.image = rgb
 
     def _add_map_title(self) -> None:
-        says = "where on the face the measured gaze has been; yellow is where it was longest"
+        says = "where on the face the gaze has been; yellow is where it was longest"
         self._gui.add_html(frame(heading("heat map on the face") + note(says)), order=3)
 
     def _draw_figures(self) -> None:
@@ -147,6 +149,18 @@ class PanelView:
             self.depth(event.target.value)
 
         return layers
+
+
+def of_what(snapshot: Snapshot) -> str:
+    """Say that the eyes' movements are no measurements where they are none, "" elsewhere."""
+    if not any("eye" in joint for joint in snapshot.reckoned):
+        return ""
+    return frame(
+        note(
+            "The eyes' servos give no feedback: these are the movements the eyes should make, "
+            "reckoned from their goals, and no measurements."
+        )
+    )
 
 
 def _setter(layers: Layers, name: str) -> Callable[[viser.GuiEvent[viser.GuiCheckboxHandle]], None]:

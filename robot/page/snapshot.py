@@ -19,7 +19,6 @@ from robot.safety.health import HealthParams
 from robot.safety.motion import JointLimit
 from robot.seeing.head_turn_residual import ResidualFigures
 from robot.types import (
-    JOINTS,
     Ghost,
     JointState,
     Level,
@@ -43,6 +42,7 @@ _TICKS_KEPT = 600
 _TRAIL_S = 0.0095
 """Joints are shown 100 times a second; a little less than 10 ms, for rounding's sake."""
 _TIMING_S = 0.5
+_LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
 _GRAVITY: dict[Level, int] = {"ok": 0, "limited": 1, "hold": 2, "limp": 3}
 
 
@@ -122,15 +122,14 @@ class Snapshots:
             plain,
             character=said.character,
             conversation=said.conversation,
-            servos=plain.servos._replace(unanswered=self._unanswered_each()),
+            servos=plain.servos._replace(
+                unanswered=tuple([self._unanswered[name] for name in plain.joints])
+            ),
             timing=timing,
             worst=worst,
             trail=tuple(trail),
             events=tuple(events),
         )
-
-    def _unanswered_each(self) -> tuple[int, ...]:
-        return tuple([self._unanswered[name] for name in JOINTS])
 
     def _count(self, tick: Tick) -> None:
         self._timing.note(tick.t_s)
@@ -157,6 +156,7 @@ def snapshot(
     rig: how it is built, for the wish's ghost, the camera and the servos' limits
     """
     pose, percept, target = tick.pose, tick.percept, tick.target
+    joints = joint_names(tick, rig)
     return Snapshot(
         t_s=tick.t_s,
         measured_rad=tick.joints.position_rad,
@@ -191,7 +191,29 @@ def snapshot(
         servos=_servos(tick, rig),
         worst=tick.verdict.level,
         trail=(_trail(tick),),
+        joints=joints,
+        reckoned=_reckoned(tick.joints, joints),
+        lower_lids=_lower_lids(pose, joints),
     )
+
+
+def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
+    """Give a name a joint; a recording may know none, then they are numbered."""
+    names = tick.verdict.joints or (rig.kinematics.names if rig is not None else ())
+    count = len(tick.joints.position_rad)
+    return names if len(names) == count else tuple(f"joint {i + 1}" for i in range(count))
+
+
+def _reckoned(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Give the joints whose place is told by nobody; where nothing is said of it, none."""
+    if not joints.measured:
+        return ()
+    told = zip(names, joints.measured, strict=True)
+    return tuple([name for name, measured in told if not measured])
+
+
+def _lower_lids(pose: GazeState, names: tuple[str, ...]) -> tuple[float, float] | None:
+    return None if _LOWER_LIDS.isdisjoint(names) else (pose.lower_left, pose.lower_right)
 
 
 def _faces(tick: Tick) -> tuple[SeenFace, ...]:
@@ -217,7 +239,7 @@ def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
 
 def _ghost(tick: Tick, rig: ShownRig) -> Ghost:
     """Give where the wish would have head and eyes."""
-    at_rest = (0.0,) * len(JOINTS)
+    at_rest = (0.0,) * len(tick.wish_rad)
     pose: GazeState = rig.kinematics.forward(JointState(tick.wish_rad, at_rest, at_rest, ()))
     return Ghost(
         pose.R_world_head,
@@ -225,6 +247,7 @@ def _ghost(tick: Tick, rig: ShownRig) -> Ghost:
         (pose.p_world_eye_left_m, pose.p_world_eye_right_m),
         (line_of_sight(pose, True), line_of_sight(pose, False)),
         (pose.lid_left, pose.lid_right),
+        _lower_lids(pose, rig.kinematics.names),
     )
 
 

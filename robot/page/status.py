@@ -2,7 +2,7 @@
 
 from html import escape
 
-from robot.page.style import AMBER, GREY, LEVELS, ORANGE, PHASES, RED, frame, pill
+from robot.page.style import AMBER, GREY, LEVELS, ORANGE, PHASES, RED, counted, frame, pill
 from robot.types import Snapshot
 
 _REASONS_SHOWN = 4
@@ -22,7 +22,7 @@ def status(snapshot: Snapshot) -> str:
         f"{_guard(snapshot)}{_old_picture(snapshot.picture_age_s)}"
         f"<div style='font-size:17px;font-weight:600'>{escape(snapshot.target_name)}</div>"
         f"<div style='opacity:.8;min-height:1.5em'>{escape(snapshot.why)}</div>"
-        f"<div style='margin:6px 0'>{pills}</div>"
+        f"<div style='margin:6px 0'>{pills}</div>{_without_feedback(snapshot)}"
         f"<div style='opacity:.8'>{_one_line(snapshot.health)}</div>"
         f"<div style='opacity:.8'>{_one_line(snapshot.seeing)}</div>"
     )
@@ -84,6 +84,17 @@ def _old_picture(age_s: float | None) -> str:
     if age_s is None or age_s < OLD_PICTURE_S:
         return ""
     return _banner(f"the picture is {age_s:.1f} s old", (), ORANGE)
+
+
+def _without_feedback(snapshot: Snapshot) -> str:
+    """Say of how many joints nobody knows where they are, "" where all are measured."""
+    if not snapshot.reckoned:
+        return ""
+    return (
+        f"<div style='color:{AMBER}'>{len(snapshot.reckoned)} of "
+        f"{counted(len(snapshot.joints), 'joint')} without feedback: shown where they should be"
+        "</div>"
+    )
 
 
 def _reasons(reasons: tuple[str, ...]) -> str:

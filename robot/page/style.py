@@ -7,6 +7,7 @@ GREEN, AMBER, ORANGE, RED, BLUE, GREY = (
     "#2b8a5a", "#d9830a", "#e8590c", "#c92a2a", "#1c7ed6", "#868e96",
 )  # fmt: skip
 PALE = "#dee2e6"
+PALE_BLUE = "#74b0e4"
 INK = "#343a40"
 
 PHASES = {"fixate": GREEN, "saccade": ORANGE, "pursue": BLUE, "blink": GREY}

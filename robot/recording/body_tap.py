@@ -4,10 +4,11 @@ The goals at torque-on, a second reading in one tick and a refusal are decisions
 well; with them a recorded run can be done again to the bit.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from drivers.errors import ServoFault, SetupError
-from robot.body import Body, JointParams
+from robot.body import Body
+from robot.joint import JointParams
 from robot.recording.moment import Engaged, Heard, Measured, Refused
 from robot.safety.guard import JointLimit
 from robot.types import JointAngles, JointState
@@ -19,7 +20,7 @@ class BodyTap(Body):
     def __init__(self, body: Body, note: Callable[[Heard], None]) -> None:
         """Take the body that does the work, and who wants to know."""
         # Not set up as a body of its own: it has no joints, only the other's.
-        self.bus = body.bus
+        self.bus, self.names = body.bus, body.names
         self._body = body
         self._note = note
 
@@ -47,8 +48,8 @@ class BodyTap(Body):
         """Send one goal to every servo."""
         self._body.write(command_rad)
 
-    def angles(self, steps: tuple[int, ...] | list[float]) -> JointAngles:
-        """Give the joint angles of servo positions in the order of JOINTS."""
+    def angles(self, steps: Sequence[float]) -> JointAngles:
+        """Give the joint angles of servo positions."""
         return self._body.angles(steps)
 
     def let_go(self) -> None:

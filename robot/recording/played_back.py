@@ -1,14 +1,15 @@
 """The machine of a recorded run: gives the models what the real one gave them, in order."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from drivers.errors import SetupError
 from drivers.types import Detections
 from gaze.types import Percept
-from robot.body import Body, JointParams
+from robot.body import Body
 from robot.frames import CameraMount, PoseHistory
+from robot.joint import JointParams
 from robot.recording.moment import Engaged, Heard, Measured, Moment, Refused
 from robot.safety.guard import JointLimit
 from robot.seeing.perception import Perception
@@ -27,7 +28,7 @@ class PlayedBody(Body):
     def __init__(self, body: Body) -> None:
         """Take the body that moves."""
         # Not set up as a body of its own: it has no joints, only the other's.
-        self.bus = body.bus
+        self.bus, self.names = body.bus, body.names
         self._body = body
         self._moment: Moment | None = None
         self._said: deque[Heard] = deque()
@@ -70,8 +71,8 @@ class PlayedBody(Body):
         """Send one goal to every servo."""
         self._body.write(command_rad)
 
-    def angles(self, steps: tuple[int, ...] | list[float]) -> JointAngles:
-        """Give the joint angles of servo positions in the order of JOINTS."""
+    def angles(self, steps: Sequence[float]) -> JointAngles:
+        """Give the joint angles of servo positions."""
         return self._body.angles(steps)
 
     def let_go(self) -> None:

@@ -54,11 +54,12 @@ class Drawing(NamedTuple):
 def png(drawing: Drawing, runs: Sequence[Shown]) -> bytes:
     """Draw a figure of one run, or of two for comparison."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=drawing.size_in, layout="constrained")
+        figure = Figure(figsize=drawing.size_in, dpi=_DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         drawing.draw(figure, runs)
         out = BytesIO()
-        canvas.print_figure(out, format="png", dpi=_DPI)
+        # print_figure would draw everything twice, the first time only to lay it out.
+        canvas.print_png(out)  # type: ignore[no-untyped-call]
     return out.getvalue()
 
 

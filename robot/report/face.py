@@ -1,5 +1,6 @@
 """Where on the face the gaze rests, for how long, and where it goes next."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -76,9 +77,15 @@ def share(rows: Floats) -> Floats:
     return out
 
 
+@cache
 def human_share() -> Floats:
-    """Give the share of time that people spend on each part (Nakamoto & Tsuruno), (8,)."""
-    return human.time_share(human.matrix(), human.DWELL_MEAN_S)
+    """Give the share of time that people spend on each part (Nakamoto & Tsuruno), (8,).
+
+    Asked for thousands of times by figures of samples drawn again, so computed once.
+    """
+    out = human.time_share(human.matrix(), human.DWELL_MEAN_S)
+    out.setflags(write=False)
+    return out
 
 
 def points(run: Gathered) -> Floats:
@@ -101,14 +108,18 @@ def density(rows: Floats) -> Floats:
     time, _, _ = np.histogram2d(
         rows[:, 1], rows[:, 0], bins=(_edges(_Z_M), _edges(_Y_M)), weights=rows[:, 2]
     )
-    out: Floats = _bell(_Z_M) @ time @ _bell(_Y_M)
+    bell_z, bell_y = _bells()
+    out: Floats = bell_z @ time @ bell_y
     return out
 
 
+@cache
 def expected_density() -> Floats:
-    """Give the density that people's share of time on the parts makes."""
+    """Give the density that people's share of time on the parts makes; computed once."""
     places = np.array([PARTS_FACE_M[part][1:] for part in PARTS])
-    return density(np.column_stack([places, human_share()]))
+    out = density(np.column_stack([places, human_share()]))
+    out.setflags(write=False)
+    return out
 
 
 def measures(run: Gathered) -> list[Measured]:
@@ -194,6 +205,11 @@ def _edges(centres: Floats) -> Floats:
     step = centres[1] - centres[0]
     out: Floats = np.append(centres - 0.5 * step, centres[-1] + 0.5 * step)
     return out
+
+
+@cache
+def _bells() -> tuple[Floats, Floats]:
+    return _bell(_Z_M), _bell(_Y_M)
 
 
 def _bell(centres: Floats) -> Floats:

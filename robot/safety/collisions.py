@@ -75,24 +75,28 @@ class Collisions:
         params: Sequence[CollisionParams],
         margin_deg: float,
         limits: tuple[JointLimit, ...],
+        joints: tuple[str, ...],
     ) -> None:
-        """Take the forbidden pairs of ranges.
+        """Take the forbidden pairs of ranges, one limit a joint, and the joints' names.
 
         margin_deg: distance from them that is kept; servos round and lag
 
         Raises:
-            ValueError: a pair leaves no pose at all inside the limits.
+            ValueError: a pair leaves no pose at all inside the limits, or names a joint
+                that is not there.
         """
         self._pairs = [
             (
-                _span(one.first, one.first_min_deg, one.first_max_deg, margin_deg),
-                _span(one.second, one.second_min_deg, one.second_max_deg, margin_deg),
+                _span(_place(one.first, joints), one.first_min_deg, one.first_max_deg, margin_deg),
+                _span(
+                    _place(one.second, joints), one.second_min_deg, one.second_max_deg, margin_deg
+                ),
             )
             for one in params
         ]
         for pair in self._pairs:
             if not any(_room(span, limits[span.joint]) for span in pair):
-                raise ValueError(_no_pose(pair, margin_deg, limits))
+                raise ValueError(_no_pose(pair, margin_deg, limits, joints))
         self._keeper = [0] * len(self._pairs)
         self.exits: dict[int, float] = {}
         self.still: set[int] = set()
@@ -176,9 +180,15 @@ class Collisions:
         return (self.exits.get(joint, exit_rad) - now) * (exit_rad - now) >= 0.0
 
 
-def _span(name: str, low_deg: float, high_deg: float, margin_deg: float) -> _Span:
+def _place(name: str, joints: tuple[str, ...]) -> int:
+    if name not in joints:
+        raise ValueError(f"a collision names {name}, which this rig does not have: take it out")
+    return joints.index(name)
+
+
+def _span(joint: int, low_deg: float, high_deg: float, margin_deg: float) -> _Span:
     low, high, margin = radians(low_deg), radians(high_deg), radians(margin_deg)
-    return _Span(JOINTS.index(name), low, high, low - margin, high + margin)
+    return _Span(joint, low, high, low - margin, high + margin)
 
 
 def _room(span: _Span, limit: JointLimit) -> bool:
@@ -186,9 +196,14 @@ def _room(span: _Span, limit: JointLimit) -> bool:
     return limit.low_rad <= span.below or limit.high_rad >= span.above
 
 
-def _no_pose(pair: tuple[_Span, _Span], margin_deg: float, limits: tuple[JointLimit, ...]) -> str:
+def _no_pose(
+    pair: tuple[_Span, _Span],
+    margin_deg: float,
+    limits: tuple[JointLimit, ...],
+    joints: tuple[str, ...],
+) -> str:
     halves = [
-        f"{JOINTS[span.joint]} {degrees(span.low):g}..{degrees(span.high):g} deg of "
+        f"{joints[span.joint]} {degrees(span.low):g}..{degrees(span.high):g} deg of "
         f"{degrees(limits[span.joint].low_rad):g}..{degrees(limits[span.joint].high_rad):g}"
         for span in pair
     ]

@@ -16,7 +16,7 @@ from robot.safety.health import Health, HealthParams
 from robot.safety.motion import JointLimit as JointLimit
 from robot.safety.motion import Motion
 from robot.safety.stuck import Stuck, StuckParams
-from robot.types import JOINTS, JointAngles, JointState, Level, Verdict
+from robot.types import JointAngles, JointState, Level, Verdict
 
 # A loop that was stopped for seconds goes on from where it was, not where it would be by now.
 _LONGEST_TICK_S = 0.1
@@ -116,9 +116,10 @@ class Guard:
         self,
         params: GuardParams,
         limits: tuple[JointLimit, ...],
+        joints: tuple[str, ...],
         reach: Callable[[], tuple[JointLimit, ...]] | None = None,
     ) -> None:
-        """Take one limit a joint, in the order of JOINTS.
+        """Take one limit a joint, and the joints' names.
 
         reach: gives the ranges and speeds that the servos themselves keep to, which hold
             beside limits that are changed; None: all
@@ -128,14 +129,18 @@ class Guard:
         """
         self._take(params)
         self._wanted, self._reach = limits, reach
-        self._neck = tuple(name.startswith("neck") for name in JOINTS)
+        self._names = joints
+        self._all_measured = [False] * len(joints)
+        self._neck = tuple(name.startswith("neck") for name in joints)
         self._motion = Motion(self._within_reach())
         self._limits = self._motion.limits
         self._waiting: set[int] = set()
         self._outside: set[int] = set()
         self._health = Health(params.health, limits)
         self._stuck = Stuck(params.stuck, len(limits))
-        self._collisions = Collisions(params.collisions, params.collision_margin_deg, limits)
+        self._collisions = Collisions(
+            params.collisions, params.collision_margin_deg, limits, joints
+        )
         self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
 
     def _take(self, params: GuardParams) -> None:
@@ -152,7 +157,7 @@ class Guard:
         Raises:
             ValueError: a collision leaves no pose inside the limits; nothing has changed.
         """
-        collisions = Collisions(params.collisions, params.collision_margin_deg, limits)
+        collisions = Collisions(params.collisions, params.collision_margin_deg, limits, self._names)
         collisions.go_on(self._collisions)
         self._collisions = collisions
         self._take(params)
@@ -280,12 +285,14 @@ class Guard:
         blind = not picture_age_s <= self._params.stale_picture_ms / 1e3
         usual = self._all_well(joints)
         far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
+        reckoned = [not measured for measured in joints.measured] or self._all_measured
         columns = zip(wish_rad, joints.position_rad, joints.measured_s, strict=True)
         why: dict[int, str] = {}
         ranks: dict[int, int] = {}
         for i, (wish, position, at_s) in enumerate(columns):
             unseen = blind and self._neck[i]
-            near = -far <= command[i] - position <= far and not watched[i]
+            # Where a servo tells nothing, its place is no news of what it met.
+            near = reckoned[i] or (-far <= command[i] - position <= far and not watched[i])
             well = near and at_s >= stale_s and not unseen and (usual or self._well(i, joints))
             if well and self._motion.follow(i, wish, dt_s):
                 continue  # nearly every wish is a good one and is passed on as it is
@@ -298,16 +305,17 @@ class Guard:
         """Move nothing, as no time has passed."""
         why = ("time stands still",) * len(self._limits)
         reasons = ("all: time stands still",)
-        return Verdict(tuple(self._motion.command), "hold", reasons, wish_rad, why, reasons)
+        command = tuple(self._motion.command)
+        return Verdict(command, "hold", reasons, wish_rad, why, reasons, self._names)
 
     def _verdict(
         self, wish_rad: JointAngles, why: dict[int, str], ranks: dict[int, int]
     ) -> Verdict:
         command = tuple(self._motion.command)
         if not why:
-            return Verdict(command, "ok", (), wish_rad)
+            return Verdict(command, "ok", (), wish_rad, joints=self._names)
         worst = max(ranks.values())
-        reasons = {i: f"{JOINTS[i]}: {reason}" for i, reason in why.items()}
+        reasons = {i: f"{self._names[i]}: {reason}" for i, reason in why.items()}
         return Verdict(
             command,
             _LEVELS[worst],
@@ -315,6 +323,7 @@ class Guard:
             wish_rad,
             tuple([why.get(i, "") for i in range(len(command))]),
             tuple([reasons[i] for i in reasons if ranks[i] == worst]),
+            self._names,
         )
 
     def _all_well(self, joints: JointState) -> bool:
@@ -421,6 +430,8 @@ class Guard:
         """Tell whether a joint is told to move and does not."""
         if self._stuck.holds(i, self._t_s):
             return True
+        if joints.measured and not joints.measured[i]:
+            return False
         command, position = self._motion.command[i], joints.position_rad[i]
         if fresh and self._stuck.found(i, command, position, joints.measured_s[i], self._t_s):
             self._retrying[i] = True

@@ -23,7 +23,7 @@ from drivers.dynamixel import DynamixelBus
 from robot.assemble import Assembly, Choice, assemble
 from robot.loop import run
 from robot.summary import Summary
-from robot.types import JOINTS
+from robot.types import in_order
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_chain import build_chain
 
@@ -140,7 +140,7 @@ def bus_exchange(cycles: int = 4000) -> None:
     now = [0.0]
     specs = [(i + 1, "xl330-m077" if i < 6 else "xc330-m288", 2048) for i in range(9)]
     rig = load_rig("desk")
-    setups = [rig.joints[name].setup() for name in JOINTS]
+    setups = [rig.joints[name].setup() for name in in_order(rig.joints)]
     chain = build_chain(specs, lambda: now[0])
     bus = DynamixelBus(InProcessPort(chain), setups, rig.bus.dynamixel)
     bus.open()

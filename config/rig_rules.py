@@ -1,0 +1,126 @@
+"""What no single section of a rig can know: the rules between them."""
+
+from collections.abc import Iterable
+
+from config.rig import Rig
+from drivers.servo_models import SERVOS
+from gaze.types import PARTS
+from robot.kinematics import LIDS
+from robot.safety.guard import Guard
+from robot.types import JOINTS
+
+
+def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:
+    for name in rig.joints:
+        if name not in JOINTS:
+            yield f"joints.{name}", f"unknown joint; known are {', '.join(JOINTS)}"
+    for way in ("pan", "tilt"):
+        own = [name for name in (f"left_eye_{way}", f"right_eye_{way}") if name in rig.joints]
+        both = f"eyes_{way}"
+        if both in rig.joints and own:
+            yield f"joints.{both}", f"turns both eyes, which {' and '.join(own)} would do as well"
+        elif both not in rig.joints and len(own) < 2:
+            yield (
+                f"joints.{both}",
+                f"nothing turns {'an eye' if own else 'the eyes'} in {way}: needed are "
+                f"left_eye_{way} and right_eye_{way}, or {both} where one servo turns both",
+            )
+
+
+def _servo_ids(rig: Rig) -> Iterable[tuple[str, str]]:
+    owner: dict[tuple[str, int], str] = {}
+    for name, joint in rig.joints.items():
+        place = joint.bus, joint.id
+        if place in owner:
+            yield f"joints.{name}.id", f"id {joint.id} is already that of {owner[place]}"
+        owner.setdefault(place, name)
+
+
+def _models(rig: Rig) -> Iterable[tuple[str, str]]:
+    for name, joint in rig.joints.items():
+        if joint.model not in SERVOS:
+            known = ", ".join(sorted(SERVOS))
+            yield f"joints.{name}.model", f"unknown servo model {joint.model!r}; known are {known}"
+
+
+def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
+    if "" in rig.buses:
+        yield "buses", "a bus needs a name; the one without is under bus"
+    ports = {"bus": rig.bus.port}
+    for name, bus in rig.buses.items():
+        same = next((key for key, port in ports.items() if port == bus.port), None)
+        if same is not None:
+            yield f"buses.{name}.port", f"{bus.port} is already that of {same}: a port has one bus"
+        ports[f"buses.{name}"] = bus.port
+    for name, joint in rig.joints.items():
+        if joint.bus and joint.bus not in rig.buses:
+            there = ", ".join(rig.buses) or "none"
+            yield f"joints.{name}.bus", f"no bus {joint.bus!r} under buses; there is {there}"
+        elif joint.model in SERVOS and SERVOS[joint.model].bus != rig.bus_of(name).kind:
+            kind = rig.bus_of(name).kind
+            yield (
+                f"joints.{name}.model",
+                f"a {joint.model} speaks {SERVOS[joint.model].bus}, and its bus is of kind {kind}",
+            )
+        elif rig.bus_of(name).kind == "maestro" and joint.id >= rig.bus_of(name).maestro.channels:
+            channels = rig.bus_of(name).maestro.channels
+            yield f"joints.{name}.id", f"the board has channels 0 to {channels - 1}"
+    used = {joint.bus for joint in rig.joints.values()}
+    for name in rig.buses:
+        if name not in used:
+            yield f"buses.{name}", "no joint is on it: take it out, or give joints this bus"
+
+
+def _lid_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
+    for name in LIDS:
+        joint = rig.joints.get(name)
+        ends = zip(rig.lid_joints.keys(name), rig.lid_joints.ends_deg(name), strict=True)
+        for key, angle in ends:
+            if joint is not None and angle is None:
+                yield f"lid_joints.{key}", f"missing; the joint {name} needs it"
+            elif joint is not None and not joint.min_deg <= (angle or 0.0) <= joint.max_deg:
+                yield (
+                    f"lid_joints.{key}",
+                    f"{angle} is outside the joint's range {joint.min_deg}..{joint.max_deg}",
+                )
+
+
+def _collisions(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Let the guard itself say whether its forbidden boxes leave any pose."""
+    if any(True for rule in (_joint_names, _models) for _ in rule(rig)):
+        return
+    try:
+        Guard(rig.guard, tuple(rig.joints[name].limit() for name in rig.names), rig.names)
+    except ValueError as error:
+        yield "guard.collisions", str(error)
+
+
+def _park_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
+    for name, angle in rig.park_deg.items():
+        joint = rig.joints.get(name)
+        if joint is None:
+            yield f"park_deg.{name}", f"no such joint; there is {', '.join(rig.names)}"
+        elif not joint.min_deg <= angle <= joint.max_deg:
+            yield (
+                f"park_deg.{name}",
+                f"{angle} is outside the joint's range {joint.min_deg}..{joint.max_deg}",
+            )
+
+
+def _part_names(rig: Rig) -> Iterable[tuple[str, str]]:
+    for code in rig.face_parts_mm:
+        if code not in PARTS:
+            yield f"face_parts_mm.{code}", f"unknown face part; parts are {', '.join(PARTS)}"
+
+
+RULES = (
+    _joint_names,
+    _servo_ids,
+    _models,
+    _buses,
+    _lid_ranges,
+    _park_ranges,
+    _part_names,
+    _collisions,
+)
+"""What no single section of a rig can know."""

@@ -1,0 +1,158 @@
+"""Several servo buses as one: joints of one rig on several ports, of several kinds."""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from drivers.errors import BusLost
+from drivers.types import BusHealth, ServoBus, ServoReading, ServoSetup
+
+
+class Share(NamedTuple):
+    """One of the buses: what it is called, and which servos of the whole are on it.
+
+    places: for each of its own servos the place in the whole
+    """
+
+    name: str
+    bus: ServoBus
+    places: tuple[int, ...]
+
+
+class MixedBus:
+    """Buses that are opened, read, written and released together; implements ServoBus.
+
+    What one bus says or suffers stays its own: while one port is gone, the servos of the
+    others are read and moved as ever. A bus that gives up ends the run for all, as a head
+    of which a part no longer obeys must not go on.
+
+    Args:
+        shares: together they hold every place from 0 on, once.
+
+    Raises:
+        ValueError: they do not.
+    """
+
+    def __init__(self, shares: Sequence[Share]) -> None:
+        self._shares = tuple(shares)
+        places = sorted(place for share in shares for place in share.places)
+        if places != list(range(len(places))):
+            raise ValueError(f"buses share out places {places}: each from 0 on must be there once")
+        self._count = len(places)
+
+    def open(self) -> None:
+        """Open every bus; where one cannot be opened, those before it are closed again.
+
+        Raises:
+            drivers.errors.PortError: a port cannot be opened.
+            drivers.errors.ServoMissing: servos are absent or of another model.
+        """
+        opened: list[Share] = []
+        try:
+            for share in self._shares:
+                share.bus.open()
+                opened.append(share)
+        except BaseException:
+            for share in opened:
+                share.bus.close()
+            raise
+
+    def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
+        """Read all servos of all buses; None where no fresh answer came.
+
+        Raises:
+            drivers.errors.BusLost: nobody has answered on a bus for longer than its patience.
+        """
+        whole: list[ServoReading | None] = [None] * self._count
+        for _, bus, places in self._shares:
+            for place, reading in zip(places, bus.read(now_s), strict=True):
+                whole[place] = reading
+        return tuple(whole)
+
+    def engage(self) -> tuple[int, ...]:
+        """Switch torque on, bus by bus; where one refuses, all are released again.
+
+        Returns the goals that are now in force, in steps.
+
+        Raises:
+            drivers.errors.DriverError: as the bus at fault raises it.
+        """
+        goals = [0] * self._count
+        try:
+            for _, bus, places in self._shares:
+                for place, goal in zip(places, bus.engage(), strict=True):
+                    goals[place] = goal
+        except BaseException:
+            self._release_quietly()
+            raise
+        return tuple(goals)
+
+    def write(self, goals_steps: Sequence[int]) -> None:
+        """Send one goal to every servo; goals are clipped to the limits.
+
+        Raises:
+            ValueError: a goal is not a number, or there are not as many as servos.
+        """
+        if len(goals_steps) != self._count:
+            raise ValueError(f"{len(goals_steps)} goals for {self._count} servos")
+        for goal in goals_steps:
+            if goal != goal:  # before any bus has sent its own
+                raise ValueError(
+                    "a goal is not a number: every goal must be a whole number of steps"
+                )
+        for _, bus, places in self._shares:
+            bus.write([goals_steps[place] for place in places])
+
+    def faults(self) -> tuple[str, ...]:
+        """Name every servo fault found so far."""
+        return tuple(fault for share in self._shares for fault in share.bus.faults())
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call."""
+        return tuple([event for share in self._shares for event in share.bus.events()])
+
+    def retune(self, setups: Sequence[ServoSetup]) -> None:
+        """Set the servos up so when the torque comes on the next time.
+
+        Raises:
+            ValueError: these are other servos.
+        """
+        if len(setups) != self._count:
+            raise ValueError("other servos need another bus: ids and models must stay")
+        for _, bus, places in self._shares:
+            bus.retune([setups[place] for place in places])
+
+    def release(self) -> None:
+        """Torque off on every bus, whatever befalls the others.
+
+        Raises:
+            drivers.errors.BusLost: ports are gone; the message names each.
+        """
+        lost = []
+        for share in self._shares:
+            try:
+                share.bus.release()
+            except BusLost as error:
+                lost.append(str(error))
+        if lost:
+            raise BusLost("; ".join(lost))
+
+    def _release_quietly(self) -> None:
+        """Release what can be: another error is on its way already."""
+        try:
+            self.release()
+        except BusLost:
+            return
+
+    def health(self) -> BusHealth:
+        """Give byte and error counts of all buses together."""
+        each = [share.bus.health() for share in self._shares]
+        errors: Counter[str] = Counter()
+        for health in each:
+            errors.update(health.errors)
+        return BusHealth(sum(h.tx_bytes for h in each), sum(h.rx_bytes for h in each), errors)
+
+    def close(self) -> None:
+        """Close every port."""
+        for share in self._shares:
+            share.bus.close()

@@ -1,0 +1,112 @@
+"""How a servo's steps become a joint's angle: a straight gear, or a push rod as measured. Pure.
+
+A push rod turns its joint less the farther the horn is from square to it, so hobby eye
+mechanisms have no one ratio: some places are measured, and between them it is straight.
+Radians at the joint, steps at the servo.
+"""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import Protocol
+
+
+class Linkage(Protocol):
+    """What lies between a servo and its joint.
+
+    steepest: most steps a radian anywhere, above 0
+    rising: more steps are a larger angle
+    """
+
+    steepest: float
+    rising: bool
+
+    def steps(self, angle_rad: float) -> float:
+        """Give the servo position of a joint angle, not rounded."""
+        ...
+
+    def angle_rad(self, steps: float) -> float:
+        """Give the joint angle of a servo position."""
+        ...
+
+    def rate_rad(self, steps: float) -> float:
+        """Give how many radians a step is at a servo position, with its sign."""
+        ...
+
+
+class Straight:
+    """A gear: so many steps a radian everywhere; implements Linkage.
+
+    zero: steps at 0 rad; slope: steps a radian, signed
+    """
+
+    def __init__(self, zero: float, slope: float) -> None:
+        """Take where 0 is and the slope."""
+        self._zero, self._slope, self._rate = zero, slope, 1.0 / slope
+        self.steepest = abs(slope)
+        self.rising = slope > 0.0
+
+    def steps(self, angle_rad: float) -> float:
+        """Give the servo position of a joint angle, not rounded."""
+        return self._zero + self._slope * angle_rad
+
+    def angle_rad(self, steps: float) -> float:
+        """Give the joint angle of a servo position."""
+        return (steps - self._zero) * self._rate
+
+    def rate_rad(self, steps: float) -> float:
+        """Give how many radians a step is, with its sign."""
+        return self._rate
+
+
+class Curve:
+    """Measured places with straight lines between; implements Linkage.
+
+    Beyond the outermost places their lines go on.
+
+    angles_rad: rising; steps: all rising or all falling; at least two of each
+
+    Raises:
+        ValueError: they are not; the message says where.
+    """
+
+    def __init__(self, angles_rad: Sequence[float], steps: Sequence[float]) -> None:
+        """Take the measured places."""
+        if len(angles_rad) < 2 or len(angles_rad) != len(steps):
+            raise ValueError("a linkage needs two places or more, each an angle and a position")
+        up = steps[-1] > steps[0]
+        for i in range(1, len(steps)):
+            if angles_rad[i] <= angles_rad[i - 1]:
+                raise ValueError(f"the angles of a linkage must rise; place {i + 1} does not")
+            if (steps[i] > steps[i - 1]) != up or steps[i] == steps[i - 1]:
+                raise ValueError(
+                    "the positions of a linkage must all rise or all fall; "
+                    f"place {i + 1} goes back: measure it anew"
+                )
+        self.rising = up
+        self._angles, self._steps = tuple(angles_rad), tuple(float(s) for s in steps)
+        # Looked up by rising steps, whichever way the rod works.
+        self._order = 1.0 if up else -1.0
+        self._keys = tuple(self._order * s for s in self._steps)
+        self._slopes = tuple(
+            (self._steps[i] - self._steps[i - 1]) / (self._angles[i] - self._angles[i - 1])
+            for i in range(1, len(steps))
+        )
+        self._last = len(self._slopes) - 1
+        self.steepest = max(abs(slope) for slope in self._slopes)
+
+    def steps(self, angle_rad: float) -> float:
+        """Give the servo position of a joint angle, not rounded."""
+        i = min(max(bisect_right(self._angles, angle_rad) - 1, 0), self._last)
+        return self._steps[i] + self._slopes[i] * (angle_rad - self._angles[i])
+
+    def angle_rad(self, steps: float) -> float:
+        """Give the joint angle of a servo position."""
+        i = self._segment(steps)
+        return self._angles[i] + (steps - self._steps[i]) / self._slopes[i]
+
+    def rate_rad(self, steps: float) -> float:
+        """Give how many radians a step is at a servo position, with its sign."""
+        return 1.0 / self._slopes[self._segment(steps)]
+
+    def _segment(self, steps: float) -> int:
+        return min(max(bisect_right(self._keys, self._order * steps) - 1, 0), self._last)

@@ -1,0 +1,181 @@
+"""Fault commands as lines of text: ``lose 3 count 2``, ``unplug for 0.5``, ``help``.
+
+The grammar of every emulated device: a table of verbs, each of which takes words of named
+kinds and calls the method of the device's faults that does it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+EVERYBODY = ("all", "*")
+BOTH = ("count", "for")
+TIME = ("for",)
+
+
+class Word(NamedTuple):
+    """One word of a command: how it is shown, and how it is understood."""
+
+    shown: str
+    read: Callable[[str], Any]
+    optional: bool = False
+
+
+class Verb(NamedTuple):
+    """One command. lasting: it may end with ``count N`` and ``for S``."""
+
+    do: Callable[..., str]
+    words: tuple[Word, ...]
+    says: str
+    lasting: tuple[str, ...] = ()
+
+
+class Commands(NamedTuple):
+    """All that can be asked of one kind of device.
+
+    cases: what ``set`` can choose, and the values as they are typed
+    ids: what the word ID stands for, e.g. "a servo's id"
+    """
+
+    verbs: Mapping[str, Verb]
+    cases: Mapping[str, str]
+    ids: str
+
+    def obey(self, faults: object, text: str) -> str:
+        """Carry out one line; gives what was done.
+
+        Raises:
+            ValueError: names the word that is wrong and what would be right.
+        """
+        words = text.split()
+        if not words or words[0] == "help":
+            return self.help(words[1] if len(words) > 1 else None)
+        name, rest = words[0].replace("_", "-"), words[1:]
+        verb = self.verbs.get(name)
+        if verb is None:
+            raise ValueError(f"{words[0]!r} is no command; there is {', '.join(self.verbs)}, help")
+        try:
+            rest, lasting = _lasting(verb, rest)
+            return verb.do(faults, *_arguments(verb, rest), **lasting)
+        except (KeyError, ValueError) as error:
+            raise ValueError(f"{name}: {error.args[0]}; usage: {self.usage(name)}") from None
+
+    def usage(self, name: str) -> str:
+        """Show how a command is typed."""
+        verb = self.verbs[name]
+        shown = [f"[{w.shown}]" if w.optional else w.shown for w in verb.words]
+        ends = {"count": "[count N]", "for": "[for SECONDS]"}
+        return " ".join([name, *shown, *(ends[word] for word in verb.lasting)])
+
+    def help(self, name: str | None = None) -> str:
+        """Explain one command or all of them, one a line."""
+        if name is not None and name in self.verbs:
+            return f"{self.usage(name)}: {self.verbs[name].says}"
+        lines = [f"{self.usage(verb):46} {self.verbs[verb].says}" for verb in self.verbs]
+        lines.append(
+            f"ID is {self.ids} or all; a fault lasts until clear, or as [..] says; set takes"
+        )
+        lines += [f"  {case} {values}" for case, values in self.cases.items()]
+        return "\n".join(lines)
+
+
+def _lasting(verb: Verb, words: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
+    """Take ``count N`` and ``for S`` off the end."""
+    left, found = list(words), dict[str, Any]()
+    while len(left) >= 2 and left[-2] in BOTH:
+        value, word = left.pop(), left.pop()
+        if word not in verb.lasting:
+            raise ValueError(f"{word!r} has no meaning here")
+        if word == "count":
+            found["count"] = count(value)
+        else:
+            found["seconds"] = number(0.0, 1e6, "seconds")(value)
+    return left, found
+
+
+def _arguments(verb: Verb, words: Sequence[str]) -> list[Any]:
+    needed = [word for word in verb.words if not word.optional]
+    if len(words) < len(needed):
+        raise ValueError(f"{needed[len(words)].shown} is missing")
+    if len(words) > len(verb.words):
+        raise ValueError(f"{words[len(verb.words)]!r} is too much")
+    return [word.read(text) for word, text in zip(verb.words, words, strict=False)]
+
+
+# --- words
+
+
+def number(low: float, high: float, what: str) -> Callable[[str], float]:
+    """Make a reader of numbers; ``what`` is told with the range where a word is none."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if not low <= value <= high:
+            raise ValueError(f"{text!r} is not {what} from {low:g} to {high:g}")
+        return value
+
+    return read
+
+
+def whole(low: int, high: int, what: str) -> Callable[[str], int]:
+    """Make a reader of whole numbers, also as 0x1F."""
+
+    def read(text: str) -> int:
+        try:
+            value = int(text, 0)
+        except ValueError:
+            value = low - 1
+        if not low <= value <= high:
+            raise ValueError(f"{text!r} is not {what} from {low} to {high}")
+        return value
+
+    return read
+
+
+def or_all(read: Callable[[str], int]) -> Callable[[str], int | None]:
+    """Make a reader of ids that also takes ``all``, which is None."""
+    return lambda text: None if text in EVERYBODY else read(text)
+
+
+def one_of(*values: str) -> Callable[[str], str]:
+    """Make a reader of words from a short list."""
+
+    def read(text: str) -> str:
+        if text not in values:
+            listed = f"neither {' nor '.join(values)}" if len(values) == 2 else _none_of(values)
+            raise ValueError(f"{text!r} is {listed}")
+        return text
+
+    return read
+
+
+def _none_of(values: Sequence[str]) -> str:
+    return f"none of {', '.join(values)}"
+
+
+def on_off(text: str) -> bool:
+    """Read on or off."""
+    return one_of("on", "off")(text) == "on"
+
+
+def hex_bytes(text: str) -> bytes | None:
+    """Read bytes as FFFF00; None for random ones."""
+    if text == "random":
+        return None
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is neither random nor bytes in hex such as FFFF00") from None
+
+
+def anything(text: str) -> str:
+    """Take a word as it is."""
+    return text
+
+
+count = whole(1, 1_000_000, "a number of answers")
+
+MS = Word("MS", number(0.0, 60_000.0, "milliseconds"))
+SWITCH = Word("on|off", on_off, True)

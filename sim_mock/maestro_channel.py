@@ -1,0 +1,115 @@
+"""One channel of an emulated Maestro: the pulse width it sends, led to its target.
+
+Widths are quarter microseconds. The board moves what it sends every 10 ms: by no more than
+the speed limit (quarter microseconds per 10 ms), while the speed changes by no more than
+the acceleration limit (the same per 80 ms), so that it comes to rest on the target. Sums
+are kept in eighths, in which both limits are whole numbers. Source: Pololu Maestro User's
+Guide (0J40), sections 4.b and 5.e; how it brakes there is not told: as late as it may [A].
+"""
+
+from math import isqrt
+
+EIGHTHS = 8
+"""Periods of 10 ms in the 80 ms of the unit of acceleration."""
+
+
+class Channel:
+    """A channel set up as a servo.
+
+    target, position: what it was told and what it sends now; 0: no pulses
+    speed, acceleration: limits in the board's units; 0: unlimited
+    low, high: targets are clipped to these
+    """
+
+    def __init__(self, low: int, high: int) -> None:
+        self.low, self.high = low, high
+        self.target = 0
+        self.speed = self.acceleration = 0
+        self._at8 = self._velocity8 = 0
+
+    @property
+    def position(self) -> int:
+        """Give the width that is sent now; 0: no pulses."""
+        return self._at8 // EIGHTHS
+
+    @property
+    def limited(self) -> bool:
+        """Tell whether it has a limit of speed or acceleration."""
+        return self.speed != 0 or self.acceleration != 0
+
+    @property
+    def moving(self) -> bool:
+        """Tell whether it is still being led to its target."""
+        return self._at8 != self.target * EIGHTHS or self._velocity8 != 0
+
+    @property
+    def led(self) -> bool:
+        """Tell whether it is being led to its target under a limit: what a board calls moving."""
+        return self.limited and self.moving
+
+    def limit_speed(self, speed: int) -> None:
+        """Limit the speed; 0: unlimited."""
+        self.speed = speed
+
+    def limit_acceleration(self, acceleration: int) -> None:
+        """Limit the acceleration; 0: unlimited. More than 255 is taken as that [A]."""
+        self.acceleration = min(acceleration, 255)
+
+    def aim(self, steps: int) -> None:
+        """Set the target, clipped to the limits; 0 ends the pulses.
+
+        Without limits, and where no pulses were sent before, it is in force at once: the
+        board does not know from where to lead the servo.
+        """
+        self.target = min(max(steps, self.low), self.high) if steps else 0
+        if not steps or not self._at8 or not self.limited:
+            self._arrive()
+
+    def limit(self, low: int, high: int) -> None:
+        """Set other limits of targets."""
+        self.low, self.high = low, high
+        if self.target:
+            self.target = min(max(self.target, low), high)
+            self._at8 = min(max(self._at8, low * EIGHTHS), high * EIGHTHS)
+
+    def restart(self) -> None:
+        """Be as after power-on: no pulses, no limits of speed and acceleration."""
+        self.speed = self.acceleration = 0
+        self.aim(0)
+
+    def step(self) -> None:
+        """Let 10 ms pass."""
+        if not self.moving:
+            return
+        if not self.limited:
+            self._arrive()
+            return
+        way8 = self.target * EIGHTHS - self._at8
+        sign = -1 if way8 < 0 else 1
+        velocity8 = sign * self._next_speed8(abs(way8), sign * self._velocity8)
+        at8 = self._at8 + velocity8
+        self._at8 = min(max(at8, self.low * EIGHTHS), self.high * EIGHTHS)
+        clipped = self._at8 != at8
+        there = self._at8 == self.target * EIGHTHS and abs(velocity8) <= self.acceleration
+        self._velocity8 = 0 if clipped or there or not self.acceleration else velocity8
+
+    def _next_speed8(self, way8: int, speed8: int) -> int:
+        """Give the speed towards the target for the next 10 ms; below 0: still away from it."""
+        most8 = self.speed * EIGHTHS or way8
+        if not self.acceleration:
+            return min(most8, way8)
+        wanted8 = min(most8, brakes_within(way8, self.acceleration))
+        return min(max(wanted8, speed8 - self.acceleration), speed8 + self.acceleration)
+
+    def _arrive(self) -> None:
+        self._at8, self._velocity8 = self.target * EIGHTHS, 0
+
+
+def brakes_within(way: int, acceleration: int) -> int:
+    """Give the largest first step of a motion that comes to rest within a way.
+
+    The steps after it are smaller by the acceleration each, the last one is the smallest.
+    """
+    steps = (isqrt(1 + 8 * way // acceleration) - 1) // 2
+    rest = way - acceleration * steps * (steps + 1) // 2
+    return steps * acceleration + rest // (steps + 1)

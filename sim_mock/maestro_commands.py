@@ -1,0 +1,162 @@
+"""Commands as an emulated Maestro finds them among the bytes that it is sent.
+
+Command bytes have bit 7 set, data bytes have not. Three forms: compact ``84 ch lo hi``,
+Pololu ``AA device 04 ch lo hi``, Mini SSC ``FF servo target``, whose last two bytes are
+0..254. Source: Pololu Maestro User's Guide (0J40), sections 5.c to 5.f. Where it is silent:
+AA followed at once by another command byte is taken as the sign that it also is, from
+which the baud rate is told, and no error [A]; what follows the number of another device
+is ignored until the next command byte [A].
+"""
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+SET_TARGET, SET_TARGETS, SET_SPEED, SET_ACCELERATION, SET_PWM = 0x84, 0x9F, 0x87, 0x89, 0x8A
+GET_POSITION, GET_MOVING, GET_ERRORS, GO_HOME = 0x90, 0x93, 0xA1, 0xA2
+STOP_SCRIPT, RUN_SCRIPT, RUN_SCRIPT_WITH, GET_SCRIPT = 0xA4, 0xA7, 0xA8, 0xAE
+POLOLU, MINI_SSC = 0xAA, 0xFF
+
+DATA_BYTES = {
+    SET_TARGET: 3,
+    SET_SPEED: 3,
+    SET_ACCELERATION: 3,
+    GET_POSITION: 1,
+    GET_MOVING: 0,
+    GET_ERRORS: 0,
+    GO_HOME: 0,
+    STOP_SCRIPT: 0,
+    RUN_SCRIPT: 1,
+    RUN_SCRIPT_WITH: 3,
+    GET_SCRIPT: 0,
+    SET_PWM: 4,
+    SET_TARGETS: 2,
+}
+"""Of set-targets: those before the targets."""
+MINI_ONLY = (SET_TARGETS, SET_PWM)
+"""The Micro Maestro, with six channels, does not know these."""
+
+ERRORS = (
+    "signal",
+    "overrun",
+    "buffer-full",
+    "crc",
+    "protocol",
+    "timeout",
+    "script-stack",
+    "script-call-stack",
+    "script-counter",
+)
+"""By the bits of the error register."""
+
+Trouble = Literal["", "crc", "protocol"]
+
+
+class Heard(NamedTuple):
+    """One command, or what was wrong with the bytes.
+
+    end: where it ended among the bytes fed
+    code: the command byte of its compact form, 0 where there is trouble
+    """
+
+    end: int
+    code: int
+    data: bytes = b""
+    trouble: Trouble = ""
+
+
+class Ear:
+    """Keeps what has been heard of a command that is not complete yet.
+
+    Args:
+        device: the number that Pololu forms must name.
+        mini: a board with 12, 18 or 24 channels.
+    """
+
+    def __init__(self, device: int, mini: bool) -> None:
+        self.device = device
+        self.crc = False
+        self._known = {
+            code: size for code, size in DATA_BYTES.items() if mini or code not in MINI_ONLY
+        }
+        self._packet = bytearray()
+        self._deaf = False
+
+    def forget(self) -> None:
+        """Drop an unfinished command."""
+        self._packet.clear()
+        self._deaf = False
+
+    def feed(self, data: bytes) -> Iterator[Heard]:
+        """Take bytes one by one; gives what each of them completes."""
+        for end, byte in enumerate(data, 1):
+            for heard in self._take(byte):
+                yield heard._replace(end=end)
+
+    def _take(self, byte: int) -> list[Heard]:
+        if self._packet and self._packet[0] == MINI_SSC and byte != MINI_SSC:
+            self._packet.append(byte)
+            return self._finished(MINI_SSC, 1) if len(self._packet) == 3 else []
+        if byte & 0x80:
+            return self._begin(byte)
+        if self._deaf:
+            return []
+        if not self._packet:
+            return [_PROTOCOL]
+        self._packet.append(byte)
+        return self._go_on()
+
+    def _begin(self, byte: int) -> list[Heard]:
+        """Start a command; one that was not finished is an error."""
+        cut = len(self._packet) > 1 or bool(self._packet) and self._packet[0] != POLOLU
+        said = [_PROTOCOL] if cut else []
+        self._packet[:] = (byte,)
+        self._deaf = False
+        return said + (self._go_on() if byte not in (POLOLU, MINI_SSC) else [])
+
+    def _go_on(self) -> list[Heard]:
+        """Look whether the command is complete."""
+        packet, head = self._packet, 1
+        if packet[0] == POLOLU:
+            if packet[1] != self.device:
+                packet.clear()
+                self._deaf = True
+                return []
+            if len(packet) < 3:
+                return []
+            head = 3
+        code = packet[head - 1] | 0x80
+        if code not in self._known:
+            packet.clear()
+            return [_PROTOCOL]
+        size = self._known[code]
+        if code == SET_TARGETS and len(packet) > head:
+            size += 2 * packet[head]
+        complete = len(packet) == head + size + self.crc
+        return self._finished(code, head) if complete else []
+
+    def _finished(self, code: int, head: int) -> list[Heard]:
+        packet = bytes(self._packet)
+        self._packet.clear()
+        if self.crc and code != MINI_SSC:
+            packet, check = packet[:-1], packet[-1]
+            if crc7(packet) != check:
+                return [Heard(0, 0, trouble="crc")]
+        return [Heard(0, code, packet[head:])]
+
+
+_PROTOCOL = Heard(0, 0, trouble="protocol")
+
+
+def word(low: int, high: int) -> int:
+    """Give the number in two data bytes."""
+    return low | high << 7
+
+
+def crc7(data: bytes) -> int:
+    """Give the check of a command: CRC-7 with the polynomial 91 hex, lowest bit first."""
+    rest = 0
+    for byte in data:
+        rest ^= byte
+        for _ in range(8):
+            rest = (rest ^ 0x91 if rest & 1 else rest) >> 1
+    return rest

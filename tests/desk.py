@@ -1,0 +1,9 @@
+"""The joints of the shipped desk rig, in the order of its joint angles."""
+
+from config.schema import load_rig
+from robot.types import in_order
+
+JOINTS = in_order(load_rig("desk").joints)
+
+LIDS = {"left_upper_lid": (-0.4, 0.4), "right_upper_lid": (-0.4, 0.4)}
+"""Ends of the upper lids in radians, for tests of a geometry alone."""

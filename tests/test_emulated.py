@@ -1,0 +1,86 @@
+"""Devices as plain data: there and back through JSON, and built from it."""
+
+import json
+from math import inf
+
+import pytest
+
+from sim_mock.emulated import (
+    BAUDS,
+    CASES,
+    DynamixelLine,
+    MaestroLine,
+    StsLine,
+    build,
+    packed,
+    unpacked,
+)
+from sim_mock.hobby_servo import HobbySpec
+from sim_mock.ports import InProcessPort
+from sim_mock.servo_physics import Physics, Quirks, ServoSpec
+
+BUILT = ServoSpec(7, "xl330-m288", 1000, 45, Physics(stop_low_steps=900.0), Quirks(True), 3)
+LINES = [
+    DynamixelLine((BUILT, ServoSpec(1, "xc330-m288")), 57_600),
+    StsLine((ServoSpec(253, "sts3215", 5, physics=Physics(load_nm=0.1)),)),
+    MaestroLine(24, 5, True, (HobbySpec(3, 4000.0),), 9600),
+    MaestroLine(),
+]
+KINDS = pytest.mark.parametrize("line", LINES, ids=[line.kind for line in LINES])
+
+
+@KINDS
+def test_a_device_travels_as_json(line):
+    assert unpacked(json.loads(json.dumps(packed(line)))) == line
+
+
+def test_an_endless_stop_travels_too():
+    line = unpacked(json.loads(json.dumps(packed(LINES[1]))))
+    assert line.servos[0].physics.stop_high_steps == inf
+
+
+def test_short_words_are_enough():
+    line = unpacked({"kind": "dynamixel", "servos": [[1, "xl330-m077"]]})
+    assert line == DynamixelLine((ServoSpec(1, "xl330-m077"),))
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(ValueError, match="no device of kind 'canopen': there is dynamixel, feet"):
+        unpacked({"kind": "canopen"})
+    with pytest.raises(ValueError, match="no device of kind None"):
+        unpacked({"servos": [[1, "xl330-m077"]]})
+    with pytest.raises(TypeError, match="volts"):
+        unpacked({"kind": "maestro", "volts": 6})
+    with pytest.raises(ValueError, match="baud 12"):
+        build(StsLine((ServoSpec(1, "sts3215"),), 12), lambda: 0.0)
+
+
+@KINDS
+def test_what_is_built_heeds_its_rate_and_knows_its_cases(line):
+    device = build(line, lambda: 0.0)
+    assert device.heed_baud is (line.baud is not None)
+    assert device.hears(line.baud or 115_200)
+    assert len(device.positions_steps()) == len(line.servos) or line.kind == "maestro"
+    for case in CASES[line.kind]:
+        assert case in device.faults.command("help")
+
+
+@KINDS
+def test_every_rate_of_a_kind_can_be_built_and_opened(line):
+    for baud in BAUDS[line.kind]:
+        servos = (ServoSpec(1, "xl430-w250"),) if line.kind == "dynamixel" else line.servos
+        device = build(type(line)(servos=servos, baud=baud), lambda: 0.0)
+        port = InProcessPort(device)
+        assert port.setBaudRate(baud)
+        assert device.hears(port.baudrate)
+    assert not InProcessPort(device).setBaudRate(12)
+
+
+def test_the_dice_of_faults_are_an_argument():
+    def noisy(seed):
+        device = build(LINES[1], lambda: 0.0, seed)
+        device.faults.command("corrupt all")
+        return device.exchange(bytes.fromhex("FFFFFD0201FF"))[0].pieces
+
+    assert noisy(1) == noisy(1)
+    assert any(noisy(seed) != noisy(1) for seed in range(2, 6))

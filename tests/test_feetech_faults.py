@@ -1,0 +1,454 @@
+"""What can go wrong on a bus of STS servos, injected, and what the driver makes of it.
+
+What must be true of each: a read takes a bounded time; no value is delivered that was not
+true in its cycle (the rig asserts it in every tick); one bad servo does not blind the
+others; a fault is data and a name; a restarted servo is set up anew and holds where it is.
+"""
+
+import pytest
+from sts_rig import IDS, NAMES, Rig
+
+from drivers.dynamixel_health import AGAIN_AND_AGAIN
+from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
+from drivers.feetech_revival import FAR_SIDE
+from drivers.types import ServoSetup
+from sim_mock.servo_physics import ServoSpec
+
+LONGEST_S = 0.1
+"""No read takes longer, but the one that opens a port anew or sets a servo up anew."""
+
+
+@pytest.fixture
+def rig():
+    return Rig().start()
+
+
+PASSING = [
+    "drop 2 0",
+    "drop 2 3",
+    "drop 2 8",
+    "drop 2 -1",
+    "corrupt 2 20",
+    "corrupt 2 70",
+    "corrupt 2 160",
+    "truncate 2 0",
+    "truncate 2 5",
+    "truncate 2 11",
+    "delay 2 10",
+    "delay 2 60",
+    "wrong-id 2 3",
+    "wrong-id 2 77",
+    "refuse 2 32",
+    "short 2 2",
+    "long 2 2",
+    "lose 2",
+    "stall 2 30",
+    "stall 2 60",
+]
+
+
+@pytest.mark.parametrize("fault", PASSING)
+def test_a_passing_fault_costs_little_and_passes(rig, fault):
+    late_ms = int(fault.split()[2]) if fault.split()[0] in ("delay", "stall") else 0
+    for times in (1, 5):
+        rig.command(f"{fault} count {times}")
+        lost = 0
+        for _ in range(30):
+            heard = rig.heard()
+            lost += not (heard[0] and heard[2] and heard[3])
+        rig.until_all()
+        # An answer under another's id spoils that other's, and too long a block the header.
+        two = fault in ("wrong-id 2 3", "long 2 2")
+        assert lost <= times * (late_ms / 10.0 + 2.0 if late_ms else 1 + two)
+        assert rig.heard() == [True] * 4
+    assert rig.longest_s < LONGEST_S
+    assert rig.bus.faults() == ()
+
+
+@pytest.mark.parametrize(
+    "fault",
+    ["noise before FFFF", "noise before FFFF0102", "noise before", "noise after FF", "noise after",
+     "fragment 1", "fragment", "echo on", "delay 2 0.3", "stall 3 0.3"],
+)  # fmt: skip
+def test_what_is_harmless(rig, fault):
+    rig.command(fault)
+    assert [rig.heard() for _ in range(20)] == [[True] * 4] * 20
+    assert rig.longest_s < LONGEST_S
+
+
+def test_answers_that_come_twice(rig):
+    rig.command("duplicate all")
+    for _ in range(30):
+        assert rig.heard() == [True] * 4
+
+
+@pytest.mark.parametrize("late_ms", [3, 15, 60, 80, 200])
+def test_everybody_late_is_never_taken_for_fresh(rig, late_ms):
+    for times in (1, 3, 12):
+        rig.command(f"delay all {late_ms} count {times}")
+        for _ in range(10):
+            rig.tick()
+        rig.until_all()
+    assert rig.longest_s < 0.3
+
+
+def test_answers_out_of_order(rig):
+    rig.command("reorder count 1")
+    rig.tick()
+    assert rig.heard() == [True] * 4
+
+
+@pytest.mark.parametrize("policy", ["silence", "skip", "timeout"])
+@pytest.mark.parametrize("missing", [(1,), (4,), (2, 3)])
+def test_silent_servos_cost_only_themselves(rig, policy, missing):
+    rig.command(f"set after-missing {policy}")
+    for servo_id in missing:
+        rig.command(f"lose {servo_id}")
+    expected = [servo_id not in missing for servo_id in IDS]
+    assert [rig.heard() for _ in range(50)] == [expected] * 50
+    assert rig.longest_s < LONGEST_S
+    lines = rig.bus.events()
+    assert all(f"{NAMES[i - 1]} (servo {i}) does not answer" in lines for i in missing)
+    rig.command("clear")
+    assert rig.until_all() <= 60
+    assert any("answers again after" in line for line in rig.bus.events())
+
+
+def test_one_that_was_silent_gets_no_goals_until_it_holds_its_place_again(rig):
+    rig.run(0.5, [2000] * 4)
+    rig.command("lose 2")
+    rig.run(0.2, [2000] * 4)
+    rig.sent.clear()
+    rig.run(0.3, [2600] * 4)
+    goals = [p for p in rig.sent if p[4] == 0x83 and p[5] == 42]
+    assert goals and all(list(p[7:-1:7]) == [1, 3, 4] for p in goals)
+    rig.command("clear")
+    seen = [rig.tick([2600] * 4)[1] for _ in range(120)]
+    assert [r.rearmed for r in seen if r is not None].count(True) == 1
+    assert next(r for r in seen if r is not None).rearmed
+    assert rig.chain.positions_steps()[1] == pytest.approx(2600, abs=8)
+
+
+def test_a_port_that_fails_is_opened_again(rig):
+    rig.command("unplug for 0.4")
+    assert rig.heard() == [False] * 4
+    assert rig.bus.events()[0].startswith("port lost: ")
+    rig.bus.write([2000] * 4)
+    began_s = rig.now_s
+    rig.until_all()
+    assert rig.now_s - began_s < 1.0
+    assert any(line.startswith("port back after 0.") for line in rig.bus.events())
+
+
+def test_after_a_replug_all_hold_where_they_are(rig):
+    rig.tick([2500] * 4)
+    rig.command("unplug for 3.0")
+    for _ in range(250):
+        assert rig.heard() == [False] * 4
+    for servo_id in IDS:
+        rig.command(f"turn {servo_id} 150")
+    rig.sent.clear()
+    while None in (readings := rig.tick([2500] * 4)):
+        pass
+    assert [(r.rearmed, r.torque) for r in readings] == [(True, True)] * 4
+    first = next(p for p in rig.sent if p[4] == 0x83 and p[5] == 42)
+    goals = [int.from_bytes(first[8 + 7 * k : 10 + 7 * k], "little") for k in range(4)]
+    assert goals == pytest.approx([r.position_steps for r in readings], abs=40)
+    assert [r.rearmed for r in rig.tick([2500] * 4)] == [False] * 4
+
+
+def test_servo_power_cut_and_back(rig):
+    rig.command("lose all for 2.0")
+    for _ in range(100):
+        assert rig.heard() == [False] * 4
+    for servo_id in IDS:
+        rig.command(f"brown-out {servo_id}")
+    assert "no servo answers: check servo power and cable" in rig.bus.events()
+    rig.until_all()
+    assert rig.bus.health().errors["restarted"] >= 4
+
+
+def test_a_port_that_stays_away_is_given_up():
+    rig = Rig(give_up_s=2.0).start()
+    rig.command("unplug")
+    began_s = rig.now_s
+    with pytest.raises(BusLost, match="has been gone for 2.0 s"):
+        for _ in range(1000):
+            rig.tick()
+    assert 2.0 <= rig.now_s - began_s <= 2.1
+    with pytest.raises(BusLost, match="no bus watchdog: cut the servo power to free them"):
+        rig.bus.release()
+    rig.command("plug")
+    rig.bus.release()
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def test_servos_that_stay_away_are_given_up():
+    rig = Rig(give_up_s=1.0).start()
+    rig.command("lose all")
+    with pytest.raises(BusLost, match="no servo has answered for 1.0 s"):
+        for _ in range(300):
+            rig.tick()
+
+
+def test_opening_is_forbidden():
+    rig = Rig()
+    rig.command("deny on")
+    with pytest.raises(PortError, match="Permission denied"):
+        rig.bus.open()
+
+
+@pytest.mark.parametrize("what", ["silence", "garbage"])
+def test_wrong_baud_rate(what):
+    rig = Rig(baud=500_000)
+    rig.command(f"set wrong-baud {what}")
+    with pytest.raises(ServoMissing, match="no servo answers: check servo power, cable and baud"):
+        rig.bus.open()
+
+
+def test_two_servos_with_one_id(rig):
+    rig.command("collide 2")
+    for _ in range(200):
+        rig.now_s += 0.01
+        began_s = rig.now_s
+        readings = rig.bus.read(rig.now_s)
+        assert None not in (readings[0], readings[2], readings[3])
+        assert rig.now_s - began_s < LONGEST_S
+        rig.bus.write([2000] * 4)
+    assert any(line.startswith("jaw (servo 2) answers, but") for line in rig.bus.events())
+
+
+def test_a_restarted_servo_is_set_up_anew_where_it_is(rig):
+    for _ in range(3):
+        rig.tick([2900] * 4)
+    rig.command("brown-out 3")
+    seen = []
+    for _ in range(150):
+        rig.now_s += 0.01
+        at = rig.chain.positions_steps()[2]
+        reading = rig.bus.read(rig.now_s)[2]
+        if reading is not None and reading.rearmed:
+            assert abs(reading.position_steps - at) <= 2
+            assert abs(rig.get(3, 42, 2) - at) <= 2
+            seen.append(at)
+        rig.bus.write([2900] * 4)
+    assert len(seen) == 1
+    assert rig.bus.faults() == ()
+    assert "neck (servo 3) restarted: set up anew" in rig.bus.events()
+    assert rig.get(3, 40) == 1
+
+
+def test_a_restart_in_the_wink_of_an_eye_is_found(rig):
+    """One that nobody missed, after which a goal has switched the torque on again."""
+    rig.bus.release()
+    setups = [s._replace(strength=0.5, max_accel_steps_s2=20_000.0) for s in rig.setups]
+    rig.bus.retune(setups)
+    rig.bus.engage()
+    rig.run(0.2, [2000] * 4)
+    assert (rig.get(3, 41), rig.get(3, 48, 2)) == (200, 500)
+    memory = rig.chain[3].memory
+    memory.set("acceleration", 0)
+    memory.set("torque_limit", 1000)
+    readings = rig.run(0.2, [2000] * 4)
+    assert (rig.get(3, 41), rig.get(3, 48, 2)) == (200, 500)
+    assert None not in readings
+
+
+def test_lost_torque_is_found_and_brought_back_at_the_present_place(rig):
+    rig.run(0.5, [2000] * 4)
+    rig.chain[2].write(40, b"\x00")
+    rig.command("turn 2 200")
+    seen = [rig.tick([2000] * 4)[1] for _ in range(30)]
+    rearmed = [r for r in seen if r is not None and r.rearmed]
+    assert len(rearmed) == 1
+    assert rearmed[0].position_steps == pytest.approx(2200, abs=8)
+    assert rig.get(2, 40) == 1
+
+
+def test_a_servo_that_keeps_restarting_stays_limp(rig):
+    for _ in range(5):
+        rig.command("brown-out 2")
+        for _ in range(150):
+            rig.tick()
+    assert rig.bus.faults() == (f"jaw (servo 2): {AGAIN_AND_AGAIN}",)
+    reading = rig.tick()[1]
+    assert (reading.torque, reading.fault) == (False, AGAIN_AND_AGAIN)
+    assert not rig.chain[2].torque
+    assert rig.chain[1].torque
+    rig.bus.engage()
+    assert rig.bus.faults() == ()
+    assert rig.tick()[1].fault == ""
+
+
+def test_overload_is_named_and_goes(rig):
+    rig.run(0.5, [2000] * 4)
+    rig.command("overload 2")
+    readings = rig.tick([2000] * 4)
+    assert None not in readings
+    assert (readings[1].alert, readings[1].fault) == (True, "overload")
+    assert [r.fault for r in readings] == ["", "overload", "", ""]
+    assert rig.bus.faults() == ("jaw (servo 2): overload",)
+    assert rig.bus.events() == ("jaw (servo 2): overload",)
+    # Another goal ends it.
+    readings = rig.run(1.5, [2100] * 4)
+    assert rig.bus.faults() == ()
+    assert (readings[1].alert, readings[1].fault) == (False, "")
+    assert rig.bus.events() == ("jaw (servo 2): the fault is gone",)
+
+
+def test_overheating_takes_the_torque_and_cooling_brings_it_back(rig):
+    rig.run(0.5, [2000] * 4)
+    rig.command("overheat 2")
+    readings = rig.run(0.5, [2000] * 4)
+    assert (readings[1].fault, readings[1].torque) == ("overheating", False)
+    rig.command("turn 2 100")
+    readings = rig.run(0.5, [2000] * 4)
+    assert not rig.chain[2].torque
+    rig.command("temperature 2 40")
+    seen = [rig.tick([2000] * 4)[1] for _ in range(200)]
+    assert [r.rearmed for r in seen if r is not None].count(True) == 1
+    assert rig.bus.faults() == ()
+    assert rig.chain[2].torque
+
+
+def test_input_voltage_is_named_and_the_torque_stays(rig):
+    """A servo for 7.4 V on 12 V says so in every answer; its answers are good all the same."""
+    rig.command("voltage all 12.0")
+    readings = rig.run(0.5, [2000] * 4)
+    assert [(r.fault, r.torque, r.alert) for r in readings] == [("input voltage", True, True)] * 4
+    assert all(r.voltage_v == pytest.approx(12.0, abs=0.3) for r in readings)
+    rig.command("brown-out 2")
+    rig.run(1.0, [2000] * 4)
+    rig.until_all()
+    assert len(rig.bus.faults()) == 4
+
+
+def test_encoder(rig):
+    rig.command("encoder 2")
+    readings = rig.tick()
+    assert readings[1] is None or readings[1].fault == "encoder"
+    assert [r is not None for r in (readings[0], readings[2], readings[3])] == [True] * 3
+    assert rig.bus.faults() == ("jaw (servo 2): encoder",)
+
+
+def test_a_stuck_joint_is_seen_by_its_load(rig):
+    rig.run(0.5, [2000] * 4)
+    rig.command("stick 2")
+    at = rig.chain.positions_steps()[1]
+    readings = rig.run(0.3, [2600] * 4)
+    assert abs(readings[1].position_steps - at) <= 1
+    assert abs(readings[1].load) > 0.3
+    readings = rig.run(4.0, [2600] * 4)
+    assert readings[1].fault == "overload"
+    assert abs(readings[1].load) < 0.3
+
+
+def test_a_babbling_node(rig):
+    rig.command("babble on for 0.5")
+    for _ in range(30):
+        rig.tick()
+    assert rig.longest_s < 0.5
+    rig.until_all()
+
+
+def test_factory_defaults():
+    rig = Rig(baud=1_000_000).start()
+    rig.bus.release()
+    rig.command("reset 3")
+    rig.now_s += 1.0
+    with pytest.raises(ServoMissing, match=r"neck \(servo 3\) does not answer"):
+        rig.bus.open()
+
+
+def test_lost_writes(rig):
+    rig.command("lose-writes 3")
+    for _ in range(4):
+        rig.tick([2500] * 4)
+    assert [rig.get(i, 42, 2) for i in IDS] == [2500] * 4
+
+
+def test_lost_writes_while_the_torque_comes_on_and_goes():
+    rig = Rig()
+    rig.bus.open()
+    rig.command("lose-writes 2")
+    rig.bus.engage()
+    rig.command("lose-writes 2")
+    rig.bus.release()
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def test_a_blocked_write(rig):
+    rig.command("block on for 0.6")
+    assert rig.heard() == [False] * 4
+    assert "takes no bytes" in rig.bus.events()[0]
+    rig.until_all()
+    assert rig.longest_s < 0.3
+
+
+@pytest.mark.parametrize("goal", ["wait", "torque-on"])
+@pytest.mark.parametrize("torque_on", ["old-goal", "present"])
+def test_whatever_goal_and_torque_do_nothing_leaps(goal, torque_on):
+    rig = Rig()
+    rig.command(f"set goal {goal}")
+    rig.command(f"set torque-on {torque_on}")
+    rig.bus.open()
+    for servo in rig.chain.servos:
+        servo.memory.set("goal_position", 3000)
+    assert rig.bus.engage() == (2000,) * 4
+    for _ in range(20):
+        rig.tick([2000] * 4)
+        assert rig.chain.positions_steps() == pytest.approx([2000] * 4, abs=3)
+    rig.command("brown-out 3")
+    for _ in range(150):
+        rig.tick([2000] * 4)
+        assert rig.chain.positions_steps() == pytest.approx([2000] * 4, abs=3)
+    rig.until_all()
+    rig.bus.release()
+    rig.run(0.2, [2500] * 4)
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def far_rig():
+    specs = [ServoSpec(1, "sts3215", 4090), ServoSpec(2, "sts3215", 700)]
+    setups = [ServoSetup(i, "sts3215", 100, 1500, 3000.0, NAMES[i - 1]) for i in (1, 2)]
+    return Rig(specs, setups)
+
+
+def test_a_joint_beyond_its_encoders_zero_is_told_so_and_not_led_the_wrong_way():
+    rig = far_rig()
+    rig.bus.open()
+    rig.now_s += 0.01
+    assert rig.bus.read(rig.now_s)[0].position_steps == 4090 - 4096
+    with pytest.raises(ServoFault, match=r"eye \(servo 1\) stands at 4090, beyond .*by hand"):
+        rig.bus.engage()
+    assert not any(servo.torque for servo in rig.chain.servos)
+    rig.command("turn 1 100")
+    assert rig.bus.engage() == (100, 700)
+
+
+def test_a_joint_that_restarts_beyond_zero_stays_limp_until_it_is_turned_back():
+    rig = far_rig()
+    rig.bus.open()
+    rig.command("turn 1 200")
+    rig.bus.engage()
+    for _ in range(20):
+        rig.bus.read(rig.now_s)
+        rig.now_s += 0.01
+    rig.command("brown-out 1")
+    rig.command("turn 1 -250")
+    faults = []
+    for _ in range(150):
+        rig.now_s += 0.01
+        rig.bus.read(rig.now_s)
+        rig.bus.write([500, 500])
+        faults.append(rig.bus.faults())
+    assert faults[-1] == (f"eye (servo 1): {FAR_SIDE}",)
+    assert [servo.torque for servo in rig.chain.servos] == [False, True]
+    assert sum("stands beyond" in line for line in rig.bus.events()) == 1
+    rig.command("turn 1 300")
+    for _ in range(60):
+        rig.now_s += 0.01
+        rig.bus.read(rig.now_s)
+        rig.bus.write([500, 500])
+    assert rig.bus.faults() == ()
+    assert [servo.torque for servo in rig.chain.servos] == [True, True]

@@ -1,0 +1,579 @@
+"""The Maestro driver against an emulated board: holding, following, errors, restarts, silence."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.errors import BusLost, PortError, ServoMissing
+from drivers.maestro import MaestroBus, MaestroParams
+from drivers.types import ServoSetup
+from sim_mock.maestro_board import build_board
+from sim_mock.ports import InProcessPort
+
+CENTRE = 6000
+SPEED = 12_000.0
+LOW, HIGH = 4400, 7600
+SETUPS = (
+    ServoSetup(0, "hobby", LOW, HIGH, SPEED, "eyes", rest_steps=6100),
+    ServoSetup(1, "hobby", LOW, HIGH, SPEED, "lid"),
+    ServoSetup(5, "hobby", LOW, HIGH, SPEED, "brow", rest_steps=9000),
+)
+IDS = tuple(setup.id for setup in SETUPS)
+TICK_S = 0.01
+
+
+class Bench:
+    """A board, a port to it, and a bus; time passes where somebody waits."""
+
+    def __init__(self, setups=SETUPS, channels=12, chosen=(), **params):
+        self.now_s = 0.0
+        self.sent = []
+        self.board = build_board(channels, lambda: self.now_s, crc=params.get("crc", False))
+        for case, value in chosen:
+            self.board.choose(case, value)
+        self.port = InProcessPort(self.board, self.sent.append, "emulated board", self._sleep_until)
+        self.bus = MaestroBus(self.port, setups, MaestroParams(**{"channels": channels, **params}))
+
+    def _sleep_until(self, at_s):
+        self.now_s = max(self.now_s, at_s)
+
+    def raw(self, text):
+        """Speak to the board past the driver."""
+        replies = self.board.exchange(bytes.fromhex(text))
+        return b"".join(piece.data for reply in replies for piece in reply.pieces)
+
+    def pulses(self, ids=IDS):
+        return [int.from_bytes(self.raw(f"90 {channel:02X}"), "little") for channel in ids]
+
+    def order(self, *goals):
+        """Send channels past the driver."""
+        for channel, goal in zip(IDS, goals, strict=True):
+            self.raw(f"84 {channel:02X} {goal & 127:02X} {goal >> 7:02X}")
+
+    def run(self, seconds, goals=None):
+        """Tick every 10 ms; give all readings."""
+        seen = []
+        for _ in range(round(seconds / TICK_S)):
+            self.now_s += TICK_S
+            seen.append(self.bus.read(self.now_s))
+            if goals is not None:
+                self.bus.write(goals)
+        return seen
+
+    def packets(self):
+        """Give what was sent since the last call."""
+        sent, self.sent[:] = list(self.sent), []
+        return sent
+
+
+@pytest.fixture
+def bench():
+    made = Bench()
+    made.bus.open()
+    return made
+
+
+@pytest.fixture
+def held(bench):
+    bench.order(5000, 6000, 7000)
+    assert bench.bus.engage() == (5000, 6000, 7000)
+    bench.run(0.1)
+    bench.bus.events()
+    return bench
+
+
+def places(readings):
+    return [None if r is None else r.position_steps for r in readings]
+
+
+# --- open and read
+
+
+def test_open_moves_nothing_and_readings_say_that_they_are_not_measured(bench):
+    assert bench.pulses() == [0, 0, 0]
+    readings = bench.run(0.05)[-1]
+    assert places(readings) == [6100, CENTRE, HIGH]
+    for reading in readings:
+        assert not reading.measured and not reading.torque and not reading.alert
+        assert reading.at_s == pytest.approx(bench.now_s)
+        assert (reading.current_ma, reading.load) == (0.0, 0.0)
+        assert reading.temperature_c is None and reading.voltage_v is None
+    bench.bus.write([5000] * 3)
+    assert bench.pulses() == [0, 0, 0]
+    assert bench.bus.health().errors == {}
+    assert bench.bus.health().tx_bytes > 0 < bench.bus.health().rx_bytes
+
+
+def test_open_finds_pulses_that_are_on(bench):
+    bench.order(5000, 6000, 7000)
+    bench.bus.open()
+    readings = bench.run(0.05)[-1]
+    assert places(readings) == [5000, 6000, 7000]
+    assert all(reading.torque for reading in readings)
+    assert bench.pulses() == [5000, 6000, 7000]
+
+
+def test_errors_from_before_are_told_and_cleared():
+    bench = Bench()
+    bench.raw("90 7F A1 55")
+    bench.bus.open()
+    assert any("serial protocol error" in line for line in bench.bus.events())
+    bench.run(0.1)
+    assert bench.bus.faults() == ()
+
+
+@pytest.mark.parametrize("form", ["compact", "pololu"])
+@pytest.mark.parametrize("crc", [False, True])
+def test_every_form_of_the_commands(form, crc):
+    bench = Bench(protocol=form, crc=crc)
+    bench.bus.open()
+    bench.bus.engage()
+    bench.run(0.5, [5000, 5500, 6500])
+    assert places(bench.run(0.01)[-1]) == [5000, 5500, 6500]
+    assert bench.bus.health().errors == {}
+
+
+@pytest.mark.parametrize("form", ["compact", "pololu"])
+def test_a_board_that_detects_its_baud_rate_is_woken(form):
+    bench = Bench(chosen=[("mode", "uart-detect")], protocol=form)
+    bench.bus.open()
+    bench.bus.engage()
+    assert bench.pulses() == [6100, CENTRE, HIGH]
+
+
+def test_a_mute_board_is_named_with_its_causes():
+    bench = Bench(chosen=[("mode", "mute")])
+    with pytest.raises(ServoMissing, match="USB Dual Port.*115200 bit/s.*CRC must be off"):
+        bench.bus.open()
+    assert bench.now_s < 0.2
+
+
+def test_a_wrong_device_number_is_a_cause():
+    bench = Bench(protocol="pololu", device=99)
+    with pytest.raises(ServoMissing, match="device number 99"):
+        bench.bus.open()
+
+
+def test_a_port_that_is_gone():
+    bench = Bench()
+    bench.board.faults.command("unplug")
+    with pytest.raises(PortError):
+        bench.bus.open()
+
+
+def test_a_channel_that_the_board_has_not():
+    bench = Bench(SETUPS[:2], 6)
+    bench.bus = MaestroBus(
+        bench.port, (*SETUPS, SETUPS[0]._replace(id=11, name="jaw")), MaestroParams(channels=12)
+    )
+    with pytest.raises(ServoMissing, match=r"jaw \(servo 11\): has the board 12 channels"):
+        bench.bus.open()
+
+
+@pytest.mark.parametrize(
+    "setup",
+    [
+        SETUPS[0]._replace(id=12),
+        SETUPS[0]._replace(min_steps=0),
+        SETUPS[0]._replace(max_steps=17_000),
+        SETUPS[0]._replace(min_steps=7000, max_steps=6000),
+    ],
+)
+def test_setups_that_no_board_can_have(setup):
+    with pytest.raises(ValueError, match=f"channel {setup.id}"):
+        Bench((setup,))
+
+
+def test_two_servos_on_one_channel():
+    with pytest.raises(ValueError, match="one servo only"):
+        Bench((SETUPS[0], SETUPS[0]))
+
+
+# --- engage
+
+
+def test_pulses_that_are_on_stay_as_they_are(bench):
+    bench.order(5000, 6000, 7000)
+    bench.packets()
+    assert bench.bus.engage() == (5000, 6000, 7000)
+    assert bench.pulses() == [5000, 6000, 7000]
+    assert bench.now_s < 0.01
+
+
+def test_limits_are_armed_before_the_goal(bench):
+    bench.bus = MaestroBus(
+        bench.port,
+        (SETUPS[0]._replace(max_accel_steps_s2=100_000.0),),
+        MaestroParams(stagger_ms=0.0),
+    )
+    bench.bus.open()
+    bench.packets()
+    bench.bus.engage()
+    sent = b"".join(bench.packets())
+    speed, accel, target = (
+        sent.index(bytes.fromhex(text)) for text in ("87 00 78 00", "89 00 50 00", "84 00 54 2F")
+    )
+    assert speed < accel < target
+
+
+def test_channels_without_pulses_go_to_their_rest_one_after_another(bench):
+    assert bench.bus.engage() == (6100, CENTRE, HIGH)
+    assert bench.pulses() == [6100, CENTRE, HIGH]
+    assert bench.now_s >= 0.2
+    said = " ".join(bench.bus.events())
+    assert "tell no positions" in said
+    assert "eyes (servo 0), lid (servo 1), brow (servo 5) had no pulses" in said
+    assert all(reading.torque for reading in bench.run(0.01)[-1])
+
+
+def test_that_nothing_is_measured_is_said_once(bench):
+    bench.bus.engage()
+    bench.bus.release()
+    bench.bus.events()
+    bench.bus.engage()
+    assert not any("tell no positions" in line for line in bench.bus.events())
+
+
+def test_after_a_release_they_begin_where_they_were(bench):
+    bench.bus.engage()
+    bench.run(1.0, [5000, 5500, 6500])
+    bench.bus.release()
+    assert bench.pulses() == [0, 0, 0]
+    assert bench.bus.engage() == (5000, 5500, 6500)
+
+
+def test_a_joint_outside_its_limits_comes_inside_slowly(bench):
+    bench.order(4000, 6000, 7000)
+    assert bench.bus.engage() == (LOW, 6000, 7000)
+    bench.run(0.1, [LOW, 6000, 7000])
+    assert 4000 < bench.pulses()[0] < 4200
+    bench.run(0.6, [LOW, 6000, 7000])
+    assert bench.pulses()[0] == LOW
+    before = bench.run(0.05, [5000, 6000, 7000])[-1][0].position_steps
+    assert before - LOW > 300
+
+
+def test_a_board_with_a_narrower_range_is_refused(bench):
+    bench.board.choose("max-us", "1800")
+    with pytest.raises(ServoMissing, match="brow.*sent to 1900 us and gets 1800 us.*widen"):
+        bench.bus.engage()
+    assert bench.pulses() == [0, 0, 0]
+
+
+def test_no_answer_at_engage(bench):
+    bench.board.choose("mode", "mute")
+    with pytest.raises(ServoMissing, match="no answer about eyes"):
+        bench.bus.engage()
+
+
+# --- following
+
+
+def test_goals_are_followed(held):
+    held.run(1.0, [5500, 5600, 6600])
+    assert held.pulses() == [5500, 5600, 6600]
+    assert places(held.run(0.01)[-1]) == [5500, 5600, 6600]
+    assert held.bus.health().errors == {}
+    assert held.bus.events() == ()
+
+
+def test_readings_keep_to_the_board_within_its_own_period(held):
+    for goal in (4500, 7500, 5200):
+        for _ in range(20):
+            readings = held.run(TICK_S, [goal, 6000, 7000])[-1]
+            assert abs(readings[0].position_steps - held.pulses()[0]) <= 0.03 * SPEED + 8
+
+
+def test_a_slow_servo_lags_behind_its_pulse():
+    bench = Bench((SETUPS[0]._replace(own_speed_steps_s=2000.0),))
+    bench.bus.open()
+    bench.bus.engage()
+    reading = bench.run(0.2, [7100])[-1][0]
+    assert bench.pulses((0,)) == [7100]
+    assert reading.position_steps == pytest.approx(6100 + 0.19 * 2000.0, abs=45)
+    assert reading.velocity_steps_s == pytest.approx(2000.0, rel=0.05)
+
+
+def test_neighbours_share_one_command_and_all_goals_one_write(held):
+    held.packets()
+    held.bus.write([5000, 6000, 7000])
+    assert held.packets() == [bytes.fromhex("9F 02 00 08 27 70 2E 84 05 58 36")]
+
+
+def test_a_micro_has_no_command_for_several():
+    bench = Bench(SETUPS[:2], 6)
+    bench.bus.open()
+    bench.bus.engage()
+    bench.packets()
+    bench.bus.write([5000, 6000])
+    assert bench.packets() == [bytes.fromhex("84 00 08 27 84 01 70 2E")]
+    assert bench.bus.moving() is None
+    bench.run(0.5, [5000, 6000])
+    assert bench.pulses((0, 1)) == [5000, 6000]
+
+
+@pytest.mark.parametrize("bad", [float("nan")])
+def test_what_is_not_a_number_is_refused(held, bad):
+    held.packets()
+    with pytest.raises(ValueError, match="not a number"):
+        held.bus.write([5000, bad, 6000])
+    with pytest.raises(ValueError):
+        held.bus.write([5000])
+    assert held.packets() == []
+
+
+def targets(packet):
+    """Take the pulse widths out of compact commands: those of 84 and 9F."""
+    found, at = [], 0
+    while at < len(packet):
+        size = {0x84: 4, 0x9F: 3 + 2 * packet[at + 1]}[packet[at]]
+        data = packet[at + (2 if packet[at] == 0x84 else 3) : at + size]
+        assert all(byte < 0x80 for byte in packet[at + 1 : at + size])
+        found += [data[i] + 128 * data[i + 1] for i in range(0, len(data), 2)]
+        at += size
+    return found
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(*(st.one_of(st.integers(-(10**6), 10**6), st.floats(allow_nan=False)),) * 3),
+        max_size=8,
+    )
+)
+def test_no_goal_outside_the_limits_ever_leaves(moves):
+    bench = Bench(stagger_ms=0.0)
+    bench.bus.open()
+    bench.bus.engage()
+    for goals in moves:
+        bench.run(TICK_S)
+        bench.packets()
+        bench.bus.write(goals)
+        for packet in bench.packets():
+            assert all(LOW <= goal <= HIGH for goal in targets(packet))
+
+
+def test_moving_and_going_home(held):
+    held.run(0.02, [7500, 6000, 7000])
+    assert held.bus.moving() is True
+    held.run(1.0)
+    assert held.bus.moving() is False
+    held.bus.go_home()
+    assert held.pulses() == [0, 0, 0]
+    held.packets()
+    held.bus.write([5000] * 3)
+    assert held.packets() == []
+
+
+def test_retune_counts_from_the_next_hold(held):
+    narrow = tuple(setup._replace(max_steps=6500, rest_steps=None) for setup in SETUPS)
+    held.bus.retune(narrow)
+    held.run(0.5, [7500] * 3)
+    assert held.pulses() == [7500] * 3
+    held.bus.release()
+    assert held.bus.engage() == (6500, 6500, 6500)
+    with pytest.raises(ValueError, match="another bus"):
+        held.bus.retune(narrow[:2])
+
+
+def test_release_is_confirmed_and_reported_where_it_is_not(held):
+    held.bus.release()
+    assert held.pulses() == [0, 0, 0]
+    assert not any(reading.torque for reading in held.run(0.05)[-1])
+    held.bus.engage()
+    held.bus.events()
+    held.board.choose("mode", "mute")
+    held.bus.release()
+    assert sum("does not confirm" in line for line in held.bus.events()) == 3
+
+
+# --- what goes wrong
+
+
+def test_a_restart_is_noticed_within_a_tick_and_held_anew_where_it_was(held):
+    held.run(1.0, [5500, 5600, 6600])
+    held.board.faults.command("brown-out")
+    seen = held.run(3.0, [5500, 5600, 6600])
+    anew = [[r is not None and r.rearmed for r in readings] for readings in seen]
+    assert [sum(column) for column in zip(*anew, strict=True)] == [1, 1, 1]
+    for i, place in enumerate((5500, 5600, 6600)):
+        first = next(r[i] for r, a in zip(seen, anew, strict=True) if a[i])
+        assert first.position_steps == pytest.approx(place, abs=1)
+    assert held.pulses() == [5500, 5600, 6600]
+    assert any("the board restarted: set up anew" in line for line in held.bus.events())
+    assert held.bus.health().errors["restarted"] == 1
+
+
+def test_after_a_restart_limits_are_armed_before_any_goal(held):
+    held.run(0.5, [5500, 5600, 6600])
+    held.board.faults.command("brown-out")
+    held.packets()
+    held.run(3.0, [5500, 5600, 6600])
+    sent = b"".join(held.packets())
+    for channel in IDS:
+        armed = sent.index(bytes((0x87, channel, 120, 0)))
+        assert armed < sent.index(bytes((0x84, channel)))
+    assert sent.index(b"\x9f") > sent.index(bytes((0x87, 1)))
+
+
+def test_an_error_that_sends_all_home_is_named_and_healed(held):
+    held.run(0.5, [5500, 5600, 6600])
+    held.raw("55")  # a data byte where a command is due
+    assert held.pulses() == [0, 0, 0]
+    seen = held.run(0.3, [5500, 5600, 6600])
+    assert any(r is not None and r.rearmed for r in seen[2])
+    assert held.pulses() == [5500, 5600, 6600]
+    said = " ".join(held.bus.events())
+    assert "the board reports: serial protocol error" in said
+    assert "sent home by an error (serial protocol error)" in said
+    assert held.bus.faults() == ("board 12: serial protocol error",)
+    assert held.bus.health().errors["serial protocol error"] == 1
+    held.run(11.0, [5500, 5600, 6600])
+    assert held.bus.faults() == ()
+
+
+def test_an_error_that_moves_nothing_is_only_named(held):
+    held.board.choose("on-error", "ignore")
+    held.raw("55")
+    seen = held.run(0.3, [5500, 5600, 6600])
+    assert not any(r is None or r.rearmed for readings in seen for r in readings)
+    assert held.bus.faults() == ("board 12: serial protocol error",)
+
+
+def test_where_home_is_a_place_they_come_back_before_they_are_there(held):
+    held.board.choose("on-error", "home")
+    held.run(1.0, [5000, 5000, 5000])
+    held.raw("55")
+    seen = held.run(0.3)
+    assert not any(r is None or r.rearmed for readings in seen for r in readings)
+    assert held.pulses() == [5000, 5000, 5000]
+
+
+def test_where_home_is_reached_at_once_they_are_held_there():
+    bench = Bench(tuple(setup._replace(max_speed_steps_s=2e6) for setup in SETUPS))
+    bench.board.choose("on-error", "home")
+    bench.bus.open()
+    bench.bus.engage()
+    bench.run(1.0, [5000, 5000, 5000])
+    bench.raw("55")
+    seen = bench.run(0.3)
+    anew = [r for readings in seen for r in readings if r is not None and r.rearmed]
+    assert [r.position_steps for r in anew] == [6000, 6000, 6000]
+    assert bench.pulses() == [6000, 6000, 6000]
+    assert "sent home by an error" in " ".join(bench.bus.events())
+
+
+def test_errors_again_and_again_end_without_pulses(held):
+    for _ in range(4):
+        held.raw("55")
+        readings = held.run(0.3, [5500, 5600, 6600])[-1]
+    assert held.pulses() == [0, 0, 0]
+    for reading in readings:
+        assert reading.alert and not reading.torque and "again and again" in reading.fault
+    assert any("eyes (servo 0): errors again and again" in line for line in held.bus.faults())
+    assert held.bus.engage() == tuple(reading.position_steps for reading in readings)
+    assert not any(reading.fault for reading in held.run(0.1)[-1])
+
+
+def test_a_channel_that_meets_an_end_of_the_board_is_told_once(held):
+    held.board.choose("max-us", "1850")
+    for _ in range(3):
+        seen = held.run(1.0, [7600, 6000, 7000])
+        held.run(1.0, [6000, 6000, 7000])
+    assert seen[-1][0].position_steps == 7400
+    assert not any(r is None or r.rearmed for readings in seen for r in readings)
+    told = [line for line in held.bus.events() if "sent to" in line]
+    assert len(told) == 1 and "gets 1850 us: widen its range" in told[0]
+
+
+def test_a_running_script_is_stopped_at_engage(bench):
+    bench.board.faults.command("script on")
+    bench.bus.engage()
+    assert "the board ran a script of its own: stopped" in bench.bus.events()
+    assert bench.raw("AE") != b"\0"
+
+
+def test_one_lost_answer_costs_one_tick_and_nothing_else(held):
+    held.board.faults.command("lose all count 1")
+    seen = held.run(0.2, [5500, 5600, 6600])
+    assert places(seen[0]) == [None, None, None]
+    assert not any(r is None or r.rearmed for readings in seen[1:] for r in readings)
+    assert sum(held.bus.health().errors.values()) == 1
+
+
+def test_a_late_answer_is_never_taken_for_another(held):
+    held.run(1.0, [5000, 6000, 7000])
+    held.board.faults.command("delay all 25 count 1")
+    seen = held.run(0.3, [5000, 6000, 7000])
+    for readings in seen:
+        assert all(
+            r is None or r.position_steps == at
+            for r, at in zip(readings, (5000, 6000, 7000), strict=True)
+        )
+    assert not any(r is not None and r.rearmed for readings in seen for r in readings)
+
+
+def test_a_silent_board_costs_little_time_and_is_given_up_in_the_end(held):
+    held.bus._params = MaestroParams(give_up_s=2.0)
+    held.board.choose("mode", "mute")
+    began_s, ticks = held.now_s, 0
+    with pytest.raises(BusLost, match="has not answered for 2"):
+        while True:
+            before_s = held.now_s
+            held.run(TICK_S, [5000, 6000, 7000])
+            assert held.now_s - before_s < 0.04
+            ticks += 1
+    assert held.now_s - began_s < 2.6
+    assert ticks > 100
+    assert any("does not answer" in line for line in held.bus.events())
+
+
+def test_nothing_is_sent_to_a_board_that_may_have_restarted(held):
+    held.board.choose("mode", "mute")
+    held.run(TICK_S)
+    held.packets()
+    held.bus.write([7000] * 3)
+    assert held.packets() == []
+
+
+def test_a_board_that_comes_back_after_silence_is_looked_at(held):
+    held.board.choose("mode", "mute")
+    held.run(1.0, [5000, 6000, 7000])
+    held.board.choose("mode", "usb-dual-port")
+    seen = held.run(1.0, [5000, 6000, 7000])
+    assert places(seen[-1]) == [5000, 6000, 7000]
+    assert any("answers again after" in line for line in held.bus.events())
+
+
+def test_unplugged_and_plugged_in_again(held):
+    held.run(0.5, [5500, 5600, 6600])
+    held.board.faults.command("unplug")
+    gone = held.run(0.5, [5500, 5600, 6600])
+    assert all(reading is None for readings in gone for reading in readings)
+    held.board.faults.command("plug")
+    seen = held.run(2.0, [5500, 5600, 6600])
+    anew = [i for readings in seen for i, r in enumerate(readings) if r is not None and r.rearmed]
+    assert sorted(anew) == [0, 1, 2]
+    assert held.pulses() == [5500, 5600, 6600]
+    said = " ".join(held.bus.events())
+    assert "port lost" in said and "port back after" in said
+
+
+def test_a_port_that_stays_away(held):
+    held.bus._params = MaestroParams(give_up_s=1.0)
+    held.board.faults.command("unplug")
+    with pytest.raises(BusLost, match="check the USB cable"):
+        held.run(2.0)
+    with pytest.raises(BusLost, match="pulses could not be stopped"):
+        held.bus.release()
+
+
+def test_a_slow_line_is_asked_less_often():
+    bench = Bench(watch_ms=40.0)
+    bench.bus.open()
+    bench.bus.engage()
+    bench.run(0.1)
+    before = bench.bus.health().rx_bytes
+    seen = bench.run(0.4, [5500, 5600, 6600])
+    assert bench.bus.health().rx_bytes - before == 10 * 4
+    assert all(r is not None for readings in seen for r in readings)

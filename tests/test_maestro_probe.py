@@ -1,0 +1,102 @@
+"""Finding a Maestro: what answers, in which form, what it held, and that nothing moves."""
+
+import pytest
+
+from drivers.errors import PortError
+from drivers.maestro_params import MaestroParams
+from drivers.maestro_probe import USB_CHANNELS, probe
+from sim_mock.maestro_board import build_board
+from sim_mock.ports import InProcessPort
+
+
+def make(channels=12, device=12, crc=False, chosen=()):
+    board = build_board(channels, lambda: 0.0, device=device, crc=crc)
+    for case, value in chosen:
+        board.choose(case, value)
+    return board, InProcessPort(board)
+
+
+def send(board, text):
+    board.exchange(bytes.fromhex(text))
+
+
+def errors(board):
+    return board.faults.board()["errors"]
+
+
+def test_a_board_as_from_the_shop():
+    _, port = make()
+    found = probe(port, MaestroParams())
+    assert found is not None
+    assert found.forms == ("compact", "pololu")
+    assert (found.crc, found.errors, found.script, found.channels) == (False, (), False, None)
+    assert found.pulses == (0,) * 6
+
+
+def test_pulses_stay_as_they_are_and_no_error_is_made():
+    board, port = make()
+    send(board, "84 00 70 2E 84 04 08 27")
+    found = probe(port, MaestroParams(), count=True)
+    assert found is not None and found.pulses == (6000, 0, 0, 0, 5000, 0)
+    assert found.channels is None
+    assert errors(board) == []
+    assert [channel["position"] for channel in board.faults.reports()[:5]] == [6000, 0, 0, 0, 5000]
+
+
+@pytest.mark.parametrize("channels", sorted(USB_CHANNELS.values()))
+def test_channels_are_counted_where_that_is_wished(channels):
+    board, port = make(channels)
+    found = probe(port, MaestroParams(), count=True)
+    assert found is not None
+    assert found.channels == channels == len(found.pulses)
+    assert found.errors == () and errors(board) == []
+
+
+def test_what_the_register_held_is_told():
+    board, port = make()
+    send(board, "55")
+    found = probe(port, MaestroParams())
+    assert found is not None and found.errors == ("serial protocol error",)
+    assert probe(port, MaestroParams()).errors == ()
+
+
+def test_a_running_script_is_seen_and_goes_on():
+    board, port = make()
+    board.faults.command("script on")
+    found = probe(port, MaestroParams())
+    assert found is not None and found.script is True
+    assert board.faults.board()["script"]
+
+
+@pytest.mark.parametrize("wanted", [False, True])
+@pytest.mark.parametrize("real", [False, True])
+def test_the_check_byte_is_found_out(wanted, real):
+    _, port = make(crc=real)
+    found = probe(port, MaestroParams(crc=wanted))
+    assert found is not None and found.crc is real
+
+
+def test_another_device_number_answers_the_compact_form_only():
+    _, port = make(device=3)
+    assert probe(port, MaestroParams()).forms == ("compact",)
+    assert probe(port, MaestroParams(device=3)).forms == ("compact", "pololu")
+    assert probe(port, MaestroParams(protocol="pololu")).forms == ("compact",)
+    assert probe(port, MaestroParams(protocol="pololu", device=3)).forms == ("pololu",)
+
+
+def test_a_board_that_detects_its_baud_rate():
+    _, port = make(chosen=[("mode", "uart-detect")])
+    found = probe(port, MaestroParams())
+    assert found is not None and "compact" in found.forms
+
+
+def test_nobody_answers():
+    _, port = make(chosen=[("mode", "mute")])
+    assert probe(port, MaestroParams()) is None
+
+
+def test_no_port():
+    board, port = make()
+    board.faults.command("unplug")
+    with pytest.raises(PortError):
+        probe(port, MaestroParams())

@@ -1,0 +1,58 @@
+"""How the command run ends in real time: by a signal, or because the bus is lost."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+from command_line import GAZERIG
+
+DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
+
+
+def begun(*words: str) -> "subprocess.Popen[str]":
+    """Start a run in a process of its own; give it once torque is on."""
+    process = subprocess.Popen(
+        [*GAZERIG, "run", *words, "--mock", "--no-page", "--summary", "-"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    # What start-up set on the servos is told once torque is on.
+    assert process.stderr is not None
+    assert any("Indirect Addresses set" in line for line in iter(process.stderr.readline, ""))
+    return process
+
+
+def test_signals_park_and_switch_torque_off() -> None:
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    processes = [begun() for _ in numbers]
+    time.sleep(3.0)
+    for number, process in zip(numbers, processes, strict=True):
+        process.send_signal(number)
+    for number, process in zip(numbers, processes, strict=True):
+        out, err = process.communicate(timeout=30)
+        assert process.returncode == 0, err
+        name = signal.Signals(number).name
+        assert f"stopped by {name}: parked, torque off" in err
+        run = json.loads(out)
+        assert run["stopped_by"] == name
+        assert run["target_share"].get("face", 0.0) > 0.0
+
+
+def test_losing_the_bus_is_a_fault_with_its_cause(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.yaml"
+    desk = DESK.read_text(encoding="utf-8")
+    # The servo bus comes first in the file; a camera has the same key.
+    assert desk.index("give_up_s: 60.0") < desk.index("geometry:")
+    rig.write_text(desk.replace("give_up_s: 60.0", "give_up_s: 1.0", 1), encoding="utf-8")
+    process = begun(str(rig), "--seconds", "30")
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    for child in children.read_text(encoding="ascii").split():
+        os.kill(int(child), signal.SIGKILL)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "port lost" in err and "torque-off could not be sent" in err
+    assert json.loads(out)["stopped_by"].startswith("fault: ")

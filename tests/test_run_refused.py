@@ -1,0 +1,80 @@
+"""What a person can mend, said in one line before a run begins; check and schema."""
+
+import json
+import os
+import re
+from pathlib import Path
+
+import pytest
+from command_line import gazerig, typed
+
+DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--mock", "--video", "nowhere.avi"), "nowhere.avi"),
+        (("--mock", "--video", "."), "."),
+        (("--mock", "--camera", "97"), "97"),
+        (("--scene", "visitor"), "/dev/ttyUSB0"),
+        (("--mock", "--scene", "circus"), "circus"),
+        (("--mock", "--oak"), "no OAK camera found"),
+        (("--mock", "--scene", "visitor", "--video", "x.avi"), "exclude each other"),
+        (("--mock", "--fast", "--video", "x.avi"), "--seconds"),
+        (("--fast", "--scene", "visitor", "--seconds", "1"), "--mock"),
+        ((), "nothing to look at"),
+        (("--mock", "--page", "8080"), "HOST:PORT"),
+        (("nosuchrig", "--mock"), "nosuchrig"),
+        (("--mock", "--profile", "giant"), "giant"),
+    ],
+)
+def test_what_a_person_can_mend_is_one_line_and_exit_code_2(
+    words: tuple[str, ...], message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    code = typed("run", "--no-page", *words)
+    one_line_and_exit_code_2(code, capfd.readouterr().err, message)
+
+
+def test_a_shell_sees_that_line_and_that_exit_code() -> None:
+    done = gazerig("run", "--no-page", "--mock", "--video", "nowhere.avi", timeout=30)
+    one_line_and_exit_code_2(done.returncode, done.stderr, "nowhere.avi")
+
+
+def one_line_and_exit_code_2(code: int, said: str, message: str) -> None:
+    assert code == 2, said
+    assert message in said
+    assert len(said.strip().splitlines()) == 1, said
+    assert "Traceback" not in said
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may open every port")
+def test_a_port_without_rights_names_the_cure(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    port = tmp_path / "tty"
+    port.touch(mode=0)
+    text = DESK.read_text(encoding="utf-8")
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(text.replace("/dev/ttyUSB0", str(port)), encoding="utf-8")
+    assert typed("run", str(rig), "--scene", "visitor", "--no-page") == 2
+    assert "dialout" in capfd.readouterr().err
+
+
+def test_check_and_schema(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert typed("check") == 0
+    capfd.readouterr()
+    assert typed("schema") == 0
+    schema = json.loads(capfd.readouterr().out)
+    assert schema["additionalProperties"] is False and "joints" in schema["properties"]
+    rig = tmp_path / "bad.yaml"
+    text = DESK.read_text(encoding="utf-8")
+    text = text.replace("max_speed_deg_s: 200.0", "max_speed_deg_s: 9000.0", 1)
+    text = text.replace("id: 9 ", "id: 8 ").replace("name: desk", "nmae: desk")
+    rig.write_text(text, encoding="utf-8")
+    assert typed("check", str(rig)) == 2
+    said = capfd.readouterr().err
+    for part in ("max_speed_deg_s", "id 8 is already that of neck_pitch", "nmae", "name"):
+        assert part in said
+    lines = [line for line in said.splitlines() if line.startswith(f"{rig}:")]
+    assert len(lines) >= 4 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)

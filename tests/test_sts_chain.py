@@ -1,0 +1,355 @@
+"""The emulated STS bus against the written rules: instructions, memory, lock, groups, habits."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sts_bench import (
+    ACTION,
+    ALL,
+    CALIBRATE,
+    PING,
+    READ,
+    REBOOT,
+    REG_WRITE,
+    RESTORE,
+    SYNC_READ,
+    SYNC_WRITE,
+    WRITE,
+    Bench,
+    instruction,
+    packets,
+)
+
+from sim_mock.device import Device
+from sim_mock.servo_physics import Physics, ServoSpec
+from sim_mock.sts_chain import build_sts
+
+FACTORY = {
+    2: (1, 0), 3: (2, 777), 5: (1, 1), 6: (1, 0), 8: (1, 1), 9: (2, 0), 11: (2, 4095), 13: (1, 70),
+    14: (1, 80), 15: (1, 40), 16: (2, 1000), 19: (1, 44), 20: (1, 47), 21: (1, 32), 22: (1, 32),
+    23: (1, 0), 28: (2, 500), 31: (2, 0), 33: (1, 0), 34: (1, 20), 35: (1, 200), 36: (1, 80),
+    40: (1, 0), 41: (1, 0), 42: (2, 0), 44: (2, 0), 46: (2, 0), 48: (2, 1000), 55: (1, 1),
+    58: (2, 0), 60: (2, 0), 62: (1, 74), 63: (1, 30), 64: (1, 0), 65: (1, 0), 66: (1, 0),
+    69: (2, 0), 84: (1, 75),
+}  # fmt: skip
+"""Size and value of registers of a servo fresh from the factory, at rest at 7.4 V and 30 degC."""
+
+
+def three(**options):
+    return Bench(*[(i, "sts3215", 1000.0 * i) for i in (1, 2, 3)], **options)
+
+
+def restart(bench, servo_id=1):
+    """Cut the power for a moment."""
+    bench.chain.faults.command(f"brown-out {servo_id}")
+    bench.wait(1.0)
+
+
+# --- who is there
+
+
+def test_it_is_a_device():
+    device: Device = build_sts([(1, "sts3215", 2048)], lambda: 0.0)
+    assert device.positions_steps() == (2048.0,)
+    assert device.hears(57_600)
+
+
+def test_every_register_of_a_new_servo():
+    bench = Bench()
+    assert {at: (n, bench.read(1, at, n)) for at, (n, _) in FACTORY.items()} == FACTORY
+    assert bench.position() == 2048
+
+
+def test_models_differ_in_their_voltage():
+    bench = Bench((1, "sts3215-12v", 2048.0))
+    assert (bench.read(1, 14), bench.read(1, 62), bench.read(1, 84)) == (140, 120, 61)
+
+
+def test_the_firmware_is_the_number_behind_3():
+    bench = Bench(ServoSpec(1, "sts3215", 2048, firmware=10))
+    assert (bench.read(1, 0), bench.read(1, 1)) == (3, 10)
+
+
+def test_what_cannot_be_built():
+    with pytest.raises(ValueError, match=r"model 'xl330-m288': STS servos are sts3215"):
+        Bench((1, "xl330-m288", 0.0))
+    with pytest.raises(ValueError, match="baud 2000000: STS servos know 1000000, 500000"):
+        Bench((1, "sts3215", 0.0), baud=2_000_000)
+    with pytest.raises(ValueError, match="load_nm"):
+        Bench(ServoSpec(1, "sts3215", 0.0, physics=Physics(load_nm=1e9)))
+
+
+def test_nobody_answers_to_an_id_that_is_not_there():
+    assert three().ask(9, PING) == []
+
+
+@pytest.mark.parametrize(("length", "address"), [(0, 40), (253, 0), (20, 250), (5, 70)])
+def test_what_is_no_register_reads_0(length, address):
+    bench = Bench()
+    [(_, _, data)] = bench.ask(1, READ, address, length)
+    assert len(data) == length
+    if address >= 70:
+        assert sum(data[1:]) in (0, 1 + 75 + 254 + 1)
+
+
+# --- writes
+
+
+def test_read_only_registers_stay_and_nobody_complains():
+    bench = Bench()
+    for address in (0, 3, 56, 62, 65):
+        before = bench.read(1, address)
+        assert bench.write(1, address, before ^ 0x55) == 0
+        assert bench.read(1, address) == before
+
+
+@pytest.mark.parametrize(("address", "value", "stays"), [(5, 254, 1), (6, 8, 0), (33, 4, 0)])
+def test_ids_bauds_and_modes_that_do_not_exist_change_nothing(address, value, stays):
+    bench = Bench()
+    bench.write(1, address, value)
+    assert bench.read(1, address) == stays
+
+
+def test_a_locked_eeprom_counts_until_the_power_goes():
+    bench = Bench()
+    bench.write(1, 21, 16)
+    bench.write(1, 9, 500, 2)
+    assert (bench.read(1, 21), bench.read(1, 9, 2)) == (16, 500)
+    restart(bench)
+    assert (bench.read(1, 21), bench.read(1, 9, 2)) == (32, 0)
+
+
+def test_only_what_is_written_while_it_is_open_is_kept():
+    bench = Bench()
+    bench.write(1, 22, 5)
+    bench.write(1, 55, 0)
+    bench.write(1, 21, 16)
+    bench.write(1, 55, 1)
+    bench.write(1, 23, 7)
+    restart(bench)
+    assert [bench.read(1, at) for at in (21, 22, 23, 55)] == [16, 32, 0, 1]
+
+
+def test_ram_starts_anew():
+    bench = Bench()
+    bench.write(1, 55, 0)
+    bench.write(1, 16, 700, 2)
+    for address, value in ((41, 9), (42, 99), (46, 8), (48, 5)):
+        bench.write(1, address, value, 1 if address == 41 else 2)
+    restart(bench)
+    values = [bench.read(1, at, n) for at, n in ((40, 1), (41, 1), (42, 2), (46, 2), (48, 2))]
+    assert values == [0, 0, 0, 0, 700]
+
+
+def test_a_new_id_counts_at_once_and_is_lost_with_the_lock_closed():
+    bench = Bench()
+    assert packets(bench.chain.receive(instruction(1, WRITE, 5, 7))) == [(1, 0, b"")]
+    assert bench.ask(1, PING) == []
+    assert bench.ask(7, PING) == [(7, 0, b"")]
+    restart(bench, 7)
+    assert bench.ask(1, PING) == [(1, 0, b"")]
+
+
+def test_a_new_baud_counts_behind_the_answer():
+    bench = Bench(baud=1_000_000)
+    assert len(bench.ask(1, WRITE, 6, 4, baud=1_000_000)) == 1
+    assert bench.ask(1, PING, baud=1_000_000) == []
+    assert len(bench.ask(1, PING, baud=115_200)) == 1
+    assert bench.chain.hears(115_200) and not bench.chain.hears(1_000_000)
+
+
+def test_a_wrong_baud_may_bring_garbage():
+    bench = Bench(baud=500_000)
+    bench.chain.choose("wrong-baud", "garbage")
+    sent = instruction(1, PING)
+    said = bench.chain.receive(sent, 1_000_000)
+    assert said and b"\xff\xff" not in said
+    bench.chain.choose("baud", "any")
+    assert len(bench.ask(1, PING, baud=1_000_000)) == 1
+
+
+def test_status_level_0_answers_reads_and_pings_only():
+    bench = Bench()
+    assert bench.write(1, 8, 0) == 0
+    assert bench.ask(1, WRITE, 42, 1, 1) == []
+    assert bench.read(1, 42, 2) == 257
+    assert len(bench.ask(1, PING)) == 1
+
+
+def test_the_return_delay_stands_in_front_of_the_answer():
+    bench = Bench()
+    [reply] = bench.chain.exchange(instruction(1, PING))
+    assert reply.pieces[0].delay_s == pytest.approx(500e-6)
+    bench.write(1, 7, 10)
+    [reply] = bench.chain.exchange(instruction(1, PING))
+    assert reply.pieces[0].delay_s == pytest.approx(20e-6)
+    assert reply.end == 6
+
+
+# --- kept writes
+
+
+def test_a_reg_write_waits_for_action():
+    bench = three()
+    for i in (1, 2):
+        assert bench.ask(i, REG_WRITE, 42, 0, 4) == [(i, 0, b"")]
+    assert [bench.read(i, 64) for i in (1, 2, 3)] == [1, 1, 0]
+    assert bench.read(1, 42, 2) == 0
+    assert bench.ask(ALL, ACTION) == []
+    assert [bench.read(i, 42, 2) for i in (1, 2, 3)] == [1024, 1024, 0]
+    assert bench.read(1, 64) == 0
+
+
+def test_a_later_reg_write_takes_the_place_of_the_first_and_action_works_once():
+    bench = Bench()
+    bench.ask(1, REG_WRITE, 42, 0, 4)
+    bench.ask(1, REG_WRITE, 42, 0, 5)
+    assert bench.ask(1, ACTION) == [(1, 0, b"")]
+    assert bench.read(1, 42, 2) == 1280
+    bench.write(1, 42, 7, 2)
+    bench.ask(1, ACTION)
+    assert bench.read(1, 42, 2) == 7
+
+
+def test_a_restart_forgets_a_reg_write():
+    bench = Bench()
+    bench.ask(1, REG_WRITE, 42, 0, 4)
+    restart(bench)
+    bench.ask(1, ACTION)
+    assert bench.read(1, 42, 2) == 0
+
+
+# --- restart, factory settings
+
+
+@pytest.mark.parametrize(("policy", "answered"), [("mute", 0), ("answer", 1)])
+def test_reboot(policy, answered):
+    bench = Bench()
+    bench.chain.choose("reboot", policy)
+    bench.engage()
+    assert len(bench.ask(1, REBOOT)) == answered
+    bench.wait(0.79)
+    assert bench.ask(1, PING) == []
+    bench.wait(0.02)
+    assert bench.read(1, 40) == 0
+
+
+def test_restore_gives_everything_back_but_the_id():
+    bench = Bench((4, "sts3215", 2048.0))
+    bench.write(4, 55, 0)
+    for address in (6, 21, 36):
+        bench.write(4, address, 3)
+    assert bench.ask(4, RESTORE) == [(4, 0, b"")]
+    bench.wait(1.0)
+    assert [bench.read(4, at) for at in (5, 6, 21, 36)] == [4, 0, 32, 80]
+
+
+# --- groups
+
+
+def test_sync_read_answers_in_the_order_asked():
+    bench = three()
+    said = bench.ask(ALL, SYNC_READ, 56, 2, 3, 1, 2)
+    assert [(i, int.from_bytes(data, "little")) for i, _, data in said] == [
+        (3, 3000), (1, 1000), (2, 2000)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("policy", "answered"), [("silence", [1]), ("skip", [1, 2, 3]), ("timeout", [1, 2, 3])]
+)
+def test_what_comes_behind_a_missing_one(policy, answered):
+    bench = three()
+    bench.chain.choose("after-missing", policy)
+    bench.chain.choose("slot-timeout-ms", "4")
+    replies = bench.chain.exchange(instruction(ALL, SYNC_READ, 56, 2, 1, 9, 2, 3))
+    pieces = [piece for reply in replies for piece in reply.pieces]
+    assert [piece.servo_id for piece in pieces] == answered
+    waits = [0.0, 0.004, 0.0] if policy == "timeout" else [0.0] * len(answered)
+    assert [piece.late_s for piece in pieces] == waits
+
+
+def test_a_silent_servo_is_a_missing_one():
+    bench = three()
+    bench.chain.faults.command("lose 2")
+    assert [i for i, _, _ in bench.ask(ALL, SYNC_READ, 56, 2, 1, 2, 3)] == [1]
+
+
+def test_sync_write_reaches_those_it_names():
+    bench = three()
+    assert bench.ask(ALL, SYNC_WRITE, 42, 2, 1, 5, 0, 3, 6, 0) == []
+    assert [bench.read(i, 42, 2) for i in (1, 2, 3)] == [5, 0, 6]
+
+
+@pytest.mark.parametrize("params", [b"", b"\x2a", b"\x2a\x02\x01\x05", b"\x2a\x00"])
+def test_a_sync_write_that_does_not_add_up_does_nothing(params):
+    bench = three()
+    assert bench.ask(ALL, SYNC_WRITE, params) == []
+    assert bench.read(1, 42, 2) == 0
+
+
+def test_a_sync_write_may_change_an_id():
+    bench = three()
+    bench.ask(ALL, SYNC_WRITE, 5, 1, 2, 20)
+    assert bench.chain.ids() == (1, 20, 3)
+    assert len(bench.ask(20, PING)) == 1
+
+
+@pytest.mark.parametrize(("policy", "ids"), [("answer", [1, 2, 3]), ("silence", [])])
+def test_broadcast_ping(policy, ids):
+    bench = three()
+    bench.chain.choose("broadcast-ping", policy)
+    assert [i for i, _, _ in bench.ask(ALL, PING)] == ids
+
+
+def test_a_broadcast_ping_that_mixes_is_no_packet():
+    bench = three()
+    bench.chain.choose("broadcast-ping", "mix")
+    said = bench.chain.receive(instruction(ALL, PING))
+    assert said == bytes((255, 255, 1 & 2 & 3, 2, 0, 0xFC & 0xFB & 0xFA))
+
+
+@pytest.mark.parametrize("code", [READ, WRITE, REG_WRITE, ACTION, CALIBRATE])
+def test_other_broadcasts_are_obeyed_in_silence(code):
+    bench = three()
+    assert bench.ask(ALL, code, 42, 7, 0) == []
+    assert [bench.read(i, 42, 2) for i in (1, 2, 3)] == ([7] * 3 if code == WRITE else [0] * 3)
+
+
+# --- habits
+
+
+@pytest.mark.parametrize(
+    ("case", "value", "message"),
+    [
+        ("after-missing", "wait", "after-missing 'wait': it can be silence, skip, timeout"),
+        ("colour", "red", "set 'colour': unknown; there is after-missing"),
+        ("packet-gap-ms", "soon", "not a number of milliseconds"),
+        ("baud", "1000000", "it can be heed, any"),
+    ],
+)
+def test_habits_that_do_not_exist(case, value, message):
+    with pytest.raises(ValueError, match=message):
+        Bench().chain.choose(case, value)
+
+
+def test_habits_can_be_chosen_as_text():
+    bench = three()
+    assert bench.chain.faults.command("set after-missing skip") == "after-missing is skip"
+    assert len(bench.ask(ALL, SYNC_READ, 56, 2, 9, 1)) == 1
+
+
+# --- two clocks, one result
+
+
+@given(st.lists(st.floats(0.0005, 0.05), min_size=1, max_size=30))
+def test_what_is_answered_does_not_depend_on_how_often_it_looks(steps):
+    often, seldom = Bench(), Bench()
+    for bench in (often, seldom):
+        bench.engage()
+        bench.ask(1, WRITE, 41, 30, 0, 12, 0, 0, 200, 5)
+    for step in steps:
+        often.now_s += step
+        often.position()
+    seldom.now_s = often.now_s
+    assert often.ask(1, READ, 40, 40) == seldom.ask(1, READ, 40, 40)

@@ -1,0 +1,320 @@
+"""What goes wrong with emulated STS servos: error bits, protections, restarts, their line."""
+
+import json
+
+import pytest
+from sts_bench import ALL, PING, READ, SYNC_READ, SYNC_WRITE, Bench, instruction, packets
+
+from sim_mock.servo_physics import Physics, ServoSpec
+
+VOLTAGE, ANGLE, HEAT, CURRENT, OVERLOAD = 1, 2, 4, 8, 32
+
+
+def jammed(goal=3000, **physics):
+    """A servo that pushes against something."""
+    bench = Bench(ServoSpec(1, "sts3215", 2048, physics=Physics(**physics)))
+    bench.engage()
+    bench.chain.faults.command("stick 1")
+    bench.write(1, 42, goal, 2)
+    return bench
+
+
+# --- what it flags
+
+
+@pytest.mark.parametrize(("volts", "bits"), [(7.4, 0), (8.0, 0), (8.2, 1), (12.0, 1), (3.9, 1)])
+def test_voltage_stands_in_every_answer_as_long_as_it_is_wrong(volts, bits):
+    bench = Bench()
+    bench.chain.faults.command(f"voltage 1 {volts}")
+    bench.wait(0.1)
+    assert bench.read(1, 62) == round(volts * 10)
+    assert bench.read(1, 65) == bits
+    assert [error for _, error, _ in bench.ask(1, READ, 0, 5)] == [bits]
+    assert [error for _, error, _ in bench.ask(ALL, SYNC_READ, 56, 2, 1)] == [bits]
+    assert bench.write(1, 41, 1) == bits
+    bench.chain.faults.command("voltage 1 7.4")
+    bench.wait(0.1)
+    assert bench.error() == 0
+
+
+def test_a_wrong_voltage_takes_the_torque_only_where_that_is_chosen():
+    bench = Bench()
+    bench.engage()
+    bench.chain.faults.command("voltage 1 9")
+    bench.wait(0.1)
+    assert bench.read(1, 40) == 1
+    bench.write(1, 19, 1)
+    assert bench.read(1, 40) == 0
+    bench.write(1, 40, 1)
+    assert bench.read(1, 40) == 0
+
+
+def test_heat_takes_the_torque_until_it_has_cooled_and_someone_switches_it_on():
+    bench = Bench()
+    bench.engage()
+    bench.chain.faults.command("overheat 1")
+    bench.wait(0.04)
+    assert (bench.error(), bench.read(1, 40), bench.read(1, 63)) == (HEAT, 0, 75)
+    bench.write(1, 40, 1)
+    assert bench.read(1, 40) == 0
+    bench.wait(120.0)
+    assert (bench.error(), bench.read(1, 40)) == (0, 0)
+    bench.write(1, 40, 1)
+    assert bench.read(1, 40) == 1
+
+
+def test_a_stall_warms_the_motor():
+    bench = jammed(thermal_s=20.0)
+    bench.write(1, 19, 0)
+    bench.wait(10.0)
+    assert 60 < bench.read(1, 63) < 100
+
+
+def test_a_broken_angle_sensor_is_flagged_until_the_restart():
+    bench = Bench()
+    bench.chain.faults.command("encoder 1")
+    bench.wait(5.0)
+    assert (bench.error(), bench.read(1, 65)) == (ANGLE, ANGLE)
+    bench.chain.faults.command("brown-out 1")
+    bench.wait(1.0)
+    assert bench.error() == 0
+
+
+# --- overload
+
+
+def test_an_overload_lowers_the_torque_after_its_time():
+    bench = jammed()
+    bench.wait(1.9)
+    assert (bench.error(), bench.read(1, 60, 2, 10)) == (0, 1000)
+    bench.wait(0.2)
+    assert (bench.error(), bench.read(1, 60, 2, 10)) == (OVERLOAD, 200)
+    assert bench.read(1, 40) == 1
+    bench.chain.faults.command("free 1")
+    bench.wait(5.0)
+    assert bench.error() == OVERLOAD
+
+
+def test_time_torque_and_what_is_left_are_registers():
+    bench = jammed()
+    bench.write(1, 34, 50)
+    bench.write(1, 35, 100)
+    bench.write(1, 36, 60)
+    bench.write(1, 48, 700, 2)
+    bench.wait(0.9)
+    assert bench.error() == 0
+    bench.wait(0.2)
+    assert (bench.error(), bench.read(1, 60, 2, 10)) == (OVERLOAD, 500)
+
+
+@pytest.mark.parametrize("limit", [500, 790])
+def test_a_torque_limit_below_it_never_overloads(limit):
+    bench = jammed()
+    bench.write(1, 48, limit, 2)
+    bench.wait(10.0)
+    assert (bench.error(), bench.read(1, 60, 2, 10)) == (0, limit)
+
+
+@pytest.mark.parametrize(
+    ("policy", "by_goal", "by_torque"),
+    [("new-goal", 0, 0), ("torque", OVERLOAD, 0), ("restart", OVERLOAD, OVERLOAD)],
+)
+def test_what_ends_an_overload(policy, by_goal, by_torque):
+    bench = Bench()
+    bench.chain.choose("overload-ends", policy)
+    bench.engage()
+    bench.chain.faults.command("overload 1")
+    assert bench.error() == OVERLOAD
+    bench.write(1, 42, 2048, 2)
+    assert bench.error() == OVERLOAD
+    bench.write(1, 42, 2040, 2)
+    assert bench.error() == by_goal
+    bench.write(1, 40, 0)
+    bench.write(1, 40, 1)
+    assert bench.error() == by_torque
+    bench.chain.faults.command("brown-out 1")
+    bench.wait(1.0)
+    assert bench.error() == 0
+
+
+def test_an_overload_that_is_not_to_unload_is_only_flagged():
+    bench = jammed()
+    bench.write(1, 19, 0)
+    bench.wait(3.0)
+    assert (bench.error(), bench.read(1, 60, 2, 10)) == (OVERLOAD, 1000)
+
+
+def test_full_speed_is_no_overload():
+    bench = Bench()
+    bench.write(1, 33, 1)
+    bench.write(1, 46, 32_000, 2)
+    bench.write(1, 40, 1)
+    bench.wait(10.0)
+    assert bench.error() == 0
+
+
+def test_overcurrent_takes_the_torque_until_it_is_switched_on_again():
+    bench = jammed()
+    bench.write(1, 28, 300, 2)
+    bench.write(1, 38, 50)
+    bench.wait(0.45)
+    assert bench.error() == 0
+    bench.wait(0.2)
+    assert (bench.error(), bench.read(1, 40)) == (CURRENT, 0)
+    bench.chain.faults.command("free 1")
+    bench.write(1, 40, 1)
+    assert (bench.error(), bench.read(1, 40)) == (0, 1)
+
+
+# --- restarts
+
+
+def test_a_brown_out_is_deaf_and_then_as_at_power_on():
+    bench = Bench()
+    bench.engage()
+    bench.write(1, 46, 100, 2)
+    bench.chain.faults.command("turn 1 10")
+    bench.chain.faults.command("brown-out 1")
+    assert bench.ask(1, PING) == []
+    bench.wait(1.0)
+    assert [bench.read(1, at, 2) for at in (40, 42, 46)] == [0, 0, 0]
+    assert bench.position() == pytest.approx(2058, abs=10)
+
+
+def test_a_supply_that_breaks_down_restarts_it_again_and_again():
+    bench = Bench()
+    bench.engage()
+    bench.chain.faults.command("voltage 1 3")
+    bench.wait(5.0, 50)
+    assert bench.ask(1, PING) == []
+    bench.chain.faults.command("voltage 1 7.4")
+    bench.wait(1.0)
+    assert bench.read(1, 40) == 0
+
+
+def test_reset_makes_it_as_from_the_factory():
+    bench = Bench((5, "sts3215", 2048.0), baud=500_000)
+    assert "id 1, 1000000 bit/s" in bench.chain.faults.command("reset 5")
+    bench.wait(1.0)
+    assert bench.ask(1, PING, baud=500_000) == []
+    assert len(bench.ask(1, PING, baud=1_000_000)) == 1
+
+
+# --- two servos with one id
+
+
+def test_two_servos_with_one_id_mix_their_answers():
+    bench = Bench()
+    bench.chain.faults.command("collide 1")
+    assert bench.ask(1, PING) == [(1, 0, b"")]
+    said = bench.chain.receive(instruction(1, READ, 56, 2))
+    with pytest.raises(AssertionError):
+        packets(said)
+    bench.ask(ALL, SYNC_WRITE, 42, 2, 1, 7, 0)
+    assert [servo.memory.get("goal_position") for servo in bench.chain.servos] == [7, 7]
+
+
+# --- the line
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("lose 1 count 1", ""),
+        ("corrupt 1 5 count 1", "df ff 01 04 00 00 08 f2"),
+        ("drop 1 0 count 1", "ff 01 04 00 00 08 f2"),
+        ("truncate 1 4 count 1", "ff ff 01 04"),
+        ("duplicate 1 count 1", "ff ff 01 04 00 00 08 f2 ff ff 01 04 00 00 08 f2"),
+        ("wrong-id 1 9 count 1", "ff ff 09 04 00 00 08 ea"),
+        ("short 1 1 count 1", "ff ff 01 03 00 00 fb"),
+        ("long 1 1 count 1", "ff ff 01 05 00 00 08 00 f1"),
+        ("refuse 1 0x20 count 1", "ff ff 01 02 20 dc"),
+        ("fragment 1 count 1", "ff ff ff ff 01 04 00 00 08 f2"),
+        ("noise before FF00 count 1", "ff 00 ff ff 01 04 00 00 08 f2"),
+    ],
+)
+def test_faults_of_the_line_to_the_byte(fault, said):
+    bench = Bench()
+    bench.chain.faults.command(fault)
+    assert bench.chain.receive(instruction(1, READ, 56, 2)).hex(" ") == said
+    assert bench.position() == 2048
+
+
+def test_answers_can_be_late_and_out_of_order():
+    bench = Bench(*[(i, "sts3215", 100.0 * i) for i in (1, 2, 3)])
+    bench.chain.faults.command("delay 2 7 count 1")
+    bench.chain.faults.command("reorder count 1")
+    [reply] = bench.chain.exchange(instruction(ALL, SYNC_READ, 56, 2, 1, 2, 3))
+    assert [piece.servo_id for piece in reply.pieces] == [3, 2, 1]
+    assert [piece.late_s for piece in reply.pieces] == [0.0, 0.007, 0.0]
+
+
+def test_echo_babble_and_lost_writes():
+    bench = Bench()
+    faults = bench.chain.faults
+    faults.command("echo")
+    ping = instruction(1, PING)
+    assert bench.chain.receive(ping) == ping + bytes((255, 255, 1, 2, 0, 252))
+    faults.command("echo off")
+    faults.command("babble")
+    bench.now_s = 0.02
+    assert bench.chain.receive(b"").startswith(b"\xff\xff")
+    faults.command("clear")
+    faults.command("lose-writes 1")
+    for _ in range(2):
+        assert bench.read(1, 42, 2) == 0
+        bench.ask(ALL, SYNC_WRITE, 42, 2, 1, 7, 0)
+    assert bench.read(1, 42, 2) == 7
+
+
+@pytest.mark.parametrize("fault", ["unplug", "deny", "block"])
+def test_faults_of_the_adapter_are_told_to_the_port(fault):
+    bench = Bench()
+    bench.chain.faults.command(f"{fault} for 0.5")
+    assert bench.chain.faults.on(fault)
+    bench.now_s = 0.6
+    assert not bench.chain.faults.on(fault)
+
+
+# --- as text
+
+
+def test_a_load_turns_a_limp_joint_and_all_means_all():
+    bench = Bench((1, "sts3215", 2048.0), (2, "sts3215", 2048.0))
+    bench.chain.faults.command("load all 0.4")
+    bench.wait(0.2)
+    assert all(place > 2100 for place in bench.chain.positions_steps())
+
+
+def test_status_tells_everything_as_json():
+    bench = Bench()
+    bench.engage(goal=100)
+    bench.chain.faults.command("lose 1")
+    told = json.loads(bench.chain.faults.command("status"))
+    assert told["faults"] == ["lose 1"]
+    [servo] = told["servos"]
+    assert servo == {
+        "id": 1, "model": "sts3215", "position": 2048, "goal": 100, "torque": 1, "error": 0,
+        "temperature_c": 30, "voltage_01v": 74,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("explode 1", "'explode' is no command; there is lose"),
+        ("overload 9", "overload: no servo 9; there is 1; usage: overload ID"),
+        ("voltage 1 99", "'99' is not volts from 0 to 30"),
+        ("turn 254 1", "'254' is not a servo id from 0 to 253"),
+        ("shock 1", "'shock' is no command"),
+    ],
+)
+def test_what_cannot_be_asked(text, message):
+    with pytest.raises(ValueError, match=message):
+        Bench().chain.faults.command(text)
+
+
+def test_help_names_every_habit():
+    told = Bench().chain.faults.command("help")
+    for case in ("after-missing silence|skip|timeout", "overload-ends", "brown-out ID"):
+        assert case in told

@@ -1,0 +1,144 @@
+"""A client that others wrote does all it can on the emulated STS bus: rustypot, in Rust.
+
+It does not know that there are no servos: it has packets, signs and units of its own.
+"""
+
+import math
+import time
+
+import pytest
+
+from sim_mock.emulated import StsLine
+from sim_mock.pty_bus import PtyBus
+from sim_mock.servo_physics import ServoSpec
+
+BAUD = 1_000_000
+IDS = [1, 2, 3]
+PLACES = [2048, 1000, 3000]
+STEADY_STEPS = 3
+DEAF_S = 0.85
+
+
+@pytest.fixture
+def bus():
+    with PtyBus() as started:
+        yield started
+
+
+@pytest.fixture
+def client(bus):
+    rustypot = pytest.importorskip("rustypot", reason="rustypot is not installed")
+    specs = [ServoSpec(i, "sts3215", place) for i, place in zip(IDS, PLACES, strict=True)]
+    opened = rustypot.Sts3215PyController(bus.start_device(StsLine(tuple(specs), BAUD)), BAUD, 0.2)
+    yield opened
+    opened.close()
+
+
+def wait_until(check, patience_s=5.0):
+    """Wait for something to become true; False where it does not."""
+    deadline = time.monotonic() + patience_s
+    while time.monotonic() < deadline:
+        if check():
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_who_is_there(client):
+    assert [client.ping(i) for i in (1, 2, 3, 4)] == [True, True, True, False]
+    assert client.scan(list(range(6))) == {1: 777, 2: 777, 3: 777}
+    assert client.broadcast_scan(IDS) == {1: 777, 2: 777, 3: 777}
+
+
+def test_every_register_it_knows(client):
+    registers = client.registers()
+    assert len(registers) >= 50
+    for register in registers:
+        data, error = client.read_raw_data_with_error(1, register.addr, register.size)
+        assert (len(data), error) == (register.size, 0), register.name
+    assert client.read_firmware_major_version(1) in (3, [3])
+
+
+def test_positions_speeds_and_torque_of_a_group(client):
+    assert client.sync_read_raw_present_position(IDS) == PLACES
+    angles = [(place - 2048) / 4096 * math.tau for place in PLACES]
+    assert client.sync_read_present_position(IDS) == pytest.approx(angles, abs=0.002)
+    client.sync_write_raw_goal_speed(IDS, [1000] * 3)
+    client.sync_write_raw_goal_position(IDS, [1500, 1500, 2500])
+    client.sync_write_torque_enable(IDS, [True] * 3)
+    assert client.sync_read_torque_enable(IDS) == [True] * 3
+    seen = []
+
+    def near():
+        seen.append(client.sync_read_register(IDS, "present_speed"))
+        places = client.sync_read_raw_present_position([3, 1, 2])
+        wanted = (2500, 1500, 1500)
+        return all(abs(a - b) <= STEADY_STEPS for a, b in zip(places, wanted, strict=True))
+
+    assert wait_until(near)
+    # 1 and 3 turn downwards, 2 upwards, none much faster than asked
+    assert min(speeds[0] for speeds in seen) < -500
+    assert max(speeds[1] for speeds in seen) > 500
+    assert min(speeds[2] for speeds in seen) < -500
+    assert max(abs(speed) for speeds in seen for speed in speeds) < 1200
+    client.write_torque_enable(2, False)
+    assert client.sync_read_torque_enable(IDS) == [True, False, True]
+
+
+def test_signs_are_those_it_expects(client):
+    client.write_register(1, "homing_offset", -100)
+    assert client.read_register(1, "homing_offset") == -100
+    assert client.read_register(1, "present_position") == 2148
+    for name in ("min_position_limit", "max_position_limit"):
+        client.write_register(2, name, 0)
+    client.write_torque_enable(2, True)
+    client.write_register(2, "goal_position", -500)
+    assert wait_until(lambda: client.read_register(2, "present_load") < -500)
+    assert wait_until(
+        lambda: abs(client.read_register(2, "present_position") + 500) <= STEADY_STEPS
+    )
+
+
+def test_settings_are_kept_only_with_the_lock_open(client):
+    client.write_p_coefficient(1, 20)
+    client.write_lock(1, False)
+    client.write_d_coefficient(1, 21)
+    client.write_lock(1, True)
+    client.reboot(1)
+    time.sleep(DEAF_S)
+    assert client.read_p_coefficient(1) in (32, [32])
+    assert client.read_d_coefficient(1) in (21, [21])
+
+
+def test_a_new_id_and_a_new_baud(client):
+    client.write_id(3, 9)
+    assert [client.ping(3), client.ping(9)] == [False, True]
+    client.write_raw_data(9, 6, [1])
+    assert client.ping(9) is False
+    client.set_baudrate(500_000)
+    assert [client.ping(9), client.ping(1)] == [True, False]
+
+
+def test_error_bits_come_with_the_data(bus, client):
+    bus.command("voltage 2 12")
+    bus.command("overload 3")
+    time.sleep(0.1)
+    said = client.sync_read_raw_data_with_error(IDS, 62, 1)
+    assert said == [([74], 0), ([120], 1), ([74], 32)]
+    assert client.read_raw_data_with_error(2, 3, 2) == ([9, 3], 1)
+
+
+def test_a_missing_servo_silences_those_behind_it_unless_they_skip_it(bus, client):
+    with pytest.raises(RuntimeError):
+        client.sync_read_raw_present_position([1, 7, 2])
+    bus.command("set after-missing skip")
+    with pytest.raises(RuntimeError):
+        client.sync_read_raw_present_position([1, 7, 2])
+    assert client.sync_read_raw_present_position([2, 1]) == [1000, 2048]
+
+
+def test_a_spoilt_answer_is_refused(bus, client):
+    bus.command("corrupt 1 50 count 1")
+    with pytest.raises(RuntimeError):
+        client.read_raw_present_position(1)
+    assert client.read_raw_present_position(1) in (2048, [2048])

@@ -1,0 +1,401 @@
+"""How emulated STS servos move: closed forms of the profile, modes, limits, origin, torque."""
+
+import pytest
+from sts_bench import CALIBRATE, RESET_TURNS, WRITE, Bench
+
+from sim_mock.servo_physics import Physics, ServoSpec
+
+SMOOTH = Physics(coulomb_share=0.0, viscous_share=0.0, play_deg=0.0, supply_ohm=0.0)
+STEADY_STEPS = 2
+"""Friction keeps a servo with factory gains so far from its goal."""
+
+TOP_STEPS_S = 55.0 / 60.0 * 4096.0
+
+
+def one(physics=SMOOTH, start=2048.0, model="sts3215"):
+    return Bench(ServoSpec(1, model, start, physics=physics))
+
+
+def command(bench, goal, speed=0, acceleration=0, time_ms=0):
+    """Write acceleration, goal, time and speed at once, as drivers do."""
+    words = b"".join((w & 0xFFFF).to_bytes(2, "little") for w in (goal, time_ms, speed))
+    bench.ask(1, WRITE, 41, acceleration, words)
+
+
+def led_to(bench):
+    """Give where the servo's profile is now."""
+    profile, drive = bench.chain.here(1).shaft.profile, bench.chain[1].drive
+    return profile.r + drive.position_steps - drive.shaft.x
+
+
+# --- the path
+
+
+@pytest.mark.parametrize("seconds", [0.1, 0.4, 0.9])
+def test_goal_speed_alone_is_a_straight_line(seconds):
+    bench = one()
+    bench.engage()
+    command(bench, 3048, speed=1000)
+    bench.wait(seconds, 7)
+    assert led_to(bench) == pytest.approx(2048 + 1000 * seconds)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "at"), [(0.2, 40.0), (0.5, 250.0), (1.0, 750.0), (1.5, 1000.0)]
+)
+def test_acceleration_makes_ramps_at_both_ends(seconds, at):
+    # 20 units are 2000 steps/s2: 0.5 s to 1000 steps/s, 0.5 s at it, 0.5 s to rest
+    bench = one()
+    bench.engage()
+    command(bench, 3048, speed=1000, acceleration=20)
+    bench.wait(seconds, 5)
+    assert led_to(bench) == pytest.approx(2048 + at)
+
+
+def test_goal_time_decides_how_long_it_takes_or_nothing():
+    for policy, at in (("obey", 2248.0), ("ignore", 3000.0)):
+        bench = one()
+        bench.chain.choose("goal-time", policy)
+        bench.engage()
+        command(bench, 3048, speed=2000, time_ms=2400)
+        bench.wait(0.48)
+        assert led_to(bench) == pytest.approx(at + (policy == "ignore") * 8)
+
+
+def test_goal_speed_0_is_the_fastest_of_the_data_sheet():
+    bench = one(start=0.0)
+    bench.engage()
+    command(bench, 4095)
+    bench.wait(0.5)
+    assert led_to(bench) == pytest.approx(TOP_STEPS_S * 0.5)
+    assert bench.position() < TOP_STEPS_S * 0.5
+    assert bench.read(1, 58, 2, 15) == pytest.approx(TOP_STEPS_S, rel=0.02)
+
+
+def test_no_goal_speed_is_faster_than_the_motor():
+    bench = one(start=0.0)
+    bench.engage()
+    command(bench, 4095, speed=30_000)
+    bench.wait(0.5)
+    assert led_to(bench) == pytest.approx(TOP_STEPS_S * 0.5)
+
+
+@pytest.mark.parametrize("goal", [1000, 2049, 3500])
+@pytest.mark.parametrize("model", ["sts3215", "sts3215-12v"])
+def test_it_comes_to_its_goal_and_stays(goal, model):
+    bench = one(Physics(), model=model)
+    bench.engage()
+    command(bench, goal, speed=1500, acceleration=50)
+    assert bench.read(1, 66) == 1
+    path = []
+    for _ in range(300):
+        bench.wait(0.01)
+        path.append(bench.position())
+    assert abs(path[-1] - goal) <= STEADY_STEPS
+    assert len(set(path[-50:])) == 1
+    assert max(path) <= max(2048, goal) + 3 and min(path) >= min(2048, goal) - 3
+    assert (bench.read(1, 66), bench.read(1, 67, 2)) == (0, goal)
+
+
+def test_a_new_speed_counts_at_once_and_the_same_command_changes_nothing():
+    bench = one()
+    bench.engage()
+    command(bench, 3048, speed=500)
+    bench.wait(0.2)
+    command(bench, 3048, speed=1000)
+    for _ in range(20):
+        bench.wait(0.01)
+        command(bench, 3048, speed=1000)
+    assert led_to(bench) == pytest.approx(2048 + 100 + 200)
+
+
+def test_the_same_goals_give_the_same_bytes():
+    def run():
+        bench, said = one(Physics(gravity_nm=0.2)), []
+        bench.engage()
+        for k in range(200):
+            command(bench, 2048 + 300 * (k // 40 % 2), speed=900)
+            bench.wait(0.01)
+            said.append(bench.ask(1, 2, 56, 15))
+        return said
+
+    first = run()
+    assert first == run()
+    assert len({data for [(_, _, data)] in first}) > 80
+
+
+# --- torque
+
+
+def test_without_torque_it_stays_and_the_goal_waits():
+    bench = one()
+    bench.write(1, 42, 3000, 2)
+    bench.wait(0.5)
+    assert (bench.position(), bench.read(1, 66)) == (2048, 0)
+    bench.write(1, 40, 1)
+    bench.wait(1.0)
+    assert bench.position() == pytest.approx(3000, abs=STEADY_STEPS)
+
+
+def test_the_old_goal_may_be_forgotten_as_the_torque_comes_on():
+    bench = one()
+    bench.chain.choose("torque-on", "present")
+    bench.write(1, 42, 3000, 2)
+    bench.write(1, 40, 1)
+    bench.wait(1.0)
+    assert bench.position() == bench.read(1, 42, 2) == 2048
+
+
+def test_a_goal_may_switch_the_torque_on():
+    bench = one()
+    bench.chain.choose("goal", "torque-on")
+    bench.write(1, 46, 1000, 2)
+    assert bench.read(1, 40) == 0
+    bench.write(1, 42, 2500, 2)
+    assert bench.read(1, 40) == 1
+    bench.wait(1.0)
+    assert bench.position() == pytest.approx(2500, abs=STEADY_STEPS)
+
+
+def test_limp_it_is_turned_by_hand_and_under_torque_it_comes_back():
+    bench = one()
+    bench.chain.faults.command("turn 1 300")
+    assert bench.position() == 2348
+    bench.engage()
+    bench.chain.faults.command("turn 1 -100")
+    assert bench.position() == 2248
+    assert bench.read(1, 60, 2, 10) == 0
+    bench.wait(0.02)
+    assert bench.read(1, 60, 2, 10) > 100
+    bench.wait(1.0)
+    assert bench.position() == pytest.approx(2348, abs=STEADY_STEPS)
+
+
+def test_torque_off_lets_a_load_pull_it_and_damping_slows_it():
+    def falls(torque):
+        bench = one(Physics(load_nm=-0.5, stop_low_steps=0.0))
+        bench.write(1, 40, torque)
+        bench.wait(0.3)
+        return 2048 - bench.position()
+
+    assert falls(0) > 4 * falls(2) > 40
+
+
+# --- force
+
+
+@pytest.mark.parametrize(("limit", "moves"), [(1000, True), (300, False)])
+def test_the_torque_limit_bounds_what_it_can_lift(limit, moves):
+    bench = one(SMOOTH._replace(load_nm=-0.5 * 1.91))
+    bench.write(1, 48, limit, 2)
+    bench.engage(goal=2200)
+    bench.wait(0.6)
+    assert (bench.position() > 2150) == moves
+    assert bench.read(1, 60, 2, 10) <= limit
+
+
+def test_load_and_current_at_a_stop_are_those_of_the_stall():
+    bench = one(SMOOTH._replace(stop_high_steps=2100.0))
+    bench.engage(goal=3000)
+    bench.wait(0.5)
+    assert bench.position() == 2100
+    assert bench.read(1, 60, 2, 10) == 1000
+    assert bench.read(1, 69, 2, 15) * 0.0065 == pytest.approx(2.7, rel=0.01)
+    # the path comes back from where it had led to
+    bench.engage(goal=2000)
+    bench.wait(0.25)
+    assert bench.read(1, 60, 2, 10) < 0
+    assert bench.read(1, 58, 2, 15) < 0
+
+
+def test_a_load_sags_the_voltage():
+    bench = one(SMOOTH._replace(stop_high_steps=2100.0, supply_ohm=0.5))
+    bench.engage(goal=3000)
+    bench.wait(0.5)
+    assert bench.read(1, 62) == pytest.approx(74 - 0.5 * 2.7 * 10, abs=3)
+
+
+def test_a_smaller_gain_holds_softer():
+    def away(gain):
+        bench = one(SMOOTH._replace(load_nm=-0.2 * 1.91))
+        bench.write(1, 21, gain)
+        bench.engage()
+        bench.wait(2.0)
+        return 2048 - bench.position()
+
+    assert away(16) == pytest.approx(2 * away(32), abs=1)
+    assert away(32) == pytest.approx(10, abs=1)
+
+
+# --- limits and origin
+
+
+@pytest.mark.parametrize(("goal", "at"), [(100, 1000), (4000, 3000), (0x8000 | 50, 1000)])
+def test_goals_end_at_the_angle_limits(goal, at):
+    bench = one()
+    bench.write(1, 9, 1000, 2)
+    bench.write(1, 11, 3000, 2)
+    bench.engage(goal=goal)
+    bench.wait(1.5)
+    assert bench.position() == pytest.approx(at, abs=STEADY_STEPS)
+    assert bench.read(1, 42, 2) == goal
+
+
+def test_both_limits_0_count_turns():
+    bench = one(start=4000.0)
+    bench.write(1, 9, 0, 2)
+    bench.write(1, 11, 0, 2)
+    bench.engage(goal=4000 + 5000)
+    bench.wait(3.0)
+    assert bench.position() == pytest.approx(9000, abs=STEADY_STEPS)
+    command(bench, 0x8000 | 700)
+    bench.wait(4.0)
+    assert bench.position() == pytest.approx(-700, abs=STEADY_STEPS)
+    assert bench.ask(1, RESET_TURNS) == [(1, 0, b"")]
+    assert bench.position() == pytest.approx(4096 - 700, abs=STEADY_STEPS)
+    bench.wait(0.5)
+    assert bench.position() == pytest.approx(4096 - 700, abs=STEADY_STEPS)
+
+
+def test_within_one_turn_it_reads_on_from_0_and_goes_the_long_way():
+    bench = one(start=4090.0)
+    bench.chain.faults.command("turn 1 20")
+    assert bench.position() == 14
+    bench.engage(goal=4000)
+    bench.wait(0.2)
+    assert 14 < bench.position() < 1000
+    bench.wait(1.5)
+    assert bench.position() == pytest.approx(4000, abs=STEADY_STEPS)
+
+
+def test_the_offset_moves_the_origin():
+    bench = one()
+    bench.write(1, 31, 100, 2)
+    assert bench.position() == 1948
+    bench.write(1, 31, 0x800 | 100, 2)
+    assert bench.position() == 2148
+
+
+@pytest.mark.parametrize("start", [0.0, 5.0, 1500.0, 2048.0, 2049.0, 3000.0, 4095.0])
+def test_128_makes_the_present_place_the_middle_for_good(start):
+    bench = one(start=start)
+    bench.write(1, 40, 128)
+    assert bench.position() == pytest.approx(2048, abs=1)
+    assert bench.read(1, 40) == 0
+    offset = bench.read(1, 31, 2, 11)
+    assert (start - offset) % 4096 == pytest.approx(2048, abs=1)
+    bench.chain.faults.command("brown-out 1")
+    bench.wait(1.0)
+    assert bench.position() == pytest.approx(2048, abs=1)
+    assert bench.read(1, 31, 2, 11) == offset
+
+
+def test_making_it_the_middle_under_torque_moves_nothing():
+    bench = one(start=1500.0)
+    bench.engage()
+    bench.wait(0.1)
+    true = bench.chain[1].shaft.x
+    bench.write(1, 40, 128)
+    assert (bench.read(1, 40), bench.read(1, 42, 2)) == (1, 2048)
+    bench.wait(0.5)
+    assert bench.chain[1].shaft.x == pytest.approx(true, abs=1)
+    assert bench.position() == pytest.approx(2048, abs=1)
+
+
+def test_calibrate_takes_any_place():
+    bench = one(start=1500.0)
+    assert len(bench.ask(1, CALIBRATE, 0xE8, 3)) == 1
+    assert bench.position() == 1000
+    assert bench.ask(1, CALIBRATE, 1) == []
+
+
+# --- other modes
+
+
+def test_mode_wheel_turns_at_the_goal_speed_both_ways_and_stops_at_0():
+    bench = one(Physics())
+    bench.write(1, 33, 1)
+    bench.write(1, 46, 1000, 2)
+    bench.write(1, 40, 1)
+    bench.wait(3.0)
+    assert bench.read(1, 58, 2, 15) == pytest.approx(1000, abs=15)
+    bench.write(1, 46, 0x8000 | 500, 2)
+    bench.wait(3.0)
+    assert bench.read(1, 58, 2, 15) == pytest.approx(-500, abs=15)
+    assert bench.read(1, 66) == 1
+    bench.write(1, 46, 0, 2)
+    bench.wait(3.0)
+    assert abs(bench.read(1, 58, 2, 15)) <= 3
+    assert bench.read(1, 66) == 0
+
+
+def test_mode_wheel_follows_the_acceleration():
+    bench = one()
+    bench.write(1, 33, 1)
+    bench.write(1, 41, 10)
+    bench.write(1, 46, 1500, 2)
+    bench.write(1, 40, 1)
+    bench.wait(0.5)
+    assert bench.chain[1].shaft.profile.v * 1000 == pytest.approx(500)
+
+
+@pytest.mark.parametrize(("duty", "share"), [(500, 0.5), (0x400 | 250, -0.25), (0, 0.0)])
+def test_mode_pwm_gives_the_duty(duty, share):
+    bench = one()
+    bench.write(1, 33, 2)
+    bench.write(1, 44, duty, 2)
+    bench.write(1, 40, 1)
+    bench.wait(2.0)
+    assert bench.read(1, 60, 2, 10) == round(1000 * share)
+    assert bench.chain[1].shaft.speed_steps_s == pytest.approx(TOP_STEPS_S * share, rel=0.01)
+
+
+def test_mode_step_goes_on_from_the_last_goal():
+    bench = one()
+    for address in (9, 11):
+        bench.write(1, address, 0, 2)
+    bench.write(1, 33, 3)
+    bench.write(1, 40, 1)
+    bench.wait(0.5)
+    assert bench.position() == 2048
+    for _ in range(2):
+        bench.write(1, 42, 3000, 2)
+    bench.wait(4.0)
+    assert bench.position() == pytest.approx(8048, abs=STEADY_STEPS)
+    bench.write(1, 42, 0x8000 | 1000, 2)
+    bench.wait(2.0)
+    assert bench.position() == pytest.approx(7048, abs=STEADY_STEPS)
+
+
+def test_a_change_of_mode_under_torque_begins_at_rest_where_it_is():
+    bench = one()
+    bench.engage()
+    bench.write(1, 33, 1)
+    bench.wait(0.5)
+    assert bench.position() == 2048
+    bench.write(1, 46, 800, 2)
+    bench.wait(0.5)
+    bench.write(1, 33, 0)
+    at = bench.position()
+    bench.wait(1.0)
+    assert abs(bench.position() - at) < 60
+    assert bench.read(1, 66) == 0
+
+
+def test_coarse_speeds_are_50_steps_a_second():
+    bench = one()
+    bench.write(1, 18, 8)
+    bench.engage()
+    command(bench, 3048, speed=20)
+    bench.wait(0.5)
+    assert led_to(bench) == pytest.approx(2548)
+    assert bench.read(1, 58, 2, 15) == pytest.approx(20, abs=1)
+
+
+def test_speed_0_may_mean_to_stop():
+    bench = one()
+    bench.write(1, 18, 4)
+    bench.engage()
+    command(bench, 3048, speed=0)
+    bench.wait(0.5)
+    assert bench.position() == 2048

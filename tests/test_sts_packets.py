@@ -1,0 +1,140 @@
+"""Packets of the emulated STS servos: the maker's own vectors, framing, signs."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sts_bench import Bench, instruction
+
+from sim_mock.sts_packets import Framing, checksum, signed, status, unsigned
+
+MAKERS = {
+    "ping": "FF FF 01 02 01 FB",
+    "read": "FF FF 01 04 02 38 02 BE",
+    "write": "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5",
+    "action": "FF FF FE 02 05 FA",
+    "reset turns": "FF FF 01 02 0A F2",
+    "sync write": "FF FF FE 20 83 2A 06 01 00 08 00 00 E8 03 02 00 08 00 00 E8 03"
+    " 03 00 08 00 00 E8 03 04 00 08 00 00 E8 03 58",
+}
+"""Examples of Feetech's protocol manual."""
+
+
+def feed(data, gap_s=0.001):
+    return [tuple(found) for found in Framing(gap_s, 0.0).feed(data, 0.0)]
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_the_makers_examples_are_understood(name):
+    data = bytes.fromhex(MAKERS[name])
+    [(servo_id, code, params, end)] = feed(data)
+    assert (servo_id, code, params, end) == (data[2], data[4], data[5:-1], len(data))
+
+
+def test_the_makers_examples_are_answered_to_the_byte():
+    bench = Bench((1, "sts3215", 1304.0))
+    said = [bench.chain.receive(bytes.fromhex(MAKERS[n])) for n in ("ping", "read", "write")]
+    assert said[0] == bytes.fromhex("FF FF 01 02 00 FC")
+    assert said[1] == bytes.fromhex("FF FF 01 04 00 18 05 DD")
+    assert said[2] == bytes.fromhex("FF FF 01 02 00 FC")
+    assert bench.read(1, 42, 2) == 2048
+    assert bench.read(1, 46, 2) == 1000
+
+
+def test_the_makers_sync_write_reaches_all_four():
+    bench = Bench(*[(i, "sts3215", 1000.0) for i in (1, 2, 3, 4)])
+    assert bench.chain.receive(bytes.fromhex(MAKERS["sync write"])) == b""
+    assert [bench.read(i, 42, 2) for i in (1, 2, 3, 4)] == [2048] * 4
+
+
+def test_the_checksum_is_the_inverse_of_the_sum():
+    assert checksum(bytes((1, 2, 1))) == 0xFB
+    assert checksum(bytes((0xFF, 1))) == 0xFF
+    assert status(7, 0x20, b"\x01") == bytes((255, 255, 7, 3, 0x20, 1, 255 - 7 - 3 - 0x20 - 1))
+
+
+@given(st.binary(max_size=6), st.integers(0, 253), st.binary(max_size=40), st.integers(1, 60))
+def test_an_instruction_in_pieces_behind_noise_is_found(noise, servo_id, params, cut):
+    noise = noise.replace(b"\xff", b"\x00")
+    data = noise + instruction(servo_id, 3, params)
+    framing = Framing(0.001, 0.0)
+    first = framing.feed(data[:cut], 0.0)
+    found = first + framing.feed(data[cut:], 0.0005)
+    assert [(f.servo_id, f.code, f.params) for f in found] == [(servo_id, 3, params)]
+
+
+def test_the_end_counts_from_the_newest_piece():
+    data = instruction(1, 3, bytes(8))
+    framing = Framing(0.001, 0.0)
+    assert framing.feed(data[:5], 0.0) == []
+    [found] = framing.feed(data[5:] + b"\x00", 0.0)
+    assert found.end == len(data) - 5
+
+
+def test_a_packet_that_stays_unfinished_is_dropped():
+    data = instruction(1, 1)
+    framing = Framing(0.001, 0.0)
+    assert framing.feed(data[:4], 0.0) == []
+    assert framing.feed(data[4:], 0.002) == []
+    assert len(framing.feed(data, 0.002)) == 1
+
+
+def test_a_wrong_checksum_is_met_with_silence_and_the_next_is_heard():
+    good = instruction(1, 1)
+    bad = good[:-1] + bytes((good[-1] ^ 4,))
+    bench = Bench()
+    assert bench.chain.receive(bad) == b""
+    assert len(bench.chain.receive(bad + good)) == 6
+
+
+@pytest.mark.parametrize("length", [0, 1])
+def test_a_length_that_cannot_be_is_passed_over(length):
+    bad = bytes((255, 255, 1, length))
+    assert len(feed(bad + instruction(1, 1))) == 1
+
+
+def test_more_than_two_ff_before_the_id_are_still_a_header():
+    assert feed(b"\xff" + instruction(5, 1)) == [(5, 1, b"", 7)]
+
+
+@given(st.binary(max_size=300))
+def test_random_bytes_never_raise(data):
+    bench = Bench((1, "sts3215", 2048.0), (0, "sts3215", 10.0))
+    bench.chain.receive(data)
+    bench.now_s = 1.0
+    bench.chain.receive(b"\xff\xff" + data)
+    for at in (2.0, 2.9):
+        bench.now_s = at
+        assert all(abs(x) < 1e7 for x in bench.chain.positions_steps())
+
+
+@given(st.integers(0, 0xFD), st.sampled_from([2, 3, 4, 5, 6, 8, 10, 11, 0x82, 0x83]), st.data())
+def test_random_instructions_never_raise(servo_id, code, data):
+    bench = Bench((1, "sts3215", 2048.0), (servo_id, "sts3215", 10.0))
+    for _ in range(4):
+        params = data.draw(st.binary(max_size=24))
+        target = data.draw(st.sampled_from((servo_id, 0xFE)))
+        bench.chain.receive(instruction(target, code, params))
+        bench.now_s += 0.5
+    assert all(abs(x) < 1e7 for x in bench.chain.positions_steps())
+
+
+@given(st.sampled_from([10, 11, 15]), st.integers(-40_000, 40_000))
+def test_signs_and_magnitudes(bit, value):
+    most = (1 << bit) - 1
+    raw = unsigned(value, bit)
+    assert 0 <= raw < 1 << bit + 1
+    assert signed(raw, bit) == max(-most, min(most, value))
+
+
+@pytest.mark.parametrize(
+    ("raw", "bit", "value"),
+    [
+        (0x8001, 15, -1),
+        (0x7FFF, 15, 32767),
+        (0x8000, 15, 0),
+        (0x0C00, 11, -1024),
+        (0x0464, 10, -100),
+    ],
+)
+def test_signs_stand_in_one_bit(raw, bit, value):
+    assert signed(raw, bit) == value

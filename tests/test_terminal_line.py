@@ -1,0 +1,146 @@
+"""One device on a pseudo-terminal, on a clock that is set by hand."""
+
+import json
+import os
+import select
+
+import pytest
+
+from sim_mock.emulated import DynamixelLine, MaestroLine, StsLine
+from sim_mock.servo_physics import ServoSpec
+from sim_mock.terminal_line import BusSettings, TerminalLine
+
+PING, PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
+STS = StsLine((ServoSpec(1, "sts3215"),))
+BOARD = MaestroLine(6)
+
+
+class Bench:
+    """A line, what it said, and a client that has its terminal open."""
+
+    def __init__(self, device=STS, **settings):
+        self.now_s = 5.0
+        self.said, self.warned = [], []
+        self.line = TerminalLine(
+            BusSettings(device, **settings),
+            lambda: self.now_s,
+            self.said.append,
+            self.warned.append,
+        )
+        self.fd = os.open(self.line.terminal.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+
+    def send(self, data):
+        os.write(self.fd, data)
+        self.serve()
+
+    def serve(self):
+        ready, _, _ = select.select(self.line.watched(), (), (), 0.0)
+        self.line.serve(ready, self.now_s)
+
+    def heard(self):
+        try:
+            return os.read(self.fd, 4096)
+        except BlockingIOError:
+            return b""
+
+    def close(self):
+        os.close(self.fd)
+        self.line.close()
+
+
+@pytest.fixture
+def bench():
+    made = []
+
+    def make(*args, **settings):
+        made.append(Bench(*args, **settings))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+def test_a_question_is_answered(bench):
+    one = bench()
+    one.send(PING)
+    assert one.heard() == PONG
+
+
+def test_a_torn_packet_is_waited_for(bench):
+    """A scheduler may leave the host's process alone half-way through its packet."""
+    one = bench()
+    one.send(PING[:3])
+    one.now_s += 0.04
+    one.send(PING[3:])
+    assert one.heard() == PONG
+    one.send(PING[:3])
+    one.now_s += 0.06
+    one.send(PING[3:])
+    assert one.heard() == b""
+
+
+def test_a_late_answer_comes_when_it_is_due(bench):
+    one = bench()
+    one.line.obey("delay 1 30")
+    one.send(PING)
+    assert one.line.patience_s() == pytest.approx(0.03, abs=2e-4)
+    one.now_s += 0.02
+    one.serve()
+    assert one.heard() == b""
+    one.now_s += 0.01
+    one.serve()
+    assert one.heard() == PONG
+
+
+def test_with_wire_time_an_answer_takes_as_long_as_its_bytes(bench):
+    one = bench(DynamixelLine((ServoSpec(1, "xl330-m077"),), 57_600), wire_time=True)
+    one.send(bytes.fromhex("FFFFFD0001030001194E"))
+    assert one.line.line.next_due_s() - 5.0 == pytest.approx(24 * 10 / 57_600 + 500e-6)
+
+
+def test_a_board_is_quiet_while_it_is_unplugged(bench):
+    one = bench(BOARD)
+    assert json.loads(one.line.obey("unplug"))["ok"].startswith("unplugged")
+    assert one.line.watched() == []
+    assert json.loads(one.line.obey("plug")) == {"ok": "no longer: unplugged"}
+    assert len(one.line.watched()) == 2
+
+
+def test_without_a_link_the_new_path_is_told_with_the_name(bench):
+    one = bench(BOARD, name="eyes")
+    before = json.loads(one.line.where())
+    assert before == {"bus": "eyes", "path": one.line.terminal.path, "baud": None}
+    one.line.obey("unplug")
+    keep = os.openpty()  # takes the number that the terminal had
+    one.line.obey("plug")
+    for fd in keep:
+        os.close(fd)
+    told = [json.loads(line) for line in one.said]
+    assert told == [{"bus": "eyes", "path": one.line.terminal.path}]
+    assert told[0]["path"] != before["path"]
+
+
+def test_answers_to_commands_carry_the_name(bench):
+    one = bench(BOARD, name="eyes")
+    assert json.loads(one.line.obey("status"))["bus"] == "eyes"
+    assert json.loads(one.line.obey("lose 9"))["bus"] == "eyes"
+    assert "no channel 9; there is 0 to 5" in json.loads(one.line.obey("lose 9"))["error"]
+
+
+def test_a_choice_that_is_none_leaves_no_link_behind(tmp_path):
+    link = tmp_path / "board"
+    for choices, says in (({"mode": "usb"}, "it can be"), ({"bad-crc": "reply"}, "there is mode")):
+        settings = BusSettings(BOARD, choices=choices, link=str(link))
+        with pytest.raises(ValueError, match=says):
+            TerminalLine(settings, lambda: 0.0, print)
+        assert not os.path.lexists(link)
+
+
+def test_a_board_that_detects_its_rate_heeds_it_from_then_on(bench):
+    one = bench(BOARD, choices={"mode": "uart-detect"})
+    one.send(bytes.fromhex("9000"))
+    assert one.heard() == b""
+    one.send(bytes.fromhex("AA0C1000"))
+    assert len(one.heard()) == 2
+    assert one.warned == []
