@@ -32,6 +32,7 @@ from drivers.feetech_registers import StsRegisters
 from drivers.feetech_revival import Revival
 from drivers.feetech_roster import find
 from drivers.feetech_setup import Fitting
+from drivers.feetech_table import STEPS_PER_TURN
 from drivers.feetech_torque import switch_off
 from drivers.feetech_views import alone_turns, together_turns
 from drivers.serial_port import BusPort
@@ -47,12 +48,13 @@ class FeetechBus:
         params: how to speak with them.
 
     Raises:
-        ValueError: more servos than one packet of goals can hold.
+        ValueError: more servos than one packet of goals can hold, or a range beyond one turn.
     """
 
     def __init__(self, port: BusPort, setups: Sequence[ServoSetup], params: FeetechParams) -> None:
         if len(setups) > MOST_GOALS:
             raise ValueError(f"{len(setups)} servos are too many for one bus: {MOST_GOALS} at most")
+        _check_ranges(setups)
         self._port = port
         self._setups = self._wanted = tuple(setups)
         self._params = params
@@ -156,7 +158,7 @@ class FeetechBus:
             self.release()
             raise
         self._care.take_on(outside)
-        self._speeds = self._revival.speeds(self._ids, outside)
+        self._speeds = self._revival.speeds(self._ids, ())
         return goals
 
     def write(self, goals_steps: Sequence[int]) -> None:
@@ -183,11 +185,12 @@ class FeetechBus:
         torque everything stays as it is.
 
         Raises:
-            ValueError: these are other servos.
+            ValueError: these are other servos, or a range is beyond one turn.
         """
         same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
         if not same:
             raise ValueError("other servos need another bus: ids and models must stay")
+        _check_ranges(setups)
         self._wanted = tuple(setups)
 
     def faults(self) -> tuple[str, ...]:
@@ -249,15 +252,13 @@ class FeetechBus:
             self._care.suspect_all()
         for servo_id, one in heard.items():
             slot = self._slot[servo_id]
-            if self._roll.answered(servo_id):
-                self._care.back(servo_id, now_s)
+            self._roll.answered(servo_id)
             if self._readings.believes(slot, one):
                 self._care.judge(servo_id, one.sample, now_s)
                 readings[slot] = self._readings.one(slot, one)
             else:
                 self._line.errors["implausible"] += 1
-        if self._roll.troubled:
-            self._care.note_out(self._roll.out, now_s)
+        self._care.note_out(self._roll.out, now_s)
         self._health.note_silent(self._roll.out, now_s, self._roll.garbling)
         return readings
 
@@ -354,6 +355,20 @@ class FeetechBus:
 
 
 _CUT = "cut the servo power"
+
+
+def _check_ranges(setups: Sequence[ServoSetup]) -> None:
+    """See that every range lies within one turn: beyond, positions mean nothing after a restart.
+
+    Raises:
+        ValueError: one does not.
+    """
+    for setup in setups:
+        if not 0 <= setup.min_steps <= setup.max_steps < STEPS_PER_TURN:
+            raise ValueError(
+                f"{call(setup)}: {setup.min_steps}..{setup.max_steps} is no range within "
+                f"0..{STEPS_PER_TURN - 1} steps"
+            )
 
 
 def _inside(goal: float, low: int, high: int) -> int:

@@ -50,7 +50,7 @@ def assign(port: BusPort, found: Found, wanted_id: int, baud: int) -> Assigned:
             "bit/s: gazerig scan tells where it is"
         )
     if not registers.settle(now.id, "lock", 1):
-        raise _refused(port, now, "that its settings are locked again")
+        raise _refused(port, now, "close its lock")
     return Assigned(found, seen, tuple(done))
 
 
@@ -59,7 +59,7 @@ def _rest(port: BusPort, registers: StsRegisters, found: Found, done: list[str])
     registers.write_all((found.id,), "status_return_level", 1)
     if registers.read(found.id, "torque_enable"):
         if not registers.write(found.id, "torque_enable", 0):
-            raise _refused(port, found, "torque off")
+            raise _refused(port, found, "let its torque go")
         done.append("torque 1 -> 0")
 
 
@@ -78,7 +78,7 @@ def _change(
         # The confirmation comes from either id, so the new one is asked instead.
         registers.write(now.id, "id", wanted_id)
         if registers.identify(wanted_id) is None:
-            raise _refused(port, now, f"the id {wanted_id}")
+            raise _refused(port, now, f"take the id {wanted_id}")
         done.append(f"id {now.id} -> {wanted_id}")
         now = now._replace(id=wanted_id)
     if now.baud != baud or registers.read(now.id, "baud_rate") != rate:
@@ -92,7 +92,7 @@ def _change(
 
 def _unlock(port: BusPort, registers: StsRegisters, now: Found) -> None:
     if not registers.write(now.id, "lock", 0):
-        raise _refused(port, now, "that its lock is opened")
+        raise _refused(port, now, "open its lock")
 
 
 def _open(port: BusPort, baud: int) -> None:
@@ -102,6 +102,6 @@ def _open(port: BusPort, baud: int) -> None:
 
 def _refused(port: BusPort, now: Found, what: str) -> ServoFault:
     return ServoFault(
-        f"{port.port_name}: the servo does not take {what} (no answer); it answered last as id "
+        f"{port.port_name}: the servo does not {what} (no answer); it answered last as id "
         f"{now.id} at {now.baud} bit/s: switch its power off and on and try again"
     )

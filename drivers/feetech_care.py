@@ -109,14 +109,12 @@ class Care:
         if sample.torque is not None:
             self._mind_torque(servo_id, sample)
 
-    def back(self, servo_id: int, now_s: float) -> None:
-        """Note that a servo answers that was out."""
-        since_s = self._out_since_s.pop(servo_id, now_s)
-        if self.engaged and now_s - since_s >= RESTART_S:
-            self._suspects.add(servo_id)
-
     def note_out(self, out: Collection[int], now_s: float) -> None:
-        """Note who is out now."""
+        """Note who is out of the group now; who is back after long may have restarted."""
+        for servo_id in [i for i in self._out_since_s if i not in out]:
+            since_s = self._out_since_s.pop(servo_id)
+            if self.engaged and now_s - since_s >= RESTART_S:
+                self._suspects.add(servo_id)
         for servo_id in out:
             self._out_since_s.setdefault(servo_id, now_s)
 

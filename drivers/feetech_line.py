@@ -10,8 +10,9 @@ from drivers.feetech_packets import (
     sync_read,
     sync_write,
 )
-from drivers.feetech_scan import identify
-from drivers.feetech_table import HIGHEST_ID, REGISTERS
+from drivers.feetech_scan import everybody
+from drivers.feetech_table import REGISTERS
+from drivers.serial_port import BITS_PER_BYTE
 
 
 class StsLine(Line):
@@ -54,13 +55,8 @@ class StsLine(Line):
 
     def ping_all(self) -> dict[int, tuple[int, int]]:
         """Ask every id that there is, one after the other; gives (model number, firmware) by id."""
-        patience_s = min(self.most_s, HURRIED * self.patience.seconds)
-        found = {}
-        for servo_id in range(HIGHEST_ID + 1):
-            seen = identify(self.port, servo_id, self._byte_s, patience_s)
-            if seen is not None:
-                found[servo_id] = seen
-        return found
+        found, _ = everybody(self.port, round(BITS_PER_BYTE / self._byte_s))
+        return {one.id: (one.number, one.firmware) for one in found}
 
     def write_all(self, ids: Sequence[int], name: str, values: Iterable[int]) -> None:
         """Write one register of several servos; no servo confirms it."""

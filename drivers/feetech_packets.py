@@ -75,7 +75,7 @@ def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes
     return instruction(BROADCAST, SYNC_WRITE, bytes((address, size)) + body)
 
 
-MOST_GOALS = 36
+MOST_GOALS = 35
 """So many servos' goals fit into one packet: 7 bytes each."""
 
 

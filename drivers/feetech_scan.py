@@ -100,7 +100,7 @@ def scan(
             continue
         patience_s = THOROUGH_S if thorough else PATIENCE_S
         found, junk = everybody(port, baud, patience_s, progress, ids)
-        shared = tuple(one.id for one in found if garbled(port, one.id, baud) >= SHARED)
+        shared = tuple(one.id for one in found if garbled(port, one.id) >= SHARED)
         yield Round(baud, True, found, junk, shared)
 
 
@@ -154,17 +154,18 @@ def ping(port: BusPort, servo_id: int, baud: int, tries: int = 2) -> Found | Non
     return None
 
 
-def garbled(port: BusPort, servo_id: int, baud: int = FACTORY_BAUD, tries: int = 6) -> int:
+def garbled(port: BusPort, servo_id: int, tries: int = 6) -> int:
     """Count how many of some answers of one servo came in pieces, or disagreed about where it is.
 
     Two servos with one id speak at the same time: where their bytes differ they spoil
     each other. Positions hardly ever agree.
     """
     request = read(servo_id, _TELLING, _TELLING_LENGTH)
+    byte_s = BITS_PER_BYTE / float(getattr(port, "baudrate", FACTORY_BAUD))
     bad, places = 0, list[int]()
     for _ in range(tries):
         port.drain()
-        raw = _answer(port, request, _TELLING_LENGTH, BITS_PER_BYTE / baud, REPLY_S)
+        raw = _answer(port, request, _TELLING_LENGTH, byte_s, REPLY_S)
         whole = [
             s
             for s in statuses(raw)

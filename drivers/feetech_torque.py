@@ -6,6 +6,7 @@ the speed that may be used for it, and both are read back before the torque come
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple, TypeVar
 
 from drivers.errors import ServoFault, ServoMissing
@@ -17,6 +18,9 @@ TRIES = 3
 
 JUMP_STEPS = STEPS_PER_TURN // 4
 """No hand moves a joint so far while the torque comes on."""
+
+STILL_STEPS = 16
+"""A limp joint held by a hand moves so far between two questions."""
 
 Value = TypeVar("Value")
 
@@ -57,20 +61,44 @@ def insist_goals(
     Raises:
         drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
     """
+    wanted = dict(zip(ids, zip(goals, speeds, strict=True), strict=True))
+    _until(line, wanted, partial(_send_goals, line), partial(_ask_goals, line), "goal_position")
 
-    def send(left: Mapping[int, tuple[int, int]]) -> None:
-        line.send(
-            GoalWrite(tuple(left)).packet(
-                [g for g, _ in left.values()], [v for _, v in left.values()]
-            )
-        )
+
+def _send_goals(line: StsLine, wanted: Mapping[int, tuple[int, int]]) -> None:
+    goals = [goal for goal, _ in wanted.values()]
+    speeds = [speed for _, speed in wanted.values()]
+    line.send(GoalWrite(tuple(wanted)).packet(goals, speeds))
+
+
+def _ask_goals(line: StsLine, ids: Sequence[int]) -> dict[int, tuple[int, int]]:
+    found = line.ask_bytes(ids, GoalWrite.ADDRESS, GoalWrite.SIZE)
+    return {i: (_GOAL.decode(data[:2]), _SPEED.decode(data[4:])) for i, data in found.items()}
+
+
+def _prepare_goals(
+    line: StsLine,
+    ids: Sequence[int],
+    goals: Sequence[int],
+    speeds: Sequence[int],
+    present: Sequence[int],
+) -> None:
+    """Write goals with their speeds to limp servos; a servo may keep its own place as goal.
+
+    Raises:
+        drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
+    """
+    places = dict(zip(ids, present, strict=True))
+    wanted = dict(zip(ids, zip(goals, speeds, strict=True), strict=True))
 
     def ask(left: Sequence[int]) -> dict[int, tuple[int, int]]:
-        found = line.ask_bytes(left, GoalWrite.ADDRESS, GoalWrite.SIZE)
-        return {i: (_GOAL.decode(data[:2]), _SPEED.decode(data[4:])) for i, data in found.items()}
+        # Where a limp servo's goal goes with its place, nothing can leap either.
+        return {
+            i: (wanted[i][0] if abs(goal - places[i]) <= STILL_STEPS else goal, speed)
+            for i, (goal, speed) in _ask_goals(line, left).items()
+        }
 
-    wanted = dict(zip(ids, zip(goals, speeds, strict=True), strict=True))
-    _until(line, wanted, send, ask, "goal_position")
+    _until(line, wanted, partial(_send_goals, line), ask, "goal_position")
 
 
 def _until(
@@ -106,7 +134,7 @@ def switch_on(
         drivers.errors.ServoFault: a servo refuses its torque, or its position jumped.
     """
     before = positions(line, ids)
-    insist_goals(line, ids, goals, speeds)
+    _prepare_goals(line, ids, goals, speeds, before)
     try:
         insist(line, ids, "torque_enable", [1] * len(ids))
     except ServoMissing:
@@ -123,6 +151,7 @@ def switch_on(
                 f"{line.who(servo_id)}: position jumped from {was} to {now} as the torque came on: "
                 "restart the servo power"
             )
+    insist_goals(line, ids, goals, speeds)
 
 
 class Released(NamedTuple):

@@ -59,26 +59,21 @@ class View:
 
     def sample(self, error: int, data: bytes) -> Sample:
         """Take one servo's bytes apart."""
-        numbers = self._layout.unpack(data)
-        armed = numbers[:3] if self.armed else (None, None, None)
-        position, velocity, load, volts, warm, status, moving, current = numbers[-8:]
+        *armed, position, velocity, load, volts, warm, status, moving, current = (
+            self._layout.unpack(data)
+        )
+        # Sign and magnitude, written out: this runs for every number of every tick.
         return Sample(
             error | status,
-            _signed(position, 15),
-            _signed(velocity, 15),
-            _signed(load, 10),
+            -(position & 0x7FFF) if position & 0x8000 else position,
+            -(velocity & 0x7FFF) if velocity & 0x8000 else velocity,
+            -(load & 0x3FF) if load & 0x400 else load & 0x3FF,
             volts,
             warm,
             moving,
-            _signed(current, 15),
+            -(current & 0x7FFF) if current & 0x8000 else current,
             *armed,
         )
-
-
-def _signed(raw: int, bit: int) -> int:
-    """Decode sign and magnitude; written out, as this runs for every number of every tick."""
-    magnitude = raw & (1 << bit) - 1
-    return -magnitude if raw >> bit & 1 else magnitude
 
 
 SENSED = View(REGISTERS["present_position"].address)

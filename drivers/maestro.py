@@ -273,6 +273,8 @@ class MaestroBus:
         register = self._line.greet()
         if register is None:
             raise ServoMissing(f"{where}: no Maestro answers: {self._mute_causes()}")
+        if not self._line.takes_crc():
+            raise ServoMissing(f"{where}: the board wants no CRC: set crc to false")
         if register:
             named = ", ".join(name_errors(register))
             self._journal.say(f"the board held errors from before, cleared now: {named}")

@@ -169,8 +169,8 @@ class Care:
             self._line.send(limits + speech.targets(goals))
 
     def _met_end(self, channel: Channel, pulse: int) -> None:
-        channel.met_end(pulse)
-        if not channel.told:
+        """Note that a channel stays elsewhere: it meets an end of the board's own range."""
+        if channel.met_end(pulse) and not channel.told:
             channel.told = True
             self._line.errors["other pulse"] += 1
             self._journal.say(refusal(channel))

@@ -42,6 +42,7 @@ class Channel:
         self._settled_s = inf
         self._recent: deque[tuple[float, int]] = deque()
         self._bottom, self._top = -inf, inf
+        self._end_steps = 0
 
     def want(self, setup: ServoSetup) -> None:
         """Take another setup of the same servo."""
@@ -155,6 +156,9 @@ class Channel:
         """Take the board's word for the pulse that it gives now."""
         if pulse_steps and not self.held:
             self.goal_steps = pulse_steps
+        if pulse_steps and self.held and not self.entering:
+            # No goal lies outside: a byte was damaged, and answers carry no check.
+            pulse_steps = self.clip(pulse_steps)
         self.gives(pulse_steps)
 
     def gives(self, pulse_steps: int) -> None:
@@ -165,13 +169,20 @@ class Channel:
         else:
             self.ramp.stop()
 
-    def met_end(self, pulse_steps: int) -> None:
-        """Note that the board goes no further than a pulse, whatever the goal."""
-        if pulse_steps < self.goal_steps:
+    def met_end(self, pulse_steps: int) -> bool:
+        """Note where a goal has ended; gives whether that is elsewhere, twice at the same pulse."""
+        before, self._end_steps = self._end_steps, pulse_steps
+        short = self.goal_steps - pulse_steps
+        self._bottom = -inf
+        self._top = inf
+        self.ramp.found(pulse_steps)
+        if before != pulse_steps or abs(short) <= FINE_STEPS:
+            return False
+        if short > 0:
             self._top = pulse_steps
         else:
             self._bottom = pulse_steps
-        self.ramp.found(pulse_steps)
+        return True
 
     def settle(self, pulse_steps: int) -> None:
         """Take a pulse for the servo's place: it has been there for long."""

@@ -53,6 +53,8 @@ ERRORS = (
 )
 """By bit of the error register."""
 
+PROTOCOL_ERROR = ERRORS.index("serial protocol error")
+
 _CRC_POLYNOMIAL = 0x91
 
 

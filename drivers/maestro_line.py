@@ -7,7 +7,7 @@ other. After one that stayed out the line is emptied before anything is asked ag
 from collections import Counter
 from collections.abc import Sequence
 
-from drivers.maestro_commands import MOST, WORD, Speech, words
+from drivers.maestro_commands import MOST, PROTOCOL_ERROR, WORD, Speech, words
 from drivers.maestro_params import MaestroParams
 from drivers.serial_port import BITS_PER_BYTE, BusPort
 
@@ -83,6 +83,17 @@ class Line:
             if found is not None:
                 return found[0]
         return None
+
+    def takes_crc(self) -> bool:
+        """Tell whether the board wants the check bytes that it is sent.
+
+        One that does not answers too, but finds an error in every command.
+        """
+        if not self.speech.crc:
+            return True
+        self.ask_words(self.speech.errors(), 1)
+        found = self.ask_words(self.speech.errors(), 1)
+        return found is None or not found[0] >> PROTOCOL_ERROR & 1
 
     def wake(self) -> int | None:
         """Ask for the errors once, so that a board that detects its baud rate wakes up."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from drivers.errors import PortError
-from drivers.maestro_commands import ERRORS, MICRO, name_errors
+from drivers.maestro_commands import ERRORS, MICRO, PROTOCOL_ERROR, name_errors
 from drivers.maestro_line import Line
 from drivers.maestro_params import Form, MaestroParams
 from drivers.serial_port import BusPort
@@ -20,8 +20,6 @@ USB_CHANNELS = {"1ffb:0089": 6, "1ffb:008a": 12, "1ffb:008b": 18, "1ffb:008c": 2
 """Channels by USB vendor and product id."""
 
 FORMS: tuple[Form, ...] = ("compact", "pololu")
-
-PROTOCOL_ERROR = ERRORS.index("serial protocol error")
 
 
 class MaestroFound(NamedTuple):
@@ -62,7 +60,7 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> MaestroF
             line = Line(port, replace(params, protocol=form, crc=crc))
             port.drain()
             register = line.greet()
-            if register is not None and not register >> len(ERRORS):
+            if register is not None and not register >> len(ERRORS) and line.takes_crc():
                 return _look(line, params, register, count)
     return None
 

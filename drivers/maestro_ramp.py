@@ -87,6 +87,9 @@ class Ramp:
         """Let time pass on the way to a goal."""
         if for_s <= 0.0:
             return
+        if self.pulse_steps == goal_steps == self.shaft_steps:
+            self._pulse_steps_s = self.shaft_steps_s = 0.0
+            return
         began_steps = self.shaft_steps
         slices = 1 if for_s > _LONG_S else ceil(for_s / _SLICE_S)
         for _ in range(slices):

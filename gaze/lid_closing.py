@@ -20,7 +20,8 @@ def closure(since_onset_s: float, close_s: float, hold_s: float, open_s: float) 
     # Opening sets off quickly and ends in a long tail: minimum jerk in a time that
     # runs fast at first.
     s = (since_onset_s - close_s - hold_s) / open_s
-    return 1.0 - min_jerk(1.0 - (1.0 - s) ** 1.4)
+    # The polynomial comes out above 1 by a rounding error just before its end.
+    return max(0.0, 1.0 - min_jerk(1.0 - (1.0 - s) ** 1.4))
 
 
 class Closing(NamedTuple):

@@ -79,6 +79,7 @@ class Ear:
             code: size for code, size in DATA_BYTES.items() if mini or code not in MINI_ONLY
         }
         self._packet = bytearray()
+        self._until = 0
         self._deaf = False
 
     def forget(self) -> None:
@@ -92,58 +93,62 @@ class Ear:
             for heard in self._take(byte):
                 yield heard._replace(end=end)
 
-    def _take(self, byte: int) -> list[Heard]:
-        if self._packet and self._packet[0] == MINI_SSC and byte != MINI_SSC:
-            self._packet.append(byte)
-            return self._finished(MINI_SSC, 1) if len(self._packet) == 3 else []
-        if byte & 0x80:
+    def _take(self, byte: int) -> tuple[Heard, ...]:
+        packet = self._packet
+        if byte & 0x80 and not (packet and packet[0] == MINI_SSC and byte != MINI_SSC):
             return self._begin(byte)
         if self._deaf:
-            return []
-        if not self._packet:
-            return [_PROTOCOL]
-        self._packet.append(byte)
-        return self._go_on()
+            return ()
+        if not packet:
+            return (_PROTOCOL,)
+        packet.append(byte)
+        return self._go_on() if len(packet) >= self._until else ()
 
-    def _begin(self, byte: int) -> list[Heard]:
+    def _begin(self, byte: int) -> tuple[Heard, ...]:
         """Start a command; one that was not finished is an error."""
-        cut = len(self._packet) > 1 or bool(self._packet) and self._packet[0] != POLOLU
-        said = [_PROTOCOL] if cut else []
-        self._packet[:] = (byte,)
+        packet = self._packet
+        said = (_PROTOCOL,) if packet and packet != _SIGN else ()
+        packet[:] = (byte,)
         self._deaf = False
-        return said + (self._go_on() if byte not in (POLOLU, MINI_SSC) else [])
+        if byte in (POLOLU, MINI_SSC):
+            self._until = 2 if byte == POLOLU else 3
+            return said
+        return said + self._go_on()
 
-    def _go_on(self) -> list[Heard]:
-        """Look whether the command is complete."""
+    def _go_on(self) -> tuple[Heard, ...]:
+        """Look whether the command is complete, or how long it must be for another look."""
         packet, head = self._packet, 1
+        if packet[0] == MINI_SSC:
+            return self._finished(MINI_SSC, head)
         if packet[0] == POLOLU:
+            head = self._until = 3
             if packet[1] != self.device:
                 packet.clear()
                 self._deaf = True
-                return []
-            if len(packet) < 3:
-                return []
-            head = 3
+                return ()
+            if len(packet) < head:
+                return ()
         code = packet[head - 1] | 0x80
         if code not in self._known:
             packet.clear()
-            return [_PROTOCOL]
-        size = self._known[code]
-        if code == SET_TARGETS and len(packet) > head:
-            size += 2 * packet[head]
-        complete = len(packet) == head + size + self.crc
-        return self._finished(code, head) if complete else []
+            return (_PROTOCOL,)
+        self._until = head + self._known[code] + self.crc
+        if code == SET_TARGETS:
+            # How long it is stands in its first byte.
+            self._until = self._until + 2 * packet[head] if len(packet) > head else head + 1
+        return self._finished(code, head) if len(packet) >= self._until else ()
 
-    def _finished(self, code: int, head: int) -> list[Heard]:
+    def _finished(self, code: int, head: int) -> tuple[Heard, ...]:
         packet = bytes(self._packet)
         self._packet.clear()
         if self.crc and code != MINI_SSC:
             packet, check = packet[:-1], packet[-1]
             if crc7(packet) != check:
-                return [Heard(0, 0, trouble="crc")]
-        return [Heard(0, code, packet[head:])]
+                return (Heard(0, 0, trouble="crc"),)
+        return (Heard(0, code, packet[head:]),)
 
 
+_SIGN = bytes((POLOLU,))
 _PROTOCOL = Heard(0, 0, trouble="protocol")
 
 

@@ -31,19 +31,27 @@ RESOLUTION = 0.5
 
 
 class Motor(Protocol):
-    """What the shaft must know of the servo's motor and gear, all at ``rated_v``."""
+    """What the shaft must know of a servo's motor and gear."""
 
     @property
-    def stall_torque_nm(self) -> float: ...
+    def stall_torque_nm(self) -> float:
+        """Give the torque that holds it still."""
+        ...
 
     @property
-    def stall_current_a(self) -> float: ...
+    def stall_current_a(self) -> float:
+        """Give the current it draws then."""
+        ...
 
     @property
-    def no_load_rpm(self) -> float: ...
+    def no_load_rpm(self) -> float:
+        """Give the speed without load."""
+        ...
 
     @property
-    def rated_v(self) -> float: ...
+    def rated_v(self) -> float:
+        """Give the voltage that all this is for."""
+        ...
 
 
 class Loop(NamedTuple):

@@ -7,6 +7,7 @@ communication protocol of the STS/SMS series.
 
 from collections.abc import Callable, Iterable
 
+from drivers.feetech_table import BAUD_RATES
 from sim_mock.device import Reply
 from sim_mock.servo_packets import Answer, Piece
 from sim_mock.servo_physics import ServoSpec
@@ -14,17 +15,14 @@ from sim_mock.sts_fault_commands import COMMANDS
 from sim_mock.sts_faults import StsFaults
 from sim_mock.sts_habits import StsHabits, chosen
 from sim_mock.sts_instructions import (
-    EEPROM_END,
     PING,
     SYNC_READ,
     SYNC_WRITE,
     answers,
     carry_out,
-    may_move_ids,
     sync_read,
     sync_writes,
 )
-from sim_mock.sts_memory import BAUD_RATES
 from sim_mock.sts_packets import BROADCAST, Framing, Instruction, pieces
 from sim_mock.sts_servo import StsServo
 
@@ -64,16 +62,18 @@ class StsChain:
     # --- who is there
 
     def refresh(self) -> None:
-        """Look again at ids and bauds; needed after changes from outside."""
+        """Look again at ids and bauds."""
+        self._told = [servo.address for servo in self.servos]
         by_id: dict[int, list[StsServo]] = {}
         for servo in self.servos:
             if not self.heed_baud or self._client_baud in (None, servo.baud):
                 by_id.setdefault(servo.id, []).append(servo)
         self._by_id = {servo_id: tuple(by_id[servo_id]) for servo_id in sorted(by_id)}
 
-    def hears(self, client_baud: int) -> bool:
-        """Tell whether any servo understands a client at this baud rate."""
-        return not self.heed_baud or any(servo.baud == client_baud for servo in self.servos)
+    def hears(self, client_baud: int | None) -> bool:
+        """Tell whether any servo understands a client at this baud rate (None: any)."""
+        heeds = self.heed_baud and client_baud is not None
+        return not heeds or any(servo.baud == client_baud for servo in self.servos)
 
     def __getitem__(self, servo_id: int) -> StsServo:
         """Give a servo by its id, as it was when last looked at."""
@@ -142,7 +142,7 @@ class StsChain:
             self._client_baud = client_baud
             self._framing.forget()
             self.refresh()
-        if not self._by_id:
+        if not self.hears(client_baud):
             return self._garbage(data)
         replies = []
         for instruction in self._framing.feed(data, now_s):
@@ -169,6 +169,9 @@ class StsChain:
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Let the addressed servos carry out one instruction; gives what they send."""
         servo_id, code, params, _ = instruction
+        if self._told != [servo.address for servo in self.servos]:
+            # A write, or a restart that lost what was not kept.
+            self.refresh()
         if servo_id != BROADCAST:
             answer = self._answer_all(servo_id, code, params)
             return self._out([answer]) if answer is not None else []
@@ -187,8 +190,6 @@ class StsChain:
         for servo in [one for same in self._by_id.values() for one in same]:
             if servo.advance(self._now_ms):
                 carry_out(servo, code, params)
-        if may_move_ids(code, params):
-            self.refresh()
 
     def _answer_all(self, servo_id: int, code: int, params: bytes) -> Answer | None:
         """Let all servos with an id carry out an instruction; gives what is said."""
@@ -197,8 +198,6 @@ class StsChain:
             said = self._answer(servo, servo_id, code, params)
             if said is not None:
                 answer = said if answer is None else said._replace(twin=answer)
-        if may_move_ids(code, params):
-            self.refresh()
         return None if answer is None or self._silent(servo_id) else answer
 
     def _answer(self, servo: StsServo, servo_id: int, code: int, params: bytes) -> Answer | None:
@@ -263,8 +262,6 @@ class StsChain:
             for servo in self._by_id.get(servo_id, ()):
                 if servo.advance(self._now_ms):
                     servo.write(params[0], data)
-        if params and params[0] < EEPROM_END:
-            self.refresh()
 
     def _out(self, said: list[Answer]) -> list[Piece]:
         if not self._wire.any:

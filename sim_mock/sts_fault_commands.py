@@ -1,10 +1,10 @@
 """What can be asked of an emulated STS bus as text; ``StsFaults`` does it."""
 
+from drivers.feetech_table import HIGHEST_ID
 from sim_mock.fault_words import Commands, Verb, Word, number, or_all, whole
 from sim_mock.line_verbs import adapter_verbs, closing_verbs, line_verbs, packet_verbs
 from sim_mock.sts_faults import StsFaults
 from sim_mock.sts_habits import cases
-from sim_mock.sts_packets import HIGHEST_ID
 
 _ID = Word("ID", whole(0, HIGHEST_ID, "a servo id"))
 _WHO = Word("ID", or_all(_ID.read))

@@ -29,10 +29,6 @@ class Chain(Protocol):
         """Put a second servo with this id on the chain."""
         ...
 
-    def refresh(self) -> None:
-        """Look again at ids and bauds that were changed behind the chain's back."""
-        ...
-
     def choose(self, case: str, value: str) -> None:
         """Choose what servos do where documents and devices differ."""
         ...
@@ -68,13 +64,11 @@ class StsFaults(LineFaults):
     def brown_out(self, servo_id: int) -> str:
         """Let a servo restart as a dip of the supply makes it: no status tells."""
         self._bus.here(servo_id).restart()
-        self._bus.refresh()
         return f"servo {servo_id} restarts"
 
     def reset(self, servo_id: int) -> str:
         """Let a servo be as from the factory: id 1, 1000000 bit/s."""
         self._bus.here(servo_id).factory_reset(1)
-        self._bus.refresh()
         return f"servo {servo_id} is as from the factory: id 1, 1000000 bit/s"
 
     def voltage(self, servo_id: int | None, volts: float) -> str:

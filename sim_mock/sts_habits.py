@@ -13,7 +13,7 @@ BroadcastPing = Literal["answer", "mix", "silence"]
 Goal = Literal["wait", "torque-on"]
 TorqueOn = Literal["old-goal", "present"]
 GoalTime = Literal["obey", "ignore"]
-OverloadEnds = Literal["new-goal", "torque", "restart"]
+OverloadEnds = Literal["new-goal", "goal-away", "torque", "restart"]
 Reboot = Literal["mute", "answer"]
 WrongBaud = Literal["silence", "garbage"]
 
@@ -25,12 +25,14 @@ class StsHabits:
     after_missing: what servos do that come after a silent one in a sync read: never answer,
         answer at once, or answer after ``slot_timeout_s`` [A]
     broadcast_ping: all answer in the order of their ids, all at once (the bytes mix), or none
-    goal: a goal position written without torque waits for it, or switches the torque on
+    goal: a goal position written without torque waits for it, or switches the torque on; the
+        maker's own examples never switch it on and move all the same [R]
     torque_on: as the torque comes on the old goal is followed, or the goal becomes the present
         position
     goal_time: Goal Time (44) decides how long a move takes where it is not 0, or means nothing
-    overload_ends: what ends the overload protection: a goal other than before (or torque off,
-        or a restart), torque off (or a restart), or a restart only
+    overload_ends: what ends the overload protection: a goal other than before, a goal that
+        leads away from what it pushed against, none but torque off, or (all the others as
+        well) a restart
     reboot: a reboot instruction is not answered, or is
     wrong_baud: a client at another baud rate hears nothing, or garbage
     packet_gap_s: a packet that stays unfinished so long is dropped [A]

@@ -6,15 +6,12 @@ Source: Feetech, communication protocol of the STS/SMS series.
 
 from collections.abc import Callable
 
-from sim_mock.sts_motion import TURN
+from drivers.feetech_table import STEPS_PER_TURN
 from sim_mock.sts_servo import MIDDLE, StsServo
 
 PING, READ, WRITE, REG_WRITE, ACTION = 1, 2, 3, 4, 5
 RESTORE, REBOOT, RESET_TURNS, CALIBRATE = 6, 8, 10, 11
 SYNC_READ, SYNC_WRITE = 0x82, 0x83
-
-EEPROM_END = 40
-"""Addresses below hold id, baud rate and return delay."""
 
 
 def carry_out(servo: StsServo, code: int, params: bytes) -> bytes | None:
@@ -28,13 +25,6 @@ def answers(servo: StsServo, code: int) -> bool:
     if code == REBOOT and servo.habits.reboot == "mute":
         return False
     return code in (PING, READ) or servo.answers_all
-
-
-def may_move_ids(code: int, params: bytes) -> bool:
-    """Tell whether an instruction may change id, baud rate or return delay."""
-    if code == WRITE:
-        return params[:1] < bytes((EEPROM_END,))
-    return code in (ACTION, RESTORE, REBOOT)
 
 
 def sync_read(params: bytes) -> tuple[int, int, bytes]:
@@ -94,7 +84,7 @@ def _reset_turns(servo: StsServo, params: bytes) -> bytes:
 def _calibrate(servo: StsServo, params: bytes) -> bytes | None:
     if len(params) not in (0, 2):
         return None
-    servo.drive.calibrate(int.from_bytes(params, "little") % TURN if params else MIDDLE)
+    servo.drive.calibrate(int.from_bytes(params, "little") % STEPS_PER_TURN if params else MIDDLE)
     return b""
 
 

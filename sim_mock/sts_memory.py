@@ -10,14 +10,11 @@ those that owners read out of an STS3215.
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drivers.feetech_table import FeetechModel
-from sim_mock.sts_packets import HIGHEST_ID, signed
+from drivers.feetech_table import BAUD_RATES, HIGHEST_ID, FeetechModel
+from sim_mock.sts_packets import signed
 
 SIZE = 256
 """What is not a register reads 0."""
-
-BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)
-"""Bit/s by the value of Baud Rate (6)."""
 
 SERVO, WHEEL, PWM, STEP = 0, 1, 2, 3
 """Operating modes (33)."""

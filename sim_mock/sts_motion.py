@@ -11,7 +11,9 @@ dead zones (26, 27), so that friction keeps it up to 2 steps from its goal, as i
 import struct
 from typing import NamedTuple
 
-from drivers.feetech_table import FeetechModel
+from drivers.feetech_table import ACCELERATION_UNIT_STEPS_S2, CURRENT_UNIT_MA, FeetechModel
+from drivers.feetech_table import STEPS_PER_TURN as TURN
+from drivers.feetech_table import TORQUE_FULL as FULL
 from sim_mock.servo_live import flicker
 from sim_mock.servo_motion import LIMP, Loop, Shaft
 from sim_mock.servo_physics import Physics
@@ -19,13 +21,9 @@ from sim_mock.servo_profile import Profile, SpeedProfile
 from sim_mock.sts_memory import PWM, SERVO, STEP, WHEEL, StsMemory
 from sim_mock.sts_packets import signed, unsigned
 
-TURN = 4096
-FULL = 1000
-"""Units of load and torque limit at full duty."""
-
-CURRENT_UNIT_A = 0.0065
-RAMP_UNIT = 100.0 / 1e6
-"""Unit of Acceleration (41): 100 steps/s2, here in steps/ms2."""
+CURRENT_UNIT_A = CURRENT_UNIT_MA / 1000.0
+RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
+"""Unit of Acceleration (41) in steps/ms2."""
 
 FINE_SPEED, ZERO_IS_FASTEST, COUNTS_TURNS = 4, 8, 16
 """Bits of Phase (18)."""
@@ -216,30 +214,30 @@ class StsDrive:
             self.shaft.wake()
         elif self.mode == PWM:
             self.tune()
-        elif self.mode == SERVO and (asked != self._asked or self._place() != profile.goal):
-            self._asked = asked
-            self._lead(profile, self._place(), asked[2] if self._timed else 0)
+        elif self.mode == SERVO:
+            place = self._place(signed(asked[1], 15))
+            if asked != self._asked or place != profile.goal:
+                self._asked = asked
+                self._lead(profile, place, asked)
         elif self.mode == STEP and new_goal:
-            self._lead(profile, profile.goal + signed(asked[1], 15), 0)
+            self._lead(profile, profile.goal + signed(asked[1], 15), asked)
 
-    def _place(self) -> float:
-        """Give where the goal position is, within the limits."""
-        goal = self.memory.get("goal_position")
+    def _place(self, goal: int) -> float:
+        """Give where a goal position is, within the limits."""
         if self._range is not None:
             goal = max(self._range[0], min(self._range[1], goal))
         return float(goal - self._shift)
 
-    def _lead(self, profile: Profile, to: float, time_ms: int) -> None:
-        """Lead the profile to a place, in a time or (0) at goal speed and acceleration."""
-        get = self.memory.get
-        speed = abs(get("goal_speed")) * self._speed_unit / 1000.0
-        if speed == 0.0 and self._stops_at_zero:
+    def _lead(self, profile: Profile, to: float, asked: tuple[int, ...]) -> None:
+        """Lead the profile to a place, in a time or at goal speed and acceleration."""
+        ramp, _, time_ms, speed = asked
+        cruise = abs(signed(speed, 15)) * self._speed_unit / 1000.0
+        if cruise == 0.0 and self._stops_at_zero:
             return
-        if time_ms:
+        if time_ms and self._timed and self.mode == SERVO:
             profile.by_time(to, time_ms, 0.0)
         else:
-            cruise = self._top if speed == 0.0 else min(speed, self._top)
-            profile.by_velocity(to, cruise, get("acceleration") * RAMP_UNIT)
+            profile.by_velocity(to, min(cruise or self._top, self._top), ramp * RAMP_UNIT)
         self.shaft.wake()
 
     def _goal_here(self) -> None:

@@ -14,7 +14,6 @@ from sim_mock.servo_packets import Answer, Piece, merge
 
 HEADER = b"\xff\xff"
 BROADCAST = 0xFE
-HIGHEST_ID = 0xFD
 SHORTEST = 6
 
 

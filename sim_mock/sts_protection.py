@@ -3,7 +3,8 @@
 Looked at every 20 ms of its own time, so the result does not depend on how often it is asked.
 Voltage and temperature are flagged as long as they are wrong; overcurrent and overload
 stay until something ends them. What a heavy load is no document says, duty or torque; here it
-is torque, as a motor at full speed has all the duty and no load.
+is torque, as a motor at full speed has all the duty and no load. ``overload_share`` and
+``overload_s`` of Physics mean nothing here: registers say so.
 Source: Feetech, memory table of the STS series, registers 13-15, 28, 34-38 and 65.
 """
 

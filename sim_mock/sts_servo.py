@@ -8,21 +8,23 @@ angle resolution (30), a blinking LED, backup (09).
 
 import struct
 
-from drivers.feetech_table import MODELS
+from drivers.feetech_table import (
+    BAUD_RATES,
+    EEPROM_END,
+    MODELS,
+    RETURN_DELAY_UNIT_S,
+    SET_MIDDLE,
+)
 from sim_mock.servo_physics import Physics, ServoSpec, checked
 from sim_mock.sts_habits import StsHabits
-from sim_mock.sts_memory import BAUD_RATES, StsMemory
+from sim_mock.sts_memory import StsMemory
 from sim_mock.sts_motion import GOALS_AT, StsDrive
 from sim_mock.sts_packets import unsigned
 from sim_mock.sts_protection import ANGLE, CURRENT, LOOK_MS, OVERLOAD, StsProtection
 
 REBOOT_MS = 800
 MIDDLE = 2048
-CALIBRATE = 128
-"""Torque (40): make the present position the middle."""
-
-RETURN_DELAY_UNIT_S = 2e-6
-RAM_AT, FACTORY_AT = 40, 80
+ADDRESS, FACTORY_AT = slice(5, 7), 80
 TORQUE_AT, GOAL_AT, GOAL_END, GOALS_END, LIMIT_END = 40, 42, 44, 48, 50
 SENSED_AT = 56
 _SENSED = struct.Struct("<HHHBBBBBHH")
@@ -106,6 +108,7 @@ class StsServo:
     def _protect(self) -> None:
         """Do what Unload Conditions say: an overload lowers the torque, all else takes it."""
         drive = self.drive
+        self._pushed = self.shaft.u
         wrong = self.protection.status & self.memory.get("unload_conditions")
         if wrong & ~OVERLOAD and drive.torque:
             self.memory.set("torque", 0)
@@ -118,7 +121,12 @@ class StsServo:
     @property
     def id(self) -> int:
         """Give the id."""
-        return self.memory.get("id")
+        return self.memory.bytes[ADDRESS.start]
+
+    @property
+    def address(self) -> bytearray:
+        """Give under what it is spoken to: id and baud rate as they are in the registers."""
+        return self.memory.bytes[ADDRESS]
 
     @property
     def torque(self) -> bool:
@@ -176,7 +184,7 @@ class StsServo:
         memory.write(address, data, written.append)
         if not written:
             return
-        if written[0] < RAM_AT or written[-1] >= FACTORY_AT:
+        if written[0] < EEPROM_END or written[-1] >= FACTORY_AT:
             self._remember()
         if TORQUE_AT in written:
             self._switch(memory.get("torque"))
@@ -187,18 +195,24 @@ class StsServo:
     def _command(self, new_goal: bool, goal_before: bytearray) -> None:
         """Follow new goals."""
         drive, memory = self.drive, self.memory
-        ends = self.habits.overload_ends == "new-goal"
-        if ends and memory.bytes[GOAL_AT:GOAL_END] != goal_before:
-            self._end_overload()
+        if self.error & OVERLOAD and memory.bytes[GOAL_AT:GOAL_END] != goal_before:
+            self._goal_after_overload()
         if new_goal and not drive.torque and self.habits.goal == "torque-on":
             memory.set("torque", 1)
             self._switch(1)
         drive.follow(new_goal)
 
+    def _goal_after_overload(self) -> None:
+        """Let a goal that is not the old one end the overload, where one does."""
+        ends = self.habits.overload_ends
+        ahead = self.memory.get("goal_position") - self.position_steps
+        if ends == "new-goal" or (ends == "goal-away" and ahead * self._pushed < 0.0):
+            self._end_overload()
+
     def _switch(self, value: int) -> None:
         """Switch the torque, or make the present position the middle."""
         drive, protection = self.drive, self.protection
-        if value == CALIBRATE:
+        if value == SET_MIDDLE:
             self.memory.set("torque", int(drive.torque))
             drive.calibrate(MIDDLE)
             return

@@ -11,7 +11,8 @@ import pytest
 
 from robot.cli.main import main
 
-GAZERIG = [sys.executable, "-c", "from robot.cli.main import main; main()"]
+_START = "import sys; from robot.cli.main import main; sys.argv[0] = 'gazerig'; main()"
+GAZERIG = [sys.executable, "-c", _START]
 
 
 def gazerig(*words: str, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:

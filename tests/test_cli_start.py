@@ -1,34 +1,39 @@
 """``gazerig`` alone says what to do next; help has examples that parse; errors are one line."""
 
-import os
+import logging
 import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import typer
+from command_line import gazerig, typed
 from typer.core import TyperGroup
 
 from drivers.serial_ports import SerialPort
 from robot.cli.examples import EXAMPLES
 from robot.cli.main import app
 from robot.cli.start import next_steps
+from robot.cli.terminal import DEBUG_LOGGER
 
 ADAPTER = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-U2D2")
 ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)
 
 
-def gazerig(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    code = "import sys; from robot.cli.main import main; sys.argv[0] = 'gazerig'; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *words],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "COLUMNS": "120", **environment},
-        timeout=120,
-    )
+Terminal = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def as_before(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Give a terminal of one width; what --debug sets is for one command."""
+    monkeypatch.setenv("COLUMNS", "120")
+    logger = logging.getLogger(DEBUG_LOGGER)
+    level = logger.level
+    yield
+    logger.setLevel(level)
 
 
 def test_without_anything_the_first_step_needs_no_hardware() -> None:
@@ -77,32 +82,35 @@ def test_every_example_names_options_that_there_are(words: str) -> None:
     assert context.args == []
 
 
-def test_help_shows_them() -> None:
-    done = gazerig("run", "--help")
-    assert "gazerig run my.yaml --oak" in re.sub(r"\s+", " ", done.stdout)
+def test_help_shows_them(capfd: Terminal) -> None:
+    assert typed("run", "--help") == 0
+    assert "gazerig run my.yaml --oak" in re.sub(r"\s+", " ", capfd.readouterr().out)
 
 
-def test_a_shell_completes_rigs_scenes_and_characters() -> None:
+def test_a_shell_completes_rigs_scenes_and_characters(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_GAZERIG_COMPLETE", "complete_bash")
+
     def completed(words: str) -> list[str]:
-        done = gazerig(
-            _GAZERIG_COMPLETE="complete_bash",
-            COMP_WORDS=f"gazerig {words}",
-            COMP_CWORD=str(len(words.split())),
-        )
-        return done.stdout.split()
+        monkeypatch.setenv("COMP_WORDS", f"gazerig {words}")
+        monkeypatch.setenv("COMP_CWORD", str(len(words.split())))
+        return gazerig().stdout.split()
 
     assert completed("check de") == ["desk"]
     assert completed("run --character bo") == ["bold"]
     assert "steps-aside" in completed("run --scene st")
 
 
-def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(tmp_path: Path) -> None:
-    short = gazerig("check", str(tmp_path / "none.yaml"))
-    assert short.returncode == 2 and len(short.stderr.strip().splitlines()) == 1
+def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(
+    tmp_path: Path, capfd: Terminal
+) -> None:
+    assert typed("check", str(tmp_path / "none.yaml")) == 2
+    short = capfd.readouterr().err
+    assert len(short.strip().splitlines()) == 1
     for words in (("--debug", "check"), ("check", "--debug")):
-        long = gazerig(*words, str(tmp_path / "none.yaml"))
-        assert long.returncode == 2 and "Traceback" in long.stderr
-        assert long.stderr.strip().splitlines()[-1] == short.stderr.strip()
+        assert typed(*words, str(tmp_path / "none.yaml")) == 2
+        long = capfd.readouterr().err
+        assert "Traceback" in long
+        assert long.strip().splitlines()[-1] == short.strip()
 
 
 def test_what_nobody_thought_of_is_one_line_too() -> None:

@@ -166,6 +166,22 @@ def test_servo_power_cut_and_back(rig):
     assert "no servo answers: check servo power and cable" in rig.bus.events()
     rig.until_all()
     assert rig.bus.health().errors["restarted"] >= 4
+    rig.run(0.6, [2200] * 4)
+    assert rig.chain.positions_steps() == pytest.approx([2200] * 4, abs=8)
+
+
+def test_power_and_port_gone_before_the_torque_was_on():
+    rig = Rig()
+    rig.bus.open()
+    rig.command("unplug for 0.3")
+    for servo_id in IDS:
+        rig.command(f"brown-out {servo_id}")
+    for _ in range(200):
+        readings = rig.tick()
+    assert not any(r.torque or r.rearmed for r in readings)
+    assert rig.bus.engage() == (2000,) * 4
+    rig.run(0.6, [2200] * 4)
+    assert rig.chain.positions_steps() == pytest.approx([2200] * 4, abs=8)
 
 
 def test_a_port_that_stays_away_is_given_up():
@@ -406,6 +422,26 @@ def test_whatever_goal_and_torque_do_nothing_leaps(goal, torque_on):
     rig.bus.release()
     rig.run(0.2, [2500] * 4)
     assert not any(servo.torque for servo in rig.chain.servos)
+
+
+@pytest.mark.parametrize("place", [2000, 950])
+def test_servos_whose_goal_goes_with_their_place_while_they_are_limp(place):
+    rig = Rig([ServoSpec(1, "sts3215", place)], [ServoSetup(1, "sts3215", 1000, 3000, 3000.0)])
+    servo = rig.chain[1]
+    real = servo.read
+
+    def read(address, length):
+        if not servo.torque:
+            servo.memory.set("goal_position", round(servo.position_steps))
+        return real(address, length)
+
+    servo.read = read
+    rig.bus.open()
+    assert rig.bus.engage() == (max(1000, place),)
+    assert rig.get(1, 42, 2) == max(1000, place)
+    for _ in range(30):
+        (reading,) = rig.tick([max(1000, place)])
+        assert abs(reading.velocity_steps_s) < 420
 
 
 def far_rig():

@@ -69,6 +69,8 @@ def test_a_stuck_one_strains_and_goes_on_when_freed():
 
 def test_it_strains_at_a_hard_stop():
     servo = HobbyServo(HobbySpec(0, 6000, stop_high_steps=6500))
+    assert run(servo, 8000, 1)[-1] == 6220
+    assert not servo.straining
     assert run(servo, 8000, 100)[-1] == 6500
     assert servo.straining
     run(servo, 0, 1)

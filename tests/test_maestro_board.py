@@ -6,12 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_mock.fault_words import Commands
+from drivers.errors import BusLost
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.maestro_board import SIZES, build_board
 from sim_mock.maestro_channel import Channel, brakes_within
 from sim_mock.maestro_commands import ERRORS, crc7
 from sim_mock.maestro_faults import COMMANDS
+from sim_mock.ports import InProcessPort
 
 PROTOCOL = 1 << ERRORS.index("protocol")
 TIMEOUT = 1 << ERRORS.index("timeout")
@@ -106,6 +107,8 @@ def test_set_multiple_targets_as_in_the_guide(world):
     assert world.positions()[2:6] == [0, 0, 6000, 0]
     world.ask("AA 0C 1F 02 00 70 2E 70 2E")
     assert world.positions()[:2] == [6000, 6000]
+    world.ask("9F 0C 00" + "70 2E" * 12)
+    assert world.positions() == [6000] * 12
     assert world.errors() == 0
     world.ask("9F 02 0B 70 2E 70 2E")
     assert world.errors() == PROTOCOL
@@ -375,6 +378,15 @@ def test_a_servo_jumps_at_the_first_pulse_at_its_own_speed(world):
     assert world.board.positions_steps()[0] >= 6000 + 22_000 * 0.04
 
 
+def test_a_pulse_comes_every_20_ms(world):
+    world.ask(target(0, 4000) + speed(0, 10) + target(0, 6000))
+    widths = []
+    for _ in range(6):
+        world.after(0.01).position()
+        widths.append(world.board.body.servos[0].width_steps)
+    assert widths == [0, 4020, 4020, 4040, 4040, 4060]
+
+
 @given(st.lists(st.integers(1, 180), min_size=1, max_size=30))
 @settings(max_examples=30)
 def test_how_often_it_is_looked_at_changes_nothing(naps_ms):
@@ -425,7 +437,8 @@ def test_serial_pins_that_detect_the_rate_wait_for_its_sign():
     world.do("set mode uart-detect")
     assert world.board.heed_baud
     assert world.ask("A1", 115_200) == b""
-    assert world.ask("84 00 AA A1", 115_200) == bytes(2)
+    (reply,) = world.board.exchange(bytes.fromhex("84 00 AA A1"), 115_200)
+    assert (reply.end, reply.pieces[0].data) == (4, bytes(2))
     assert world.ask("A1", 9600) == b""
     assert world.ask("A1", 115_200) == bytes((1, 0))
     world.do("brown-out")
@@ -517,6 +530,7 @@ def test_a_stuck_servo_shows_in_nothing_that_the_board_tells(world):
 
 def test_commands_and_bytes_are_lost_on_their_way(world):
     world.do("lose-writes 1")
+    assert world.ask("A1") == bytes(2)
     world.ask(target(0, 6000))
     assert world.position() == 0
     world.ask(target(0, 6000))
@@ -579,7 +593,6 @@ def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
 
 def test_help_explains_every_command_and_case(world):
     text = world.do("help")
-    assert isinstance(COMMANDS, Commands)
     assert all(COMMANDS.usage(name) in text for name in COMMANDS.verbs)
     assert all(f"  {case} " in text for case in COMMANDS.cases)
 
@@ -596,6 +609,40 @@ def test_help_explains_every_command_and_case(world):
 def test_boards_that_do_not_exist(channels, options, says):
     with pytest.raises(ValueError, match=says):
         build_board(channels, lambda: 0.0, **options)
+
+
+# --- on a line
+
+
+def test_behind_a_port_answers_take_their_time_on_the_wire():
+    world = World(baud=9600)
+
+    def sleep_until(t_s):
+        world.now_s = t_s
+
+    port = InProcessPort(world.board, sleep_until=sleep_until)
+    slow = InProcessPort(world.board, sleep_until=sleep_until, wire_time=True)
+    port.setBaudRate(9600)
+    port.write(target(0, 6000) + b"\x90\x00")
+    assert (port.read_until(2, 0.0), world.now_s) == (b"\x70\x17", 0.0)
+    slow.setBaudRate(9600)
+    slow.write(b"\x90\x00")
+    assert slow.read_until(2, 1.0) == b"\x70\x17"
+    assert world.now_s == pytest.approx(4 * 10 / 9600)
+
+
+def test_an_unplugged_board_goes_on_as_it_was():
+    world = World()
+    port = InProcessPort(world.board)
+    port.setBaudRate(9600)
+    port.write(target(0, 6000))
+    world.do("unplug for 1")
+    with pytest.raises(BusLost):
+        port.write(b"\xa1")
+    world.after(1.0)
+    port.setBaudRate(9600)
+    port.write(b"\x90\x00")
+    assert port.read_until(2, world.now_s) == b"\x70\x17"
 
 
 # --- anything at all

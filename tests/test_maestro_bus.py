@@ -1,14 +1,19 @@
 """The Maestro driver against an emulated board: holding, following, errors, restarts, silence."""
 
+import time
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import BusLost, PortError, ServoMissing
 from drivers.maestro import MaestroBus, MaestroParams
+from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
+from sim_mock.emulated import MaestroLine
 from sim_mock.maestro_board import build_board
 from sim_mock.ports import InProcessPort
+from sim_mock.pty_bus import PtyBus
 
 CENTRE = 6000
 SPEED = 12_000.0
@@ -151,6 +156,13 @@ def test_a_mute_board_is_named_with_its_causes():
 def test_a_wrong_device_number_is_a_cause():
     bench = Bench(protocol="pololu", device=99)
     with pytest.raises(ServoMissing, match="device number 99"):
+        bench.bus.open()
+
+
+def test_a_board_without_the_check_byte_is_not_fed_errors():
+    bench = Bench()
+    bench.bus = MaestroBus(bench.port, SETUPS, MaestroParams(crc=True))
+    with pytest.raises(ServoMissing, match="wants no CRC: set crc to false"):
         bench.bus.open()
 
 
@@ -475,6 +487,29 @@ def test_errors_again_and_again_end_without_pulses(held):
     assert not any(reading.fault for reading in held.run(0.1)[-1])
 
 
+def test_a_board_that_restarts_again_and_again_stays_without_pulses(held):
+    for _ in range(4):
+        held.board.faults.command("brown-out")
+        readings = held.run(1.0, [5500, 5600, 6600])[-1]
+    assert held.pulses() == [0, 0, 0]
+    assert all("supply too weak" in reading.fault for reading in readings)
+    held.packets()
+    held.bus.write([5000] * 3)
+    assert held.packets() == []
+
+
+def test_goals_never_switch_a_channel_on_that_is_not_held_yet(held):
+    held.run(0.5, [5500, 5600, 6600])
+    held.board.faults.command("brown-out")
+    on = []
+    for _ in range(60):
+        readings = held.run(TICK_S, [5500, 5600, 6600])[-1]
+        on.append(sum(pulse > 0 for pulse in held.pulses()))
+        assert on[-1] == sum(reading is not None for reading in readings)
+    # One more in each tick.
+    assert [n for n in on if n][:3] == [1, 2, 3]
+
+
 def test_a_channel_that_meets_an_end_of_the_board_is_told_once(held):
     held.board.choose("max-us", "1850")
     for _ in range(3):
@@ -566,6 +601,26 @@ def test_a_port_that_stays_away(held):
         held.run(2.0)
     with pytest.raises(BusLost, match="pulses could not be stopped"):
         held.bus.release()
+
+
+def test_over_a_pseudo_terminal():
+    with PtyBus() as server:
+        port = BlockingPort(server.start_device(MaestroLine(12)))
+        bus = MaestroBus(port, SETUPS, MaestroParams(reply_timeout_ms=200.0, stagger_ms=0.0))
+        bus.open()
+        assert bus.engage() == (6100, CENTRE, HIGH)
+        goals = [5500, 5600, 6600]
+        end_s = port.now_s() + 20.0
+        readings = bus.read(port.now_s())
+        while places(readings) != goals and port.now_s() < end_s:
+            bus.write(goals)
+            time.sleep(0.01)
+            readings = bus.read(port.now_s())
+        assert places(readings) == goals
+        assert bus.health().errors == {}
+        bus.release()
+        assert not any(reading.torque for reading in bus.read(port.now_s()))
+        bus.close()
 
 
 def test_a_slow_line_is_asked_less_often():

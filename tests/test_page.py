@@ -27,6 +27,8 @@ from typing import TypeVar
 import cv2
 import numpy as np
 import pytest
+from desk import JOINTS
+from six_joints import of_six
 from websockets.sync.client import connect
 
 from gaze.types import PART_NAMES, PARTS
@@ -113,6 +115,7 @@ def looking(
         bodies=(SeenBody(face.id, "face", face.p_world_m, 0.1), *bodies),
         rate_hz=200.0,
         health="bus: 61 200 reads, 3 lost, 0 faults",
+        joints=JOINTS,
     )
 
 
@@ -196,6 +199,10 @@ class Browser:
         """Everything there is to read on the page."""
         answer = self._ask("Runtime.evaluate", expression="document.body.innerText")
         return answer["result"].get("value", "")
+
+    def run(self, script: str) -> None:
+        """Do what a script says."""
+        self._ask("Runtime.evaluate", expression=script)
 
     def photograph(self) -> bytes:
         """A PNG of the page, without the notice that this browser has no graphics card."""
@@ -312,6 +319,12 @@ def test_page_shows_a_head_that_turns() -> None:
         with feeding(page, lambda _: there):
             wait_for(eyes_elsewhere, "the turn of the head")
             wait_for(lambda: reads("face 3: left eye", "pulls with", "fixate", "bus:"), "the words")
+        # Six servos that tell nothing: a person is told so before the torque comes on again.
+        limp = replace(of_six(there), stopped="a test")
+        with feeding(page, lambda t_s: replace(limp, t_s=3.0 + t_s)):
+            wait_for(lambda: reads("6 of 6 joints without feedback", "Resume"), "the other rig")
+            browser.run("document.querySelector('#rig-words button').click()")
+            wait_for(lambda: reads("6 joints without feedback jump to their places"), "the warning")
         own = (url, "data:", f"blob:{url}")
         assert [asked for asked in browser.asked_for if not asked.startswith(own)] == []
         assert any(asked.startswith(url) for asked in browser.asked_for)

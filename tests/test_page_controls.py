@@ -15,19 +15,33 @@ from typing import NamedTuple
 import pytest
 import viser
 from desk import JOINTS
+from six_joints import SIX, of_six
 
+from config.knobs import knobs, values
+from config.schema import load_rig
 from gaze.types import Vec3
 from robot.orders import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_json
 from robot.page.controls import LeadView
 from robot.page.ear import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
 from robot.page.feed import TuningFeed
 from robot.page.hear import PageHear
-from robot.page.jog import JogView, measured_table
-from robot.page.knob import PageKnob, hint, knob_from, label, read, slides, step_of, written
+from robot.page.jog import MEASURED, RECKONED, JogView, measured_table
+from robot.page.knob import (
+    KnobControl,
+    PageKnob,
+    hint,
+    knob_from,
+    label,
+    read,
+    slides,
+    step_of,
+    written,
+)
 from robot.page.link import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
 from robot.page.tell import Teller
 from robot.page.tuning import found, group_of
 from robot.page.view import News, drain
+from robot.remote.requests import plain
 from robot.types import Snapshot
 
 PATIENCE_S = 20.0
@@ -51,6 +65,7 @@ SNAPSHOT = Snapshot(
     bodies=(),
     rate_hz=200.0,
     health="0 lost",
+    joints=JOINTS,
 )
 
 
@@ -477,6 +492,36 @@ def test_the_table_shows_wish_and_measured() -> None:
     assert table.count("12.3") == 9 and table.count("5.7") == 9 and "neck yaw" in table
 
 
+def test_what_nobody_measured_has_a_column_of_its_own() -> None:
+    assert RECKONED not in measured_table(SNAPSHOT)
+    table = measured_table(of_six(SNAPSHOT))
+    assert f">{RECKONED}</td>" in table and f">{MEASURED}</td>" not in table
+    assert "eyes pan" in table and "20.0" in table and "neck" not in table
+    mixed = measured_table(of_six(SNAPSHOT, SIX[:1]))
+    lines = mixed.split("<tr>")
+    assert mixed.index(f">{MEASURED}<") < mixed.index(f">{RECKONED}<")
+    cells = [line.split("<td style='text-align:right'>")[1:] for line in lines[1:]]
+    assert [cell.partition("<")[0] for cell in cells[0]] == ["10.0", "", "20.0"]
+    assert [cell.partition("<")[0] for cell in cells[1]] == ["11.0", "21.0", ""]
+
+
+def test_sliders_are_those_of_the_rig(server: viser.ViserServer) -> None:
+    mouth = Mouth()
+    view = JogView(server.gui, server.gui.add_tab_group().add_tab("joints"), mouth)  # type: ignore[arg-type]
+    rig = values(load_rig("maker"))
+    view.values(rig)
+    assert tuple(view._sliders) == SIX
+    lid = view._sliders["left_lower_lid"]
+    assert (lid.min, lid.max) == tuple(
+        rig[f"joints.left_lower_lid.{e}_deg"] for e in ("min", "max")
+    )
+    view.show(of_six(SNAPSHOT))
+    assert view._sliders["eyes_pan"].value == pytest.approx(20.0)
+    touch(server, lid, 5.0)
+    assert mouth.told == [(Jog((("left_lower_lid", radians(5.0)),)), "5")]
+    view.show(SNAPSHOT)  # of another rig: nothing to follow, and nothing breaks
+
+
 # --- parameters ---------------------------------------------------------------------------------
 
 
@@ -502,7 +547,10 @@ def test_a_slider_has_some_hundred_round_steps(low: float, high: float) -> None:
 def test_what_a_slider_cannot_set_finely_is_typed() -> None:
     assert slides(KNOB, 1.0)
     assert not slides(KNOB._replace(high=1e6), 1.0)
-    assert not slides(KNOB, 11.0) and not slides(KNOB._replace(optional=True), 1.0)
+    assert not slides(KNOB, 11.0)
+    assert not slides(KNOB._replace(optional=True, default=None), 1.0)
+    assert slides(KNOB._replace(optional=True), 1.0)
+    assert not slides(KNOB._replace(optional=True), None)
     assert not slides(KNOB._replace(kind="list"), (1.0, 2.0))
 
 
@@ -519,6 +567,56 @@ def test_what_cannot_be_read_is_refused_with_an_example() -> None:
     with pytest.raises(ValueError, match=r"a\.b: '1,5' is no number; write it like 1\.0"):
         read(KNOB, "1,5")
     assert read(KNOB._replace(optional=True), "null") is None
+
+
+def test_a_slider_makes_room_where_null_comes_into_force(server: viser.ViserServer) -> None:
+    knob = KNOB._replace(optional=True)
+    tab = server.gui.add_tab_group().add_tab("null")
+    with tab:
+        slider = KnobControl(server.gui, knob, 1.0, False, ignore, ignored, 0.0)
+        typed = KnobControl(server.gui, knob, None, False, ignore, ignored, 1.0)
+    assert slider.can_show(2.0) and not slider.can_show(None)
+    assert typed.can_show(None) and typed.can_show(2.0)
+    typed.show(2.0, False)
+    assert typed._handle.value == "2.0"
+
+
+@pytest.mark.parametrize("name", ["maker", "feetech", "desk"])
+def test_every_parameter_of_every_rig_becomes_a_control(
+    server: viser.ViserServer, name: str
+) -> None:
+    rig = load_rig(name)
+    now, texts = values(rig), {}
+    sent = json.loads(json.dumps([plain(knob._asdict()) for knob in knobs(rig, load_rig("desk"))]))
+    places = [knob_from(data) for data in sent]
+    assert {knob.key for knob in places} == set(now)
+    tab = server.gui.add_tab_group().add_tab(name)
+    refused: list[str] = []
+    with tab:
+        for knob in places:
+            if knob.kind in ("list", "mapping") or knob.key.startswith("joints."):
+                value = json.loads(json.dumps(plain(now[knob.key])))
+                control = KnobControl(server.gui, knob, value, False, ignore, refused.append, 0.0)
+                control.show(value, True)
+                assert hint(knob).startswith(knob.key)
+                if control._form is not None:
+                    texts[knob.key] = str(control._handle.value)
+                    assert read(knob, texts[knob.key]) == value
+                control.remove()
+    if name == "maker":
+        assert texts["joints.eyes_pan.linkage"].startswith("[[-32.0, 1068.0], [")
+        linkage = next(knob for knob in places if knob.key == "joints.eyes_pan.linkage")
+        assert "next start" in hint(linkage) and "default" not in hint(linkage)
+    assert refused == []
+
+
+def ignored(words: str) -> None:
+    raise AssertionError(words)
+
+
+def ignore(key: str, value: object) -> None:
+    """A control that is only looked at asks for nothing."""
+    raise AssertionError(f"{key} was asked to be {value}")
 
 
 def test_search_takes_every_word() -> None:

@@ -17,6 +17,7 @@ import msgspec
 import numpy as np
 import pytest
 import viser
+from desk import JOINTS
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
@@ -48,6 +49,7 @@ SNAPSHOT = Snapshot(
     bodies=(),
     rate_hz=200.0,
     health="0 lost",
+    joints=JOINTS,
 )
 # Noise does not compress: what the deaf browser is owed soon fills all buffers.
 NOISE = np.random.default_rng(0).integers(0, 255, (8, 360, 480, 3)).astype(np.uint8)

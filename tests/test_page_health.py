@@ -1,13 +1,20 @@
 """The health of servos, loop and picture in words and colours, and why the gaze is where it is."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from math import atan2, degrees
 from typing import TypeVar
 
 import pytest
 import viser
+from desk import JOINTS
+from six_joints import SIX, TELLS_NOTHING, of_six
 
 from gaze.types import Pull
+from robot.page.ghost import GhostView
+from robot.page.head import HeadView
 from robot.page.health import (
+    NO_FEEDBACK,
     health,
     servo_table,
     strain_of_heat,
@@ -17,6 +24,7 @@ from robot.page.health import (
 from robot.page.layers import Layers, LayersView
 from robot.page.panel import PanelView
 from robot.page.style import AMBER, RED
+from robot.page.traces import Traces, TracesView
 from robot.page.why import pulls, winner
 from robot.types import (
     Ghost,
@@ -53,6 +61,7 @@ def snapshot(t_s: float = 1.0) -> Snapshot:
         camera=SeenCamera(AHEAD, (0.05, 0.0, 0.18), 1.2, 1.6), field_deg=(100.0, 60.0, 60.0, 75.0),
         trail=(Trail(t_s, REST, REST, REST),),
         events=(SeenSaccade(0.5, 0.05, 5.0, 180.0), SeenFixation(0.2, 0.3, "LE")),
+        joints=JOINTS,
     )  # fmt: skip
 
 
@@ -80,11 +89,11 @@ def test_voltage_is_told_by_both_ends(volts: float | None, strain: str) -> None:
 def test_without_limits_nothing_is_coloured() -> None:
     hot = WELL._replace(temperature_c=(90.0,) * 9, limits=None)
     assert strain_of_heat(hot, 0) == ""
-    assert AMBER not in servo_table(hot) and RED not in servo_table(hot)
+    assert AMBER not in servo_table(hot, JOINTS) and RED not in servo_table(hot, JOINTS)
 
 
 def test_a_healthy_rig_has_no_alarm_and_every_joint_a_row() -> None:
-    table = servo_table(WELL)
+    table = servo_table(WELL, JOINTS)
     assert table.count("<tr") == 10
     assert AMBER not in table and RED not in table
     assert "neck roll" in table and "+10 %" in table
@@ -92,16 +101,31 @@ def test_a_healthy_rig_has_no_alarm_and_every_joint_a_row() -> None:
 
 def test_faults_and_silence_are_said_beside_the_joint() -> None:
     fault = ("", "overload <1>") + ("",) * 7
-    table = servo_table(WELL._replace(fault=fault, age_s=(0.0, 0.0, 1.25) + (0.0,) * 6))
+    table = servo_table(WELL._replace(fault=fault, age_s=(0.0, 0.0, 1.25) + (0.0,) * 6), JOINTS)
     assert "left eye tilt<div" in table and "overload &lt;1&gt;" in table
     assert "right eye pan<div" in table and "silent for 1.2 s" in table
-    assert "torque off" in servo_table(WELL._replace(torque=(False,) * 9))
-    assert "nothing is known" in servo_table(Servos())
+    assert "torque off" in servo_table(WELL._replace(torque=(False,) * 9), JOINTS)
+    assert "nothing is known" in servo_table(Servos(), ())
 
 
 def test_what_was_not_measured_is_a_dash_and_no_zero() -> None:
     unread = WELL._replace(temperature_c=(None,) * 9, voltage_v=(None,) * 9, unanswered=())
-    assert servo_table(unread).count(">-</td>") == 27
+    assert servo_table(unread, JOINTS).count(">-</td>") == 27
+
+
+def test_a_servo_that_tells_nothing_has_no_figures() -> None:
+    table = servo_table(TELLS_NOTHING, SIX, SIX)
+    assert table.count(f">{NO_FEEDBACK}</td>") == 6 and "not noticed" in table
+    assert " %" not in table and ">-</td>" not in table  # a load of 0 is none that was measured
+    assert "eyes pan" in table and "neck" not in table
+    assert NO_FEEDBACK not in servo_table(WELL, JOINTS)
+
+
+def test_only_the_joints_nobody_measures_are_without_figures() -> None:
+    table = servo_table(WELL, JOINTS, ("left_upper_lid",))
+    assert table.count(f">{NO_FEEDBACK}</td>") == 1 and table.count("+10 %") == 8
+    silent = servo_table(WELL._replace(age_s=(1.25,) * 9), JOINTS, JOINTS)
+    assert silent.count("silent for 1.2 s") == 9  # a board that is gone is told all the same
 
 
 def test_loop_figures_are_told_and_coloured_when_late() -> None:
@@ -132,6 +156,10 @@ def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:
     assert "wanders" in pulls(snapshot())
 
 
+def as_it_is(shot: Snapshot) -> Snapshot:
+    return shot
+
+
 # --- on a page --------------------------------------------------------------------------
 
 
@@ -150,27 +178,124 @@ def handles(server: viser.ViserServer, kind: type[T]) -> list[T]:
     ]
 
 
-def test_panel_takes_snapshots_and_fills_its_tabs(server: viser.ViserServer) -> None:
+@pytest.mark.parametrize(("made", "last"), [(as_it_is, "neck roll"), (of_six, "right lower lid")])
+def test_panel_takes_snapshots_and_fills_its_tabs(
+    server: viser.ViserServer, made: Callable[[Snapshot], Snapshot], last: str
+) -> None:
     panel = PanelView(server.gui)
-    shots = tuple(snapshot(0.04 * k) for k in range(51))
+    shots = tuple(made(snapshot(0.04 * k)) for k in range(51))
     for shot in shots:
         panel.note((shot,))
         panel.show(shot)
     said = " ".join(html.content for html in handles(server, viser.GuiHtmlHandle))
     for words in (
-        "thing &lt;4&gt;", "51 saccades", "51 rests", "neck roll", "the last 30 seconds",
+        "thing &lt;4&gt;", "51 saccades", "51 rests", last, "the last 30 seconds",
     ):  # fmt: skip
         assert words in said
-    plots = handles(server, viser.GuiUplotHandle)
+    plots = panel._traces_view._plots
     assert len(plots) == 3
-    assert all(len(plot.data[0]) > 40 for plot in plots)
-    panel.note((snapshot(0.0),))
+    assert all(len(plot.plot.data[0]) > 40 for plot in plots)
+    panel.note((made(snapshot(0.0)),))
     for _ in range(26):
-        panel.show(snapshot(0.0))
+        panel.show(made(snapshot(0.0)))
     again = " ".join(html.content for html in handles(server, viser.GuiHtmlHandle))
     assert "51 saccades" not in again and "1 saccade<" in again
     panel.silent()
     assert "nothing has come from the rig" in panel._status.content
+
+
+def test_what_nobody_measured_is_drawn_and_named_otherwise(server: viser.ViserServer) -> None:
+    panel = PanelView(server.gui)
+    view = panel._traces_view
+
+    def shown(t_s: float, reckoned: tuple[str, ...]) -> list[bool]:
+        shot = of_six(snapshot(t_s), reckoned)
+        panel.note((shot,))
+        panel._shown = 0
+        panel.show(shot)
+        named = [plot.plot.series[3]["label"] == "reckoned, not measured" for plot in view._plots]
+        assert named == ["dash" in plot.plot.series[3] for plot in view._plots]
+        assert named == ["no feedback" in plot.title.content for plot in view._plots]
+        return named
+
+    assert shown(1.0, SIX) == [True, True, True]
+    assert "> measured<" not in view._key.content and "reckoned" in view._key.content
+    assert "no measurements" in panel._of_what.content
+    before = view._plots
+    assert shown(1.1, SIX) == [True, True, True]
+    assert view._plots is before  # what stays as it is is not made anew
+    assert shown(1.2, ("left_lower_lid",)) == [False, False, True]
+    assert "> measured<" in view._key.content and "reckoned" in view._key.content
+    assert panel._of_what.content == ""
+    assert shown(1.3, ()) == [False, False, False]
+    assert "reckoned" not in view._key.content
+
+
+def test_the_menu_of_traces_is_that_of_the_rig(server: viser.ViserServer) -> None:
+    traces = Traces()
+    view = TracesView(server.gui, server.gui.add_tab_group().add_tab("traces"))
+    traces.add(snapshot(1.0))
+    view.show(traces)
+    assert view._what.options == ("yaw", "pitch", "left eye", "right eye", "neck")
+    view._what.value = "neck"
+    view.show(traces)
+    assert "neck, roll" in view._plots[-1].title.content
+    traces.add(of_six(snapshot(2.0)))
+    view.show(traces)
+    assert view._what.options == ("yaw", "pitch", "left eye", "right eye")
+    assert view._what.value == "yaw" and "lower lids" in view._plots[-1].title.content
+    view._what.value = "left eye"
+    view.show(traces)
+    titles = " ".join(plot.title.content for plot in view._plots)
+    assert len(view._plots) == 4 and titles.count("both eyes") == 2
+    assert "left upper lid" in titles and "left lower lid" in titles
+
+
+def test_the_head_has_the_lids_and_the_neck_that_the_rig_has(server: viser.ViserServer) -> None:
+    view, ghost = HeadView(server.scene), GhostView(server.scene)
+    handles = server.scene._handle_from_node_name
+
+    def drawn(shot: Snapshot) -> set[str]:
+        view.show(shot)
+        ghost.show(shot)
+        nodes = {
+            "upper": "/head/lids_left/upper", "lower": "/head/lids_left/lower", "neck": "/neck",
+            "post": "/post", "ghost's upper": "/ghost/lid_left",
+            "ghost's lower": "/ghost/lower_lid_left",
+        }  # fmt: skip
+        return {name for name, node in nodes.items() if handles[node].visible}
+
+    def edge_deg(part: str) -> float:
+        """How high a lid's edge stands above the eye's equator."""
+        w, _, y, _ = handles[f"/head/lids_{part}"].wxyz
+        return -2.0 * degrees(atan2(y, w))
+
+    assert drawn(snapshot()) == {"upper", "lower", "neck", "ghost's upper"}
+    still = edge_deg("left/lower")
+    assert drawn(of_six(snapshot())) == {
+        "upper", "lower", "post", "ghost's upper", "ghost's lower",
+    }  # fmt: skip
+    assert edge_deg("left/lower") < edge_deg("right/lower") < still - 3.0
+    met = replace(of_six(snapshot()), lids=(0.0, 0.0), lower_lids=(0.0, 0.0))
+    drawn(met)
+    assert edge_deg("left/lower") == pytest.approx(still) == edge_deg("left/upper")
+    bare = replace(snapshot(), joints=("eyes_pan", "eyes_tilt", "neck_yaw"))
+    assert drawn(bare) == {"neck"}
+    lower_only = replace(bare, joints=("eyes_pan", "left_lower_lid"), lower_lids=(0.5, 1.0))
+    assert drawn(lower_only) == {"lower", "post", "ghost's lower"}
+
+
+def test_a_head_without_a_neck_stands_on_a_post(server: viser.ViserServer) -> None:
+    view = HeadView(server.scene)
+    view.show(replace(of_six(snapshot()), p_world_head_m=(0.1, 0.05, 0.12)))
+    (x, y, _), (fx, fy, _) = view._post.position, view._foot.position
+    assert (x, y) == (fx, fy) and y == pytest.approx(0.05)
+    top_m = view._post.position[2] + view._post.scale[2]
+    assert 0.0 < top_m < 0.12  # up to the shell and not out of its top
+    view.show(replace(of_six(snapshot(2.0)), p_world_head_m=(0.0, 0.0, -0.3)))
+    assert 0.0 < view._post.scale[2] < 0.02  # a head that lies on the table
+    view.show(snapshot(3.0))
+    assert view._foot.position[0] == 0.0 and not view._post.visible
 
 
 def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> None:

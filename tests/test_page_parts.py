@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from desk import JOINTS
+from six_joints import RECKONED_RAD, SIX, WISH_RAD, of_six
 
 from drivers.types import DetectedFace, Detections, MovingBlob
 from gaze.angles import rotation
@@ -24,7 +25,8 @@ from robot.page.picture import (
 )
 from robot.page.place import along, quaternion, turned_up, upright_along
 from robot.page.status import drawn_together, status
-from robot.page.traces import GROUPS, MOST_POINTS, Traces, mean_deg
+from robot.page.traces import GROUPS, MOST_POINTS, Group, Traces, groups_of, mean_deg
+from robot.types import JOINTS as EVERY_JOINT
 from robot.types import SeenFace, Snapshot, Trail
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -54,6 +56,7 @@ def snapshot(
         bodies=(),
         rate_hz=199.7,
         health="3 lost",
+        joints=JOINTS,
     )
 
 
@@ -126,9 +129,56 @@ def test_a_group_is_the_mean_of_its_joints() -> None:
     angles_deg = np.zeros((2, 3, len(JOINTS)))
     angles_deg[:, 2, JOINTS.index("left_eye_pan")] = 4.0
     angles_deg[:, 2, JOINTS.index("right_eye_pan")] = 2.0
-    assert mean_deg(angles_deg, GROUPS["yaw"][0]).tolist() == [[0.0, 0.0, 3.0]] * 2
+    eyes = groups_of(JOINTS)["yaw"][0]
+    assert mean_deg(angles_deg, eyes, JOINTS).tolist() == [[0.0, 0.0, 3.0]] * 2
     named = {name for groups in GROUPS.values() for group in groups for name in group.joints}
-    assert named == set(JOINTS)
+    assert named == set(EVERY_JOINT)
+
+
+def test_traces_are_of_the_joints_that_are_there() -> None:
+    desk = {
+        name: [len(group.joints) for group in groups] for name, groups in groups_of(JOINTS).items()
+    }
+    assert desk == {
+        "yaw": [2, 1, 2], "pitch": [2, 1, 2], "left eye": [1, 1, 1], "right eye": [1, 1, 1],
+        "neck": [1, 1, 1],
+    }  # fmt: skip
+    six = groups_of(SIX)
+    assert tuple(six) == ("yaw", "pitch", "left eye", "right eye")
+    assert [group.joints for group in six["yaw"]] == [
+        ("eyes_pan",),
+        ("left_upper_lid", "right_upper_lid"),
+        ("left_lower_lid", "right_lower_lid"),
+    ]
+    assert six["left eye"][0] == Group("both eyes, yaw, + left", ("eyes_pan",))
+    assert six["right eye"][-1].joints == ("right_lower_lid",)
+    assert groups_of(()) == {}
+    mixed = groups_of(("left_eye_pan", "right_eye_pan", "eyes_tilt"))
+    assert [group.joints for group in mixed["right eye"]] == [("right_eye_pan",), ("eyes_tilt",)]
+
+
+def test_traces_take_the_joints_of_the_rig_that_is_shown() -> None:
+    traces = Traces()
+    traces.add(moving(1.0))
+    traces.add(of_six(snapshot(2.0)))
+    ago_s, angles_deg = traces.table(30.0)
+    assert traces.joints == SIX and traces.reckoned == set(SIX)
+    assert len(ago_s) == 1 and angles_deg.shape == (1, 3, 6)
+    assert angles_deg[0, 0] == pytest.approx(np.degrees(WISH_RAD))
+    assert angles_deg[0, 2] == pytest.approx(np.degrees(RECKONED_RAD))
+
+
+def test_status_says_how_many_joints_nobody_measures() -> None:
+    assert "without feedback" not in status(snapshot())
+    said = "6 of 6 joints without feedback: shown where they should be"
+    assert said in status(of_six(snapshot()))
+    assert "2 of 6 joints" in status(of_six(snapshot(), SIX[:2]))
+    assert "anywhere" not in status(of_six(snapshot()))
+    limp = of_six(snapshot())
+    limp = replace(limp, servos=limp.servos._replace(torque=(True,) + (False,) * 5))
+    assert "5 without torque: may be anywhere" in status(limp)
+    limp = replace(limp, servos=limp.servos._replace(torque=(False,) * 6))
+    assert "all without torque: may be anywhere" in status(limp)
 
 
 def turn(q: tuple[float, float, float, float], v: tuple[float, float, float]) -> np.ndarray:

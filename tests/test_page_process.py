@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import pytest
+from desk import JOINTS
 
 from robot.page.link import Page
 from robot.page.view import free_port as first_free_port
@@ -45,6 +46,7 @@ SNAPSHOT = Snapshot(
     bodies=(),
     rate_hz=200.0,
     health="0 lost",
+    joints=JOINTS,
 )
 
 

@@ -61,7 +61,7 @@ def test_whoever_commands_is_told_what_became_of_every_joint() -> None:
     assert verdict.applied("neck_yaw") == (radians(51.0), permitted, "out of range")
     assert verdict.applied("left_eye_pan") == (0.0001, 0.0001, "")
     assert verdict.reasons == ("neck_yaw: out of range",)
-    with pytest.raises(ValueError, match="unknown joint 'ear'; known are left_eye_pan, "):
+    with pytest.raises(ValueError, match="no joint 'ear'; there is left_eye_pan, "):
         verdict.applied("ear")
 
 

@@ -7,6 +7,7 @@ from math import degrees, radians
 import numpy as np
 import pytest
 from desk import JOINTS
+from six_joints import SIX
 
 from config.schema import Rig, load_rig
 from gaze.angles import angle_between
@@ -23,13 +24,13 @@ TICKS_BETWEEN = 8
 
 
 @cache
-def visit() -> tuple[Rig, Assembly, tuple[Tick, ...]]:
-    """Eight seconds of a rig that talks with somebody."""
-    rig = load_rig("desk")
+def visit(name: str = "desk", last_s: float = 8.0) -> tuple[Rig, Assembly, tuple[Tick, ...]]:
+    """Some seconds of a rig that talks with somebody."""
+    rig = load_rig(name)
     made = assemble(rig, Choice(mock=True, fast=True, seed=0, scene="face-to-face"))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
-    over: Callable[[float], str | None] = lambda s: "over" if s >= 8.0 else None  # noqa: E731
+    over: Callable[[float], str | None] = lambda s: "over" if s >= last_s else None  # noqa: E731
     run(made.robot, made.clock, made.loop, over, ticks.append)
     made.robot.stop()
     made.close()
@@ -180,3 +181,52 @@ def test_snapshots_survive_the_way_and_are_short() -> None:
         message = pack(shot)
         assert len(message) < MESSAGE_BYTES / 20
         assert unpack(message) == shot
+
+
+@cache
+def maker_shown() -> tuple[tuple[Tick, ...], Snapshot]:
+    """Two seconds of six hobby servos on a Maestro, in one snapshot."""
+    _, made, ticks = visit("maker", 2.0)
+    snapshots = Snapshots(RATE_HZ, made.shown())
+    for tick in ticks:
+        snapshots.note(tick)
+    shot = snapshots.take(Said())
+    assert shot is not None
+    return ticks, shot
+
+
+def test_joints_of_servos_that_tell_nothing_are_shown_as_reckoned() -> None:
+    ticks, shot = maker_shown()
+    assert shot.joints == shot.reckoned == load_rig("maker").names == SIX
+    assert len(shot.measured_rad) == len(shot.wish_rad) == len(shot.permitted_rad) == 6
+    assert shot.servos.temperature_c == shot.servos.voltage_v == (None,) * 6
+    assert shot.servos.unanswered == (0,) * 6
+    assert all(len(row.measured_rad) == 6 for row in shot.trail)
+    one = ticks[-1].joints._replace(measured=(True, False, True, True, True, False))
+    mixed = snapshot(ticks[-1]._replace(joints=one), 200.0, "", "")
+    assert mixed.reckoned == ("eyes_tilt", "right_lower_lid")
+    measured = snapshot(visit()[2][-1], 200.0, "", "")
+    assert measured.joints == JOINTS and measured.reckoned == ()
+
+
+def test_lower_lids_are_shown_where_there_are_any() -> None:
+    ticks, shot = maker_shown()
+    pose = ticks[-1].pose
+    assert shot.lower_lids == (pose.lower_left, pose.lower_right)
+    assert shot.ghost is not None and shot.ghost.lower_lids is not None
+    assert shot.ghost.lower_lids == pytest.approx(shot.lower_lids, abs=0.2)
+    assert all(0.0 < opening < 1.0 for opening in shot.lower_lids)
+    desk = taken()[-1]
+    assert desk.lower_lids is None and desk.ghost is not None and desk.ghost.lower_lids is None
+
+
+def test_a_snapshot_of_six_joints_survives_the_way() -> None:
+    _, shot = maker_shown()
+    assert unpack(pack(shot)) == shot
+
+
+def test_joints_whose_names_nobody_knows_are_numbered() -> None:
+    tick = visit()[2][-1]
+    nameless = tick._replace(verdict=tick.verdict._replace(joints=()))
+    assert snapshot(nameless, 200.0, "", "").joints[:2] == ("joint 1", "joint 2")
+    assert snapshot(nameless, 200.0, "", "", rig=shown_rig()).joints == JOINTS

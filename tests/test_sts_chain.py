@@ -20,6 +20,8 @@ from sts_bench import (
     packets,
 )
 
+from drivers import feetech_table
+from sim_mock import sts_memory
 from sim_mock.device import Device
 from sim_mock.servo_physics import Physics, ServoSpec
 from sim_mock.sts_chain import build_sts
@@ -92,6 +94,23 @@ def test_what_is_no_register_reads_0(length, address):
         assert sum(data[1:]) in (0, 1 + 75 + 254 + 1)
 
 
+def test_registers_lie_where_the_drivers_table_has_them():
+    theirs = {(r.address, r.size, r.sign) for r in feetech_table.REGISTERS.values()}
+    ours = {(r.address, r.size, r.sign) for r in sts_memory.REGISTERS.values()}
+    live = {at for at, _, _ in theirs} & set(range(56, 71))
+    assert {row for row in theirs if row[0] not in live} <= ours
+    bench = Bench()
+    differ = {
+        r.name
+        for r in feetech_table.registers_of(feetech_table.MODELS["sts3215"])
+        if r.initial is not None
+        and r.area == "eeprom"
+        and bench.read(1, r.address, r.size) != r.initial
+    }
+    # how servos leave the factory is reported differently
+    assert differ <= {"firmware_minor", "return_delay_time", "velocity_i_gain"}
+
+
 # --- writes
 
 
@@ -156,6 +175,23 @@ def test_a_new_baud_counts_behind_the_answer():
     assert bench.ask(1, PING, baud=1_000_000) == []
     assert len(bench.ask(1, PING, baud=115_200)) == 1
     assert bench.chain.hears(115_200) and not bench.chain.hears(1_000_000)
+
+
+def test_a_dip_of_the_supply_brings_back_the_id_that_was_kept():
+    bench = Bench(baud=1_000_000)
+    bench.write(1, 5, 7)
+    bench.chain.faults.command("voltage 7 3")
+    bench.wait(0.5)
+    bench.chain.faults.command("voltage 1 7.4")
+    bench.wait(2.0)
+    assert bench.ask(7, PING) == []
+    assert bench.ask(1, PING) == [(1, 0, b"")]
+
+
+def test_what_follows_a_new_id_in_the_same_breath_is_heard():
+    bench = Bench()
+    data = instruction(1, WRITE, 5, 7) + instruction(7, PING)
+    assert packets(bench.chain.receive(data)) == [(1, 0, b""), (7, 0, b"")]
 
 
 def test_a_wrong_baud_may_bring_garbage():

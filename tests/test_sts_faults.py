@@ -117,7 +117,12 @@ def test_a_torque_limit_below_it_never_overloads(limit):
 
 @pytest.mark.parametrize(
     ("policy", "by_goal", "by_torque"),
-    [("new-goal", 0, 0), ("torque", OVERLOAD, 0), ("restart", OVERLOAD, OVERLOAD)],
+    [
+        ("new-goal", 0, 0),
+        ("goal-away", OVERLOAD, 0),
+        ("torque", OVERLOAD, 0),
+        ("restart", OVERLOAD, OVERLOAD),
+    ],
 )
 def test_what_ends_an_overload(policy, by_goal, by_torque):
     bench = Bench()
@@ -135,6 +140,15 @@ def test_what_ends_an_overload(policy, by_goal, by_torque):
     bench.chain.faults.command("brown-out 1")
     bench.wait(1.0)
     assert bench.error() == 0
+
+
+def test_an_overload_may_end_only_by_a_goal_that_leads_away():
+    bench = jammed(goal=3000)
+    bench.chain.choose("overload-ends", "goal-away")
+    bench.wait(2.1)
+    for goal, error in ((3100, OVERLOAD), (2100, OVERLOAD), (2000, 0)):
+        bench.write(1, 42, goal, 2)
+        assert bench.error() == error
 
 
 def test_an_overload_that_is_not_to_unload_is_only_flagged():

@@ -160,7 +160,7 @@ def _board(channels: int, device: int | None, crc: bool) -> MaestroLine:
 def _of_rig(name: str, firmware: int | None) -> dict[str, Emulated]:
     """Give what is on every bus of a rig by the bus's name, "" for the only one."""
     lines = {bus: _aged(one, firmware) for bus, one in emulated_lines(load_rig(name)).items()}
-    return lines if len(lines) > 1 else {"": one for one in lines.values()}
+    return lines if len(lines) > 1 else dict(zip(("",), lines.values(), strict=True))
 
 
 def _aged(line: Emulated, firmware: int | None) -> Emulated:

@@ -39,6 +39,10 @@ EYE_RADIUS_M = 0.019
 _AHEAD = np.array((((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),))
 SHELL_MIDDLE_M = (-0.078, 0.0, 0.004)
 SHELL_HALF_AXES_M = (0.084, 0.074, 0.098)
+_FOOT = (
+    *((0.0, 0.0), (0.085, 0.0), (0.085, 0.0), (0.080, 0.014), (0.080, 0.014)),
+    *((0.034, 0.022), (0.0, 0.022)),
+)
 _NECK_TOP_M = (-0.062, 0.0, -0.075)
 # Edges of the lids above the eye's equator: where they meet, and each wide open. A lower lid
 # that no servo moves stands where they meet.
@@ -65,6 +69,7 @@ class HeadView:
         """Put neck, head and eyes into the scene, at rest, as if every joint were there."""
         self._scene = scene
         self._joints: tuple[str, ...] = ()
+        self._foot = self._add("/foot", turned(_FOOT), _METAL, (0.0, 0.0, FLOOR_M))
         self._stand = self._add_stand()
         self._post = self._add("/post", turned([(0.022, 0.0), (0.022, 1.0)]), _METAL)
         self._post.visible = False
@@ -90,11 +95,10 @@ class HeadView:
         )
 
     def _add_stand(self) -> tuple[viser.MeshHandle, ...]:
-        """Add foot, column and the joint on it; give what only a rig with a neck has."""
-        foot = [(0.0, 0.0), (0.085, 0.0), (0.085, 0.0), (0.080, 0.014), (0.080, 0.014)]
+        """Add the column and the joint on it, which only a rig with a neck has."""
         column = [(0.034, 0.022), (0.030, 0.05), (0.028, -FLOOR_M), (0.0, -FLOOR_M)]
         return (
-            self._add("/stand", turned(foot + column), _METAL, (0.0, 0.0, FLOOR_M)),
+            self._add("/stand", turned(column), _METAL, (0.0, 0.0, FLOOR_M)),
             self._add("/joint", cap(0.031, pi, 24), _TRIM),
         )
 
@@ -174,6 +178,8 @@ class HeadView:
         for part in (*self._stand, self._neck):
             part.visible = self._necked
         self._post.visible = not self._necked
+        if self._necked:
+            put(self._foot, (0.0, 0.0, FLOOR_M))
         for eye in self._eyes:
             eye.upper.visible = f"{eye.side}_upper_lid" in joints
             # An upper lid shuts upon a lower one, moved or not.
@@ -194,7 +200,8 @@ class HeadView:
             return
         x, y, z = add(p_world_head_m, SHELL_MIDDLE_M)
         length = max(0.01, round(z - 0.9 * SHELL_HALF_AXES_M[2] - FLOOR_M, 4))
-        put(self._post, (x, y, FLOOR_M))
+        for part in (self._foot, self._post):
+            put(part, (x, y, FLOOR_M))
         if length != self._post_m:
             self._post_m = length
             self._post.scale = (1.0, 1.0, length)

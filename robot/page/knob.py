@@ -70,7 +70,9 @@ def step_of(low: float, high: float) -> float:
 
 def slides(knob: PageKnob, value: object) -> bool:
     """Tell whether a slider can set a parameter finely enough."""
-    if knob.kind not in ("number", "whole") or knob.optional or isinstance(value, bool):
+    if knob.kind not in ("number", "whole") or isinstance(value, bool):
+        return False
+    if knob.optional and knob.default is None:  # a slider cannot be put back to null
         return False
     low, high = knob.low, knob.high
     if low is None or high is None or not low < high or not isinstance(value, int | float):
@@ -124,6 +126,7 @@ class KnobControl:
         put: called when a person asks for another value; refuse: when it cannot be read
         """
         self.knob = knob
+        self.order = order
         self._put = put
         self._refuse = refuse
         self._unsaved = unsaved
@@ -205,6 +208,10 @@ class KnobControl:
         if unsaved != self._unsaved:
             self._unsaved = unsaved
             self._handle.label = label(self.knob, unsaved)
+
+    def can_show(self, value: object) -> bool:
+        """Tell whether this control can show a value: a slider cannot show null."""
+        return self._form is not None or value is not None
 
     def remove(self) -> None:
         """Take the control away."""

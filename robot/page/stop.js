@@ -82,6 +82,15 @@
     draw();
   }
 
+  // A servo that tells nothing cannot be taken hold of where it is.
+  function how() {
+    const blind = state.blind;
+    if (!blind) return "The torque comes on where the joints are.";
+    const who = blind === 1 ? "1 joint without feedback jumps to its place"
+      : `${blind} joints without feedback jump to their places`;
+    return `${who} at full speed.`;
+  }
+
   // What there is to say, most urgent first: [text, alarm, buttons].
   function saying() {
     if (state.recording) return ["A recording: nothing here moves or stops a rig.", false, []];
@@ -91,7 +100,7 @@
     if (state.silent) return ["The rig is silent: use its emergency stop.", true, []];
     if (!state.stopped) return ["", false, []];
     if (confirming) {
-      return ["Fingers out? The torque comes on where the joints are.", false, [
+      return [`Fingers out? ${how()}`, false, [
         button("Yes, resume", "yes", resume),
         button("No", "no", () => sure(false)),
       ]];

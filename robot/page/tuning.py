@@ -169,8 +169,14 @@ class TuningPanel:
             self._refresh()
 
     def _refresh(self) -> None:
-        for key, control in self._controls.items():
-            control.show(self._values[key], key in self._unsaved)
+        with self._lock:
+            for key, control in list(self._controls.items()):
+                if control.can_show(self._values[key]):
+                    control.show(self._values[key], key in self._unsaved)
+                else:
+                    control.remove()
+                    with self._folder:
+                        self._controls[key] = self._control(key, control.order)
 
     def _ask(self, what: Mapping[str, object]) -> None:
         if not self._teller.ask({"tune": what}, self._who):
@@ -198,11 +204,11 @@ class TuningPanel:
             with self._folder:
                 for place, key in enumerate(wanted[:MOST_SHOWN]):
                     if key not in self._controls:
-                        self._controls[key] = self._control(key, place)
+                        self._controls[key] = self._control(key, float(place))
             more = len(wanted) - MOST_SHOWN
             self._rest.content = _note(f"and {more} more: search for less") if more > 0 else ""
 
-    def _control(self, key: str, place: int) -> KnobControl:
+    def _control(self, key: str, place: float) -> KnobControl:
         return KnobControl(
             self._gui,
             self._knobs[key],
@@ -210,7 +216,7 @@ class TuningPanel:
             key in self._unsaved,
             self._put,
             self._refuse,
-            float(place),
+            place,
         )
 
     def _chosen(self) -> list[str]:

@@ -176,10 +176,15 @@ class View:
                 self._draw()
 
     def _stop_state(self) -> dict[str, object]:
-        """Give what the stop button must know: a recording can neither be stopped nor resumed."""
+        """Give what the stop button must know: a recording can neither be stopped nor resumed.
+
+        blind: joints without feedback, which do not take hold where they are but jump
+        """
         if self._replay is not None:
             return {"recording": True}
-        return {"stopped": self._newest.stopped if self._newest else "", "silent": False}
+        shot = self._newest
+        stopped, blind = (shot.stopped, len(shot.reckoned)) if shot else ("", 0)
+        return {"stopped": stopped, "silent": False, "blind": blind}
 
     def _take(self, kind: bytes, data: object) -> None:
         """Take what the rig says beside snapshots and pictures."""

@@ -1,0 +1,46 @@
+"""Which turn a position of an STS servo belongs to."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.feetech_turn import lost, nearest_turn
+
+STEPS = st.integers(-40000, 40000)
+RANGE = st.tuples(st.integers(0, 4095), st.integers(0, 4095)).map(lambda pair: tuple(sorted(pair)))
+
+
+def away(steps, low, high):
+    return max(low - steps, steps - high, 0)
+
+
+@given(STEPS, RANGE)
+def test_it_is_the_same_place_and_none_is_nearer(steps, span):
+    turned = nearest_turn(steps, *span)
+    assert (turned - steps) % 4096 == 0
+    assert away(turned, *span) <= min(away(turned - 4096, *span), away(turned + 4096, *span))
+
+
+@given(STEPS, RANGE)
+def test_inside_the_range_nothing_changes(steps, span):
+    low, high = span
+    inside = low + steps % (high - low + 1)
+    assert nearest_turn(inside, low, high) == inside
+    assert not lost(inside, low, high)
+
+
+@given(RANGE, STEPS)
+def test_one_step_on_is_one_step_on_but_for_the_far_side(span, steps):
+    low, high = span
+    leap = abs(nearest_turn(steps + 1, low, high) - nearest_turn(steps, low, high))
+    assert (
+        leap == 1 or away(nearest_turn(steps, low, high), low, high) >= (4096 - high + low) // 2 - 1
+    )
+
+
+def test_by_hand():
+    assert nearest_turn(4090, 100, 1500) == -6
+    assert nearest_turn(-6, 100, 1500) == -6
+    assert nearest_turn(3200, 1000, 3000) == 3200
+    assert nearest_turn(5000, 0, 4095) == 904
+    assert lost(4090, 100, 1500) and lost(5000, 0, 4095)
+    assert not lost(20, 100, 1500)

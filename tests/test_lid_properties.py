@@ -1,0 +1,133 @@
+"""Whatever the parameters and whatever happens, lids stay between shut and open and never jump."""
+
+from dataclasses import fields
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gaze.lid_closing import closure
+from gaze.lids import LidParams, Lids
+
+DT = 0.005
+STEEPEST = 1.875  # slope of minimum jerk at its middle
+GLIDE_S, DROOP_S = 0.3, 1.0
+
+
+def steepest_opening() -> float:
+    """Give the steepest slope of an opening that takes 1 s."""
+    shut = [closure(1.0 + s, 0.0, 1.0, 1.0) for s in np.linspace(0.0, 1.0, 20_001)]
+    return float(-np.diff(shut).min() * 20_000)
+
+
+OPENING = steepest_opening()
+
+
+def admissible() -> st.SearchStrategy[LidParams]:
+    """Draw any parameters that a file may hold."""
+    ranges: dict[str, st.SearchStrategy[float | str | bool]] = {}
+    for item in fields(LidParams):
+        if "choices" in item.metadata:
+            ranges[item.name] = st.sampled_from(item.metadata["choices"])
+        elif isinstance(item.default, bool):
+            ranges[item.name] = st.booleans()
+        else:
+            ranges[item.name] = st.floats(item.metadata["low"], item.metadata["high"])
+    return st.builds(LidParams, **ranges)
+
+
+class Event(NamedTuple):
+    """Something that happens, and the gaze in the ticks after it."""
+
+    what: str
+    level: float
+    pitch_deg: float
+    shift_deg: float | None
+    ticks: int
+
+
+EVENTS = st.builds(
+    Event,
+    st.sampled_from(["", "", "left", "right", "sleepy", "rest", "conversation", "retune"]),
+    st.floats(0.0, 1.0),
+    st.floats(-60.0, 60.0),
+    st.none() | st.floats(-90.0, 90.0),
+    st.integers(1, 60),
+)
+
+
+def happen(model: Lids, event: Event, other: LidParams, t_s: float) -> None:
+    if event.what in ("left", "right"):
+        model.wink(event.what, t_s + event.level - 0.5)  # type: ignore[arg-type]
+    elif event.what in ("rest", "conversation"):
+        model.mode(event.what)  # type: ignore[arg-type]
+    elif event.what == "sleepy":
+        model.sleepy(event.level)
+    elif event.what == "retune":
+        model.retune(other)
+
+
+def fastest_per_s(params: LidParams) -> float:
+    """Give the steepest slope that blink, glide and droop may have together."""
+    blink = max(STEEPEST / (params.close_ms / 1e3), OPENING / (params.open_ms / 1e3))
+    return blink + STEEPEST / GLIDE_S + STEEPEST / DROOP_S
+
+
+def following_per_deg(params: LidParams) -> float:
+    upper = params.follow_per_deg * max(1.0, params.follow_up_share)
+    return max(upper, params.lower_follow_per_deg)
+
+
+@settings(max_examples=60, deadline=None)
+@given(admissible(), admissible(), st.lists(EVENTS, min_size=1, max_size=10), st.integers(0, 99))
+def test_lids_stay_within_bounds_and_never_jump(
+    first: LidParams, other: LidParams, events: list[Event], seed: int
+) -> None:
+    model = Lids(first, np.random.default_rng(seed))
+    most = max(fastest_per_s(first), fastest_per_s(other)) * DT
+    per_deg = max(following_per_deg(first), following_per_deg(other))
+    t_s, pitch_deg, before = 0.0, 0.0, None
+    for event in events:
+        happen(model, event, other, t_s)
+        for tick in range(event.ticks):
+            t_s += DT
+            shift = None if tick or event.shift_deg is None else radians(event.shift_deg)
+            # The eye turns at up to 600 deg/s.
+            turn_deg = min(3.0, max(-3.0, event.pitch_deg - pitch_deg))
+            pitch_deg += turn_deg
+            left, right, _, *lower = model.step(t_s, radians(pitch_deg), shift)
+            now = np.array([left, right, *lower])
+            assert (now >= 0.0).all() and (now <= 1.0).all()
+            if before is not None:
+                step = np.abs(now - before).max()
+                assert step <= most + per_deg * abs(turn_deg) + 1e-9
+            before = now
+
+
+@settings(max_examples=60, deadline=None)
+@given(admissible(), st.floats(-60.0, 60.0), st.floats(-60.0, 60.0), st.floats(0.0, 1.0))
+def test_both_lids_follow_the_eye_the_same_way_with_any_parameters(
+    params: LidParams, one_deg: float, other_deg: float, level: float
+) -> None:
+    model = Lids(params, np.random.default_rng(0))
+    model.sleepy(level)
+    down, up = (model.step(0.0, radians(a), None) for a in sorted((one_deg, other_deg)))
+    assert up.left >= down.left and up.right >= down.right
+    assert up.lower_left <= down.lower_left and up.lower_right <= down.lower_right
+
+
+@settings(max_examples=60, deadline=None)
+@given(admissible(), st.floats(-60.0, 60.0), st.floats(0.0, 1.0))
+def test_a_full_blink_shuts_all_lids_whose_share_is_whole(
+    params: LidParams, pitch_deg: float, level: float
+) -> None:
+    whole = {"lower_close_share": 1.0, "incomplete_share": 0.0, "evoked_literal": True}
+    never = {"blinks_per_min": 0.0, "evoked_literal_deg": 0.0, "sleepy_level": 0.0}
+    chosen = LidParams(**{**vars(params), **whole, **never, "sleepy_slowness": 0.0})
+    model = Lids(chosen, np.random.default_rng(0))
+    model.sleepy(level)
+    model.step(0.0, radians(pitch_deg), radians(90.0))
+    shut = model.step(chosen.close_ms / 1e3, radians(pitch_deg), None)
+    assert shut.blink and (shut.left, shut.right, shut.lower_left, shut.lower_right) == (0.0,) * 4
