@@ -210,7 +210,7 @@ class Care:
         for servo_id in ids:
             self._readings.name_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
         for servo_id, position in found.items():
-            self._line.errors["restarted"] += 1
+            self._line.errors["rearmed"] += 1
             slot = self._slot[servo_id]
             readings[slot] = self._readings.held(slot, position, at_s, self.engaged)
             self._limp.discard(servo_id)

@@ -19,13 +19,16 @@ from drivers.bus_reconnect import Reconnect
 from drivers.errors import BusLost, PortError, ServoMissing
 from drivers.maestro_care import Care
 from drivers.maestro_channel import Channel, check
-from drivers.maestro_commands import MICRO, MOST_INPUT, name_errors
-from drivers.maestro_hold import TRIES, Outcome, refusal, switch_off, take
+from drivers.maestro_commands import MICRO
+from drivers.maestro_hold import TRIES, switch_off
 from drivers.maestro_line import Line
 from drivers.maestro_params import MaestroParams as MaestroParams
 from drivers.maestro_silence import Silence
+from drivers.maestro_start import find, take_on
 from drivers.serial_port import BusPort
 from drivers.types import BusHealth, ServoReading, ServoSetup
+
+UNMEASURED = "hobby servos tell no positions: what is shown is where they were sent"
 
 
 class MaestroBus:
@@ -81,7 +84,7 @@ class MaestroBus:
             )
         try:
             self._port.clearPort()
-            self._find()
+            find(self._line, self._channels, self._params, self._journal)
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
@@ -128,12 +131,10 @@ class MaestroBus:
         """
         self._take_wanted()
         try:
-            self._stop_script()
-            pulses = self._all_pulses()
-            for channel, pulse in zip(self._channels, pulses, strict=True):
-                channel.found(pulse)
-            self._tell(pulses)
-            self._take_on(pulses)
+            if not self._told:
+                self._told = True
+                self._journal.say(UNMEASURED)
+            take_on(self._line, self._channels, self._params, self._journal)
         except ServoMissing:
             self.release()
             raise
@@ -261,109 +262,7 @@ class MaestroBus:
         answer = self._line.ask(self._line.speech.moving(), 1)
         return None if answer is None else bool(answer[0])
 
-    # --- finding and holding
-
-    def _find(self) -> None:
-        """Greet the board and look at every channel.
-
-        Raises:
-            drivers.errors.ServoMissing: it does not answer, or a channel is no servo's.
-        """
-        where = self._port.port_name
-        register = self._line.greet()
-        if register is None:
-            raise ServoMissing(f"{where}: no Maestro answers: {self._mute_causes()}")
-        if not self._line.takes_crc():
-            raise ServoMissing(f"{where}: the board wants no CRC: set crc to false")
-        if register:
-            named = ", ".join(name_errors(register))
-            self._journal.say(f"the board held errors from before, cleared now: {named}")
-        pulses = self._all_pulses()
-        for channel, pulse in zip(self._channels, pulses, strict=True):
-            if 0 < pulse <= MOST_INPUT:
-                raise ServoMissing(
-                    f"{where}: channel {channel.id} is an input, {call(channel.setup)} cannot "
-                    "move: set it to Servo in Pololu's program"
-                )
-            channel.settle(pulse)
-
-    def _mute_causes(self) -> str:
-        """Say what keeps a board from answering."""
-        params = self._params
-        number = f", its device number {params.device}" if params.protocol == "pololu" else ""
-        check_byte = "on" if params.crc else "off"
-        return (
-            "on USB take the first of its two ports and set it to 'USB Dual Port' in Pololu's "
-            f"program; on its serial pins check TX, RX, ground and {params.baud} bit/s{number}; "
-            f"its CRC must be {check_byte}"
-        )
-
-    def _all_pulses(self) -> tuple[int, ...]:
-        """Ask for every pulse.
-
-        Raises:
-            drivers.errors.ServoMissing: a channel does not answer.
-        """
-        for _ in range(TRIES):
-            pulses = self._line.pulses(self._ids)
-            if pulses is not None:
-                return pulses
-        for channel in self._channels:
-            if self._line.pulses((channel.id,)) is None:
-                raise ServoMissing(
-                    f"{self._port.port_name}: no answer about {call(channel.setup)}: has the board "
-                    f"{self._params.channels} channels?"
-                )
-        raise ServoMissing(f"{self._port.port_name}: answers get lost: check cable and baud rate")
-
-    def _stop_script(self) -> None:
-        """Stop the board's own script where one runs: it would move servos against us."""
-        status = self._line.ask(self._line.speech.script_status(), 1)
-        if status == b"\0":
-            self._line.send(self._line.speech.stop_script())
-            self._journal.say("the board ran a script of its own: stopped")
-
-    def _tell(self, pulses: Sequence[int]) -> None:
-        """Say, once, that nothing is measured, and who goes to an unknown distance."""
-        if not self._told:
-            self._told = True
-            self._journal.say(
-                "hobby servos tell no positions: what is shown is where they were sent"
-            )
-        limp = [call(c.setup) for c, pulse in zip(self._channels, pulses, strict=True) if not pulse]
-        if limp:
-            self._journal.say(f"{', '.join(limp)} had no pulses: they go to their places at once")
-
-    def _take_on(self, pulses: Sequence[int]) -> None:
-        """Take hold of every channel, those without pulses one after another.
-
-        Raises:
-            drivers.errors.ServoMissing: a channel does not take its goal.
-        """
-        stagger_s = self._params.stagger_ms / 1000.0
-        start_s = -inf
-        for channel, pulse in zip(self._channels, pulses, strict=True):
-            if not pulse:
-                self._line.wait(start_s + stagger_s)
-                start_s = self._port.now_s()
-            self._insist(channel, pulse)
-
-    def _insist(self, channel: Channel, pulse: int) -> None:
-        """Take hold of one channel.
-
-        Raises:
-            drivers.errors.ServoMissing: it does not take its goal.
-        """
-        for _ in range(TRIES):
-            outcome = take(self._line, channel, pulse)
-            if outcome is Outcome.HELD:
-                return
-            if outcome is Outcome.ELSEWHERE and channel.on:
-                break
-        where = self._port.port_name
-        if outcome is Outcome.MUTE:
-            raise ServoMissing(f"{where}: no answer about {call(channel.setup)}: check its cable")
-        raise ServoMissing(f"{where}: {refusal(channel)}")
+    # --- holding
 
     def _take_wanted(self) -> None:
         """Put in force what was asked for since the servos were held last."""

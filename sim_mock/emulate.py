@@ -104,10 +104,15 @@ class Server:
         for name, line in named.items():
             if text.startswith(f"{name}:"):
                 return line.obey(text[len(name) + 1 :].strip())
-        first = next(iter(named))
-        if "" in named or len(named) == 1:
-            return named.get("", named[first]).obey(text)
-        return json.dumps({"error": f"name the bus first ({', '.join(named)}): {first}: {text}"})
+        first, last = next(iter(named)), next(reversed(named))
+        if "" not in named and len(named) > 1:
+            names = ", ".join(named)
+            return json.dumps({"error": f"name the bus first ({names}): {first}: {text}"})
+        answer = named.get("", named[first]).obey(text)
+        if text == "help" and len(named) > 1:
+            hint = f"buses: {', '.join(filter(None, named))}; a command for one: {last}: {text}"
+            answer = json.dumps({"ok": f"{json.loads(answer)['ok']}\n{hint}"})
+        return answer
 
 
 def _warn(text: str) -> None:

@@ -171,6 +171,14 @@ def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
         assert told.read() == "a client speaks at 1000000 bit/s; the servos listen at 500000\n"
 
 
+def test_a_rig_of_hobby_servos_is_a_board_that_sends_no_pulses_yet():
+    emulator = Emulator("--rig", "maker")
+    assert emulator.ready == {"path": emulator.path, "baud": None}
+    assert asked(emulator.path, bytes.fromhex("9000"), 2, 115_200) == bytes(2)
+    assert {servo["target"] for servo in emulator.type("status")["servos"]} == {0}
+    assert emulator.end() == 0
+
+
 MIXED = {
     "": StsLine(parse_servos("1:sts3215", 10), 1_000_000),
     "eyes": DynamixelLine(parse_servos("1-2:xl330-m077", 53), 57_600),
@@ -196,6 +204,7 @@ def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path):
     port.closePort()
     assert emulator.type("eyes: lose 2 count 1")["bus"] == "eyes"
     assert emulator.type("eyes:status")["faults"] == ["lose 2"]
+    assert emulator.type("help")["ok"].endswith("buses: eyes; a command for one: eyes: help")
     assert [servo["model"] for servo in emulator.type("status")["servos"]] == ["sts3215"]
     assert emulator.end() == 0
     assert not os.path.lexists(link) and not os.path.lexists(f"{link}-eyes")

@@ -66,7 +66,8 @@ def test_all_have_words_and_structure_waits_for_the_next_start() -> None:
 def test_the_order_is_that_of_the_file() -> None:
     groups = [knob.key.split(".")[0] for knob in KNOBS]
     firsts = list(dict.fromkeys(groups))
-    assert firsts == [f.name for f in fields(Rig)]
+    # The desk rig has one bus, so nothing stands under buses.
+    assert firsts == [f.name for f in fields(Rig) if f.name != "buses"]
 
 
 @pytest.mark.parametrize(

@@ -169,8 +169,13 @@ def walk(tmp_path: Path) -> str:
     return str(path)
 
 
+ABSENT = ("lid_joints.left_lower", "lid_joints.right_lower")
+
+
 def live_knobs() -> tuple[Knob, ...]:
-    return tuple(k for k in knobs(RIG, RIG) if not k.live.startswith(NEXT_START))
+    # The desk rig has no lower lids, so nothing obeys their angles.
+    there = (k for k in knobs(RIG, RIG) if not k.key.startswith(ABSENT))
+    return tuple(k for k in there if not k.live.startswith(NEXT_START))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -252,4 +252,4 @@ def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
 def test_a_pair_that_leaves_no_pose_is_refused() -> None:
     whole = CollisionParams("neck_pitch", -60.0, 50.0, "left_upper_lid", -34.5, 34.5)
     with pytest.raises(ValueError, match="neck_pitch -60..50 deg of -60..50 with left_upper_lid"):
-        Guard(GuardParams(collisions=(whole,)), LIMITS)
+        Guard(GuardParams(collisions=(whole,)), LIMITS, JOINTS)

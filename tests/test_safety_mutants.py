@@ -71,7 +71,7 @@ class Bench:
             at if k == JOINT and at is not None else p for k, p in enumerate(self.path[-1])
         )
         ages = tuple(self.t_s - (old_s if k == JOINT else 0.0) for k in range(9))
-        usual = {"torque": True, "fault": "", "rearmed": False, "load": 0.0}
+        usual = {"torque": True, "fault": "", "rearmed": False, "load": 0.0, "measured": True}
         usual |= {"temperature_c": 40.0, "voltage_v": 5.0}
         columns = {
             name: tuple(one if k == JOINT else usual[name] for k in range(9))
@@ -258,6 +258,13 @@ def not_moving(m: ModuleType) -> None:
         assert bench.why == ""
 
 
+def reckoned(m: ModuleType) -> None:
+    bench = Bench(m)
+    for _ in range(200):  # a servo that tells nothing is never found not moving
+        bench.tick(0.4, at=0.0, measured=False)
+        assert bench.why != "not moving"
+
+
 def torque_off(m: ModuleType) -> None:
     for wish, at in ((0.0001, -0.2), (0.5, -0.2), (0.0001, -0.02)):
         bench = Bench(m)
@@ -405,6 +412,7 @@ CHECKS: tuple[Callable[[ModuleType], None], ...] = (
     overloaded,
     voltage,
     not_moving,
+    reckoned,
     torque_off,
     limp,
     rearmed,
@@ -506,6 +514,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (STUCK, "self._until_s[i] = t_s + self._retry_s", "self._until_s[i] = t_s", not_moving),
     (GUARD, "not watched[i]", "True", not_moving),
     (GUARD, "near = -far <= command[i] - position <= far and", "near =", not_moving),
+    (GUARD, "if joints.measured and not joints.measured[i]:", "if False:", reckoned),
     (GUARD, "self._retreat[i] = back = position", "pass", not_moving),
     (GUARD, "if self._retrying[i] else wish", "if False else wish", not_moving),
     # torque and faults

@@ -243,8 +243,8 @@ def _key(reckoned: Sequence[bool]) -> str:
     if any(reckoned):
         shown.append((*_RECKONED, "- -"))
     names = "".join(
-        f"<span style='margin-right:12px'><span style='color:{colour};font-weight:700'>{mark}"
-        f"</span> {name}</span>"
+        f"<span style='margin-right:12px;white-space:nowrap'>"
+        f"<span style='color:{colour};font-weight:700'>{mark}</span> {name}</span>"
         for name, colour, _, mark in shown
     )
     return frame(f"<div style='font-size:12px'>{names}</div>")

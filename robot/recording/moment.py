@@ -16,7 +16,7 @@ from gaze.types import Bodies, Face, GazeCommand, GazeState, Percept, Pull, Targ
 from robot.loop import Tick
 from robot.orders import as_json as order_as_json
 from robot.orders import from_json as order_from_json
-from robot.types import JointAngles, JointState, Verdict
+from robot.types import JOINTS, JointAngles, JointState, Verdict
 
 Json = dict[str, Any]
 Flat = tuple[Any, ...]
@@ -56,6 +56,11 @@ class Moment(NamedTuple):
     dt_s: float
     before: tuple[Heard, ...] = ()
 
+
+_ONCE_ALL = tuple(
+    [name for name in JOINTS if not name.startswith("eyes_") and "lower" not in name]
+)
+"""The joints of a recording that does not name them: every rig had these."""
 
 _HEARD: dict[str, type[Heard]] = {"engaged": Engaged, "measured": Measured, "refused": Refused}
 _HEARD_NAMES = {kind: name for name, kind in _HEARD.items()}
@@ -139,6 +144,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
     verdict = data["verdict"]
     if verdict["wish_rad"] is None:
         verdict["wish_rad"] = wish
+    verdict.setdefault("joints", _ONCE_ALL)
     target = data["target"]
     target["pulls"] = tuple([Pull(**pull) for pull in target["pulls"]])
     tick = Tick(

@@ -24,7 +24,6 @@ from robot.recording.played_back import NoCamera, PlayedBody, PlayedPerception
 from robot.recording.read import BadRecording, RunRecording
 from robot.session import leave
 from robot.summary import Summary
-from robot.types import JOINTS
 
 Joints = Literal["recorded", "emulated"]
 
@@ -242,7 +241,7 @@ def _short(was: Tick, now: Tick, name: str) -> str:
     then, again = was.wish_rad, now.wish_rad
     if name == "command":
         then, again = was.verdict.command_rad, now.verdict.command_rad
-    rows = zip(JOINTS, then, again, strict=True)
+    rows = zip(now.verdict.joints, then, again, strict=True)
     joint, old, new = next(row for row in rows if repr(row[1]) != repr(row[2]))
     return f"{joint} {new:.6f} rad, was {old:.6f}"
 

@@ -56,6 +56,8 @@ _JOINTS = _object(
     position_rad=_NUMBERS, velocity_rad_s=_NUMBERS, measured_s=_NUMBERS, missing=_TEXTS,
     torque=_list(_YES), fault=_TEXTS, load=_NUMBERS, temperature_c=_list(_MAYBE),
     voltage_v=_list(_MAYBE), rearmed=_list(_YES),
+    measured=_says(_list(_YES), "false: its servo tells nothing, this is its goal moved by known "
+                   "speeds; empty: all are measured"),
 )  # fmt: skip
 _PULL = _object(
     id=_WHOLE, kind=_TEXT, slide=_NUMBER, loom=_NUMBER, spin=_NUMBER, onset=_NUMBER, rule=_NUMBER,
@@ -69,16 +71,18 @@ _TARGET = _object(
 _GAZE_STATE = _object(
     head_rad=_NUMBERS, head_rate_rad_s=_NUMBERS, eye_left_rad=_NUMBERS, eye_right_rad=_NUMBERS,
     R_world_head=_MATRIX, p_world_head_m=_NUMBERS, p_world_eye_left_m=_NUMBERS,
-    p_world_eye_right_m=_NUMBERS, lid_left=_NUMBER, lid_right=_NUMBER,
+    p_world_eye_right_m=_NUMBERS, lid_left=_NUMBER, lid_right=_NUMBER, lower_left=_NUMBER,
+    lower_right=_NUMBER,
 )  # fmt: skip
 _GAZE_COMMAND = _object(
     head_rad=_NUMBERS, eye_left_rad=_NUMBERS, eye_right_rad=_NUMBERS, lid_left=_NUMBER,
     lid_right=_NUMBER, phase=_TEXT, blink=_YES, gaze_point_world_m=_NUMBERS, saccades=_WHOLE,
-    fixations=_WHOLE, blinks=_WHOLE,
+    fixations=_WHOLE, blinks=_WHOLE, lower_left=_NUMBER, lower_right=_NUMBER,
 )  # fmt: skip
 _VERDICT = _object(
     command_rad=_NUMBERS, level=_TEXT, reasons=_TEXTS,
     wish_rad={"type": ["array", "null"], "items": _NUMBER}, why=_TEXTS, gravest=_TEXTS,
+    joints=_says(_TEXTS, "names, in the order of every list of joints"),
 )  # fmt: skip
 _ORDER: Schema = {"type": "object", "properties": {"order": _TEXT}}
 
@@ -86,8 +90,9 @@ _TICK = _says(
     _object(
         t_s=_says(_NUMBER, "the rig's own time, s"),
         dt_s=_says(_NUMBER, "since the tick before, s"),
-        joints=_says(_JOINTS, "as measured, in the order of /joint_states' names"),
-        pose=_says(_GAZE_STATE, "head and eyes as measured; yaw + left, pitch + up"),
+        joints=_says(_JOINTS, "as measured, in the order of verdict.joints"),
+        pose=_says(_GAZE_STATE, "head and eyes as joints.measured says; yaw + left, pitch + up; "
+                   "lids 0 shut .. 1 open, 1 where there is none"),
         percept={"type": ["integer", "null"], "description": "number of the /rig/percept in force"},
         target=_says(_TARGET, "where to look and why, the strongest pulls term by term"),
         gaze=_says(_GAZE_COMMAND, "what the models wish"),

@@ -8,7 +8,7 @@ from robot.recording import run_format as fmt
 from robot.recording import viewer_messages as viewers
 from robot.recording.moment import Flat, as_json, percept_as_json
 from robot.recording.run_writer import RunWriter
-from robot.types import JointState
+from robot.types import JointState, Verdict
 
 _VIEWED_EVERY_S = 0.0399  # a little under 40 ms, so that rounding does not turn it into 45
 
@@ -23,6 +23,7 @@ class Scribe:
         self._at_s = 0.0
         self._viewed_s = -1.0
         self._joints: JointState | None = None
+        self._names: tuple[str, ...] = ()
         self._faces: list[Vec3] = []
 
     def tick(self, values: Flat) -> None:
@@ -36,7 +37,7 @@ class Scribe:
             self._add(fmt.LOG, viewers.line(event, self._now_ns))
         for order in data["orders"]:
             self._add(fmt.ORDER, order)
-        self._joints = JointState(*values[3])
+        self._joints, self._names = JointState(*values[3]), Verdict(*values[8]).joints
         if self._at_s - self._viewed_s >= _VIEWED_EVERY_S or self._viewed_s < 0.0:
             self._viewed_s = self._at_s
             self._show(GazeState(*values[4]), values[6][7])
@@ -75,7 +76,7 @@ class Scribe:
         """Write what viewers draw of the newest tick."""
         now_ns = self._now_ns
         if self._joints is not None:
-            self._add(fmt.JOINT_STATES, viewers.joint_states(self._joints, now_ns))
+            self._add(fmt.JOINT_STATES, viewers.joint_states(self._names, self._joints, now_ns))
         self._add(fmt.TRANSFORMS, viewers.transforms(pose, now_ns))
         self._add(fmt.SCENE, viewers.scene(pose, point_m, self._faces, now_ns))
 

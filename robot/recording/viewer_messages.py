@@ -5,13 +5,14 @@ and right_eye with x along the line of sight.
 """
 
 import base64
+from collections.abc import Sequence
 from math import copysign, sqrt
 from typing import Any
 
 from gaze.angles import add, compose, norm, rotate, rotation, sub
 from gaze.types import Angles2, GazeState, Mat3, Vec3
 from robot.recording.run_format import UNUSED
-from robot.types import JOINTS, JointState
+from robot.types import JointState
 
 Json = dict[str, Any]
 
@@ -51,9 +52,9 @@ def line(words: str, at_ns: int) -> Json:
     }  # fmt: skip
 
 
-def joint_states(joints: JointState, at_ns: int) -> Json:
-    """Give joints as measured as foxglove.JointStates: rad and rad/s."""
-    rows = zip(JOINTS, joints.position_rad, joints.velocity_rad_s, strict=True)
+def joint_states(names: Sequence[str], joints: JointState, at_ns: int) -> Json:
+    """Give joints as they are as foxglove.JointStates: rad and rad/s."""
+    rows = zip(names, joints.position_rad, joints.velocity_rad_s, strict=True)
     return {
         "timestamp": stamp(at_ns),
         "joints": [{"name": n, "position": q, "velocity": v} for n, q, v in rows],

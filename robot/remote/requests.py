@@ -16,7 +16,6 @@ from robot.clock import Clock
 from robot.loop import Tick
 from robot.orders import Order, Tune, Value, from_json
 from robot.page.snapshot import target_name
-from robot.types import JOINTS
 
 _TAKEN_UP_S = 1.0
 """Within this the loop must have obeyed; a servo that answers late costs it some 50 ms."""
@@ -170,7 +169,9 @@ class Pulse:
         tick = self._newest
         if tick is None:
             return {"ticks": 0, "stopped": "", "said": []}
-        measured = zip(JOINTS, tick.joints.position_rad, strict=True)
+        names, told = tick.verdict.joints, tick.joints.measured
+        measured = zip(names, tick.joints.position_rad, strict=True)
+        reckoned = [name for name, tells in zip(names, told, strict=False) if not tells]
         return {
             "ticks": self._ticks,
             "t_s": tick.t_s,
@@ -182,6 +183,7 @@ class Pulse:
             "why": tick.target.why,
             "phase": tick.gaze.phase,
             "joints_deg": {name: round(degrees(angle), 2) for name, angle in measured},
+            "reckoned": reckoned,
             "said": list(self._said),
         }
 

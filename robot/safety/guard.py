@@ -130,7 +130,6 @@ class Guard:
         self._take(params)
         self._wanted, self._reach = limits, reach
         self._names = joints
-        self._all_measured = [False] * len(joints)
         self._neck = tuple(name.startswith("neck") for name in joints)
         self._motion = Motion(self._within_reach())
         self._limits = self._motion.limits
@@ -285,14 +284,12 @@ class Guard:
         blind = not picture_age_s <= self._params.stale_picture_ms / 1e3
         usual = self._all_well(joints)
         far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
-        reckoned = [not measured for measured in joints.measured] or self._all_measured
         columns = zip(wish_rad, joints.position_rad, joints.measured_s, strict=True)
         why: dict[int, str] = {}
         ranks: dict[int, int] = {}
         for i, (wish, position, at_s) in enumerate(columns):
             unseen = blind and self._neck[i]
-            # Where a servo tells nothing, its place is no news of what it met.
-            near = reckoned[i] or (-far <= command[i] - position <= far and not watched[i])
+            near = -far <= command[i] - position <= far and not watched[i]
             well = near and at_s >= stale_s and not unseen and (usual or self._well(i, joints))
             if well and self._motion.follow(i, wish, dt_s):
                 continue  # nearly every wish is a good one and is passed on as it is
@@ -430,6 +427,7 @@ class Guard:
         """Tell whether a joint is told to move and does not."""
         if self._stuck.holds(i, self._t_s):
             return True
+        # Where a servo tells nothing, its place is no news of what it met.
         if joints.measured and not joints.measured[i]:
             return False
         command, position = self._motion.command[i], joints.position_rad[i]

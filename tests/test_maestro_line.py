@@ -1,0 +1,130 @@
+"""The line's patience and the memory of one channel, each by itself."""
+
+import pytest
+
+from drivers.maestro_channel import Channel
+from drivers.maestro_commands import Speech
+from drivers.maestro_line import Line
+from drivers.maestro_params import MaestroParams
+from drivers.types import ServoSetup
+
+SETUP = ServoSetup(3, "hobby", 4400, 7600, 12_000.0)
+
+
+class SlowPort:
+    """A port whose answers are a list of byte strings; one that is late arrives while draining."""
+
+    port_name = "scripted"
+
+    def __init__(self, *answers, late=b""):
+        self.answers, self.late, self.sent = list(answers), late, []
+
+    def now_s(self):
+        return 0.0
+
+    def write(self, data):
+        self.sent.append(data)
+
+    def read_until(self, length, deadline_s):
+        came = self.answers.pop(0)
+        if came is None:
+            # It is still on its way: whoever only throws away what is here misses it.
+            self.answers.insert(0, self.late)
+            return b""
+        return came
+
+    def drain(self):
+        self.answers = [answer for answer in self.answers if answer is not self.late]
+        return 0
+
+    def clearPort(self):
+        pass
+
+
+def test_an_answer_after_its_time_is_not_the_next_ones():
+    port = SlowPort(None, b"\x70\x17", late=b"\xff\x00")
+    line = Line(port, MaestroParams())
+    assert line.pulses((0,)) is None
+    assert line.pulses((0,)) == (6000,)
+    assert line.errors == {"timeout": 1}
+
+
+def test_numbers_that_cannot_be_are_damage():
+    line = Line(SlowPort(b"\xff\xff", b"\x70\x17"), MaestroParams())
+    assert line.pulses((0,)) is None
+    assert line.errors == {"damaged": 1}
+    assert line.pulses((0,)) == (6000,)
+
+
+def test_the_board_is_not_asked_too_much_at_once():
+    port = SlowPort(bytes(12), bytes(6))
+    assert Line(port, MaestroParams()).pulses(range(9)) == (0,) * 9
+    assert [len(packet) for packet in port.sent] == [12, 6]
+
+
+def held(setup=SETUP, pulse=6000):
+    channel = Channel(setup)
+    channel.settle(pulse)
+    channel.start(pulse, 0.0)
+    channel.limits(Speech())
+    channel.hold()
+    return channel
+
+
+def test_a_damaged_pulse_never_puts_a_reading_outside_the_limits():
+    channel = held(pulse=4400)
+    assert not channel.strange(4300, 0.0)
+    channel.found(4300)
+    channel.advance(0.004)
+    assert channel.reading(0.004).position_steps == 4400
+
+
+def test_a_pulse_far_from_every_goal_is_strange():
+    channel = held()
+    assert channel.strange(0, 0.0)
+    assert channel.strange(7000, 0.0)
+    assert not channel.strange(6010, 0.0)
+
+
+def test_long_after_the_last_goal_a_pulse_must_be_there():
+    channel = held()
+    channel.aim(6600, 0.0)
+    assert not channel.strange(6200, 0.02)
+    assert channel.strange(6200, 1.0)
+    assert not channel.strange(6200, 1.0, led_away=True)
+    assert not channel.strange(6604, 1.0)
+
+
+def test_an_end_of_the_board_is_believed_when_it_was_met_twice():
+    channel = held()
+    channel.aim(7600, 0.0)
+    assert not channel.met_end(7400)
+    assert channel.met_end(7400)
+    channel.advance(5.0)
+    assert channel.reading(5.0).position_steps == 7400
+    assert not channel.met_end(7600)
+    channel.advance(9.0)
+    assert channel.reading(9.0).position_steps == 7600
+
+
+def test_a_reading_is_anew_once():
+    channel = held()
+    channel.rearm()
+    assert [channel.reading(0.0).rearmed for _ in range(2)] == [True, False]
+
+
+@pytest.mark.parametrize(("rest", "place"), [(None, 6000), (5000, 5000), (9000, 7600), (0, 4400)])
+def test_where_a_servo_without_pulses_is_taken_to_be(rest, place):
+    channel = Channel(SETUP._replace(rest_steps=rest))
+    assert channel.reading(0.0).position_steps == place
+    assert channel.start(0, 0.0) == place
+
+
+def test_new_limits_bring_the_guess_inside_but_leave_a_known_place():
+    channel = Channel(SETUP)
+    channel.want(SETUP._replace(rest_steps=5000))
+    assert channel.reading(0.0).position_steps == 5000
+    channel.settle(7000)
+    channel.want(SETUP._replace(max_steps=6500))
+    assert channel.reading(0.0).position_steps == 7000
+    assert channel.start(7000, 0.0) == 6500
