@@ -9,6 +9,7 @@ import contextlib
 import importlib.resources
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -224,8 +225,13 @@ def _read(path: Path, faults: list[Fault]) -> tuple[str, Entry | None]:
     return text, None
 
 
+@lru_cache(maxsize=16)
 def _composed(text: str) -> Node | None:
-    """Parse YAML as far as nodes, which know their lines."""
+    """Parse YAML as far as nodes, which know their lines and are only read.
+
+    The parser takes nearly all the time of loading, and a rig loads the same layers again
+    with each tuning, saving and checking.
+    """
     yaml = YAML(typ="safe", pure=True)
     yaml.max_depth = _DEPTH
     yaml.composer.warn_double_anchors = False  # YAML 1.2 allows to set an anchor again

@@ -14,6 +14,7 @@ from serial import Serial, SerialException
 from serial.tools import list_ports
 
 from drivers.errors import BusLost, PortError
+from drivers.feetech_table import BAUD_RATES as FEETECH_RATES
 
 BITS_PER_BYTE = 10
 SDK_MARGIN_S = 0.034
@@ -183,6 +184,18 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     # --- what the SDK uses
 
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Open at a baud rate; False where the rate is not possible.
+
+        Raises:
+            drivers.errors.PortError: absent, busy or not permitted.
+        """
+        # Feetech servos know rates that the SDK's list lacks.
+        if baudrate not in FEETECH_RATES and self.getCFlagBaud(baudrate) <= 0:
+            return False
+        self.baudrate = baudrate
+        return self.setupPort(baudrate)
+
     def setupPort(self, cflag_baud: int) -> bool:
         """Open at a baud rate.
 
@@ -194,6 +207,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             self.ser = Serial(self.port_name, cflag_baud, timeout=0, exclusive=True)
         except (SerialException, OSError) as error:
             raise PortError(explain(self.port_name, error.errno)) from error
+        except ValueError as error:  # pyserial: an adapter that does not do this rate
+            raise PortError(
+                f"{self.port_name} cannot run at {cflag_baud} bit/s: choose 115200 or 1000000"
+            ) from error
         self._fd = self.ser.fileno()
         self._fds = (self._fd,)
         ask_low_latency(self.ser)

@@ -51,7 +51,7 @@ class Summary:
             self._limited[reason.partition(": ")[2]] += 1
 
     def _fixates(self, tick: Tick, dt_s: float) -> bool:
-        """Tell a fixation as an eye tracker does: by the measured speed of the gaze."""
+        """Tell a fixation as an eye tracker does: by the speed of the gaze as the servos have it."""
         before, self._gaze = self._gaze, cyclopean(tick)
         if before is None or dt_s <= 0.0 or tick.gaze.phase == "saccade":
             return False
@@ -71,18 +71,30 @@ class Summary:
                 "median": _percentile_deg(self._errors_mdeg, 50.0),
                 "p95": _percentile_deg(self._errors_mdeg, 95.0),
             },
+            "reckoned": list(reckoned_joints(last)) if last else [],
             "limited": dict(sorted(self._limited.items())),
             "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
         }
 
 
+def reckoned_joints(tick: Tick) -> tuple[str, ...]:
+    """Give the joints whose servos tell nothing: their place is reckoned, not measured."""
+    told = tick.joints.measured
+    if not told:
+        return ()
+    return tuple([n for n, tells in zip(tick.verdict.joints, told, strict=True) if not tells])
+
+
 def cyclopean(tick: Tick) -> Vec3:
-    """Give the mean of the two measured lines of sight, as a unit vector in the world."""
+    """Give the mean of both lines of sight as the servos have them: a unit vector in the world."""
     return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
 
 
 def gaze_error_rad(tick: Tick) -> float:
-    """Give the mean angle of the two measured lines of sight off the intended point."""
+    """Give the mean angle of both lines of sight, as the servos have them, off the intended point.
+
+    Eyes that one linkage turns sideways stay parallel: what that leaves counts too.
+    """
     target, pose = tick.target, tick.pose
     point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, tick.t_s - target.at_s)))
     left = angle_between(line_of_sight(pose, True), sub(point, pose.p_world_eye_left_m))

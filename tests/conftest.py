@@ -1,4 +1,4 @@
-"""What all tests share: steady examples, and programs that start with compiled modules.
+"""What all tests share: steady examples, compiled modules, one thread a process.
 
 Property tests draw the same examples every time; HYPOTHESIS_PROFILE=search draws others.
 """
@@ -16,3 +16,8 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
 # the whole source again: one second of processor time each, in more than a hundred programs.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# Tests run side by side, one worker a core: threads of a numeric library in each of them would
+# only wait for each other. Read when the library loads, so before any test imports it.
+for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):
+    os.environ.setdefault(threads, "1")

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from config.load import load, read_yaml, shipped, shipped_names
-from config.schema import GazeConfig, load_rig
+from config.rig import GazeConfig
+from config.schema import load_rig
 from gaze.angles import rotation
 from gaze.attention import Attention
 from gaze.bottom_up import BottomUp

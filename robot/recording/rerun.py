@@ -27,6 +27,8 @@ from robot.summary import Summary
 
 Joints = Literal["recorded", "emulated"]
 
+_LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
+
 
 class Rerun(NamedTuple):
     """What came out of doing a run again.
@@ -108,6 +110,7 @@ class _Again:
         first = next(moments, None)
         if first is None:
             raise SetupError(f"{recording.path} holds no tick: there is nothing to run again")
+        self._see_joints(first.tick.verdict.joints)
         if recording.note:
             self._notes.append(recording.note)
         began_s = self._start(first)
@@ -124,6 +127,20 @@ class _Again:
         now = self._made.sent_digest()
         same = now == end.tx_sha256 if end.tx_sha256 else None
         return self._compared.result(self._joints, same, tuple(self._notes))
+
+    def _see_joints(self, recorded: tuple[str, ...]) -> None:
+        """See that recorded joints are the rig's own; say where the rig has others.
+
+        Raises:
+            drivers.errors.SetupError: they are to be fed to a rig that has others.
+        """
+        names = self._made.robot.body.names
+        if names == recorded:
+            return
+        apart = f"the rig has the joints {', '.join(names)}, the recording {', '.join(recorded)}"
+        if self._body is not None:
+            raise SetupError(f"{apart}: let the servos be emulated")
+        self._notes.append(apart)
 
     def _start(self, first: Moment) -> float:
         """Begin where the recorded run began; give when."""
@@ -213,10 +230,13 @@ class _Decided(NamedTuple):
 
 
 def _decided(tick: Tick) -> _Decided:
+    gaze = tick.gaze
+    if _LOWER_LIDS.isdisjoint(tick.verdict.joints):  # what is asked of absent lids moves nothing
+        gaze = gaze._replace(lower_left=1.0, lower_right=1.0)
     # The reason's words may be put better one day; what they stand for is in the pulls.
     return _Decided(
         repr(tick.target._replace(why="")),
-        repr(tick.gaze),
+        repr(gaze),
         repr(tick.wish_rad),
         repr(tick.verdict.command_rad),
         tick.verdict.level,
@@ -238,6 +258,8 @@ def _short(was: Tick, now: Tick, name: str) -> str:
         return f"{now.gaze.phase}, was {was.gaze.phase}"
     if name == "level":
         return f"{now.verdict.level}, was {was.verdict.level}"
+    if was.verdict.joints != now.verdict.joints:
+        return f"joints {', '.join(now.verdict.joints)}, was {', '.join(was.verdict.joints)}"
     then, again = was.wish_rad, now.wish_rad
     if name == "command":
         then, again = was.verdict.command_rad, now.verdict.command_rad

@@ -16,6 +16,7 @@ from robot.clock import Clock
 from robot.loop import Tick
 from robot.orders import Order, Tune, Value, from_json
 from robot.page.snapshot import target_name
+from robot.summary import reckoned_joints
 
 _TAKEN_UP_S = 1.0
 """Within this the loop must have obeyed; a servo that answers late costs it some 50 ms."""
@@ -169,9 +170,7 @@ class Pulse:
         tick = self._newest
         if tick is None:
             return {"ticks": 0, "stopped": "", "said": []}
-        names, told = tick.verdict.joints, tick.joints.measured
-        measured = zip(names, tick.joints.position_rad, strict=True)
-        reckoned = [name for name, tells in zip(names, told, strict=False) if not tells]
+        measured = zip(tick.verdict.joints, tick.joints.position_rad, strict=True)
         return {
             "ticks": self._ticks,
             "t_s": tick.t_s,
@@ -183,7 +182,7 @@ class Pulse:
             "why": tick.target.why,
             "phase": tick.gaze.phase,
             "joints_deg": {name: round(degrees(angle), 2) for name, angle in measured},
-            "reckoned": reckoned,
+            "reckoned": list(reckoned_joints(tick)),
             "said": list(self._said),
         }
 
