@@ -10,7 +10,15 @@ Source of the packets: Feetech, communication protocol of the SCS and STS series
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from drivers.feetech_packets import STATUS_OVERHEAD, Status, read, statuses
+from drivers.feetech_packets import (
+    BROADCAST,
+    PING,
+    STATUS_OVERHEAD,
+    Status,
+    instruction,
+    read,
+    statuses,
+)
 from drivers.feetech_table import BAUD_RATES, HIGHEST_ID, MODELS, REGISTERS, STEPS_PER_TURN
 from drivers.serial_port import BITS_PER_BYTE, BusPort
 
@@ -128,6 +136,16 @@ def everybody(
     heard = _heard(raw)
     found = (_found(status, baud) for status in heard.answers)
     return tuple(dict.fromkeys(one for one in found if one is not None)), heard.junk
+
+
+def anybody(port: BusPort) -> bool:
+    """Tell whether anyone answers a ping to everybody; their answers may spoil each other."""
+    question = instruction(BROADCAST, PING)
+    port.drain()
+    port.write(question)
+    heard = port.read_until(1 << 12, port.now_s() + REPLY_S)
+    # An adapter that echoes puts the question before the answers.
+    return bool(heard.replace(question, b"", 1))
 
 
 def identify(

@@ -10,6 +10,7 @@ from gaze.angles import add, angle_between, scale, sub, unit
 from gaze.field_of_view import line_of_sight
 from gaze.types import Vec3
 from robot.loop import Tick
+from robot.reckoned import reckoned_joints
 
 _FIXATION_RAD_S = radians(40.0)
 """Slower is fixating; 30 is usual, and one servo step in a 5 ms tick is already 18 deg/s."""
@@ -51,7 +52,7 @@ class Summary:
             self._limited[reason.partition(": ")[2]] += 1
 
     def _fixates(self, tick: Tick, dt_s: float) -> bool:
-        """Tell a fixation as an eye tracker does: by the speed of the gaze as the servos have it."""
+        """Tell a fixation as an eye tracker does: by the speed of the gaze."""
         before, self._gaze = self._gaze, cyclopean(tick)
         if before is None or dt_s <= 0.0 or tick.gaze.phase == "saccade":
             return False
@@ -75,14 +76,6 @@ class Summary:
             "limited": dict(sorted(self._limited.items())),
             "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
         }
-
-
-def reckoned_joints(tick: Tick) -> tuple[str, ...]:
-    """Give the joints whose servos tell nothing: their place is reckoned, not measured."""
-    told = tick.joints.measured
-    if not told:
-        return ()
-    return tuple([n for n, tells in zip(tick.verdict.joints, told, strict=True) if not tells])
 
 
 def cyclopean(tick: Tick) -> Vec3:

@@ -1,6 +1,6 @@
 """The health of servos, loop and picture in words and colours, and why the gaze is where it is."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import atan2, degrees
 from typing import TypeVar
@@ -24,7 +24,9 @@ from robot.page.health import (
 from robot.page.layers import Layers, LayersView
 from robot.page.panel import PanelView
 from robot.page.style import AMBER, RED
+from robot.page.tell import Teller
 from robot.page.traces import Traces, TracesView
+from robot.page.view import News, View
 from robot.page.why import pulls, winner
 from robot.types import (
     Ghost,
@@ -229,6 +231,34 @@ def test_what_nobody_measured_is_drawn_and_named_otherwise(server: viser.ViserSe
     assert panel._of_what.content == ""
     assert shown(1.3, ()) == [False, False, False]
     assert "reckoned" not in view._key.content
+
+
+class Nobody:
+    """A stop button and an ear that take whatever they are told."""
+
+    def tell(self, state: Mapping[str, object]) -> None:
+        self.told = dict(state)
+
+
+def test_who_comes_late_sees_all_panels_as_they_are_now(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    people: dict[int, object] = {}
+    monkeypatch.setattr(server, "get_clients", lambda: people)
+    button = Nobody()
+    view = View(server, Teller(None), button.tell)  # type: ignore[arg-type]
+    view.show(News((replace(snapshot(1.0), target_name="the first"),), None, ended=False))
+    for k in range(20):  # nobody looks
+        view.show(News((snapshot(1.1 + 0.1 * k),), None, ended=False))
+    last = replace(of_six(snapshot(4.0)), target_name="the last", stopped="a test")
+    view.show(News((last,), None, ended=False))
+    assert button.told == {"stopped": "a test", "silent": False, "blind": 6}
+    assert "the first" in view._panel._status.content
+    people[0] = object()
+    view.show(News((), None, ended=False))
+    panel = view._panel
+    assert "the last" in panel._status.content and NO_FEEDBACK in panel._health.content
+    assert len(panel._traces_view._plots) == 3 and panel._traces_view._drawn[0][1]
 
 
 def test_the_menu_of_traces_is_that_of_the_rig(server: viser.ViserServer) -> None:

@@ -7,12 +7,14 @@ X series; the numbers are those of drivers.dynamixel_table.
 from collections.abc import Iterator
 
 from drivers.dynamixel_registers import Registers
-from drivers.dynamixel_scan import SHARED, Found
+from drivers.dynamixel_scan import SHARED
+from drivers.serial_port import BusPort
 from drivers.types import ServoSetup
 from robot.bringup.doctor_patient import Patient, Verdict
 from robot.bringup.doctor_settings import SETTINGS
 from robot.bringup.doctor_state import STATE
 from robot.bringup.findings import Finding, Fix
+from robot.bringup.servo_kind import Found
 
 RULES = (*STATE, *SETTINGS)
 
@@ -41,6 +43,15 @@ READ = (
     "present_temperature",
 )
 """The registers that are looked at."""
+
+
+def visit(port: BusPort, setup: ServoSetup, found: Found, garbled: int) -> list[Finding]:
+    """Read one servo and judge it; torque is left as it is.
+
+    Raises:
+        drivers.errors.BusLost: the port is gone.
+    """
+    return examine(take(Registers(port), setup, found, garbled))
 
 
 def take(registers: Registers, setup: ServoSetup, found: Found, garbled: int) -> Patient:

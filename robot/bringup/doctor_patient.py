@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drivers.dynamixel_scan import Found
 from drivers.dynamixel_table import MODELS, Model
+from drivers.servo_models import SERVOS
 from drivers.types import ServoSetup
 from robot.bringup.findings import Level
+from robot.bringup.servo_kind import Found
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,5 +48,7 @@ Rule = Callable[[Patient], Iterator[Verdict]]
 
 
 def name_servo(setup: ServoSetup) -> str:
-    """Name a joint with its servo."""
-    return f"{setup.name} (servo {setup.id})" if setup.name else f"servo {setup.id}"
+    """Name a joint with its servo, or with its channel where it is a hobby servo."""
+    facts = SERVOS.get(setup.model)
+    noun = "channel" if facts is not None and facts.bus == "maestro" else "servo"
+    return f"{setup.name} ({noun} {setup.id})" if setup.name else f"{noun} {setup.id}"

@@ -8,9 +8,14 @@ Level = Literal["ok", "note", "warn", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "note", "warn", "error")
 
 
+BOARD = -1
+"""In place of a servo's id: the board that servos hang on."""
+
+
 class Fix(NamedTuple):
     """One register write that mends something and moves nothing.
 
+    servo_id: ``BOARD`` for the board itself, whose "registers" are what can be told to it
     was: the value found, None where it could not be read
     """
 

@@ -1,37 +1,15 @@
-"""Restarting one servo: the only way but the power switch to clear a latched error."""
+"""Restarting one servo: on a Dynamixel the only way but the switch to clear a latched error."""
 
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drivers.dynamixel_registers import Registers
-from drivers.dynamixel_scan import Found, ping, reboot
-from drivers.dynamixel_table import name_errors
-from drivers.errors import ServoMissing
+from drivers.errors import ServoFault, ServoMissing
 from drivers.serial_port import BusPort
+from robot.bringup.servo_kind import Found, ServoKind, Standing
 
 BACK_S = 3.0
-"""A servo that is not back after so long will not come; they take about 0.4 s."""
+"""A servo that is not back after so long will not come; they take about 0.4 to 0.8 s."""
 PAUSE_S = 0.1
-
-
-class Standing(NamedTuple):
-    """How a servo stands.
-
-    errors: latched hardware errors by name
-    torque: None where it could not be read; position: in steps, None likewise
-    """
-
-    errors: tuple[str, ...]
-    torque: bool | None
-    position: int | None
-    voltage_v: float | None
-
-    def __str__(self) -> str:
-        """Say it in a line."""
-        latched = f"latched: {' and '.join(self.errors)}" if self.errors else "nothing latched"
-        torque = {None: "torque unknown", False: "torque off", True: "torque on"}[self.torque]
-        volts = "" if self.voltage_v is None else f", {self.voltage_v:.1f} V"
-        return f"{latched}, {torque}, at step {self.position}{volts}"
 
 
 class Rebooted(NamedTuple):
@@ -42,13 +20,13 @@ class Rebooted(NamedTuple):
     away_s: float
 
 
-def present(port: BusPort, servo_id: int, baud: int) -> Found:
+def present(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> Found:
     """Find one servo.
 
     Raises:
         drivers.errors.ServoMissing: it does not answer.
     """
-    found = ping(port, servo_id, baud, tries=3)
+    found = kind.ping(port, servo_id, baud, 3)
     if found is None:
         raise ServoMissing(
             f"{port.port_name}: servo {servo_id} does not answer at {baud} bit/s: "
@@ -57,37 +35,35 @@ def present(port: BusPort, servo_id: int, baud: int) -> Found:
     return found
 
 
-def standing(port: BusPort, servo_id: int) -> Standing:
-    """Read how a servo stands."""
-    registers = Registers(port)
-    status = registers.read(servo_id, "hardware_error_status")
-    torque = registers.read(servo_id, "torque_enable")
-    volts = registers.read(servo_id, "present_input_voltage")
-    return Standing(
-        name_errors(status or 0),
-        None if torque is None else bool(torque),
-        registers.read(servo_id, "present_position"),
-        None if volts is None else volts / 10.0,
-    )
-
-
 def restart(
-    port: BusPort, servo_id: int, baud: int, sleep_until: Callable[[float], None]
+    port: BusPort,
+    kind: ServoKind,
+    servo_id: int,
+    baud: int,
+    sleep_until: Callable[[float], None],
 ) -> Rebooted:
     """Restart a servo and wait until it answers; its torque is off then.
 
     Raises:
         drivers.errors.ServoMissing: it does not answer, before or after.
+        drivers.errors.ServoFault: it answers, but has not restarted.
         drivers.errors.BusLost: the port is gone.
     """
-    present(port, servo_id, baud)
-    before, began_s = standing(port, servo_id), port.now_s()
-    reboot(port, servo_id)
+    present(port, kind, servo_id, baud)
+    before, began_s = kind.standing(port, servo_id), port.now_s()
+    kind.reboot(port, servo_id)
     for _ in range(round(BACK_S / PAUSE_S)):
         sleep_until(port.now_s() + PAUSE_S)
-        if ping(port, servo_id, baud, tries=1) is not None:
-            away_s = port.now_s() - began_s
-            return Rebooted(before, standing(port, servo_id), away_s)
+        if kind.ping(port, servo_id, baud, 1) is None:
+            continue
+        away_s = port.now_s() - began_s
+        after = kind.standing(port, servo_id)
+        if before.torque and after.torque:
+            raise ServoFault(
+                f"{port.port_name}: servo {servo_id} has not restarted, its torque is still on: "
+                "its firmware may not know how; switch its power off and on"
+            )
+        return Rebooted(before, after, away_s)
     raise ServoMissing(
         f"{port.port_name}: servo {servo_id} does not come back after its restart: "
         "switch its power off and on"

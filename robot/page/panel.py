@@ -108,7 +108,11 @@ class PanelView:
     def silent(self) -> None:
         """Say that the rig sends nothing any more."""
         self._status.content = silence()
-        self._shown = 0  # the next words come at once
+        self.draw_all()
+
+    def draw_all(self) -> None:
+        """Draw everything at the next picture, whoever's turn it is."""
+        self._shown = 0
 
     def show_picture(self, jpeg: bytes) -> None:
         """Draw the camera picture; one that cannot be decoded is skipped."""

@@ -147,7 +147,7 @@ class View:
         self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
         self._jpeg: bytes | None = None
-        self._drawn = False
+        self._drawn = self._watched = False
         self._add_views()
 
     def _ask_depth(self, on: bool) -> None:
@@ -171,7 +171,11 @@ class View:
             self._newest = news.snapshots[-1]
             self._tell(self._stop_state())
         self._jpeg = news.jpeg or self._jpeg
-        if self._server.get_clients() or not self._drawn:
+        watched = bool(self._server.get_clients())
+        if watched and not self._watched:  # who comes late may find a rig that stands still
+            self._panel.draw_all()
+        self._watched = watched
+        if watched or not self._drawn:
             with self._server.atomic():  # a browser never sees half of a snapshot
                 self._draw()
 

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gaze.types import PART_NAMES, Floats
+from robot.reckoned import PARTLY, RECKONED, Basis
 from robot.recording.gaze_angles import Trace
 from robot.recording.gaze_labels import Labels, Stretch
 
@@ -27,6 +28,11 @@ _EVENT_COLUMNS = (
     "onset", "duration", "trial_type", "amplitude", "peak_velocity", "target", "part", "message",
 )  # fmt: skip
 _MISSING = "n/a"
+_METHODS: dict[Basis, str] = {
+    "measured": "servo encoders",
+    "partly reckoned": f"servo encoders, {PARTLY}",
+    "reckoned": RECKONED,
+}
 
 
 class About(NamedTuple):
@@ -82,17 +88,30 @@ def label_of(name: str) -> str:
 
 
 def _eyes(trace: Trace) -> tuple[_Eye, ...]:
-    opening = "opening of the upper lid, 0 shut .. 1 open"
     head = [
         (f"head_{name}", "deg", says, trace.head_deg[:, k])
         for k, (name, says) in enumerate(
             (("yaw", "head in space, + to its left"), ("pitch", "+ up"), ("roll", "+ right ear"))
         )
+        if f"neck_{name}" in trace.joints
     ]
     return (
-        _Eye("eye1", "left", trace.left_deg, (("lid", "1", opening, trace.lids[:, 0]),)),
-        _Eye("eye2", "right", trace.right_deg, (("lid", "1", opening, trace.lids[:, 1]),)),
+        _Eye("eye1", "left", trace.left_deg, _lids(trace, "left", 0)),
+        _Eye("eye2", "right", trace.right_deg, _lids(trace, "right", 1)),
         _Eye("eye3", "cyclopean", trace.cyclopean_deg, tuple(head)),
+    )
+
+
+def _lids(trace: Trace, side: str, k: int) -> tuple[tuple[str, str, str, Floats], ...]:
+    """Give the columns of one eye's lids, those that are there."""
+    every = (
+        ("lid", "upper", trace.lids[:, k]),
+        ("lower_lid", "lower", trace.lower_lids[:, k]),
+    )
+    return tuple(
+        (name, "1", f"opening of the {which} lid, 0 shut .. 1 open", openings)
+        for name, which, openings in every
+        if f"{side}_{which}_lid" in trace.joints
     )
 
 
@@ -108,7 +127,9 @@ def _write_frame(root: Path, subject: str, about: About) -> Iterator[Path]:
         "# Gaze of an animatronic head\n\nThe participants are robots. What an eye tracker would\n"
         "have measured is taken from the angles of their servos: lines of sight in space, x + to\n"
         "the robot's own left and y + up, in degrees. Events are what the robot's models did, as\n"
-        "they say themselves, moved by the lag of its eyes; amplitudes and speeds are measured.\n"
+        "they say themselves, moved by the lag of its eyes; amplitudes and speeds are those of\n"
+        "the samples. GazeBasis tells samples that were measured from those that were reckoned\n"
+        "from commands, as the servos of some robots tell nothing.\n"
     )
     columns = {"species": {"Description": "what the participant is"}}
     for path, text in (
@@ -133,6 +154,7 @@ def _write_frame(root: Path, subject: str, about: About) -> Iterator[Path]:
 def _write_eye(
     stem: Path, eye: _Eye, trace: Trace, about: About, labels: Labels
 ) -> tuple[Path, Path]:
+    basis = trace.basis(eye.recorded)
     sidecar: dict[str, object] = {
         "TaskName": about.task,
         "Columns": ["timestamp", "x_coordinate", "y_coordinate", *(m[0] for m in eye.more)],
@@ -141,7 +163,9 @@ def _write_eye(
         "PhysioType": "eyetrack",
         "RecordedEye": eye.recorded,
         "SampleCoordinateSystem": "gaze-in-world",
-        "EyeTrackingMethod": "servo encoders",
+        "EyeTrackingMethod": _METHODS[basis],
+        "GazeBasis": basis,
+        "ReckonedJoints": list(trace.reckoned),
         "Manufacturer": "gazerig",
         "ManufacturersModelName": about.subject,
         "DeviceSerialNumber": _MISSING,

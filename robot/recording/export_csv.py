@@ -1,23 +1,31 @@
 """A run as CSV that eye-tracking tools and spreadsheets open: samples, events, fixations.
 
-Angles and signs are those of robot.recording.gaze_angles; an empty cell is a lost eye.
+Angles and signs are those of robot.recording.gaze_angles; an empty cell is a lost eye. Beside
+the samples stands what they rest on, as JSON: servos that measured, or such as tell nothing.
 """
 
 import csv
-from collections.abc import Iterable, Iterator, Sequence
+import json
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from math import isfinite
 from pathlib import Path
+
+import numpy as np
 
 from robot.recording.gaze_angles import MOVEMENTS, Trace
 from robot.recording.gaze_labels import Labels, Stretch
 
-SAMPLES = (
+_GAZE = (
     "time_s", "x_deg", "y_deg", "left_x_deg", "left_y_deg", "right_x_deg", "right_y_deg",
-    "head_yaw_deg", "head_pitch_deg", "head_roll_deg", "left_lid", "right_lid",
-    "event", "movement", "target", "part",
 )  # fmt: skip
-"""x_deg, y_deg: the cyclopean gaze; lids: 0 shut .. 1 open; event: blink, else the movement;
-target, part: what the eyes are on, and in a saccade what they go to."""
+_HEAD = {
+    "neck_yaw": "head_yaw_deg", "neck_pitch": "head_pitch_deg", "neck_roll": "head_roll_deg",
+}  # fmt: skip
+_LIDS = {
+    "left_upper_lid": "left_lid", "right_upper_lid": "right_lid",
+    "left_lower_lid": "left_lower_lid", "right_lower_lid": "right_lower_lid",
+}  # fmt: skip
+_LABELS = ("event", "movement", "target", "part")
 
 EVENTS = ("onset_s", "duration_s", "event", "amplitude_deg", "peak_deg_s", "target", "part")
 FIXATIONS = ("start_s", "duration_s", "part", "target")
@@ -27,19 +35,47 @@ FIXATIONS = ("start_s", "duration_s", "part", "target")
 def write_csv(
     trace: Trace, labels: Labels, stretches: Sequence[Stretch], stem: Path
 ) -> tuple[Path, ...]:
-    """Write STEM_samples.csv, STEM_events.csv and STEM_fixations.csv; give their paths.
+    """Write STEM_samples.csv, _events.csv, _fixations.csv and _samples.json; give their paths.
 
     Raises:
         OSError: they cannot be written.
     """
     made = (
-        ("samples", SAMPLES, _sample_rows(trace, labels)),
+        ("samples", columns(trace.joints), _sample_rows(trace, labels)),
         ("events", EVENTS, map(_event_row, stretches)),
         ("fixations", FIXATIONS, _fixation_rows(stretches)),
     )
-    return tuple(
+    tables = tuple(
         _write(stem.with_name(f"{stem.name}_{kind}.csv"), names, rows) for kind, names, rows in made
     )
+    beside = stem.with_name(f"{stem.name}_samples.json")
+    beside.write_text(json.dumps(_rests_on(trace), indent=2) + "\n", encoding="utf-8")
+    return (*tables, beside)
+
+
+def columns(joints: Collection[str]) -> tuple[str, ...]:
+    """Give the columns of the samples of a rig with these joints.
+
+    x_deg, y_deg: the cyclopean gaze; lids: 0 shut .. 1 open; event: blink, else the movement;
+    target, part: what the eyes are on, and in a saccade what they go to
+    """
+    there = [name for joint, name in (_HEAD | _LIDS).items() if joint in joints]
+    return (*_GAZE, *there, *_LABELS)
+
+
+def _rests_on(trace: Trace) -> dict[str, object]:
+    """Say of each group of columns whether it was measured."""
+    gaze = {"x_deg y_deg": "cyclopean", "left_*_deg": "left", "right_*_deg": "right"}
+    more = {"head_*_deg": ("head", _HEAD), "*_lid": ("lids", _LIDS)}
+    there = {
+        key: of for key, (of, joints) in more.items() if not joints.keys().isdisjoint(trace.joints)
+    }
+    return {
+        "joints": list(trace.joints),
+        "reckoned_joints": list(trace.reckoned),
+        "basis": {key: trace.basis(of) for key, of in (gaze | there).items()},
+        "reckoned": "from commands and known servo speeds, not measured",
+    }
 
 
 def number(value: float | None, decimals: int = 4) -> str:
@@ -56,12 +92,15 @@ def _write(path: Path, names: Sequence[str], rows: Iterable[Sequence[str]]) -> P
 
 
 def _sample_rows(trace: Trace, labels: Labels) -> Iterator[list[str]]:
-    columns = zip(
+    head = [joint in trace.joints for joint in _HEAD]
+    lid = [joint in trace.joints for joint in _LIDS]
+    rows = zip(
         trace.time_s.tolist(), trace.cyclopean_deg.tolist(), trace.left_deg.tolist(),
-        trace.right_deg.tolist(), trace.head_deg.tolist(), trace.lids.tolist(),
+        trace.right_deg.tolist(), trace.head_deg[:, head].tolist(),
+        np.hstack([trace.lids, trace.lower_lids])[:, lid].tolist(),
         labels.event(), labels.movement.tolist(), labels.looked_at.tolist(), strict=True,
     )  # fmt: skip
-    for time_s, *angles, lids, event, movement, looked_at in columns:
+    for time_s, *angles, lids, event, movement, looked_at in rows:
         name = trace.names[looked_at]
         yield [
             number(time_s, 6),

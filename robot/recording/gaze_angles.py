@@ -8,7 +8,8 @@ y  pitch above the level, + up
 0, 0 is level and straight ahead of the base. The cyclopean gaze is the mean of both eyes'
 unit lines of sight. These are angles of Fick: a turn in x of 1 deg moves the gaze by
 cos(y) deg. Where a servo that an angle rests on gave no fresh answer in a tick, the angle is
-NaN: the eye was lost, as an eye tracker says it.
+NaN: the eye was lost, as an eye tracker says it. So is what the rig has no joint for. Angles of
+servos that tell nothing are reckoned: their goals, moved by the speeds they are known to have.
 """
 
 from array import array
@@ -24,6 +25,7 @@ from gaze.field_of_view import line_of_sight
 from gaze.types import Angles2, Floats, GazeState, Target, Vec3
 from robot.loop import Tick
 from robot.orders import Jog, Order, Stop
+from robot.reckoned import Basis, basis_of, reckoned_joints
 
 Ints = NDArray[np.int64]
 
@@ -32,9 +34,16 @@ MOVEMENTS = ("", "fixation", "saccade", "pursuit")
 
 _CODE = {"fixate": 1, "saccade": 2, "pursue": 3}
 _ARRIVED_RAD = 0.009  # half a degree: nearer than that a new target needs no saccade
-_NECK = frozenset(("neck_yaw", "neck_pitch", "neck_roll"))
-_LEFT = _NECK | {"left_eye_pan", "left_eye_tilt"}
-_RIGHT = _NECK | {"right_eye_pan", "right_eye_tilt"}
+_NECK_AXES = ("neck_yaw", "neck_pitch", "neck_roll")
+_LIDS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
+_NECK = frozenset(_NECK_AXES)
+_BOTH = _NECK | {"eyes_pan", "eyes_tilt"}
+_LEFT = _BOTH | {"left_eye_pan", "left_eye_tilt"}
+_RIGHT = _BOTH | {"right_eye_pan", "right_eye_tilt"}
+_RESTS_ON = {
+    "left": _LEFT, "right": _RIGHT, "cyclopean": _LEFT | _RIGHT, "head": _NECK,
+    "lids": frozenset(_LIDS),
+}  # fmt: skip
 _LOST: Angles2 = (nan, nan)
 
 
@@ -57,12 +66,14 @@ class Trace(NamedTuple):
     """One run as columns of n ticks.
 
     start_s: clock of the rig at the first tick; time_s: (n,) since then
-    left_deg, right_deg, cyclopean_deg: (n, 2) x and y as measured, NaN where lost
-    head_deg: (n, 3) yaw + left, pitch + up, roll + right ear down; lids: (n, 2) 0 shut .. 1 open
+    left_deg, right_deg, cyclopean_deg: (n, 2) x and y as the servos have them, NaN where lost
+    head_deg: (n, 3) yaw + left, pitch + up, roll + right ear down, NaN without such a joint
+    lids, lower_lids: (n, 2) left and right, 0 shut .. 1 open, NaN without such a joint
     planned_deg: (n, 2) cyclopean x and y that were wished for
     movement: (n,) index in MOVEMENTS, as planned; blink: (n,) whether one was planned
     looked_at: (n,) index in names, as planned
     messages: what happened and was asked for, (time_s, words) in order
+    joints: names of the rig's joints; reckoned: those whose servos tell nothing
     """
 
     start_s: float
@@ -78,11 +89,18 @@ class Trace(NamedTuple):
     looked_at: Ints
     names: tuple[LookedAt, ...]
     messages: tuple[tuple[float, str], ...]
+    lower_lids: Floats
+    joints: tuple[str, ...]
+    reckoned: tuple[str, ...]
 
     @property
     def rate_hz(self) -> float:
         """Give the usual rate of the ticks."""
         return 1.0 / float(np.median(np.diff(self.time_s)))
+
+    def basis(self, of: str) -> Basis:
+        """Tell whether "left", "right" or "cyclopean" gaze, "head" or "lids" are measured."""
+        return basis_of(self.joints, self.reckoned, _RESTS_ON[of].__contains__)
 
 
 def in_space(pose: GazeState) -> InSpace:
@@ -116,6 +134,8 @@ class Tracing:
         self._fixated: Target | None = None
         self._saccades = 0
         self._jogged = False
+        self._joints: tuple[str, ...] = ()
+        self._reckoned: dict[str, None] = {}
 
     def note(self, tick: Tick) -> None:
         """Add a tick."""
@@ -124,17 +144,17 @@ class Tracing:
         pose, missing = tick.pose, tick.joints.missing
         left, right, cyclopean = in_space(pose)
         planned = _degrees(sub(tick.gaze.gaze_point_world_m, pose.p_world_head_m))
-        lids = (pose.lid_left, pose.lid_right)
+        lids = (pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right)
         head = tuple(map(degrees, pose.head_rad))
+        self._joints = tick.verdict.joints
+        self._reckoned.update(dict.fromkeys(reckoned_joints(tick)))
         if missing:
             lost_left, lost_right = not _LEFT.isdisjoint(missing), not _RIGHT.isdisjoint(missing)
             cyclopean = _LOST if lost_left or lost_right else cyclopean
             left, right = _LOST if lost_left else left, _LOST if lost_right else right
             head = (nan, nan, nan) if not _NECK.isdisjoint(missing) else head
-            lids = (
-                nan if "left_upper_lid" in missing else lids[0],
-                nan if "right_upper_lid" in missing else lids[1],
-            )
+            lost_lids = [nan if n in missing else o for n, o in zip(_LIDS, lids, strict=True)]
+            lids = (lost_lids[0], lost_lids[1], lost_lids[2], lost_lids[3])
         time_s = tick.t_s - self._start_s
         self._angles.extend((time_s, *left, *right, *cyclopean, *head, *lids, *planned))
         self._note_orders(tick, time_s)
@@ -148,14 +168,17 @@ class Tracing:
         Raises:
             ValueError: there are fewer than two ticks.
         """
-        a = np.array(self._angles).reshape(-1, 14)
+        a = np.array(self._angles).reshape(-1, 16)
         codes = np.array(self._codes, np.int64).reshape(-1, 3)
         if len(a) < 2 or self._start_s is None:
             raise ValueError("fewer than two ticks: there is nothing to export")
+        for column, joint in enumerate((*_NECK_AXES, *_LIDS), start=7):
+            if joint not in self._joints:
+                a[:, column] = nan
         return Trace(
             self._start_s, a[:, 0], a[:, 1:3], a[:, 3:5], a[:, 5:7], a[:, 7:10], a[:, 10:12],
-            a[:, 12:14], codes[:, 0], codes[:, 1] > 0, codes[:, 2], tuple(self._numbers),
-            tuple(self._messages),
+            a[:, 14:16], codes[:, 0], codes[:, 1] > 0, codes[:, 2], tuple(self._numbers),
+            tuple(self._messages), a[:, 12:14], self._joints, tuple(self._reckoned),
         )  # fmt: skip
 
     def _note_orders(self, tick: Tick, time_s: float) -> None:

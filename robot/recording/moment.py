@@ -57,9 +57,7 @@ class Moment(NamedTuple):
     before: tuple[Heard, ...] = ()
 
 
-_ONCE_ALL = tuple(
-    [name for name in JOINTS if not name.startswith("eyes_") and "lower" not in name]
-)
+_ONCE_ALL = tuple([name for name in JOINTS if not name.startswith("eyes_") and "lower" not in name])
 """The joints of a recording that does not name them: every rig had these."""
 
 _HEARD: dict[str, type[Heard]] = {"engaged": Engaged, "measured": Measured, "refused": Refused}

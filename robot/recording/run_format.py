@@ -91,8 +91,11 @@ _TICK = _says(
         t_s=_says(_NUMBER, "the rig's own time, s"),
         dt_s=_says(_NUMBER, "since the tick before, s"),
         joints=_says(_JOINTS, "as measured, in the order of verdict.joints"),
-        pose=_says(_GAZE_STATE, "head and eyes as joints.measured says; yaw + left, pitch + up; "
-                   "lids 0 shut .. 1 open, 1 where there is none"),
+        pose=_says(
+            _GAZE_STATE,
+            "head and eyes as joints.measured says; yaw + left, pitch + up; "
+            "lids 0 shut .. 1 open, 1 where there is none",
+        ),
         percept={"type": ["integer", "null"], "description": "number of the /rig/percept in force"},
         target=_says(_TARGET, "where to look and why, the strongest pulls term by term"),
         gaze=_says(_GAZE_COMMAND, "what the models wish"),

@@ -16,7 +16,7 @@ from robot.clock import Clock
 from robot.loop import Tick
 from robot.orders import Order, Tune, Value, from_json
 from robot.page.snapshot import target_name
-from robot.summary import reckoned_joints
+from robot.reckoned import reckoned_joints
 
 _TAKEN_UP_S = 1.0
 """Within this the loop must have obeyed; a servo that answers late costs it some 50 ms."""

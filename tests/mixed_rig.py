@@ -1,0 +1,28 @@
+"""A rig of three kinds of bus: the maker's eyes on a neck of two smart servos."""
+
+from pathlib import Path
+
+MAKER = Path(__file__).parents[1] / "config" / "rigs" / "maker.yaml"
+
+NECK = """
+buses:
+  neck:
+    port: /dev/ttyUSB0
+    kind: dynamixel
+  tilt:
+    port: /dev/ttyACM1
+    kind: feetech
+"""
+NECK_JOINTS = """
+  neck_yaw: {id: 7, model: xc330-m288, bus: neck, min_deg: -60.0, max_deg: 60.0,
+    max_speed_deg_s: 200.0, max_accel_deg_s2: 2000.0}
+  neck_pitch: {id: 1, model: sts3215, bus: tilt, min_deg: -25.0, max_deg: 25.0,
+    max_speed_deg_s: 150.0, max_accel_deg_s2: 1500.0}
+"""
+
+
+def mixed_text() -> str:
+    """Write the maker's eyes on a neck of one Dynamixel and one Feetech servo."""
+    text = MAKER.read_text(encoding="utf-8")
+    text = text.replace("\njoints:", f"{NECK}\njoints:")
+    return text.replace("\nlid_joints:", f"{NECK_JOINTS}\nlid_joints:")

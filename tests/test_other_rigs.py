@@ -1,0 +1,120 @@
+"""The maker's eyes, the Feetech head and a rig of three kinds of bus, alive in simulated time."""
+
+from math import degrees, radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mixed_rig import mixed_text
+
+from config.schema import Rig, load_rig
+from robot.assemble import Assembly, assemble
+from robot.choice import Choice
+from robot.loop import Tick, run
+
+
+def ran(rig: Rig, seconds: float, seed: int = 0) -> tuple[Assembly, list[Tick], tuple[str, ...]]:
+    """Run a rig before a visitor; gives what ran, every tick, and what was said at the start."""
+    made = assemble(rig, Choice(mock=True, fast=True, seed=seed, scene="visitor"))
+    ticks: list[Tick] = []
+    made.robot.start(made.clock)
+    said = made.robot.body.bus.events()
+
+    def over(s: float) -> str | None:
+        return "over" if s >= seconds else None
+
+    count = run(made.robot, made.clock, made.loop, over, ticks.append)
+    assert count.stopped_by == "over"
+    return made, ticks, said
+
+
+def rig_of(name: str, tmp_path: Path) -> Rig:
+    if name != "mixed":
+        return load_rig(name)
+    file = tmp_path / "mixed.yaml"
+    file.write_text(mixed_text(), encoding="utf-8")
+    return load_rig(str(file))
+
+
+@pytest.mark.parametrize("name", ["maker", "feetech", "mixed"])
+def test_it_looks_at_its_visitor_blinks_and_lets_go(name: str, tmp_path: Path) -> None:
+    rig = rig_of(name, tmp_path)
+    made, ticks, _ = ran(rig, 8.0)
+    robot = made.robot
+    last = ticks[-1]
+    assert all(len(t.wish_rad) == len(rig.names) == len(t.joints.position_rad) for t in ticks)
+    assert last.gaze.saccades > 10 and last.gaze.blinks >= 1
+    assert {t.target.kind for t in ticks[400:]} >= {"face"}
+    # Both eyes' mean line of sight is on the point that is looked at.
+    on = [t for t in ticks[600:] if t.target.kind == "face" and t.gaze.phase == "fixate"]
+    eyes = np.array([(t.pose.eye_left_rad, t.pose.eye_right_rad) for t in on]).mean(axis=1)
+    wish = np.array([(t.gaze.eye_left_rad, t.gaze.eye_right_rad) for t in on]).mean(axis=1)
+    assert np.degrees(np.median(np.abs(eyes - wish))) < 0.6
+    assert robot.park(made.park_rad, made.clock, made.loop)
+    robot.stop()
+    made.close()
+
+
+def test_the_makers_eyes_have_no_neck_to_move() -> None:
+    _, ticks, said = ran(load_rig("maker"), 4.0)
+    assert any("no positions" in line for line in said)
+    for tick in ticks:
+        assert tick.pose.head_rad == (0.0, 0.0, 0.0)
+        assert tick.pose.eye_left_rad == tick.pose.eye_right_rad
+        assert tick.joints.measured == (False,) * 6
+        assert tick.joints.temperature_c == (None,) * 6
+        assert not any("not moving" in reason for reason in tick.verdict.reasons)
+
+
+def test_four_lids_follow_and_meet() -> None:
+    rig = load_rig("maker")
+    _, ticks, _ = ran(rig, 12.0)
+    i = {name: k for k, name in enumerate(rig.names)}
+    wish = np.degrees([t.verdict.command_rad for t in ticks])
+    shut = np.flatnonzero([t.gaze.lid_left == 0.0 for t in ticks])
+    assert len(shut) > 3  # some blink shuts all the way
+    at = shut[len(shut) // 2]
+    ends = rig.lid_joints
+    assert ticks[at].wish_rad[i["left_upper_lid"]] == pytest.approx(radians(ends.left_shut_deg))
+    assert ticks[at].gaze.lower_left == 0.0
+    # Between blinks the lids go with the eyes: upper and lower the same way.
+    open_ = [k for k, t in enumerate(ticks) if not t.gaze.blink and k > 600]
+    tilt = wish[open_, i["eyes_tilt"]]
+    upper, lower = wish[open_, i["left_upper_lid"]], wish[open_, i["left_lower_lid"]]
+    assert np.ptp(tilt) > 2.0
+    assert np.corrcoef(tilt, upper)[0, 1] > 0.6  # looks up: the upper lid opens
+    assert np.corrcoef(tilt, lower)[0, 1] < -0.6  # and the lower one follows it up: less open
+
+
+@pytest.mark.parametrize("name", ["maker", "feetech", "mixed"])
+def test_same_seed_same_bytes(name: str, tmp_path: Path) -> None:
+    rig = rig_of(name, tmp_path)
+    sent = []
+    for seed in (3, 3, 4):
+        made, _, _ = ran(rig, 1.5, seed)
+        sent.append(made.sent_digest())
+        made.close()
+    assert sent[0] == sent[1] != sent[2]
+
+
+def test_true_servos_keep_to_their_joints_ranges(tmp_path: Path) -> None:
+    """What the emulated shafts do, not what anybody believes of them."""
+    rig = rig_of("mixed", tmp_path)
+    made = assemble(rig, Choice(mock=True, fast=True, seed=1, scene="boxing"))
+    from robot.emulated_rig import place_of
+
+    ports = [share.bus._port for share in made.robot.body.bus._shares]  # type: ignore[attr-defined]
+    devices = dict(zip(("", "neck", "tilt"), (port.chain for port in ports), strict=True))
+    worst = dict.fromkeys(rig.names, 0.0)
+
+    def look(tick: Tick) -> None:
+        for name, joint in rig.joints.items():
+            place = devices[joint.bus].positions_steps()[place_of(rig, name)]
+            angle = degrees(joint.angle_rad(place))
+            worst[name] = max(worst[name], angle - joint.max_deg, joint.min_deg - angle)
+
+    made.robot.start(made.clock)
+    run(made.robot, made.clock, made.loop, lambda s: "over" if s >= 6.0 else None, look)
+    assert max(worst.values()) < 0.6, worst
+    made.robot.stop()
+    made.close()
