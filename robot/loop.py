@@ -135,6 +135,8 @@ class Robot:
         self._puppet_shifts = 0
         self._jogged: JointAngles = ()
         self._last: JointAngles = ()
+        # The models lead again: they begin where this tick finds head and eyes.
+        self._takes_over = False
         self.stopped = ""
         self.tune: Callable[[Tune, float], tuple[str, ...]] = _not_tunable
         self._told: list[str] = []
@@ -219,6 +221,9 @@ class Robot:
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
         self._poses.remember(t_s, pose.head_rad)
+        if self._takes_over:
+            self._takes_over = False
+            self._oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
         target = self._led(self.attention.choose(percept, pose, t_s), t_s)
@@ -320,8 +325,7 @@ class Robot:
         """Hold all joints but those given; without any, let the models lead again."""
         if not angles_rad:
             if self._jogged:
-                joints = self.body.read(t_s)
-                self._oculomotor.reset(t_s, self._kinematics.forward(joints))
+                self._takes_over = True
                 self._guard.go_gently()
             self._jogged = ()
             return
@@ -351,7 +355,7 @@ class Robot:
         self.stopped = ""
         self._told.append("torque on again: going on slowly")
         self._guard.reset(t_s, goals)
-        self._oculomotor.reset(t_s, self._kinematics.forward(self.body.read(t_s)))
+        self._takes_over = True
 
 
 def _at_rest(

@@ -134,6 +134,6 @@ def test_a_full_blink_shuts_all_lids_whose_share_is_whole(
 
 
 def test_the_tail_of_an_opening_never_passes_the_open_lid() -> None:
-    # The tail comes out at -4e-16 there, were it not for the bound.
-    since_s = np.linspace(0.11, 0.285, 5001)
-    assert min(closure(float(s), 0.075, 0.035, 0.175) for s in since_s) == 0.0
+    # The tail comes out at -1.3e-15 there, were it not for the bound.
+    shut = [closure(1.0 + s, 0.0, 1.0, 1.0) for s in np.linspace(0.9, 1.0, 4001)]
+    assert min(shut) == 0.0

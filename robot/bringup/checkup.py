@@ -1,4 +1,4 @@
-"""A rig's whole bus examined: who is there, at which baud rate, and how each servo is.
+"""A whole bus of a rig examined: who is there, at which baud rate, and how each servo is.
 
 Reads only; ``mend`` writes what the findings offer, to servos whose torque is off, and
 moves nothing.
@@ -9,19 +9,15 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drivers.dynamixel_registers import Registers
-from drivers.dynamixel_scan import COMMON_FIRST, Found, everybody, garbled, ping, scan
 from drivers.errors import DriverError, PortError
 from drivers.serial_port import BusPort
 from drivers.serial_ports import WISHED_LATENCY_MS, Host, latency_file, latency_ms, set_latency
+from drivers.servo_models import BusKind
 from drivers.types import ServoSetup
-from robot.bringup.doctor import examine, take
 from robot.bringup.doctor_patient import name_servo
-from robot.bringup.doctor_port import examine_latency, examine_port, port_facts
-from robot.bringup.findings import Finding, Fix, worst
-
-Tell = Callable[[str], None]
-"""Is told in a few words what is being done now."""
+from robot.bringup.doctor_port import examine_latency, examine_owner, examine_port, port_facts
+from robot.bringup.findings import Finding, worst
+from robot.bringup.servo_kind import Found, ServoKind, Tell
 
 
 class Presence(NamedTuple):
@@ -52,20 +48,23 @@ class Done:
 
 
 def check_all(
-    port: BusPort, setups: Sequence[ServoSetup], baud: int, host: Host, tell: Tell
+    port: BusPort, kind: BusKind, host: Host, examine: Callable[[], list[Finding]]
 ) -> list[Finding]:
-    """Examine the port and, where it can be used, every servo; the port is closed after it.
+    """Examine a port and, where it can be used, what is behind it; the port is closed after it.
 
     What goes wrong on the way is among the findings.
+
+    kind: what is asked there; examine: asks it
     """
     device = port.port_name
-    findings = examine_port(port_facts(device, host))
+    facts = port_facts(device, host)
+    findings = [*examine_port(facts), *examine_owner(facts, kind)]
     if worst(findings) == "error":
-        return findings
+        return [finding for finding in findings if finding.level != "ok"]
     try:
-        servos = check(port, setups, baud, tell)
+        behind = examine()
         # While it is open: the program asks the adaptor itself for low latency then.
-        return [*findings, *examine_latency(device, host), *servos]
+        return [*findings, *examine_latency(device, host), *behind]
     except DriverError as error:
         # The message names port and cure.
         return [Finding("error", str(error).removeprefix(device).lstrip(": "), device)]
@@ -73,25 +72,30 @@ def check_all(
         port.closePort()
 
 
-def check(port: BusPort, setups: Sequence[ServoSetup], baud: int, tell: Tell) -> list[Finding]:
-    """Examine every servo of a rig, and whoever else is on the bus; torque is left as it is.
+def check(
+    port: BusPort, kind: ServoKind, setups: Sequence[ServoSetup], baud: int, tell: Tell
+) -> list[Finding]:
+    """Examine every servo of a bus, and whoever else is on it; torque is left as it is.
 
     Raises:
         drivers.errors.PortError: the port cannot be opened.
         drivers.errors.BusLost: it has gone away.
     """
-    presence = look(port, setups, baud, tell)
-    findings = list(judge_presence(presence, baud))
-    registers = Registers(port)
+    presence = look(port, kind, setups, baud, tell)
+    findings = list(judge_presence(presence, kind, baud))
     for setup in setups:
         if setup.id in presence.there:
             tell(f"reading {name_servo(setup)}")
             found, spoilt = presence.there[setup.id], presence.garbled.get(setup.id, 0)
-            findings += examine(take(registers, setup, found, spoilt))
+            findings += kind.examine(port, setup, found, spoilt)
+    if presence.there:
+        findings += [Finding("note", note, "the bus") for note in kind.notes]
     return findings
 
 
-def look(port: BusPort, setups: Sequence[ServoSetup], baud: int, tell: Tell) -> Presence:
+def look(
+    port: BusPort, kind: ServoKind, setups: Sequence[ServoSetup], baud: int, tell: Tell
+) -> Presence:
     """Find out who is on the bus; the port is left open at the rig's baud rate.
 
     Raises:
@@ -100,22 +104,22 @@ def look(port: BusPort, setups: Sequence[ServoSetup], baud: int, tell: Tell) -> 
     """
     tell(f"asking everybody at {baud} bit/s")
     _open(port, baud)
-    answers, _ = everybody(port, baud)
+    answers, _ = kind.everybody(port, baud)
     there = {found.id: found for found in answers}
     spoilt = {i: n for i, n in Counter(found.id for found in answers).items() if n > 1}
     for setup in setups:
         if setup.id not in there:
             tell(f"asking {name_servo(setup)}")
-            found = ping(port, setup.id, baud)
+            found = kind.ping(port, setup.id, baud, 2)
             if found is not None:
                 there[setup.id] = found
-        pieces = garbled(port, setup.id, 6 if setup.id in there else 1)
+        pieces = kind.garbled(port, setup.id, 6 if setup.id in there else 1)
         if pieces:
             spoilt[setup.id] = pieces
     missing = tuple(setup for setup in setups if setup.id not in there)
     known = {setup.id for setup in setups}
     strangers = tuple(found for i, found in sorted(there.items()) if i not in known)
-    elsewhere = tuple(_elsewhere(port, baud, tell)) if missing else ()
+    elsewhere = tuple(_elsewhere(port, kind, baud, tell)) if missing else ()
     if missing:
         _open(port, baud)
     return Presence(there, missing, strangers, elsewhere, spoilt)
@@ -126,24 +130,24 @@ def _open(port: BusPort, baud: int) -> None:
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 57600 or 1000000")
 
 
-def _elsewhere(port: BusPort, baud: int, tell: Tell) -> Iterator[Found]:
+def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterator[Found]:
     """Look at all other baud rates."""
-    others = [other for other in COMMON_FIRST if other != baud]
-    for other in others:
+    for other in kind.rates:
+        if other == baud:
+            continue
         tell(f"somebody is missing: asking at {other} bit/s")
-        for result in scan(port, (other,), old_protocol=False):
-            yield from result.found
+        if port.setBaudRate(other):
+            yield from kind.everybody(port, other)[0]
 
 
-def judge_presence(presence: Presence, baud: int) -> Iterator[Finding]:
+def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[Finding]:
     """Judge who is there and who is not."""
     if presence.missing and not presence.there and not presence.elsewhere:
         yield Finding(
             "error",
             f"no servo answers, at {baud} bit/s or any other rate",
             "the bus",
-            "is the servo supply on? does each servo's LED flash once when it comes on? is the "
-            "adaptor's plug the TTL one (3 pins), and the first cable in?",
+            kind.nobody,
         )
         return
     at = {found.id: found for found in presence.elsewhere}
@@ -204,27 +208,13 @@ def mend_latency(device: str, host: Host) -> list[Done]:
     return [Done(device, f"latency timer {was} -> {WISHED_LATENCY_MS} ms: {how}", done)]
 
 
-def mend(port: BusPort, findings: Iterable[Finding]) -> Iterator[Done]:
+def mend(port: BusPort, kind: ServoKind, findings: Iterable[Finding]) -> Iterator[Done]:
     """Write what the findings offer, one servo after the other; only where the torque is off.
 
     Raises:
         drivers.errors.BusLost: the port is gone.
     """
-    registers = Registers(port)
     for finding in findings:
         for fix in finding.fixes:
-            yield _mend(registers, fix, finding.where)
-
-
-def _mend(registers: Registers, fix: Fix, where: str) -> Done:
-    if fix.register == "status_return_level":
-        # No servo that answers pings alone confirms this; and it moves nothing.
-        registers.write_all((fix.servo_id,), fix.register, fix.value)
-    torque = registers.read(fix.servo_id, "torque_enable")
-    if torque:
-        return Done(where, f"{fix}: not done, its torque is on", False)
-    if torque is None or not registers.settle(fix.servo_id, fix.register, fix.value):
-        return Done(where, f"{fix}: not done, the servo does not take it", False)
-    if registers.read(fix.servo_id, fix.register) != fix.value:
-        return Done(where, f"{fix}: not done, it reads back otherwise", False)
-    return Done(where, f"{fix}: done", True)
+            why = kind.mend(port, fix)
+            yield Done(finding.where, f"{fix}: {f'not done, {why}' if why else 'done'}", not why)

@@ -17,9 +17,7 @@ def _assign_dynamixel(
     return dynamixel_assign.assign(port, seen, setup, baud, tell)
 
 
-def _assign_feetech(
-    port: BusPort, found: Found, setup: ServoSetup, baud: int, tell: Tell
-) -> SetUp:
+def _assign_feetech(port: BusPort, found: Found, setup: ServoSetup, baud: int, tell: Tell) -> SetUp:
     tell(f"id {found.id} -> {setup.id}, {found.baud} -> {baud} bit/s")
     seen = feetech_scan.Found(found.id, found.number, found.firmware, found.baud)
     return SetUp(*feetech_assign.assign(port, seen, setup.id, baud))

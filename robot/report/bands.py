@@ -60,6 +60,14 @@ _ONE_POINT = (
     "scanpath face_tracking",
     "by design: the face is looked at as one point (Nakamoto & Tsuruno 4.4.3)",
 )
+PARALLEL = "eyes parallel"
+"""Style of a run in which one linkage turns both eyes sideways."""
+
+_PARALLEL = (
+    PARALLEL,
+    "by build: one linkage turns both eyes sideways, so that each passes the point that they are "
+    "on by half their distance from each other",
+)
 _STARES = (
     "conversation none",
     "no conversation was on: the gaze then leaves a face only for something that pulls more; "
@@ -92,7 +100,7 @@ BANDS: tuple[Band, ...] = (
          "1988)"),
     Band("rest_error", SACCADES, "gaze off its target between saccades, median", "deg", 0.0, 1.0,
          30, "people notice 1 to 2 deg in which object is looked at; a direct gaze "
-         "may be off by 2.6 deg (Horstmann & Linke 2021)"),
+         "may be off by 2.6 deg (Horstmann & Linke 2021)", "", (_PARALLEL,)),
     Band("on_parts", FACE, "share of the time meant for a face that is on a part of it", "share",
          0.8, 1.0, 30, "Nakamoto & Tsuruno 3.2.2 and figs 8 and 9: looks go to the parts", "",
          (_NO_WALK,)),
@@ -114,11 +122,12 @@ BANDS: tuple[Band, ...] = (
          0.7, 1.0, 30, "Nakamoto & Tsuruno 4.3, figs 8 and 9", "", (_NO_WALK, _ONE_POINT)),
     Band("left_mm", FACE, "left pupil axis past the point looked at, median", "mm", 0.0, 18.0, 30,
          "1 deg at 1 m, the least that people notice; 2.6 deg pass for a direct gaze "
-         "(Horstmann & Linke 2021)"),
+         "(Horstmann & Linke 2021)", "", (_PARALLEL,)),
     Band("right_mm", FACE, "right pupil axis past the point looked at, median", "mm", 0.0, 18.0,
-         30, "the same"),
+         30, "the same", "", (_PARALLEL,)),
     Band("in_cone", FACE, "both axes inside the cone of direct gaze about that point", "share",
-         0.9, 1.0, 30, "Horstmann & Linke 2021: 5.2 deg across, the same from 1.6 to 7.9 m"),
+         0.9, 1.0, 30, "Horstmann & Linke 2021: 5.2 deg across, the same from 1.6 to 7.9 m", "",
+         (_PARALLEL,)),
     Band("vergence", FACE, "vergence off what the face's distance asks for, median", "deg",
          -1.0, 1.0, 30, "half of what passes for a direct gaze (Linke & Horstmann 2022)"),
     Band("vergence_ok", FACE, "vergence that passes for a direct gaze", "share", 0.9, 1.0, 30,

@@ -21,7 +21,7 @@ from robot.report import (
 )
 from robot.report.about import About
 from robot.report.bands import BY_KEY, applies
-from robot.report.canvas import COLOURS, Drawing, Shown, png
+from robot.report.canvas import COLOURS, Drawing, Shown, caption_of, png
 from robot.report.gathered import Gathered, Gathering
 from robot.report.measured import Finding, Measured, judged
 from robot.report.page import Picture, report_page
@@ -70,7 +70,7 @@ def report_of(run: Gathered, about: About, out: Path, progress: Progress) -> Rep
     findings = found(run)
     pictures = drawn([Shown(about.name, run, COLOURS[0], about.model)], progress)
     page = report_page(about, run, findings, pictures)
-    written = write_all(out, page, pictures, [_numbers(f) for f in findings])
+    written = write_all(out, page, pictures, [_numbers(f, run) for f in findings])
     return Report(findings, out, *written)
 
 
@@ -95,12 +95,17 @@ def read(ticks: Iterable[Tick], about: About, progress: Progress) -> Gathered:
 
 
 def measured(run: Gathered) -> tuple[Measured, ...]:
-    """Measure all that applies in the run's mode of conversation."""
+    """Measure all that applies to the rig's joints and in the run's mode of conversation."""
     each = (
         saccades.measures(run), face.measures(run), eye_head.measures(run),
         following.measures(run), blinks.measures(run), social.measures(run),
     )  # fmt: skip
-    return tuple(m for group in each for m in group if applies(BY_KEY[m.key], run.mode))
+    return tuple(
+        m
+        for group in each
+        for m in group
+        if applies(BY_KEY[m.key], run.mode) and not run.joints.left_out(m.key)
+    )
 
 
 def found(run: Gathered) -> tuple[Finding, ...]:
@@ -109,17 +114,22 @@ def found(run: Gathered) -> tuple[Finding, ...]:
 
 
 def drawn(runs: Sequence[Shown], progress: Progress) -> tuple[Picture, ...]:
-    """Draw every figure of one run, or of two beside each other."""
+    """Draw every figure of one run, or of two beside each other, of those that it can show."""
     pictures = []
     for count, drawing in enumerate(DRAWINGS):
         progress(DRAWING, count / len(DRAWINGS))
-        pictures.append(Picture(drawing, png(drawing, runs)))
+        able = [shown for shown in runs if not shown.run.joints.left_out(drawing.key)]
+        if able:
+            pictures.append(Picture(drawing, png(drawing, able), caption_of(drawing, able)))
     progress(DRAWING, 1.0)
     return tuple(pictures)
 
 
-def _numbers(finding: Finding) -> dict[str, object]:
-    """Give a finding as plain JSON; what is not known is null."""
+def _numbers(finding: Finding, run: Gathered) -> dict[str, object]:
+    """Give a finding as plain JSON; what is not known is null.
+
+    basis: "measured", "partly reckoned" or "reckoned"
+    """
     band = finding.band
     return {
         "key": band.key, "title": band.title, "unit": band.unit,
@@ -127,6 +137,7 @@ def _numbers(finding: Finding) -> dict[str, object]:
         "high95": _known(finding.high95), "asked": _known(finding.measured.asked),
         "events": finding.measured.events, "least_events": band.least,
         "band": [band.low, band.high], "verdict": finding.verdict, "source": band.source,
+        "basis": run.joints.basis(band.group),
     }  # fmt: skip
 
 

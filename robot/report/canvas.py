@@ -41,7 +41,10 @@ class Shown(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """One figure: its key (the file's name), the section it stands in, title and caption."""
+    """One figure: its key (the file's name), the section it stands in, title and caption.
+
+    caption: "{measured}" in it becomes what the runs' figures are: measured, or reckoned
+    """
 
     key: str
     group: str
@@ -49,6 +52,16 @@ class Drawing(NamedTuple):
     caption: str
     draw: Callable[[Figure, Sequence[Shown]], None]
     size_in: tuple[float, float] = (8.4, 3.8)
+
+
+def caption_of(drawing: Drawing, runs: Sequence[Shown]) -> str:
+    """Give the caption of a figure of these runs."""
+    return drawing.caption.replace("{measured}", basis_words(runs, drawing.group))
+
+
+def basis_words(runs: Sequence[Shown], group: str) -> str:
+    """Tell in a word or some what runs together rest on, e.g. "measured or reckoned"."""
+    return " or ".join(dict.fromkeys(shown.run.joints.basis(group) for shown in runs))
 
 
 def png(drawing: Drawing, runs: Sequence[Shown]) -> bytes:

@@ -22,7 +22,8 @@ from robot.report.about import About
 from robot.report.bands import BY_KEY
 from robot.report.build import Progress, drawn, measured, read
 from robot.report.canvas import COLOURS, Shown
-from robot.report.compare_page import Difference, Word, compare_page
+from robot.report.compare_page import Difference, Word, compare_page, mixed
+from robot.report.gathered import Gathered
 from robot.report.measured import Measured, figure, judged
 from robot.report.measured import drawn as resampled
 from robot.report.written import write_all
@@ -34,12 +35,16 @@ COMPARING = "comparing"
 
 
 class Comparison(NamedTuple):
-    """What was found, and the files that say so."""
+    """What was found, and the files that say so.
+
+    warning: that one run is measured and the other reckoned, "" where both are alike
+    """
 
     differences: tuple[Difference, ...]
     page: Path
     pictures: tuple[Path, ...]
     data: Path
+    warning: str
 
 
 def compare(
@@ -63,8 +68,8 @@ def compare(
     ]
     pictures = drawn(shown, progress)
     page = compare_page(abouts, runs, differences, pictures)
-    written = write_all(out, page, pictures, [_numbers(d) for d in differences])
-    return Comparison(differences, out, *written)
+    written = write_all(out, page, pictures, [_numbers(d, runs) for d in differences])
+    return Comparison(differences, out, *written, mixed(abouts, runs))
 
 
 def differences_of(a: Sequence[Measured], b: Sequence[Measured]) -> tuple[Difference, ...]:
@@ -137,7 +142,7 @@ def _interval(b: Floats, a: Floats, value: float) -> tuple[float, float]:
     return low, high
 
 
-def _numbers(d: Difference) -> dict[str, object]:
+def _numbers(d: Difference, runs: Sequence[Gathered]) -> dict[str, object]:
     values = {
         "a": d.a.value, "b": d.b.value, "difference": d.difference, "low95": d.low95,
         "high95": d.high95, "chance": d.chance, "chance_of_shape": d.chance_shape,
@@ -146,4 +151,5 @@ def _numbers(d: Difference) -> dict[str, object]:
     events = [d.a.measured.events, d.b.measured.events]
     return {"key": d.a.band.key, "title": d.a.band.title, "unit": d.a.band.unit, **known,
             "events": events, "verdicts": [d.a.verdict, d.b.verdict],
-            "word": d.word}  # fmt: skip
+            "word": d.word,
+            "basis": [run.joints.basis(d.a.band.group) for run in runs]}  # fmt: skip

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Literal, NamedTuple
 
+from robot.reckoned import Basis
 from robot.report.about import About
 from robot.report.bands import GROUPS
 from robot.report.gathered import Gathered
 from robot.report.measured import Finding
-from robot.report.page import Picture, line_of, number, rendered, with_unit
+from robot.report.page import Picture, banner, left_out, line_of, number, rendered, with_unit
 
 Word = Literal["more than chance", "may be chance", "too few events"]
 
@@ -88,6 +89,8 @@ class Section(NamedTuple):
     name: str
     rows: tuple[Row, ...]
     pictures: tuple[Picture, ...]
+    left_out: tuple[str, ...]
+    basis: tuple[str, ...]
 
 
 def compare_page(
@@ -102,6 +105,8 @@ def compare_page(
             group,
             tuple(_row(d, abouts) for d in differences if d.a.band.group == group),
             tuple(p for p in pictures if p.drawing.group == group),
+            _left_out(abouts, runs, group),
+            tuple(_basis(run.joints.basis(group)) for run in runs),
         )
         for group in GROUPS
     )
@@ -109,7 +114,48 @@ def compare_page(
         "compare.html", abouts=abouts, sections=sections, facts=_facts(abouts, runs),
         differing=[d.a.band.title for d in differences if d.word == "more than chance"],
         counts={word: sum(d.word == word for d in differences) for word in _CLASSES},
+        banners=banners(abouts, runs),
     )  # fmt: skip
+
+
+def banners(abouts: tuple[About, About], runs: Sequence[Gathered]) -> tuple[str, ...]:
+    """Give what a reader must know first: which runs were not measured, and that they differ so."""
+    told = [
+        f"{about.name}: {words}"
+        for about, run in zip(abouts, runs, strict=True)
+        if (words := banner(run.joints))
+    ]
+    return (*told, *filter(None, (mixed(abouts, runs),)))
+
+
+def mixed(abouts: tuple[About, About], runs: Sequence[Gathered]) -> str:
+    """Warn of a measured run beside a reckoned one, "" where both rest on the same."""
+    first, second = (run.joints.whole_basis for run in runs)
+    if first == second:
+        return ""
+    return (
+        f"{abouts[0].name} is {first} and {abouts[1].name} is {second}: what differs may be what "
+        "the servos tell, not what the gaze did"
+    )
+
+
+def _left_out(abouts: tuple[About, About], runs: Sequence[Gathered], group: str) -> tuple[str, ...]:
+    """Give why a section says less than it could, and of which run."""
+    each = [dict.fromkeys(left_out(run.joints, group)) for run in runs]
+    both = [why for why in each[0] if why in each[1]]
+    return (
+        *both,
+        *(
+            f"{about.name}: {why}"
+            for about, reasons in zip(abouts, each, strict=True)
+            for why in reasons
+            if why not in both
+        ),
+    )
+
+
+def _basis(basis: Basis) -> str:
+    return "" if basis == "measured" else f" ({basis})"
 
 
 def _facts(

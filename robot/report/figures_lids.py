@@ -8,7 +8,16 @@ from matplotlib.figure import Figure
 
 from robot.report import blinks, human, social
 from robot.report.bands import LIDS, SOCIAL
-from robot.report.canvas import HUMAN, HUMAN_FILL, Drawing, Shown, label, legend, nothing
+from robot.report.canvas import (
+    HUMAN,
+    HUMAN_FILL,
+    Drawing,
+    Shown,
+    basis_words,
+    label,
+    legend,
+    nothing,
+)
 
 _SHOWN_S = np.arange(-0.1, 0.5, 0.005)
 _PHASES = (("closing", 60.0, 100.0), ("shut", 20.0, 60.0), ("opening", 130.0, 250.0))
@@ -25,6 +34,10 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
                            color=shown.colour, alpha=0.18)  # fmt: skip
         trace.plot(1e3 * _SHOWN_S, np.median(mean, axis=0), color=shown.colour, lw=1.6,
                    label=f"{shown.name} ({len(mean)})")  # fmt: skip
+        lower = _mean_blink(shown, "lower_lid")
+        if lower is not None and np.isfinite(lower).all():
+            trace.plot(1e3 * _SHOWN_S, np.median(lower, axis=0), color=shown.colour, lw=1.4,
+                       ls="--", label=f"{shown.name}, lower lids")  # fmt: skip
     for row, (_, low, high) in enumerate(_PHASES):
         phases.barh(row, high - low, 0.75, left=low, color=HUMAN_FILL,
                     label="people" if row == 0 else None)  # fmt: skip
@@ -36,22 +49,27 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
                 low10, mid, high90 = np.percentile(seen, (10, 50, 90))
                 phases.plot([low10, high90], [at, at], color=shown.colour, lw=2.0)
                 phases.plot(mid, at, "o", color=shown.colour, ms=5,
-                            label=f"{shown.name}, measured" if row == 0 else None)  # fmt: skip
+                            label=f"{shown.name}, {shown.run.joints.basis(LIDS)}" if row == 0 else None)  # fmt: skip
             if len(asked):
                 phases.plot(np.median(asked), at, "|", color="black", ms=11,
                             label="as commanded" if row == n == 0 else None)  # fmt: skip
     phases.set_yticks(range(3), [name for name, _, _ in _PHASES])
     phases.invert_yaxis()
-    label(trace, "time from the blink's beginning, ms", "lid opening", "measured lids")
+    label(
+        trace,
+        "time from the blink's beginning, ms",
+        "lid opening",
+        f"lids, {basis_words(runs, LIDS)}",
+    )
     label(phases, "ms", "", "phases")
     legend(trace, "lower right")
     phases.set_xlim(0.0, None)
     legend(phases, "upper right")
 
 
-def _mean_blink(shown: Shown) -> np.ndarray | None:
+def _mean_blink(shown: Shown, column: str = "lid") -> np.ndarray | None:
     """Give the lid openings about every blink on one time axis, (n, times)."""
-    t, lid = shown.run.column("t"), shown.run.column("lid")
+    t, lid = shown.run.column("t"), shown.run.column(column)
     inside = [
         b.onset_s for b in shown.run.blinks if t[0] < b.onset_s - 0.1 < b.onset_s + 0.5 < t[-1]
     ]
@@ -129,8 +147,8 @@ def _strip(axes: Axes, bouts: np.ndarray, start_s: float, row: int, colour: str)
 
 DRAWINGS = (
     Drawing("blink_shape", LIDS, "Shape of a blink",
-            "Median and 10th to 90th percentile of measured lids; and the lengths of the phases "
-            "beside people's. A phase lasts while the lid is faster than a twentieth of its peak.",
+            "Median and 10th to 90th percentile of {measured} upper lids, and the median of lower "
+            "ones where the rig has such; and the lengths of the phases beside people's. A phase lasts while the lid is faster than a twentieth of its peak.",
             _shape),
     Drawing("blink_when", LIDS, "When the lids blink",
             "Intervals between blinks; and the share of gaze shifts that bring one.", _when),

@@ -28,7 +28,8 @@ def _overview(figure: Figure, runs: Sequence[Shown]) -> None:
         start = float(onsets[int(np.argmax(many))]) if many else float(t[0])
         part = run.between(start, start + _OVERVIEW_S)
         axes.plot(t[part], run.column("target_yaw")[part], color=HUMAN, lw=1.0, label="target")
-        axes.plot(t[part], run.column("head_yaw")[part], color="#2b8a5a", lw=1.4, label="head")
+        if run.joints.has("neck_yaw"):
+            axes.plot(t[part], run.column("head_yaw")[part], color="#2b8a5a", lw=1.4, label="head")
         axes.plot(t[part], run.column("gaze_yaw")[part], color=shown.colour, lw=1.2, label="gaze")
         label(axes, "time in s", "yaw, deg", shown.name)
         legend(axes, "upper right", 3)
@@ -114,10 +115,10 @@ def _fixations(figure: Figure, runs: Sequence[Shown]) -> None:
 
 DRAWINGS = (
     Drawing("overview", SACCADES, "Twelve seconds of the run",
-            "Measured gaze and head, and the direction of the target, sideways.", _overview,
+            "Gaze and head, {measured}, and the direction of the target, sideways.", _overview,
             (8.4, 3.4)),
     Drawing("main_sequence", SACCADES, "Main sequence",
-            "Each dot is a measured saccade of the gaze in space; grey is where people's lie: "
+            "Each dot is a saccade of the gaze in space, {measured}; grey is where people's lie: "
             "between Baloh's and the higher of Bahill's and Collewijn's curves, 15 % between "
             "people; durations 21 + 2.2 A to 25 + 2.4 A ms, +- 25 %.", _main_sequence),
     Drawing("saccade_shape", SACCADES, "Skew and sizes",

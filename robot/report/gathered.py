@@ -15,8 +15,10 @@ from gaze.types import Face, Floats, Vec3
 from robot.face_gaze import on_face
 from robot.loop import Tick
 from robot.orders import Ask
+from robot.reckoned import reckoned_joints
 from robot.report.blink_finder import BlinkFinder
 from robot.report.gaze_events import NEAR_FACE_M, Blink, Fixation, GazeEvents, Saccade, beside_m
+from robot.report.run_joints import LOWER, UPPER, RunJoints, joints_of, openings
 from robot.summary import cyclopean
 
 PLANE_M = -0.028
@@ -31,11 +33,12 @@ class Row(NamedTuple):
 
     gaze_*: mean line of sight in space; head_*, eye_*: neck, and mean eye in the head
     target_*: direction of the point in force from the head, now; target_*_rate: its speed
-    vergence, vergence_due: as measured, and as the point's place asks for
+    vergence, vergence_due: as it is, and as the point's place asks for
     off_left, off_right: angle of each line of sight off the point
     left_y_mm ... right_z_mm: where each pupil axis passes the point, in the face's plane
     face_y, face_z: where the gaze meets the face, from the tip of the nose
     face_off: how far the person's face is turned away from the robot
+    lid, lower_lid: the wider opening of the upper and of the lower lids, 0 shut .. 1 open
     shift: the target's event count; mode: index in MODES
     """
 
@@ -64,6 +67,7 @@ class Row(NamedTuple):
     face_off: float
     on_face: float
     lid: float
+    lower_lid: float
     phase: float
     is_face: float
     shift: float
@@ -75,6 +79,7 @@ class Gathered:
     """A whole run: columns (one value a tick), and events in the order of their beginning.
 
     asked_blinks: as the models commanded them; kinds: seconds per kind of target
+    joints: of the rig, and which of them are reckoned
     """
 
     rows: Floats
@@ -83,6 +88,7 @@ class Gathered:
     blinks: tuple[Blink, ...]
     asked_blinks: tuple[Blink, ...] = ()
     kinds: dict[str, float] = field(default_factory=dict)
+    joints: RunJoints = RunJoints()
 
     def column(self, name: str) -> Floats:
         """Give a column of Row by its name."""
@@ -134,6 +140,8 @@ class Gathering:
         self._kinds: defaultdict[str, float] = defaultdict(float)
         self._mode = 0
         self._last_s: float | None = None
+        self._names: tuple[str, ...] = ()
+        self._reckoned: dict[str, None] = {}
 
     def note(self, tick: Tick) -> None:
         """Take a tick; what happens while somebody has stopped the robot does not count."""
@@ -147,7 +155,10 @@ class Gathering:
                 self._fixations.append(event)
             else:
                 self._blinks.append(event)
-        asked = self._asked_lids.note(tick.t_s, tick.gaze.lid_left, tick.gaze.lid_right)
+        self._names = tick.verdict.joints
+        self._reckoned.update(dict.fromkeys(reckoned_joints(tick)))
+        lids = openings(tick.gaze.lid_left, tick.gaze.lid_right, self._names, UPPER)
+        asked = self._asked_lids.note(tick.t_s, *lids) if lids is not None else None
         if asked is not None:
             self._asked_blinks.append(asked)
         if self._last_s is not None:
@@ -166,12 +177,13 @@ class Gathering:
             tuple(self._blinks),
             tuple(self._asked_blinks),
             dict(self._kinds),
+            joints_of(self._names, self._reckoned),
         )
 
 
 def row_of(tick: Tick, mode: int) -> Row:
     """Give the columns of one tick."""
-    pose, target = tick.pose, tick.target
+    pose, target, names = tick.pose, tick.target, tick.verdict.joints
     head, left, right = pose.p_world_head_m, pose.p_world_eye_left_m, pose.p_world_eye_right_m
     sight_left, sight_right = line_of_sight(pose, True), line_of_sight(pose, False)
     way = cyclopean(tick)
@@ -205,7 +217,9 @@ def row_of(tick: Tick, mode: int) -> Row:
         degrees(angle_between(sight_right, sub(point, right))),
         1e3 * on_left[0], 1e3 * on_left[1], 1e3 * on_right[0], 1e3 * on_right[1],
         gaze_at[0], gaze_at[1], off_deg, float(seen),
-        max(pose.lid_left, pose.lid_right), _PHASES.index(tick.gaze.phase),
+        max(openings(pose.lid_left, pose.lid_right, names, UPPER) or (nan,)),
+        max(openings(pose.lower_left, pose.lower_right, names, LOWER) or (nan,)),
+        _PHASES.index(tick.gaze.phase),
         float(target.kind == "face"), target.shift, mode,
     )  # fmt: skip
 

@@ -1,7 +1,8 @@
 """What the eyes do, found tick by tick as an eye tracker finds it: saccades, fixations, blinks.
 
-All is measured: the mean of both lines of sight in space, and the opening of the lids. What
-was commanded stands beside it, so that what the servos make of a saccade can be told.
+All is as the servos say: the mean of both lines of sight in space, and the opening of the upper
+lids. Of servos that tell nothing it is reckoned from their goals. What was commanded stands
+beside it, so that what the servos make of a saccade can be told.
 """
 
 from collections import Counter, deque
@@ -13,6 +14,7 @@ from gaze.types import PARTS, Face, Vec3
 from robot.loop import Tick
 from robot.report.blink_finder import Blink as Blink
 from robot.report.blink_finder import BlinkFinder
+from robot.report.run_joints import UPPER, openings
 from robot.report.saccade_finder import Jump, SaccadeFinder
 from robot.summary import cyclopean
 from robot.types import JOINTS
@@ -47,7 +49,7 @@ class Commanded(NamedTuple):
 
 
 class Saccade(NamedTuple):
-    """One saccade of the measured gaze in space.
+    """One saccade of the gaze in space.
 
     peak_at: share of the duration at which it was fastest, .5 is symmetric
     commanded: what had been asked for, None where the eyes jumped by themselves
@@ -119,7 +121,9 @@ class GazeEvents:
         t_s = tick.t_s
         way = cyclopean(tick)
         jump = self._saccades.note(t_s, way)
-        blink = self._blinks.note(t_s, tick.pose.lid_left, tick.pose.lid_right)
+        names, pose = tick.verdict.joints, tick.pose
+        lids = openings(pose.lid_left, pose.lid_right, names, UPPER)
+        blink = self._blinks.note(t_s, *lids) if lids is not None else None
         if jump is None:
             if not self._saccades.under_way:
                 self._rest.note(tick, way)

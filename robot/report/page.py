@@ -9,20 +9,23 @@ from typing import NamedTuple
 
 import jinja2
 
+from robot.reckoned import RECKONED, Basis
 from robot.report.about import About
-from robot.report.bands import GROUPS, Band
+from robot.report.bands import BANDS, GROUPS, Band
 from robot.report.canvas import Drawing
 from robot.report.gathered import Gathered
 from robot.report.measured import Finding
+from robot.report.run_joints import RunJoints
 
 _CLASSES = {"pass": "pass", "outside": "outside", "too few events": "few"}
 
 
 class Picture(NamedTuple):
-    """A drawn figure."""
+    """A drawn figure, and its caption for the runs in it."""
 
     drawing: Drawing
     png: bytes
+    caption: str
 
     @property
     def data_uri(self) -> str:
@@ -65,18 +68,22 @@ class Section(NamedTuple):
     name: str
     lines: tuple[Line, ...]
     pictures: tuple[Picture, ...]
+    left_out: tuple[str, ...]
+    basis: Basis
 
 
 def report_page(
     about: About, run: Gathered, findings: Sequence[Finding], pictures: Sequence[Picture]
 ) -> str:
     """Give the page of one run as HTML that needs no other file."""
-    styles = about.styles | {f"conversation {run.mode}"}
+    styles = about.styles | {f"conversation {run.mode}"} | run.joints.styles
     sections = tuple(
         Section(
             group,
             tuple(line_of(f, styles) for f in findings if f.band.group == group),
             tuple(p for p in pictures if p.drawing.group == group),
+            left_out(run.joints, group),
+            run.joints.basis(group),
         )
         for group in GROUPS
     )
@@ -85,7 +92,29 @@ def report_page(
     return rendered(
         "report.html", about=about, facts=facts, sections=sections, counts=counts,
         outside=[f.band.title for f in findings if f.verdict == "outside"],
+        basis=run.joints.whole_basis, banner=banner(run.joints),
     )  # fmt: skip
+
+
+def left_out(joints: RunJoints, group: str) -> tuple[str, ...]:
+    """Give why a section says less than it could of another rig."""
+    return joints.all_left_out(band.key for band in BANDS if band.group == group)
+
+
+def banner(joints: RunJoints) -> str:
+    """Give what a reader must know first where servos tell nothing, "" where all measure."""
+    if not joints.reckoned:
+        return ""
+    if joints.whole_basis == "reckoned":
+        return (
+            "Nothing here is measured: the servos of this rig tell nothing. Where this page speaks "
+            f"of what was found, it is {RECKONED}. Real eyes may lag, stick or swing, and the "
+            "verdicts would not know."
+        )
+    return (
+        f"Not all of this is measured: the servos of {', '.join(joints.reckoned)} tell nothing. "
+        f"What rests on them is {RECKONED}; sections that do so say it."
+    )
 
 
 def rendered(template: str, **values: object) -> str:
@@ -107,7 +136,7 @@ def line_of(finding: Finding, styles: frozenset[str]) -> Line:
     notes = tuple(words for style, words in band.notes if style in styles)
     return Line(
         band.title,
-        with_unit(value, band.unit) if isfinite(value) else "nothing measured",
+        with_unit(value, band.unit) if isfinite(value) else "nothing found",
         interval,
         number(asked) if isfinite(asked) else "",
         band_words(band),

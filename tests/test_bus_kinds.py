@@ -1,0 +1,435 @@
+"""What every kind of servo bus promises, over both twins: one suite for all of them.
+
+Kinds: Dynamixel, Feetech STS, hobby servos on a Maestro, and all three as one bus. Twins:
+the emulated servos in this process, and behind a pseudo-terminal. What only one kind does
+is in the tests of its own name.
+"""
+
+from math import nan
+
+import pytest
+from bus_kinds import KINDS, SHARES, Twin, in_process, twin_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.errors import BusLost, PortError, ServoMissing
+
+TWINS = ("in-process", "pty")
+AWAY = (0.2, 0.8, 0.3, 0.7, 0.25, 0.75)
+
+
+@pytest.fixture(params=[(kind, place) for kind in KINDS for place in TWINS], ids="-".join)
+def twin(request):
+    with twin_of(*request.param) as made:
+        yield made
+
+
+@pytest.fixture(params=KINDS)
+def here(request):
+    """Give a twin in this process: for what takes long, or needs no terminal."""
+    with twin_of(request.param, "in-process") as made:
+        yield made
+
+
+@pytest.fixture
+def held(twin):
+    """Give a bus that holds every servo where it stands."""
+    twin.pulses_on()
+    bus = twin.bus()
+    bus.open()
+    bus.engage()
+    bus.events()
+    yield bus
+    bus.release()
+    bus.close()
+
+
+def starts(twin):
+    return [SHARES[place % 4] for place in range(twin.count)]
+
+
+def away(twin):
+    return AWAY[: twin.count]
+
+
+def smart(twin):
+    """Give the places of servos that answer for themselves."""
+    return [place for place, name in twin.on.items() if name != "maestro"]
+
+
+def well(readings):
+    return all(r is not None and r.torque for r in readings)
+
+
+# --- open, engage, read, write, release
+
+
+def test_open_finds_all_and_nothing_moves(twin):
+    twin.pulses_on()
+    bus = twin.bus()
+    before = twin.truth()
+    bus.open()
+    readings = bus.read(twin.now_s())
+    assert twin.near(twin.seen(readings), starts(twin))
+    # A Maestro that gives pulses goes on to give them; nobody else holds anything.
+    assert [r.torque for r in readings] == [twin.on[p] == "maestro" for p in range(twin.count)]
+    bus.write(twin.steps(away(twin)))
+    twin.run(bus, 0.1, away(twin))
+    assert twin.near(twin.truth(), before)
+    bus.close()
+
+
+def test_readings_are_fresh_in_order_and_say_whether_they_are_measured(twin, held):
+    twin.run(held, 0.05)
+    before_s = twin.now_s()
+    readings = held.read(before_s)
+    assert twin.near(twin.seen(readings), starts(twin))
+    assert all(before_s <= r.at_s <= twin.now_s() for r in readings)
+    assert [r.measured for r in readings] == [twin.on[p] != "maestro" for p in range(twin.count)]
+    assert not any(r.alert or r.fault or r.rearmed for r in readings)
+
+
+def test_engage_holds_every_servo_where_it_is(twin):
+    twin.pulses_on()
+    bus = twin.bus()
+    bus.open()
+    before = twin.truth()
+    goals = bus.engage()
+    assert twin.near(twin.shares(goals), before)
+    for _ in range(10):
+        readings = twin.run(bus, 0.02)
+        assert twin.near(twin.truth(), before)
+    assert well(readings)
+    assert twin.holding() == [True] * twin.count
+    bus.release()
+    bus.close()
+
+
+def test_goals_are_followed_and_told(twin, held):
+    readings = twin.until(
+        held, lambda r: twin.near(twin.seen(r), away(twin)), away(twin), patience_s=5.0
+    )
+    twin.run(held, 0.3, away(twin))
+    assert twin.near(twin.truth(), away(twin))
+    assert well(readings)
+
+
+def test_goals_are_clipped_to_the_limits(twin, held):
+    ends = [(-40.0, 60.0, -1e-3, 1.001)[place % 4] for place in range(twin.count)]
+    inside = [min(1.0, max(0.0, end)) for end in ends]
+    twin.until(held, lambda r: twin.near(twin.seen(r), inside), ends, patience_s=5.0)
+    twin.run(held, 0.3, ends)
+    assert twin.near(twin.truth(), inside)
+    assert twin.goals() == twin.steps(inside)
+
+
+def test_what_is_no_number_is_refused_and_nothing_is_sent(twin, held):
+    twin.run(held, 0.05, starts(twin))
+    before = held.health().tx_bytes
+    for place in range(twin.count):
+        goals = twin.steps(away(twin))
+        goals[place] = nan
+        with pytest.raises(ValueError, match="not a number"):
+            held.write(goals)
+    for wrong in (goals[:-1], [*goals, goals[0]]):
+        with pytest.raises(ValueError):
+            held.write(wrong)
+    assert held.health().tx_bytes == before
+    twin.run(held, 0.2)
+    assert twin.near(twin.truth(), starts(twin))
+
+
+def test_release_takes_the_torque_of_all_and_is_confirmed(twin, held):
+    twin.run(held, 0.05)
+    assert all(twin.holding())
+    held.release()
+    assert twin.holding() == [False] * twin.count
+    readings = twin.run(held, 0.1, away(twin))
+    assert not any(r.torque for r in readings)
+    assert twin.near(twin.truth(), starts(twin))
+    assert "refused" not in held.health().errors
+    assert held.events() == ()
+
+
+def test_a_bus_is_opened_again_and_closed_twice(twin):
+    twin.pulses_on()
+    bus = twin.bus()
+    for _ in range(2):
+        bus.open()
+        bus.engage()
+        assert twin.near(twin.seen(bus.read(twin.now_s())), starts(twin))
+        bus.release()
+        bus.close()
+        bus.close()
+
+
+def test_bytes_are_counted_and_no_errors(twin, held):
+    before = held.health()
+    twin.run(held, 0.1, starts(twin))
+    after = held.health()
+    assert after.tx_bytes > before.tx_bytes > 0
+    assert after.rx_bytes > before.rx_bytes > 0
+    assert after.errors == {}
+    assert held.faults() == ()
+
+
+# --- somebody is missing
+
+
+def test_open_names_who_is_missing_and_leaves_the_ports_free(twin):
+    place = smart(twin)[-1] if smart(twin) else None
+    if place is None:
+        twin.command("set mode mute")
+        told = "no Maestro answers"
+        wanted = twin.setups
+    else:
+        told = rf"{twin.setups[place].name} \(servo 99\) does not answer"
+        lost = twin.setups[place]._replace(id=99)
+        wanted = [*twin.setups[:place], lost, *twin.setups[place + 1 :]]
+    with pytest.raises(ServoMissing, match=told) as caught:
+        twin.bus(wanted).open()
+    message = str(caught.value)
+    assert twin.wires.ports[twin.on[place or 0]].port_name in message
+    assert "\n" not in message
+    if place is None:
+        twin.command("set mode dual-port")
+    bus = twin.bus()
+    bus.open()
+    bus.close()
+
+
+def test_a_port_that_cannot_be_opened_is_named(here):
+    for name in here.buses:
+        here.command("deny on", name)
+        with pytest.raises(PortError, match=f"emulated {name}"):
+            here.bus().open()
+        here.command("deny off", name)
+    bus = here.bus()
+    bus.open()
+    bus.close()
+
+
+def test_one_silent_servo_costs_only_itself(twin, held):
+    """A Maestro answers for all its channels at once: there the board is one."""
+    for place in smart(twin)[:1]:
+        others = [p for p in range(twin.count) if p != place]
+        twin.strike("lose", place)
+        readings = twin.until(held, lambda r: r[place] is None, starts(twin))
+        for _ in range(20):
+            readings = twin.run(held, 0.0, starts(twin))
+            assert all(readings[p] is not None for p in others)
+            twin.wait(0.01)
+        assert readings[place] is None
+        assert held.health().errors["timeout"] >= 1
+        twin.until(held, lambda r: _says(held, twin, place, "does not answer"), starts(twin))
+        twin.command("clear", twin.on[place])
+        twin.until(held, well, starts(twin))
+        assert twin.near(twin.truth(), starts(twin))
+
+
+def _says(bus, twin, place, what):
+    """Tell whether the bus says something of a servo by its joint's name."""
+    name = twin.setups[place].name
+    return any(line.startswith(f"{name} (servo") and what in line for line in bus.events())
+
+
+# --- a port goes away
+
+
+def test_an_unplugged_port_comes_back_and_holds(twin, held):
+    name = next(iter(twin.buses))
+    gone = twin.buses[name]
+    rest = [p for p in range(twin.count) if p not in gone]
+    twin.run(held, 0.1, starts(twin))
+    twin.command("unplug", name)
+    twin.until(held, lambda r: all(r[p] is None for p in gone), starts(twin))
+    for _ in range(20):
+        # Who plans goals goes on for a while as if nothing were.
+        readings = twin.run(held, 0.0, [0.5] * twin.count)
+        assert [readings[p] for p in gone] == [None] * len(gone)
+        assert all(readings[p] is not None for p in rest)
+        twin.wait(0.01)
+    twin.command("plug", name)
+    rearmed = _until_back(twin, held, gone)
+    assert sorted(rearmed) == sorted(gone)
+    assert twin.near([twin.truth()[p] for p in gone], [starts(twin)[p] for p in gone])
+    told = held.events()
+    assert any(line.startswith("port lost: ") for line in told)
+    assert any(line.startswith("port back after ") for line in told)
+
+
+def _until_back(twin, bus, gone):
+    """Tick until all hold again, with goals far away until a servo says where it begins."""
+    goals, rearmed = [0.9] * twin.count, []
+    before = twin.truth()
+
+    def note(readings):
+        for place, reading in enumerate(readings):
+            if reading is not None and reading.rearmed:
+                rearmed.append(place)
+                goals[place] = twin.seen(readings)[place]
+        return len(set(rearmed)) == len(gone) and well(readings)
+
+    end_s = twin.now_s() + 8.0
+    while not note(bus.read(twin.now_s())):
+        assert twin.now_s() < end_s, (rearmed, bus.events())
+        truth = twin.truth()
+        assert twin.near([truth[p] for p in gone], [before[p] for p in gone])
+        bus.write(twin.steps(goals))
+        twin.wait(0.01)
+    twin.run(bus, 0.3, goals)
+    return rearmed
+
+
+@pytest.mark.parametrize("nth", range(3))
+def test_a_port_that_stays_away_is_given_up_and_told_at_release(here, nth):
+    if nth >= len(here.buses):
+        pytest.skip("no such bus in this kind")
+    name = list(here.buses)[nth]
+    here.pulses_on()
+    bus = here.bus(give_up_s=1.0)
+    bus.open()
+    bus.engage()
+    here.command("unplug", name)
+    began_s = here.now_s()
+    with pytest.raises(BusLost, match=f"emulated {name} has been gone for 1.0 s"):
+        here.run(bus, 3.0, starts(here))
+    assert here.now_s() - began_s < 1.2
+    with pytest.raises(BusLost, match=f"emulated {name} is gone.*cut the servo power"):
+        bus.release()
+    # What could be reached was let go of all the same.
+    assert [on for p, on in enumerate(here.holding()) if here.on[p] != name] == [False] * (
+        here.count - len(here.buses[name])
+    )
+    here.command("plug", name)
+    bus.release()
+    assert not any(here.holding())
+    bus.close()
+
+
+def test_no_read_takes_long_while_nobody_answers(here):
+    here.pulses_on()
+    bus = here.bus(give_up_s=2.0)
+    bus.open()
+    bus.engage()
+    here.run(bus, 0.5, starts(here))
+    here.command("lose all")
+    spent = []
+    with pytest.raises(BusLost, match="answered for 2"):
+        for _ in range(1000):
+            began_s = here.now_s()
+            bus.read(began_s)
+            spent.append(here.now_s() - began_s)
+            bus.write(here.steps(starts(here)))
+            here.wait(0.01)
+    assert max(spent) < 0.1
+    assert sum(spent) < 0.35 * len(spent) * 0.01 + 0.3
+
+
+# --- a servo restarts
+
+
+def test_a_restart_is_found_and_the_servo_held_where_it_is(twin, held):
+    place = 0
+    # The board of a Maestro is one: all its channels restart.
+    struck = [p for p in range(twin.count) if twin.on[p] == "maestro"]
+    struck = struck if twin.on[place] == "maestro" else [place]
+    twin.run(held, 0.2, starts(twin))
+    twin.strike("brown-out", place)
+    rearmed = _until_back(twin, held, struck)
+    assert sorted(rearmed) == struck
+    assert all(twin.holding())
+    told = held.events()
+    assert any("restarted: set up anew" in line for line in told), told
+    assert held.faults() == ()
+    # It follows again, with the speed that it was set up with.
+    twin.until(held, lambda r: twin.near(twin.seen(r), away(twin)), away(twin))
+
+
+def test_a_fault_is_named_with_its_joint_or_board(here):
+    here.pulses_on()
+    bus = here.bus()
+    bus.open()
+    bus.engage()
+    here.run(bus, 0.5, starts(here))
+    bus.events()
+    for name, places in here.buses.items():
+        if name == "maestro":
+            here.command("error protocol", name)
+            cause = "board 12: protocol"
+        else:
+            here.strike("overload", places[1])
+            setup = here.setups[places[1]]
+            cause = f"{setup.name} (servo {setup.id}): overload"
+        readings = here.run(bus, 0.3, starts(here))
+        assert any(fault.startswith(cause) for fault in bus.faults()), bus.faults()
+        assert any(cause.split(": ")[1] in line for line in bus.events())
+        assert None not in readings
+        if name != "maestro":
+            assert (readings[places[1]].fault, readings[places[1]].alert) == ("overload", True)
+    bus.release()
+    bus.close()
+
+
+# --- other limits
+
+
+def test_retune_waits_for_the_next_torque(here):
+    here.pulses_on()
+    bus = here.bus()
+    bus.open()
+    bus.engage()
+    narrow = [
+        s._replace(min_steps=at - 40, max_steps=at + 40)
+        for s, at in zip(here.setups, here.steps([0.5] * here.count), strict=True)
+    ]
+    bus.retune(narrow)
+    here.run(bus, 1.5, away(here))
+    assert here.near(here.truth(), away(here))
+    bus.release()
+    goals = bus.engage()
+    for setup, goal in zip(narrow, goals, strict=True):
+        assert setup.min_steps <= goal <= setup.max_steps
+    here.run(bus, 4.0, away(here))
+    for setup, goal in zip(narrow, here.goals(), strict=True):
+        assert setup.min_steps <= goal <= setup.max_steps
+    with pytest.raises(ValueError, match="other servos need another bus"):
+        bus.retune([s._replace(id=s.id + 1) for s in narrow])
+    with pytest.raises(ValueError, match="other servos need another bus"):
+        bus.retune(narrow[:-1])
+
+
+# --- properties
+
+ANY = st.integers(-(2**40), 2**40) | st.floats(allow_nan=True, allow_infinity=True)
+FAULTS = ("", "lose all count 2", "delay all 15 count 3", "corrupt all count 3", "unplug for 0.05")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=25, deadline=None)
+@given(data=st.data())
+def test_no_goal_outside_the_limits_ever_reaches_a_servo(kind, data):
+    inside = in_process(kind)
+    twin = Twin(kind, inside.wires, patient=False)
+    twin.pulses_on()
+    bus = twin.bus()
+    bus.open()
+    bus.engage()
+    rows = data.draw(st.lists(st.lists(ANY, min_size=twin.count, max_size=twin.count), max_size=6))
+    twin.command(data.draw(st.sampled_from(FAULTS)) or "clear")
+    for goals in rows:
+        bus.read(twin.now_s())
+        before = len(inside.sent)
+        try:
+            bus.write(goals)
+        except ValueError:
+            assert any(goal != goal for goal in goals)
+            assert len(inside.sent) == before
+        for setup, goal in zip(twin.setups, twin.goals(), strict=True):
+            assert goal is None or setup.min_steps <= goal <= setup.max_steps
+        twin.wait(0.02)
+    # Nothing stands beyond but for what a servo's own inertia does.
+    assert all(-NEAR <= share <= 1.0 + NEAR for share in twin.truth())
+
+
+NEAR = 0.02
