@@ -5,6 +5,7 @@ from math import ceil
 
 from drivers.bus_journal import Journal, call
 from drivers.bus_reconnect import Reconnect
+from drivers.bus_roll import Roll
 from drivers.dynamixel_care import Care
 from drivers.dynamixel_health import Health
 from drivers.dynamixel_line import Line
@@ -14,7 +15,6 @@ from drivers.dynamixel_reader import Heard, Reader, Whole
 from drivers.dynamixel_readings import Readings
 from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_revival import Revival
-from drivers.dynamixel_roll import Roll
 from drivers.dynamixel_roster import find
 from drivers.dynamixel_setup import Fitting
 from drivers.dynamixel_table import (

@@ -3,8 +3,9 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import inf
 
+from drivers.bus_line import TRIES
 from drivers.dynamixel_health import Health
-from drivers.dynamixel_line import TRIES, Line
+from drivers.dynamixel_line import Line
 from drivers.dynamixel_packets import ALERT
 from drivers.dynamixel_readings import Readings
 from drivers.dynamixel_revival import Revival

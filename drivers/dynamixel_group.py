@@ -7,7 +7,7 @@ taken out piece by piece, so that a bad servo costs only itself.
 """
 
 import struct
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from fastcrc.crc16 import umts
@@ -195,15 +195,3 @@ def _columns(error: int, first: int, view: View, stride: int) -> Columns:
     # A fast answer has one number before the first servo's, a plain one its head.
     named = {name: slice(first + i, None, stride) for i, name in enumerate(view.fields)}
     return Columns(slice(error, None, stride), **named)
-
-
-def silent_ones(ids: Sequence[int], heard: Collection[int]) -> tuple[int, ...]:
-    """Name the servos that kept silent of their own accord.
-
-    A servo waits for the one before it, so behind the last one heard only the first is
-    to blame; what is missing before the last one heard has nobody else to blame.
-    """
-    missing = [i for i, servo_id in enumerate(ids) if servo_id not in heard]
-    last_heard = max((i for i, servo_id in enumerate(ids) if servo_id in heard), default=-1)
-    behind = [i for i in missing if i > last_heard][:1]
-    return tuple(ids[i] for i in [i for i in missing if i < last_heard] + behind)

@@ -1,10 +1,8 @@
-"""Exchanges on the servo bus: bounded waiting, clean lines, counts, starvation noticed."""
+"""Exchanges with Dynamixel servos that stand beside the cyclic one."""
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import inf
+from collections.abc import Iterable, Sequence
 
-from drivers.dynamixel_group import silent_ones
+from drivers.bus_line import BusLine
 from drivers.dynamixel_packets import (
     BROADCAST,
     ERROR_NUMBER,
@@ -16,11 +14,7 @@ from drivers.dynamixel_packets import (
     statuses,
     sync_read,
 )
-from drivers.dynamixel_patience import Patience
 from drivers.dynamixel_table import REGISTERS
-from drivers.serial_port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
-
-TRIES, HURRIED = 3, 4.0
 
 PING_QUIET_S = 0.04
 """All who will answer a ping to everybody have done so when nothing came for so long."""
@@ -29,114 +23,10 @@ PING_MOST_S = 0.8
 """The SDK waits so long for them; nobody answers later."""
 
 _ROOM = 4096
-_BACKLOG_S = 0.05
 
 
-class Line:
-    """A port with the patience of one bus; every method may raise drivers.errors.BusLost.
-
-    tx_bytes, rx_bytes: counts since it was made
-    errors: counts by kind
-    patience: that of the cyclic exchange; all others have the longest
-    tries: how often a servo is asked outside the cyclic exchange; in the loop, once
-    starving_s: silence after which a servo's own watchdog trips; inf where none is armed
-    starved: such a silence has happened
-    quiet: nothing came any more when the last exchange was given up
-    whole_s: when the last exchange's answer was due as far as the wire goes
-    deadline_s: end of the last exchange's patience
-    """
-
-    def __init__(
-        self,
-        port: BusPort,
-        least_s: float,
-        most_s: float,
-        baud: int,
-        names: Mapping[int, str] | None = None,
-    ) -> None:
-        self.port = port
-        self._names = names or {}
-        self.tx_bytes = self.rx_bytes = 0
-        self.errors: Counter[str] = Counter()
-        self.patience = Patience(least_s, most_s)
-        self.most_s = most_s
-        self.tries = TRIES
-        self.starving_s = inf
-        self.starved = False
-        self.quiet = True
-        self.whole_s = self.deadline_s = 0.0
-        self._byte_s = BITS_PER_BYTE / baud
-        self._sent_s = port.now_s()
-        self._free_s = self._sent_s
-
-    def who(self, servo_id: int) -> str:
-        """Name a servo for people."""
-        return self._names.get(servo_id, f"servo {servo_id}")
-
-    def send(self, packet: bytes) -> None:
-        """Send a packet."""
-        now_s = self.port.now_s()
-        self.port.write(packet)
-        # Up to after the write: the host may have been asleep just before the bytes left.
-        if self.port.now_s() - self._sent_s >= self.starving_s:
-            self.starved = True
-        self._sent_s = now_s
-        # Bytes leave after those still on their way out, at the bus's own speed.
-        free_s = self._free_s
-        if not now_s <= free_s <= now_s + _BACKLOG_S:
-            free_s = now_s
-        self._free_s = free_s + len(packet) * self._byte_s
-        self.tx_bytes += len(packet)
-
-    def exchange(self, request: bytes, length: int) -> tuple[bytes, float]:
-        """Send a request, wait for ``length`` bytes; gives what came, and when.
-
-        The wait ends as the patience does, beyond the time the bytes take on the wire.
-        """
-        port = self.port
-        # What is here before the question cannot be its answer.
-        port.clearPort()
-        self.send(request)
-        self.quiet = False
-        whole_s = self._free_s + length * self._byte_s
-        half_s = 0.5 * self.patience.seconds
-        raw = port.read_until(length, whole_s + half_s)
-        if len(raw) < length:
-            # The second half shows whether the line has fallen silent.
-            more = port.read_until(length - len(raw), whole_s + 2.0 * half_s)
-            self.quiet = not more
-            raw += more
-        at_s = port.now_s()
-        self.whole_s, self.deadline_s = whole_s, whole_s + 2.0 * half_s
-        self.rx_bytes += len(raw)
-        if len(raw) == length:
-            self.patience.note(at_s - whole_s)
-        return raw, at_s
-
-    def complete(self, raw: bytes, missing: Callable[[bytes], int], deadline_s: float) -> bytes:
-        """Wait on for an answer that has turned out to be longer than its shortest form."""
-        while wanted := missing(raw):
-            more = self.port.read_until(wanted, deadline_s)
-            if not more:
-                self.quiet = True
-                break
-            self.rx_bytes += len(more)
-            raw += more
-        return raw
-
-    def drain(self, quiet_s: float = QUIET_S) -> int:
-        """Throw away what arrives until the line is quiet; gives the number of bytes.
-
-        Gives up on a line that never falls silent.
-        """
-        end_s = self.port.now_s() + BABBLE_S
-        dropped = 0
-        while True:
-            more = self.port.read_until(_ROOM, self.port.now_s() + quiet_s)
-            dropped += len(more)
-            self.rx_bytes += len(more)
-            if not more or self.port.now_s() >= end_s or dropped >= 16 * _ROOM:
-                return dropped
+class Line(BusLine):
+    """A port with the patience of one bus; every method may raise drivers.errors.BusLost."""
 
     def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
         """Read one register of several servos; who is not in the answer did not answer well."""
@@ -146,38 +36,11 @@ class Line:
             for servo_id, data in self.ask_bytes(ids, register.address, register.size).items()
         }
 
-    def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
-        """Read the same bytes of several servos.
-
-        A silent servo silences those behind it: they are asked again without it, and it
-        alone where it may be asked more than once. In the loop, where nobody answers at all
-        that is the end of it.
-        """
-        values: dict[int, bytes] = {}
-        left, silent = tuple(ids), list[int]()
-        while left:
-            heard = self._ask(left, address, length)
-            values.update(heard)
-            if self.tries == 1 and not heard:
-                break
-            blamed = silent_ones(left, values)
-            silent += blamed
-            left = tuple(i for i in left if i not in values and i not in blamed)
-        for servo_id in silent:
-            for _ in range(self.tries - 1):
-                values.update(self._ask((servo_id,), address, length))
-                if servo_id in values:
-                    break
-        return values
-
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         port, nominal = self.port, len(ids) * (length + STATUS_OVERHEAD)
         port.clearPort()
         self.send(sync_read(ids, address, length))
-        # In the loop others are waiting, and how late answers are has been measured.
-        hurried_s = min(self.most_s, HURRIED * self.patience.seconds)
-        patience_s = self.most_s if self.tries > 1 else hurried_s
-        deadline_s = self._free_s + nominal * self._byte_s + patience_s
+        deadline_s = self._ends_s(nominal)
         raw = self.complete(b"", lambda r: bytes_missing(r, len(ids), length), deadline_s)
         values = {
             status.id: status.params

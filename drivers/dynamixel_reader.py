@@ -8,9 +8,9 @@ from collections.abc import Collection
 from math import inf
 from typing import NamedTuple
 
-from drivers.dynamixel_group import FastGroup, Group, PlainGroup, Values, silent_ones
+from drivers.bus_roll import Roll, silent_ones
+from drivers.dynamixel_group import FastGroup, Group, PlainGroup, Values
 from drivers.dynamixel_line import Line
-from drivers.dynamixel_roll import Roll
 from drivers.dynamixel_views import Sample, Turns
 
 MOST_GROUPS = 64

@@ -19,8 +19,8 @@ from collections.abc import Sequence
 
 from drivers.bus_journal import Journal, call
 from drivers.bus_reconnect import Reconnect
+from drivers.bus_roll import Roll
 from drivers.dynamixel_health import Health
-from drivers.dynamixel_roll import Roll
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from drivers.feetech_care import RESTART_S, Care
 from drivers.feetech_line import StsLine

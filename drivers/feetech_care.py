@@ -3,8 +3,8 @@
 from collections.abc import Collection, Mapping, Sequence
 from math import inf
 
+from drivers.bus_line import TRIES
 from drivers.dynamixel_health import Health
-from drivers.dynamixel_line import TRIES
 from drivers.feetech_line import StsLine
 from drivers.feetech_readings import Readings
 from drivers.feetech_revival import FAR_SIDE, Revival

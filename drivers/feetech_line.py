@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from drivers.dynamixel_line import HURRIED, Line
+from drivers.bus_line import BusLine
 from drivers.feetech_packets import (
     STATUS_OVERHEAD,
     bytes_missing,
@@ -15,7 +15,7 @@ from drivers.feetech_table import REGISTERS
 from drivers.serial_port import BITS_PER_BYTE
 
 
-class StsLine(Line):
+class StsLine(BusLine):
     """A port with the patience of one bus; every method may raise drivers.errors.BusLost.
 
     What is asked and written here goes through sync read and sync write even for a single
@@ -32,10 +32,7 @@ class StsLine(Line):
         nominal = len(ids) * (length + STATUS_OVERHEAD)
         self.port.clearPort()
         self.send(sync_read(ids, address, length))
-        # In the loop others are waiting, and how late answers are has been measured.
-        hurried_s = min(self.most_s, HURRIED * self.patience.seconds)
-        patience_s = self.most_s if self.tries > 1 else hurried_s
-        deadline_s = self._free_s + nominal * self._byte_s + patience_s
+        deadline_s = self._ends_s(nominal)
         found: dict[int, bytes] = {}
 
         def missing(raw: bytes) -> int:

@@ -8,8 +8,7 @@ from collections.abc import Collection
 from math import inf
 from typing import NamedTuple
 
-from drivers.dynamixel_group import silent_ones
-from drivers.dynamixel_roll import Roll
+from drivers.bus_roll import Roll, silent_ones
 from drivers.feetech_group import Group
 from drivers.feetech_line import StsLine
 from drivers.feetech_views import Sample, Turns

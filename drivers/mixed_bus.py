@@ -2,10 +2,19 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from math import inf
 from typing import NamedTuple
 
 from drivers.errors import BusLost
 from drivers.types import BusHealth, ServoBus, ServoReading, ServoSetup
+
+
+IN_A_ROW = 3
+"""So many reads may stay without any answer before a bus is asked less often."""
+
+AGAIN_S = 0.2
+"""Time between questions to a bus of which nobody answers. Each costs its whole patience, 20 ms
+as a rule, and while it lasts the servos of the other buses wait for their goals."""
 
 
 class Share(NamedTuple):
@@ -17,6 +26,26 @@ class Share(NamedTuple):
     name: str
     bus: ServoBus
     places: tuple[int, ...]
+
+
+class _Patience:
+    """Says when a bus is read: always, but seldom while nobody on it answers."""
+
+    def __init__(self) -> None:
+        self._in_vain, self._due_s = 0, -inf
+
+    def due(self, now_s: float) -> bool:
+        """Tell whether to read it now."""
+        return now_s >= self._due_s
+
+    def note(self, readings: Sequence[ServoReading | None], now_s: float) -> None:
+        """Note what it gave."""
+        if readings.count(None) < len(readings):
+            self._in_vain = 0
+            return
+        self._in_vain += 1
+        if self._in_vain >= IN_A_ROW:
+            self._due_s = now_s + AGAIN_S
 
 
 class MixedBus:
@@ -35,6 +64,7 @@ class MixedBus:
 
     def __init__(self, shares: Sequence[Share]) -> None:
         self._shares = tuple(shares)
+        self._patience = [_Patience() for _ in self._shares]
         places = sorted(place for share in shares for place in share.places)
         if places != list(range(len(places))):
             raise ValueError(f"buses share out places {places}: each from 0 on must be there once")
@@ -47,6 +77,7 @@ class MixedBus:
             drivers.errors.PortError: a port cannot be opened.
             drivers.errors.ServoMissing: servos are absent or of another model.
         """
+        self._patience = [_Patience() for _ in self._shares]
         opened: list[Share] = []
         try:
             for share in self._shares:
@@ -60,12 +91,19 @@ class MixedBus:
     def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
         """Read all servos of all buses; None where no fresh answer came.
 
+        A bus of which nobody answers is asked five times a second until somebody does: the
+        servos of the others are not to wait for it.
+
         Raises:
             drivers.errors.BusLost: nobody has answered on a bus for longer than its patience.
         """
         whole: list[ServoReading | None] = [None] * self._count
-        for _, bus, places in self._shares:
-            for place, reading in zip(places, bus.read(now_s), strict=True):
+        for (_, bus, places), patience in zip(self._shares, self._patience, strict=True):
+            if not patience.due(now_s):
+                continue
+            readings = bus.read(now_s)
+            patience.note(readings, now_s)
+            for place, reading in zip(places, readings, strict=True):
                 whole[place] = reading
         return tuple(whole)
 

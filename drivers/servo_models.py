@@ -64,7 +64,14 @@ SERVOS: dict[str, ServoFacts] = {
     },
     **{
         name: ServoFacts(
-            "maestro", model.steps_per_turn, model.lowest, model.highest, "us", US_STEPS, 1500, False
+            "maestro",
+            model.steps_per_turn,
+            model.lowest,
+            model.highest,
+            "us",
+            US_STEPS,
+            1500,
+            False,
         )
         for name, model in HOBBY.items()
     },

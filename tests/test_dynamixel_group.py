@@ -4,8 +4,8 @@ import struct
 
 import pytest
 
-from drivers.dynamixel_group import FastGroup, PlainGroup, silent_ones
-from drivers.dynamixel_roll import AGAIN_FIRST_S, AGAIN_LAST_S, Roll
+from drivers.bus_roll import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
+from drivers.dynamixel_group import FastGroup, PlainGroup
 from drivers.dynamixel_views import DIRECT, direct_turns
 from sim_mock.servo_chain import build_chain, status
 

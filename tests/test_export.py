@@ -24,7 +24,7 @@ from robot.kinematics import GeometryParams, Kinematics
 from robot.loop import Tick, run
 from robot.orders import Jog, Stop
 from robot.recording.export_bids import About, label_of, write_bids
-from robot.recording.export_csv import EVENTS, SAMPLES, write_csv
+from robot.recording.export_csv import EVENTS, columns, write_csv
 from robot.recording.gaze_angles import Trace, in_space, trace_of
 from robot.recording.gaze_labels import Labels, Stretch, labels_of, lag_of, stretches_of
 from robot.types import JointState
@@ -195,10 +195,10 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 def test_a_row_a_sample_with_what_was_measured(face: Run, tables: tuple[Path, ...]) -> None:
     assert [path.name for path in tables] == [
-        "seen_samples.csv", "seen_events.csv", "seen_fixations.csv",
+        "seen_samples.csv", "seen_events.csv", "seen_fixations.csv", "seen_samples.json",
     ]  # fmt: skip
     read = rows(tables[0])
-    assert tuple(read[0]) == SAMPLES and len(read) == len(face.ticks)
+    assert tuple(read[0]) == columns(JOINTS) and len(read) == len(face.ticks)
     tick, row = face.ticks[2000], read[2000]
     space = in_space(tick.pose)
     assert float(row["left_x_deg"]) == pytest.approx(space.left_deg[0], abs=6e-5)

@@ -511,7 +511,7 @@ def test_export_writes_tables(recorded: Path, tmp_path: Path) -> None:
     code, words = said("export", recorded, "--csv", "--out", tmp_path / "seen")
     assert code == 0 and "saccades" in words
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "seen_events.csv", "seen_fixations.csv", "seen_samples.csv",
+        "seen_events.csv", "seen_fixations.csv", "seen_samples.csv", "seen_samples.json",
     ]  # fmt: skip
 
 

@@ -23,7 +23,7 @@ from robot.report import bands, build, face, human
 from robot.report.about import About
 from robot.report.build import DRAWINGS, found, measured, report_of
 from robot.report.canvas import COLOURS, Shown, png
-from robot.report.gathered import Gathered, Gathering
+from robot.report.gathered import Gathered, Gathering, Row
 from robot.report.gaze_events import Blink, Commanded, Fixation, Saccade
 from robot.report.measured import Finding, Measured, judged, mean, median
 from robot.report.model import own, published
@@ -32,7 +32,7 @@ from robot.report.page import band_words, gauge, number
 RIG = load_rig("desk")
 SLOWER = replace(RIG, loop=replace(RIG.loop, rate_hz=100.0))
 """Half the ticks, for what is asked about fixations alone."""
-EMPTY = Gathered(np.zeros((0, 29)), (), (), ())
+EMPTY = Gathered(np.zeros((0, len(Row._fields))), (), (), ())
 
 
 def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> Gathered:
@@ -99,7 +99,7 @@ def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -
         for n, (a, d, v, at) in enumerate(saccades)
     )
     shuts = tuple(Blink(3.0 * n, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0) for n in range(blinks))
-    rows = np.full((600, 29), np.nan)
+    rows = np.full((600, len(Row._fields)), np.nan)
     rows[:, 0] = np.arange(600) * 0.05
     rows[:, -1] = 0.0
     return Gathered(rows, every, (), shuts, shuts)
@@ -185,7 +185,7 @@ def fixed(parts: list[int], seconds: float = 0.3) -> Gathered:
         Fixation(n * seconds, seconds, PARTS[part], True, 1, "face", PARTS[part])
         for n, part in enumerate(parts)
     )
-    return Gathered(np.zeros((0, 29)), (), every, ())
+    return Gathered(np.zeros((0, len(Row._fields))), (), every, ())
 
 
 def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:

@@ -12,11 +12,10 @@ from typing import NamedTuple
 from drivers.errors import DriverError, PortError
 from drivers.serial_port import BusPort
 from drivers.serial_ports import WISHED_LATENCY_MS, Host, latency_file, latency_ms, set_latency
-from drivers.servo_models import BusKind
 from drivers.types import ServoSetup
 from robot.bringup.doctor_patient import name_servo
 from robot.bringup.doctor_port import examine_latency, examine_owner, examine_port, port_facts
-from robot.bringup.findings import Finding, worst
+from robot.bringup.findings import Finding, Fix, worst
 from robot.bringup.servo_kind import Found, ServoKind, Tell
 
 
@@ -48,7 +47,7 @@ class Done:
 
 
 def check_all(
-    port: BusPort, kind: BusKind, host: Host, examine: Callable[[], list[Finding]]
+    port: BusPort, kind: str, host: Host, examine: Callable[[], list[Finding]]
 ) -> list[Finding]:
     """Examine a port and, where it can be used, what is behind it; the port is closed after it.
 
@@ -208,13 +207,15 @@ def mend_latency(device: str, host: Host) -> list[Done]:
     return [Done(device, f"latency timer {was} -> {WISHED_LATENCY_MS} ms: {how}", done)]
 
 
-def mend(port: BusPort, kind: ServoKind, findings: Iterable[Finding]) -> Iterator[Done]:
-    """Write what the findings offer, one servo after the other; only where the torque is off.
+def mend(write: Callable[[Fix], str], findings: Iterable[Finding]) -> Iterator[Done]:
+    """Write what the findings offer, one after the other.
+
+    write: writes one, where that is safe; gives "" or why it was not done
 
     Raises:
         drivers.errors.BusLost: the port is gone.
     """
     for finding in findings:
         for fix in finding.fixes:
-            why = kind.mend(port, fix)
+            why = write(fix)
             yield Done(finding.where, f"{fix}: {f'not done, {why}' if why else 'done'}", not why)

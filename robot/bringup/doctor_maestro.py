@@ -141,7 +141,9 @@ def _speech(board: Board, found: MaestroFound) -> Iterator[Finding]:
     """Judge how it wants to be spoken to."""
     params = board.params
     if params.protocol not in found.forms:
-        number = f"its device number is not {params.device}; " if params.protocol == "pololu" else ""
+        number = (
+            f"its device number is not {params.device}; " if params.protocol == "pololu" else ""
+        )
         yield Finding(
             "error",
             f"answers the {found.forms[0]} form only, the YAML says {params.protocol}",
@@ -187,15 +189,18 @@ def _channels(board: Board) -> Iterator[Finding]:
     for setup in board.setups:
         pulse, where = board.pulses.get(setup.id), name_servo(setup)
         if setup.id >= size:
-            yield Finding("error", f"the board has channels 0..{size - 1} only", where,
-                          "correct its id in the YAML")  # fmt: skip
+            says, cure = f"the board has channels 0..{size - 1} only", "correct its id in the YAML"
         elif pulse is None:
-            yield Finding("error", "the board does not answer about this channel", where,
-                          "has it so many channels? correct id or channels in the YAML")  # fmt: skip
+            says = "the board does not answer about this channel"
+            cure = "has it so many channels? correct its id, or bus.maestro.channels"
         elif 0 < pulse <= MOST_INPUT:
-            yield Finding("error", "is an input", where, "set it to Servo in Pololu's program")
+            says, cure = "is an input", "set its channel to Servo in Pololu's program"
         elif pulse:
             yield from _pulse(setup, pulse, where)
+            continue
+        else:
+            continue
+        yield Finding("error", says, where, cure)
 
 
 def _pulse(setup: ServoSetup, pulse: int, where: str) -> Iterator[Finding]:

@@ -19,7 +19,6 @@ from drivers.serial_ports import (
     latency_ms,
     serial_ports,
 )
-from drivers.servo_models import BusKind
 from robot.bringup.findings import Finding
 
 POLOLU = "1ffb:"
@@ -76,7 +75,7 @@ def usb_of(device: str, ports: Sequence[SerialPort]) -> str:
     return next((port.usb for port in ports if os.path.realpath(port.device) == real), "")
 
 
-def examine_owner(facts: PortFacts, kind: BusKind) -> list[Finding]:
+def examine_owner(facts: PortFacts, kind: str) -> list[Finding]:
     """Judge whether a port is one that servo packets may be sent to; nothing where it is."""
     if kind == "maestro" or not usb_of(facts.device, facts.others).startswith(POLOLU):
         return []
@@ -91,7 +90,7 @@ def examine_owner(facts: PortFacts, kind: BusKind) -> list[Finding]:
     ]
 
 
-def refuse_owner(device: str, kind: BusKind, ports: Sequence[SerialPort]) -> None:
+def refuse_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
     """See that a port is one that servo packets may be sent to.
 
     Raises:

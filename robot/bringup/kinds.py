@@ -4,7 +4,6 @@ from drivers import dynamixel_scan, feetech_assign, feetech_scan
 from drivers.dynamixel_table import MODELS as DYNAMIXEL_MODELS
 from drivers.feetech_table import MODELS as FEETECH_MODELS
 from drivers.serial_port import BusPort
-from drivers.servo_models import BusKind
 from drivers.types import ServoSetup
 from robot.bringup import doctor, doctor_feetech, dynamixel_assign, dynamixel_care, feetech_care
 from robot.bringup.servo_kind import Found, ServoKind, SetUp, Tell
@@ -68,5 +67,5 @@ FEETECH = ServoKind(
     reboot=feetech_care.reboot,
 )
 
-KINDS: dict[BusKind, ServoKind] = {"dynamixel": DYNAMIXEL, "feetech": FEETECH}
+KINDS: dict[str, ServoKind] = {"dynamixel": DYNAMIXEL, "feetech": FEETECH}
 """By the name that a rig's YAML gives them."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from drivers.errors import BusLost, ServoFault, ServoMissing
-from drivers.maestro_commands import MOST_INPUT
+from drivers.maestro_commands import MOST_INPUT, name_errors
 from drivers.maestro_hold import switch_off
 from drivers.maestro_line import Line
 from drivers.maestro_ramp import SPEED_STEPS_S, speed_units
@@ -90,7 +90,9 @@ def _pulse(line: Line, setup: ServoSetup) -> int:
         found = line.pulses((setup.id,))
         if found is not None:
             return found[0]
-    raise ServoMissing(f"{line.port.port_name}: no answer about {name_servo(setup)}: check its cable")
+    raise ServoMissing(
+        f"{line.port.port_name}: no answer about {name_servo(setup)}: check its cable"
+    )
 
 
 def _end(line: Line, setup: ServoSetup) -> None:
@@ -105,6 +107,20 @@ def _end(line: Line, setup: ServoSetup) -> None:
     except BusLost:
         sure = False
     if not sure:
-        raise ServoFault(
-            f"{name_servo(setup)} may still get pulses: switch the servo supply off"
+        raise ServoFault(f"{name_servo(setup)} may still get pulses: switch the servo supply off")
+
+
+def sent_home(line: Line) -> tuple[str, ...]:
+    """Send all channels home and clear the errors; gives those that the board held, by name.
+
+    Raises:
+        drivers.errors.ServoMissing: the board does not answer.
+        drivers.errors.BusLost: the port is gone.
+    """
+    register = line.greet()
+    if register is None:
+        raise ServoMissing(
+            f"{line.port.port_name}: no Maestro answers: gazerig doctor names the cure"
         )
+    line.send(line.speech.go_home())
+    return name_errors(register)

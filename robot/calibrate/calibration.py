@@ -25,7 +25,10 @@ LARGEST_BLIND_JUMP_STEPS = STEPS_PER_TURN // 8
 ENDS = {
     "eye_pan": ("LEFT", "RIGHT"),
     "eye_tilt": ("UPPER", "LOWER"),
+    "eyes_pan": ("LEFT", "RIGHT"),
+    "eyes_tilt": ("UPPER", "LOWER"),
     "upper_lid": ("OPEN", "SHUT"),
+    "lower_lid": ("OPEN", "SHUT"),
     "neck_yaw": ("LEFT", "RIGHT"),
     "neck_pitch": ("UPPER", "LOWER"),
     "neck_roll": ("RIGHT EAR DOWN", "LEFT EAR DOWN"),
@@ -50,12 +53,27 @@ class Marks(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """What the rig file must say of one joint; fields as in robot.body.JointParams."""
+    """What the rig file must say of one joint; fields as in robot.joint.JointParams."""
 
     zero_step: int
     sign: int
     min_deg: float
     max_deg: float
+
+
+class Places(NamedTuple):
+    """What the rig file must say of a joint behind a push rod; fields as in JointParams.
+
+    linkage: each (joint angle in degrees, servo position in steps or us), angles rising
+    """
+
+    linkage: tuple[tuple[float, float], ...]
+    min_deg: float
+    max_deg: float
+
+
+Value = int | float | tuple[tuple[float, float], ...]
+"""What a calibration writes."""
 
 
 class Unwrapped:
@@ -102,6 +120,17 @@ def ends_of(joint_name: str) -> tuple[str, str]:
     return next(ends for part, ends in ENDS.items() if joint_name.endswith(part))
 
 
+def is_lid(joint_name: str) -> bool:
+    """Tell whether a joint moves a lid: its ends are what matters, and it has no straight ahead."""
+    return joint_name.endswith("_lid")
+
+
+def lid_keys(joint_name: str) -> tuple[str, str]:
+    """Give the keys of a lid's shut and open angle under lid_joints, as in config.rig.LidJoints."""
+    lid = joint_name.removesuffix("_lid").removesuffix("_upper")
+    return f"{lid}_shut_deg", f"{lid}_open_deg"
+
+
 def middle(marks: Marks) -> Marks:
     """Put the zero half-way between the ends."""
     return marks._replace(zero=(marks.positive_end + marks.negative_end) // 2)
@@ -124,7 +153,7 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
             f"{SMALLEST_RANGE_DEG:g} are needed: is this the joint that was turned, "
             "and is its horn screwed on?"
         )
-    _refuse_seam(name, low, high, steps_per_deg)
+    _refuse_seam(name, low, high, steps_per_deg, joint.facts.bus == "feetech")
     if not low < marks.zero < high:
         raise CalibrationRefused(
             f"{name}: straight ahead (step {marks.zero % STEPS_PER_TURN}) does not lie between "
@@ -134,18 +163,21 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
     sign = 1 if marks.positive_end > marks.negative_end else -1
     most = abs(marks.positive_end - marks.zero) / steps_per_deg - margin_deg
     least = abs(marks.negative_end - marks.zero) / steps_per_deg - margin_deg
-    made = Calibration(marks.zero % STEPS_PER_TURN, sign, -_inwards(least), _inwards(most))
+    made = Calibration(marks.zero % STEPS_PER_TURN, sign, -inwards(least), inwards(most))
     _refuse_unfit(name, made, joint, margin_deg)
     return made
 
 
-def _inwards(angle_deg: float) -> float:
+def inwards(angle_deg: float) -> float:
     """Round down to tenths, so that never a hair beyond what was measured is allowed."""
     return floor(angle_deg * 10.0 + 1e-6) / 10.0
 
 
-def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float) -> None:
-    """Refuse a travel that leaves the turn 0..4095 in which a restarted servo counts."""
+def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable: bool) -> None:
+    """Refuse a travel that leaves the turn 0..4095 in which a restarted servo counts.
+
+    settable: the servo can be told to call any place its middle, and keeps to it
+    """
     if low // STEPS_PER_TURN == high // STEPS_PER_TURN:
         return
     turn_deg = STEPS_PER_TURN / steps_per_deg
@@ -153,6 +185,12 @@ def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float) -> None:
         raise CalibrationRefused(
             f"{name}: it turns {(high - low) / steps_per_deg:.0f} deg, and its servo counts only "
             f"one turn ({turn_deg:.0f} deg): give the joint stops, or check its ratio"
+        )
+    if settable:
+        raise CalibrationRefused(
+            f"{name}: its travel (steps {low % STEPS_PER_TURN} to {high % STEPS_PER_TURN}) crosses "
+            "the servo's seam from 4095 to 0, where a restarted servo is a whole turn wrong: "
+            "calibrate anew with --set-middle, and the servo calls the middle of the travel 2048"
         )
     centre = (low + high) // 2 % STEPS_PER_TURN
     off = STEPS_PER_TURN // 2 - centre
@@ -202,23 +240,23 @@ def applied(joint: JointParams, made: Calibration) -> JointParams:
 def changes(
     name: str,
     joint: JointParams,
-    made: Calibration,
+    made: Calibration | Places,
     park_deg: Mapping[str, float],
-) -> dict[str, int | float]:
+) -> dict[str, Value]:
     """Give dotted keys of the rig file and their new values, those alone that differ.
 
     Values that stood on the old range follow: a lid's shut and open angle go to its ends,
     a parking angle outside the new range to its nearer end.
     """
-    wanted: dict[str, int | float] = {
+    wanted: dict[str, Value] = {
         f"joints.{name}.{key}": value
         for key, value in made._asdict().items()
         if getattr(joint, key) != value
     }
-    if name.endswith("upper_lid"):
-        side = name.split("_")[0]
-        wanted[f"lid_joints.{side}_shut_deg"] = made.min_deg
-        wanted[f"lid_joints.{side}_open_deg"] = made.max_deg
+    if is_lid(name):
+        shut, wide = lid_keys(name)
+        wanted[f"lid_joints.{shut}"] = made.min_deg
+        wanted[f"lid_joints.{wide}"] = made.max_deg
     parked = park_deg.get(name)
     if parked is not None and not made.min_deg <= parked <= made.max_deg:
         wanted[f"park_deg.{name}"] = made.min_deg if parked < made.min_deg else made.max_deg

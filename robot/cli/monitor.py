@@ -1,5 +1,6 @@
 """The command monitor: a live table of all servos, without touching them."""
 
+import contextlib
 import json
 from collections.abc import Callable, Iterator, Mapping
 from math import inf
@@ -10,14 +11,27 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from config.schema import load_rig
-from robot.bringup.monitor import Look, Monitor, Sample, as_json
+from config.schema import Rig, load_rig
+from drivers.dynamixel_registers import Registers
+from drivers.feetech_registers import StsRegisters
+from drivers.serial_port import BlockingPort
+from robot.bringup.looks import DynamixelLooks, FeetechLooks, Look, Looks, MaestroLooks
+from robot.bringup.monitor import Monitor, Sample, as_json
+from robot.cli.opened import opened
 from robot.cli.terminal import RigArgument, clear_errors, signals
-from robot.cli.wires import MockOption, PortOption, registers, wires
+from robot.cli.wires import MockOption, PortOption, Wires, wires
 from robot.clock import RealClock
 from robot.joint import JointParams
+from robot.rig_bus import bus_names
 
 app = typer.Typer()
+
+RECKONED = (
+    "~ is reckoned from the pulse (us); hobby servos tell nothing. The board's errors are not "
+    "asked for: telling clears them"
+)
+_MEASURED = ("goal deg", "at deg", "step", "deg/s", "load %", "C", "V")
+_UNTOLD = "-"
 
 
 @app.command()
@@ -35,12 +49,9 @@ def monitor(
     """Watch all servos; reads alone: nothing is written, torque stays as it is."""
     with clear_errors(), signals() as stopped:
         found, clock = load_rig(rig), RealClock()
-        with (
-            wires(found, mock, port) as wire,
-            registers(wire.paths[""], found.bus.baud, tries=1) as (regs, line),
-        ):
+        with wires(found, mock, port) as wire, _looks(found, wire) as looks:
             joints = {name: found.joints[name] for name in found.names}
-            watch = Monitor(regs, joints, line.now_s)
+            watch = Monitor(looks, joints, clock.now_s)
             samples = _samples(watch, clock, rate, 0.0 if once else seconds, stopped)
             if as_lines:
                 start_s = clock.now_s()
@@ -52,6 +63,25 @@ def monitor(
                 with Live(console=Console(), auto_refresh=False) as live:
                     for sample in samples:
                         live.update(_table(sample, joints, rate), refresh=True)
+
+
+@contextlib.contextmanager
+def _looks(rig: Rig, wire: Wires) -> Iterator[dict[str, Looks]]:
+    """Open every bus for looking alone."""
+    with contextlib.ExitStack() as ports:
+        yield {
+            name: _looks_on(rig, name, ports.enter_context(opened(rig, wire, name)))
+            for name in bus_names(rig)
+        }
+
+
+def _looks_on(rig: Rig, bus: str, port: BlockingPort) -> Looks:
+    config = rig.buses[bus] if bus else rig.bus
+    if config.kind == "maestro":
+        return MaestroLooks(port, config.maestro)
+    if config.kind == "feetech":
+        return FeetechLooks(StsRegisters(port, tries=1))
+    return DynamixelLooks(Registers(port, tries=1))
 
 
 def _samples(
@@ -78,43 +108,62 @@ def _samples(
 
 
 def _table(sample: Sample, joints: Mapping[str, JointParams], rate: float) -> Table:
-    """Lay a sample out as a table."""
+    """Lay a sample out as a table; what only some kinds of servo have gets columns if any is."""
+    hobby = any(not joint.facts.measured for joint in joints.values())
     share = sample.unanswered / sample.asked
+    caption = (
+        f"{rate:g} looks a second, each {1e3 * sample.took_s:.0f} ms; "
+        f"{sample.unanswered} of {sample.asked} unanswered ({share:.1%})"
+    )
     table = Table(
         box=None,
         padding=(0, 1, 0, 0),
         caption_justify="left",
-        caption=f"{rate:g} looks a second, each {1e3 * sample.took_s:.0f} ms; "
-        f"{sample.unanswered} of {sample.asked} unanswered ({share:.1%})",
+        caption=f"{caption}\n{RECKONED}" if hobby else caption,
     )
     table.add_column("joint", no_wrap=True)
+    several = any(joint.bus for joint in joints.values())
+    if several:
+        table.add_column("bus", no_wrap=True)
     table.add_column("id", justify="right", no_wrap=True)
-    for name in ("goal deg", "at deg", "step", "deg/s", "load %", "C", "V"):
+    for name in (*_MEASURED, *(("us",) if hobby else ())):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("torque", no_wrap=True)
     table.add_column("errors")
     for name, look in sample.looks.items():
-        table.add_row(name, str(joints[name].id), *_row(look))
+        where = (name, joints[name].bus or "main") if several else (name,)
+        table.add_row(*where, str(joints[name].id), *_row(look, hobby))
     return table
 
 
-def _row(look: Look | None) -> tuple[str, ...]:
+def _row(look: Look | None, hobby: bool) -> tuple[str, ...]:
     if look is None:
-        return ("",) * 8 + ("[red]no answer[/red]",)
-    errors = f"[red]{', '.join(look.errors)}[/red]" if look.errors else "none"
+        return ("",) * (len(_MEASURED) + hobby + 1) + ("[red]no answer[/red]",)
+    if look.errors:
+        errors = f"[red]{', '.join(look.errors)}[/red]"
+    else:
+        errors = "none" if look.measured else _UNTOLD
+    at = _number(look.position_deg, 1)
     return (
         _number(look.goal_deg, 1),
-        _number(look.position_deg, 1),
-        str(look.position_steps),
+        at if look.measured or at == _UNTOLD else f"~{at}",
+        _UNTOLD if look.position_steps is None else str(look.position_steps),
         _number(look.velocity_deg_s, 0),
-        _number(100.0 * look.load, 0),
-        f"{look.temperature_c}",
-        f"{look.voltage_v:.1f}",
+        _number(None if look.load is None else 100.0 * look.load, 0),
+        _number(look.temperature_c, 0),
+        _number(look.voltage_v, 1),
+        *((_pulse(look),) if hobby else ()),
         "on" if look.torque else "off",
         errors,
     )
 
 
-def _number(value: float, digits: int) -> str:
-    """Write a number, and zero without a sign."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
+def _pulse(look: Look) -> str:
+    if look.pulse_us is None:
+        return _UNTOLD
+    return f"{look.pulse_us:g}" if look.pulse_us else "none"
+
+
+def _number(value: float | None, digits: int) -> str:
+    """Write a number, zero without a sign, and "-" where there is none."""
+    return _UNTOLD if value is None else f"{round(value, digits) + 0.0:.{digits}f}"

@@ -6,12 +6,14 @@ from typing import Annotated, NamedTuple
 
 import typer
 
+from config.rig import BusConfig
 from config.schema import Rig
 from drivers.dynamixel_registers import Registers
 from drivers.errors import PortError, SetupError
 from drivers.serial_port import BlockingPort
+from drivers.types import ServoSetup
 from robot.emulated_rig import emulated_lines
-from robot.rig_bus import bus_names, ports_of
+from robot.rig_bus import bus_names, joints_on, ports_of, rig_setups
 from sim_mock.emulated import Emulated
 from sim_mock.pty_bus import PtyBuses
 
@@ -75,6 +77,17 @@ def bus_label(rig: Rig, name: str) -> str:
     if len(bus_names(rig)) == 1:
         return "the bus"
     return f"bus {name}" if name else "the main bus"
+
+
+def bus_config(rig: Rig, name: str) -> BusConfig:
+    """Give how the servos of a bus are reached."""
+    return rig.buses[name] if name else rig.bus
+
+
+def setups_on(rig: Rig, name: str) -> tuple[ServoSetup, ...]:
+    """Give what a bus must know of its servos, in the order of the joints."""
+    every = dict(zip(rig.names, rig_setups(rig), strict=True))
+    return tuple(every[joint] for joint in joints_on(rig, name))
 
 
 @contextlib.contextmanager

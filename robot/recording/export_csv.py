@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from robot.reckoned import RECKONED
 from robot.recording.gaze_angles import MOVEMENTS, Trace
 from robot.recording.gaze_labels import Labels, Stretch
 
@@ -74,7 +75,7 @@ def _rests_on(trace: Trace) -> dict[str, object]:
         "joints": list(trace.joints),
         "reckoned_joints": list(trace.reckoned),
         "basis": {key: trace.basis(of) for key, of in (gaze | there).items()},
-        "reckoned": "from commands and known servo speeds, not measured",
+        "reckoned": RECKONED,
     }
 
 

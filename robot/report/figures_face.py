@@ -214,8 +214,8 @@ DRAWINGS = (
             "figures 8 and 9 of Nakamoto & Tsuruno).", _heat, (8.4, 4.6)),
     Drawing("pupil_axes", FACE, "Where each pupil axis passes at the face",
             "One dot a fixation: the line of sight of each eye, {measured}, in the plane of the "
-            "face, from the point that was to be looked at. As the rig saw the face: an error of its "
-            "camera does not show here.", _pupils, (8.4, 4.2)),
+            "face, from the point that was to be looked at. As the rig saw the face: an error of "
+            "its camera does not show here.", _pupils, (8.4, 4.2)),
     Drawing("vergence", FACE, "Vergence at the face",
             "Angle between the lines of sight, {measured}, less that of the point looked at.",
             _vergence, (8.4, 3.0)),

@@ -49,7 +49,8 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
                 low10, mid, high90 = np.percentile(seen, (10, 50, 90))
                 phases.plot([low10, high90], [at, at], color=shown.colour, lw=2.0)
                 phases.plot(mid, at, "o", color=shown.colour, ms=5,
-                            label=f"{shown.name}, {shown.run.joints.basis(LIDS)}" if row == 0 else None)  # fmt: skip
+                            label=f"{shown.name}, {basis_words([shown], LIDS)}" if row == 0
+                            else None)  # fmt: skip
             if len(asked):
                 phases.plot(np.median(asked), at, "|", color="black", ms=11,
                             label="as commanded" if row == n == 0 else None)  # fmt: skip
@@ -147,8 +148,9 @@ def _strip(axes: Axes, bouts: np.ndarray, start_s: float, row: int, colour: str)
 
 DRAWINGS = (
     Drawing("blink_shape", LIDS, "Shape of a blink",
-            "Median and 10th to 90th percentile of {measured} upper lids, and the median of lower "
-            "ones where the rig has such; and the lengths of the phases beside people's. A phase lasts while the lid is faster than a twentieth of its peak.",
+            "Median and 10th to 90th percentile of the upper lids, {measured}, and the median of "
+            "lower ones where the rig has such; and the lengths of the phases beside people's. A "
+            "phase lasts while the lid is faster than a twentieth of its peak.",
             _shape),
     Drawing("blink_when", LIDS, "When the lids blink",
             "Intervals between blinks; and the share of gaze shifts that bring one.", _when),

@@ -4,7 +4,7 @@ Servos later in a group read wait for the ones before them, so one that keeps si
 leave the group at once; it is then asked alone, at once and after that ever more seldom.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
 """Time between attempts at a servo that stays silent: doubled from the first to the last."""
@@ -77,3 +77,15 @@ class Roll:
     def _regroup(self) -> None:
         self.group = tuple(servo_id for servo_id in self._ids if servo_id not in self._due_s)
         self.troubled = bool(self._due_s or self._damaged)
+
+
+def silent_ones(ids: Sequence[int], heard: Collection[int]) -> tuple[int, ...]:
+    """Name the servos that kept silent of their own accord.
+
+    A servo waits for the one before it, so behind the last one heard only the first is
+    to blame; what is missing before the last one heard has nobody else to blame.
+    """
+    missing = [i for i, servo_id in enumerate(ids) if servo_id not in heard]
+    last_heard = max((i for i, servo_id in enumerate(ids) if servo_id in heard), default=-1)
+    behind = [i for i in missing if i > last_heard][:1]
+    return tuple(ids[i] for i in [i for i in missing if i < last_heard] + behind)

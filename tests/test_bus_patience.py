@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.bus_journal import MOST, Journal, call, title
+from drivers.bus_patience import WINDOW, Patience
 from drivers.bus_reconnect import Reconnect
 from drivers.dynamixel_health import AGAIN_AND_AGAIN, Health
-from drivers.dynamixel_patience import WINDOW, Patience
 from drivers.dynamixel_table import MODELS, indirect_blocks
 from drivers.dynamixel_views import (
     CALM_S,

@@ -1,0 +1,99 @@
+"""What a scan has found, in words and in plain values; printed by the command line."""
+
+from collections.abc import Container, Iterator, Sequence
+
+from drivers.maestro_params import US_STEPS
+from drivers.servo_models import BusKind
+from robot.bringup.searching import Looked, found_of
+from robot.bringup.servo_kind import Found
+
+
+def servo_plain(kind: BusKind, servo: Found) -> dict[str, object]:
+    """Give a servo as JSON can hold it."""
+    return {
+        "kind": kind,
+        "id": servo.id,
+        "number": servo.number,
+        "firmware": servo.firmware,
+        "baud": servo.baud,
+        "model": servo.model,
+    }
+
+
+def board_plain(looked: Looked) -> dict[str, object]:
+    """Give a Maestro as JSON can hold it; pulses in us, 0 for none."""
+    board = looked.board
+    if board is None:
+        raise ValueError("no board answered")
+    pulses = [pulse / US_STEPS for pulse in board.pulses]
+    return {**board._asdict(), "channels": looked.channels, "baud": looked.baud, "pulses": pulses}
+
+
+def board_words(looked: Looked) -> Iterator[str]:
+    """Say what a board has told."""
+    board = looked.board
+    if board is None:
+        return
+    if looked.channels is not None:
+        size = f"{looked.channels} channels"
+    else:
+        size = "6 channels or more (asking for one too many would send all of them home)"
+    crc = "on" if board.crc else "off"
+    yield f"Pololu Maestro: {size}, {' and '.join(board.forms)} form, CRC {crc}"
+    given = [f"{n}: {pulse / US_STEPS:g} us" for n, pulse in enumerate(board.pulses) if pulse]
+    yield f"pulses: {', '.join(given) or 'none'} (channels 0..{len(board.pulses) - 1})"
+    yield f"errors it held, cleared by asking: {', '.join(board.errors) or 'none'}"
+    yield {True: "its own script runs", False: "no script runs", None: "its script: no answer"}[
+        board.script
+    ]
+
+
+def remarks(rounds: Sequence[Looked], where: str) -> Iterator[str]:
+    """Say what tables of servos and boards do not."""
+    found = found_of(rounds)
+    boards = sum(1 for one in rounds if one.board is not None)
+    if not boards or found:
+        count = f"{len(found)} servo{'s' if len(found) != 1 else ''}"
+        yield f"{count} on {where}; {_asked(rounds)}"
+    for one in rounds:
+        yield from _odd(one, {rate.baud for rate in rounds if rate.somebody})
+    if not found and not boards:
+        yield (
+            "nobody answers: is the servo supply on? does each servo's LED flash once when it "
+            "comes on? is the first cable in the right plug of the adaptor? is another program "
+            "using the port? a Maestro on USB: is it set to 'USB Dual Port', and is this the "
+            "first of its two ports?"
+        )
+
+
+def _asked(rounds: Sequence[Looked]) -> str:
+    """Say which kinds were asked at which rates."""
+    rates: dict[BusKind, list[str]] = {}
+    for one in rounds:
+        if one.possible:
+            rates.setdefault(one.kind, []).append(str(one.baud))
+    return "; ".join(f"asked {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
+
+
+def _odd(one: Looked, heard: Container[int]) -> Iterator[str]:
+    """Say what was odd at one rate; heard: the rates at which somebody was understood."""
+    twice = {servo.id for servo in one.found if one.found.count(servo) > 1}
+    for servo_id in sorted({*one.shared, *twice}):
+        yield (
+            f"two or more servos have id {servo_id} at {one.baud} bit/s: connect them one at a "
+            "time and run gazerig setup"
+        )
+    if one.found or one.baud in heard:
+        return
+    if one.protocol_1:
+        ids = ", ".join(map(str, one.protocol_1))
+        yield (
+            f"at {one.baud} bit/s something answers in Protocol 1 as id {ids}: another maker's "
+            "servo (gazerig scan --kind feetech), or one whose Protocol Type must be set to 2 with "
+            "Dynamixel Wizard 2.0"
+        )
+    elif one.junk:
+        yield (
+            f"at {one.baud} bit/s only pieces came: a wrong rate, a loose plug, or two servos "
+            "with one id"
+        )

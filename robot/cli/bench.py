@@ -1,0 +1,62 @@
+"""What the bring-up commands share: this computer's ports, one opened port, progress, options."""
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from drivers.serial_port import BlockingPort
+from drivers.serial_ports import Host, SerialPort, serial_ports
+from robot.bringup.doctor_port import refuse_owner, usb_of
+from robot.cli.terminal import status
+
+host = Host()
+"""Where this computer tells about its ports."""
+
+YesOption = Annotated[bool, typer.Option("--yes", help="Yes to every question.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="One line of JSON instead of words.")]
+
+
+def ports_here() -> tuple[SerialPort, ...]:
+    """List the serial ports of this computer."""
+    return serial_ports(host)
+
+
+def usb_id(path: str) -> str:
+    """Give the USB vendor and product id of a port, "" where it has none."""
+    return usb_of(path, ports_here())
+
+
+@contextlib.contextmanager
+def opened(path: str, kind: str) -> Iterator[BlockingPort]:
+    """Give a port to ask a kind of servos on, not opened yet, closed again at the end.
+
+    Raises:
+        drivers.errors.PortError: what is behind it would be moved by that.
+    """
+    refuse_owner(path, kind, ports_here())
+    line = BlockingPort(path)
+    try:
+        yield line
+    finally:
+        line.closePort()
+
+
+def console() -> Console:
+    """Give the place for results; long lines are the terminal's business."""
+    return Console(soft_wrap=True, highlight=False)
+
+
+def progress(line: str) -> None:
+    """Show what is being done, on a terminal only."""
+    if sys.stderr.isatty():
+        status(line)
+
+
+def wipe() -> None:
+    """Take the progress line away."""
+    if sys.stderr.isatty():
+        status("")

@@ -1,0 +1,130 @@
+"""The command ``gazerig doctor``: every bus of a rig examined, and what is safe mended."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated
+
+import typer
+
+from config.schema import Rig, load_rig
+from drivers.serial_port import BlockingPort
+from robot.bringup import checkup as checkup
+from robot.bringup import doctor_maestro as doctor_maestro
+from robot.bringup.checkup import Done
+from robot.bringup.findings import Finding, worst
+from robot.bringup.kinds import KINDS
+from robot.bringup.servo_report import as_plain, grouped, summed_up
+from robot.cli import bench as bench
+from robot.cli.bench import JsonOption, console, progress, wipe
+from robot.cli.terminal import FAULT, RigArgument, clear_errors
+from robot.cli.wires import MockOption, PortOption, bus_config, bus_label, setups_on, wires
+
+app = typer.Typer()
+
+STYLES = {"ok": "green", "note": "cyan", "warn": "yellow", "error": "bold red"}
+
+Tell = Callable[[str], None]
+
+
+@app.command()
+def doctor(
+    rig: RigArgument = "desk",
+    port: PortOption = None,
+    mock: MockOption = False,
+    fix: Annotated[
+        bool, typer.Option("--fix", help="Mend what is safe; torque stays off, nothing moves.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Examine every port and servo against the rig's YAML; every finding has its cure."""
+    with clear_errors():
+        model = load_rig(rig)
+        tell: Tell = (lambda _: None) if as_json else _tell
+        with wires(model, mock, port) as wired:
+            lines = wired.opened_by()
+            findings = _examined(model, lines, tell)
+            if fix:
+                _fix(model, lines, findings, tell)
+                tell("after that:")
+                findings = _examined(model, lines, tell)
+        if as_json:
+            rows = [as_plain(one, bus) for bus, some in findings.items() for one in some]
+            print(json.dumps(rows))
+        whole = [one for some in findings.values() for one in some]
+        tell(summed_up(whole, rig, fix))
+    if worst(whole) == "error":
+        raise typer.Exit(FAULT)
+
+
+def _examined(rig: Rig, lines: Mapping[str, BlockingPort], tell: Tell) -> dict[str, list[Finding]]:
+    """Examine every bus, and tell what was found; gives the findings by bus."""
+    findings = {}
+    for bus, line in lines.items():
+        findings[bus] = _examine(rig, bus, line)
+        wipe()
+        if len(lines) > 1:
+            tell(f"{bus_label(rig, bus)} ({bus_config(rig, bus).kind}, {line.port_name}):")
+        show_findings(findings[bus], tell)
+    return findings
+
+
+def _examine(rig: Rig, bus: str, line: BlockingPort) -> list[Finding]:
+    """Examine one bus."""
+    config, setups = bus_config(rig, bus), setups_on(rig, bus)
+
+    def behind() -> list[Finding]:
+        if config.kind == "maestro":
+            usb = bench.usb_id(line.port_name)
+            return doctor_maestro.visit(line, config.maestro, setups, usb)
+        return checkup.check(line, KINDS[config.kind], setups, config.baud, progress)
+
+    return checkup.check_all(line, config.kind, bench.host, behind)
+
+
+def _tell(line: str) -> None:
+    """Print a line of the doctor's; all of it goes the same way, so that its order stays."""
+    level, space, rest = line.partition(" ")
+    out = console()
+    if level in STYLES:
+        out.print(f"[{STYLES[level]}]{level:5}[/]", end=space)
+        out.print(rest, markup=False)
+    else:
+        out.print(line, markup=False)
+
+
+def _fix(
+    rig: Rig,
+    lines: Mapping[str, BlockingPort],
+    findings: Mapping[str, Sequence[Finding]],
+    tell: Tell,
+) -> None:
+    """Mend what can be, and say each thing."""
+    done: list[Done] = []
+    for bus, line in lines.items():
+        done += checkup.mend_latency(line.port_name, bench.host)
+        if any(finding.fixes for finding in findings[bus]):
+            done += _mend(rig, bus, line, findings[bus])
+            line.closePort()
+    for one in done:
+        tell(str(one))
+    if not done:
+        tell("nothing that --fix may mend")
+
+
+def _mend(rig: Rig, bus: str, line: BlockingPort, findings: Sequence[Finding]) -> list[Done]:
+    config = bus_config(rig, bus)
+    line.setBaudRate(config.baud)
+    if config.kind == "maestro":
+        return list(
+            checkup.mend(lambda fix: doctor_maestro.mend(line, config.maestro, fix), findings)
+        )
+    kind = KINDS[config.kind]
+    return list(checkup.mend(lambda fix: kind.mend(line, fix), findings))
+
+
+def show_findings(findings: Sequence[Finding], tell: Tell) -> None:
+    """Tell findings, the worst first, the same one at several servos once."""
+    for level, where, what, cure in grouped(findings):
+        tell(f"{level} {where}: {what}")
+        if cure:
+            tell(f"      -> {cure}")

@@ -1,0 +1,26 @@
+"""One bus of a rig, opened as a port for questions and orders to single servos."""
+
+import contextlib
+from collections.abc import Iterator
+
+from config.schema import Rig
+from drivers.errors import PortError
+from drivers.serial_port import BlockingPort
+from robot.cli.wires import Wires
+
+
+@contextlib.contextmanager
+def opened(rig: Rig, wire: Wires, bus: str) -> Iterator[BlockingPort]:
+    """Open the port of the bus of this name at its speed; nothing is sent.
+
+    Raises:
+        drivers.errors.PortError: it is absent, busy, not permitted, or has no such speed.
+    """
+    config = rig.buses[bus] if bus else rig.bus
+    port = BlockingPort(wire.paths[bus])
+    if not port.setBaudRate(config.baud):
+        raise PortError(f"{port.port_name} cannot run at {config.baud} bit/s: choose another")
+    try:
+        yield port
+    finally:
+        port.closePort()

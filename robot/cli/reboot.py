@@ -1,0 +1,110 @@
+"""The command ``gazerig reboot``: servos restarted one by one."""
+
+from typing import Annotated
+
+import typer
+
+from config.schema import Rig, load_rig
+from drivers.errors import SetupError
+from drivers.maestro_line import Line
+from drivers.serial_port import BlockingPort
+from robot.bringup import servo_reboot as servo_reboot
+from robot.bringup.kinds import KINDS
+from robot.bringup.maestro_sweep import sent_home
+from robot.bringup.servo_kind import ServoKind
+from robot.cli.bench import YesOption, opened
+from robot.cli.terminal import FAULT, clear_errors, say
+from robot.cli.wires import MockOption, PortOption, bus_config, bus_label, wires
+from robot.clock import RealClock
+from robot.rig_bus import bus_names, joints_on
+
+app = typer.Typer()
+
+HIGHEST_ID = {"dynamixel": 252, "feetech": 253, "maestro": 23}
+
+
+@app.command()
+def reboot(
+    servos: Annotated[list[str], typer.Argument(metavar="ID...", help="Servo ids or joints.")],
+    port: PortOption = None,
+    rig: Annotated[str, typer.Option(help="The rig whose ports and baud rates.")] = "desk",
+    mock: MockOption = False,
+    yes: YesOption = False,
+) -> None:
+    """Restart servos, which clears latched errors; their torque is off afterwards."""
+    with clear_errors():
+        model = load_rig(rig)
+        wanted: dict[str, list[int]] = {}
+        for text in servos:
+            bus, servo_id = _servo(model, text)
+            wanted.setdefault(bus, []).append(servo_id)
+        again = []
+        with wires(model, mock, port) as wired:
+            for bus, ids in wanted.items():
+                config = bus_config(model, bus)
+                with opened(wired.paths[bus], config.kind) as line:
+                    line.setBaudRate(config.baud)
+                    if config.kind == "maestro":
+                        _board(model, bus, line, yes)
+                        continue
+                    kind = KINDS[config.kind]
+                    again += [_reboot(line, kind, model, bus, one, yes) for one in ids]
+    if any(again):
+        raise typer.Exit(FAULT)
+
+
+def _servo(rig: Rig, text: str) -> tuple[str, int]:
+    """Read the name of a joint, or a servo id; gives its bus and id.
+
+    Raises:
+        drivers.errors.SetupError: it is neither, or there are several buses with such ids.
+    """
+    if text in rig.joints:
+        return rig.joints[text].bus, rig.joints[text].id
+    buses = bus_names(rig)
+    if text.isdecimal() and len(buses) > 1:
+        having = [b for b in buses if any(rig.joints[j].id == int(text) for j in joints_on(rig, b))]
+        if len(having) == 1:
+            return having[0], int(text)
+        named = ", ".join(bus_label(rig, bus) for bus in having or buses)
+        raise SetupError(f"{text}: which bus ({named})? name the joint instead")
+    most = HIGHEST_ID[bus_config(rig, buses[0]).kind]
+    if text.isdecimal() and int(text) <= most:
+        return buses[0], int(text)
+    raise SetupError(f"{text}: neither an id from 0 to {most} nor a joint ({', '.join(rig.names)})")
+
+
+def _reboot(
+    line: BlockingPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, yes: bool
+) -> bool:
+    """Restart one servo; tells whether it complains again."""
+    names = [joint for joint in joints_on(rig, bus) if rig.joints[joint].id == servo_id]
+    name = f"{names[0]} (servo {servo_id})" if names else f"servo {servo_id}"
+    baud = bus_config(rig, bus).baud
+    servo_reboot.present(line, kind, servo_id, baud)
+    before = kind.standing(line, servo_id)
+    say(f"{name}: {before}")
+    limp = f"{name} goes limp: hold what it carries. Restart it?"
+    if before.torque and not yes and not typer.confirm(limp, err=True):
+        say(f"{name}: left as it is")
+        return False
+    result = servo_reboot.restart(line, kind, servo_id, baud, RealClock().sleep_until)
+    say(f"{name}: back after {result.away_s:.1f} s: {result.after}")
+    if result.after.errors:
+        say(f"{name}: the cause is still there: gazerig doctor names the cure")
+    return bool(result.after.errors)
+
+
+def _board(rig: Rig, bus: str, line: BlockingPort, yes: bool) -> None:
+    """Do what comes nearest to a restart of a Maestro: clear its errors, send it home."""
+    label = bus_label(rig, bus)
+    say(
+        f"{label}: a Maestro has no restart over its serial line (its power switch is one); its "
+        "errors can be cleared, and all its channels sent home, which is what Pololu's program "
+        "set for 'On startup or error': no pulses, or a place to which servos go at once"
+    )
+    if not yes and not typer.confirm("Keep fingers away. Do that?", err=True):
+        say(f"{label}: left as it is")
+        return
+    held = sent_home(Line(line, bus_config(rig, bus).maestro))
+    say(f"{label}: home; errors it held, cleared now: {', '.join(held) or 'none'}")

@@ -1,0 +1,180 @@
+"""The command ``gazerig scan``: which ports there are, and who answers on one."""
+
+import json
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from config.schema import load_rig
+from drivers.errors import SetupError
+from drivers.serial_port import BlockingPort
+from drivers.serial_ports import SerialPort
+from drivers.servo_models import BusKind
+from robot.bringup.doctor_port import POLOLU, name_ports
+from robot.bringup.kinds import KINDS
+from robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
+from robot.bringup.searching import RATES, Looked, found_of, known_kinds, plan, search
+from robot.cli import bench as bench
+from robot.cli.bench import JsonOption, console
+from robot.cli.terminal import FAULT, clear_errors, say
+from robot.cli.wires import MockOption, wires
+
+app = typer.Typer()
+
+
+@app.command()
+def scan(
+    port: Annotated[str | None, typer.Option(help="Serial port; default: the only one.")] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            help="dynamixel, feetech, maestro or all; default: one after the other until one "
+            "answers. Name it where a Maestro only listens on the line."
+        ),
+    ] = None,
+    bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",
+    thorough: Annotated[
+        bool, typer.Option("--thorough", help="Wait longer at every baud rate for late answers.")
+    ] = False,
+    mock: MockOption = False,
+    rig: Annotated[str, typer.Option(help="With --mock: the rig whose servos.")] = "desk",
+    as_json: JsonOption = False,
+) -> None:
+    """List serial ports, and who answers on one at every baud rate. Changes nothing."""
+    with clear_errors():
+        rates, kinds = parse_bauds(bauds), _parse_kind(kind or "all")
+        found_ports = bench.ports_here()
+        if not as_json:
+            _show_ports(found_ports)
+        model = load_rig(rig)
+        if mock or port is None:
+            refuse_both = port if mock else None
+            with wires(model, mock, refuse_both) as wired:
+                paths = list(wired.paths.values()) if mock else [_only_port(found_ports)]
+                somebody = [_one(path, kinds, rates, thorough, kind, as_json) for path in paths]
+        else:
+            somebody = [_one(port, kinds, rates, thorough, kind, as_json)]
+    if not any(somebody):
+        raise typer.Exit(FAULT)
+
+
+def _parse_kind(text: str) -> tuple[BusKind, ...]:
+    try:
+        return known_kinds(text)
+    except ValueError as error:
+        raise SetupError(f"--kind {error}") from None
+
+
+def parse_bauds(text: str) -> tuple[int, ...] | None:
+    """Read --bauds; None for all.
+
+    Raises:
+        drivers.errors.SetupError: it holds what nobody can be set to.
+    """
+    if text == "all":
+        return None
+    known = sorted({rate for rates in RATES.values() for rate in rates})
+    rates = [int(word) if word.strip().isdecimal() else -1 for word in text.split(",")]
+    if not set(rates) <= set(known):
+        named = ", ".join(map(str, known))
+        raise SetupError(f"--bauds {text}: not all or some of {named}, with commas between")
+    return tuple(rates)
+
+
+def _only_port(ports: Sequence[SerialPort]) -> str:
+    """Give the one port on USB; asking strange devices needs a person's word."""
+    usb = [port for port in ports if port.usb]
+    if len(usb) == 1:
+        return usb[0].by_id or usb[0].device
+    if usb:
+        raise SetupError(f"which port? name it with --port: {name_ports(usb)}")
+    raise SetupError(
+        "no serial port on USB: plug the adaptor in (its LED should light), or name a port "
+        "with --port"
+    )
+
+
+def _one(
+    path: str,
+    kinds: Sequence[BusKind],
+    rates: Sequence[int] | None,
+    thorough: bool,
+    named: str | None,
+    as_json: bool,
+) -> bool:
+    """Search one port and show what was found; tells whether anyone answered."""
+    usb = bench.usb_id(path)
+    asked = plan(usb, kinds, rates)
+    if not asked and usb.startswith(POLOLU):
+        raise SetupError(
+            f"{path} is a board of Pololu: packets for servos would move what hangs on it; "
+            "name the adaptor's port with --port, or ask with --kind maestro"
+        )
+    if not asked:
+        raise SetupError(f"--bauds: none of them is a rate of {' or '.join(kinds)}")
+    line = BlockingPort(path)
+    try:
+        rounds = _search(line, usb, asked, thorough, named == "all")
+        if not thorough and not any(one.somebody for one in rounds):
+            # Ids that lie far apart answer after a long silence.
+            servos = [row for row in asked if row[0] == "dynamixel"]
+            rounds = [
+                *[one for one in rounds if one.kind != "dynamixel"],
+                *_search(line, usb, servos, True, True),
+            ]
+    finally:
+        line.closePort()
+    _show(rounds, path, as_json)
+    return any(one.somebody for one in rounds)
+
+
+def _search(
+    line: BlockingPort,
+    usb: str,
+    asked: Sequence[tuple[BusKind, int]],
+    thorough: bool,
+    to_the_end: bool,
+) -> list[Looked]:
+    rounds = []
+    errors = Console(stderr=True)
+    with Progress(console=errors, transient=True, disable=not errors.is_terminal) as bar:
+        task = bar.add_task("asking", total=len(asked))
+        for one in search(line, usb, asked, thorough, to_the_end):
+            rounds.append(one)
+            bar.update(task, advance=1, description=f"asked {one.kind} at {one.baud} bit/s")
+    return rounds
+
+
+def _show_ports(ports: Sequence[SerialPort]) -> None:
+    for port in ports:
+        alias = f", lasting name {port.by_id}" if port.by_id else ""
+        say(f"port {port.device}: {port.description}{f' [{port.usb}]' if port.usb else ''}{alias}")
+
+
+def _show(rounds: Sequence[Looked], where: str, as_json: bool) -> None:
+    boards = [one for one in rounds if one.board is not None]
+    found = found_of(rounds)
+    if as_json:
+        told: dict[str, object] = {
+            "port": where,
+            "servos": [servo_plain(kind, servo) for kind, servo in found],
+            "boards": [board_plain(one) for one in boards],
+        }
+        print(json.dumps(told))
+        return
+    out = console()
+    if found:
+        table = Table("id", "model", "firmware", "baud", "kind")
+        for kind, servo in found:
+            version = KINDS[kind].version(servo.firmware)
+            table.add_row(str(servo.id), servo.model, version, str(servo.baud), KINDS[kind].title)
+        out.print(table)
+    for one in boards:
+        for line in board_words(one):
+            out.print(f"{where}: {line}", markup=False)
+    for line in remarks(rounds, where):
+        out.print(line, markup=False)

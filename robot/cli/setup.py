@@ -1,0 +1,172 @@
+"""The command ``gazerig setup``: each servo gets its id, each channel its person's look."""
+
+from typing import Annotated
+
+import typer
+
+from config.schema import Rig, load_rig
+from drivers.errors import DriverError, SetupError
+from drivers.serial_port import BlockingPort
+from drivers.types import ServoSetup
+from robot.bringup import servo_setup as servo_setup
+from robot.bringup.doctor_patient import name_servo
+from robot.bringup.kinds import KINDS
+from robot.bringup.servo_kind import ServoKind
+from robot.cli.bench import YesOption, opened, progress, wipe
+from robot.cli.setup_maestro import set_up_board
+from robot.cli.terminal import RigArgument, clear_errors, say
+from robot.cli.wires import MockOption, PortOption, bus_config, bus_label, setups_on, wires
+from robot.rig_bus import bus_names
+from sim_mock.emulated import DynamixelLine, Emulated, StsLine
+from sim_mock.servo_physics import ServoSpec
+
+app = typer.Typer()
+
+FACTORY_ID = 1
+
+
+@app.command()
+def setup(
+    rig: RigArgument = "desk",
+    joint: Annotated[
+        list[str] | None, typer.Option("--joint", "--only", help="This joint only; repeatable.")
+    ] = None,
+    port: PortOption = None,
+    mock: MockOption = False,
+    yes: YesOption = False,
+) -> None:
+    """Give each servo its id and baud rate, one connected at a time; try a Maestro's channels."""
+    with clear_errors():
+        model = load_rig(rig)
+        wanted = _known_joints(joint or list(model.names), model.names)
+        left: list[str] = []
+        for bus in bus_names(model):
+            mine = [one for one in setups_on(model, bus) if one.name in wanted]
+            if not mine:
+                continue
+            if bus_config(model, bus).kind == "maestro":
+                left += _board(model, rig, bus, mine, port, mock, yes)
+            else:
+                left += _chain(model, rig, bus, mine, port, mock, yes)
+        if left:
+            say(f"skipped: {', '.join(left)}")
+        say(f"done: {len(wanted) - len(left)} of {len(wanted)}. Next: gazerig doctor {rig}")
+
+
+def _known_joints(names: list[str], known: tuple[str, ...]) -> tuple[str, ...]:
+    for name in names:
+        if name not in known:
+            raise SetupError(f"--joint {name}: unknown; joints are {', '.join(known)}")
+    return tuple(names)
+
+
+def _where(rig: Rig, bus: str) -> str:
+    """Name a bus where there are several."""
+    return f", {bus_label(rig, bus)}" if len(bus_names(rig)) > 1 else ""
+
+
+# --- servos with ids
+
+
+def _chain(
+    rig: Rig,
+    title: str,
+    bus: str,
+    setups: list[ServoSetup],
+    port: str | None,
+    mock: bool,
+    yes: bool,
+) -> list[str]:
+    """Set the servos of one bus up; gives the joints that were skipped."""
+    say(
+        f"{title}{_where(rig, bus)}: {len(setups)} of {len(rig.names)} servos to set up for "
+        f"{bus_config(rig, bus).baud} bit/s. Switch the servo supply off before you plug or "
+        "unplug one."
+    )
+    left = []
+    for n, one in enumerate(setups, 1):
+        say(
+            f"{n} of {len(setups)}: connect the {one.model} of {name_servo(one)}, and no other "
+            "servo"
+        )
+        if not _step(rig, bus, one, port, mock, yes):
+            left.append(one.name)
+    return left
+
+
+def _step(rig: Rig, bus: str, one: ServoSetup, port: str | None, mock: bool, yes: bool) -> bool:
+    """Set one joint's servo up, again and again until it is done or skipped."""
+    kind = KINDS[bus_config(rig, bus).kind]
+    fresh = {bus: _fresh(rig, one, kind)}
+    while True:
+        if not yes and not _go_on("   Enter: it is connected; s: skip this one; Ctrl-C: end "):
+            return False
+        try:
+            with (
+                wires(rig, mock, port, fresh) as wired,
+                opened(wired.paths[bus], kind.name) as line,
+            ):
+                return _set_up(line, kind, one, bus_config(rig, bus).baud, yes)
+        except DriverError as error:
+            if yes:
+                raise
+            say(f"   {error}")
+
+
+def _fresh(rig: Rig, one: ServoSetup, kind: ServoKind) -> Emulated:
+    """Give a servo as it comes from the factory."""
+    spec = (ServoSpec(FACTORY_ID, one.model, rig.joints[one.name].zero),)
+    if kind.name == "feetech":
+        return StsLine(spec, kind.factory_baud)
+    return DynamixelLine(spec, kind.factory_baud)
+
+
+def _set_up(line: BlockingPort, kind: ServoKind, wanted: ServoSetup, baud: int, yes: bool) -> bool:
+    found = servo_setup.find_alone(line, kind, servo_setup.search_order(kind, baud), progress)
+    wipe()
+    say(
+        f"   found: {found.model}, firmware {kind.version(found.firmware)}, id {found.id} at "
+        f"{found.baud} bit/s"
+    )
+    servo_setup.refuse_model(found, kind, wanted, line.port_name)
+    question = f"   give it id {wanted.id} and {baud} bit/s?"
+    if not yes and not typer.confirm(question, default=True, err=True):
+        return False
+    result = servo_setup.assign(line, kind, found, wanted, baud, progress)
+    wipe()
+    done = "; ".join(result.done) or "nothing to change"
+    say(
+        f"   {name_servo(wanted)}: {done}; answers as id {result.now.id} at {result.now.baud} bit/s"
+    )
+    return True
+
+
+def _go_on(question: str) -> bool:
+    """Wait for Enter; False where the person skips."""
+    return (
+        not typer.prompt(question, default="", show_default=False, prompt_suffix="", err=True)
+        .lower()
+        .startswith("s")
+    )
+
+
+# --- channels of a board
+
+
+def _board(
+    rig: Rig,
+    title: str,
+    bus: str,
+    setups: list[ServoSetup],
+    port: str | None,
+    mock: bool,
+    yes: bool,
+) -> list[str]:
+    """Say what to set on a board and try its channels; gives the joints that were skipped."""
+    say(f"{title}{_where(rig, bus)}: a Pololu Maestro, {len(setups)} channels to look at.")
+    with (
+        wires(rig, mock, port) as wired,
+        opened(wired.paths[bus], "maestro") as line,
+    ):
+        joints = {one.name: rig.joints[one.name] for one in setups}
+        return set_up_board(line, bus_config(rig, bus).maestro, setups, joints, yes)

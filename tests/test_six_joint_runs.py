@@ -1,0 +1,375 @@
+"""Runs of a rig of six hobby servos without a neck: recorded, done again, reported, exported."""
+
+import csv
+import gzip
+import json
+from collections.abc import Iterator
+from html import unescape
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from desk import JOINTS
+from mcap.reader import make_reader
+from mixed_rig import mixed_text
+from six_joints import SIX
+
+from config.schema import Rig, load_rig
+from config.text import rig_text, walk_text
+from drivers.errors import SetupError
+from robot.assemble import assemble
+from robot.choice import Choice
+from robot.loop import Tick, run
+from robot.recording.export_bids import About as Subject
+from robot.recording.export_bids import write_bids
+from robot.recording.export_csv import columns, write_csv
+from robot.recording.gaze_angles import trace_of
+from robot.recording.gaze_labels import labels_of, stretches_of
+from robot.recording.moment import as_json, flat, from_json
+from robot.recording.read import RunRecording
+from robot.recording.recorder import Recorder
+from robot.recording.rerun import rerun
+from robot.recording.run_format import HEALTH, PERCEPT, TICK, Message
+from robot.recording.run_info import RunEnd, RunInfo, as_text
+from robot.recording.run_writer import RunWriter
+from robot.remote.requests import Pulse
+from robot.report import build
+from robot.report.about import About
+from robot.report.compare import compare
+from robot.report.gathered import Gathered, Gathering
+from robot.report.run_joints import UPPER, RunJoints, openings
+from robot.session import leave
+from robot.summary import Summary
+
+STARTED = "2026-01-31T12:00:00+00:00"
+NO_MORE = {
+    "joints": ("measured",), "pose": ("lower_left", "lower_right"),
+    "gaze": ("lower_left", "lower_right"), "verdict": ("joints",),
+}  # fmt: skip
+"""Fields of a tick that recordings once did not have."""
+
+
+class Run(NamedTuple):
+    recording: RunRecording
+    ticks: list[Tick]
+
+
+def recorded(path: Path, rig: Rig, seconds: float) -> Run:
+    """Record a simulated run; give its ticks too."""
+    made = assemble(rig, Choice(mock=True, fast=True, seed=5, scene="visitor"))
+    info = RunInfo(
+        "a rig", rig.profile, rig_text(rig), 5, made.loop.rate_hz, STARTED,
+        walk_yaml=walk_text(rig.gaze.scanpath.walk), scene="visitor", mock=True, fast=True,
+    )  # fmt: skip
+    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
+    recorder.open()
+    made.robot.body = recorder.tapped(made.robot.body)
+    seen: list[Tick] = []
+
+    def watch(tick: Tick) -> None:
+        recorder.note(tick)
+        seen.append(tick)
+
+    made.robot.start(made.clock)
+    stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
+    count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
+    leave(made, count, lambda line: None)
+    recorder.close(count.stopped_by, made.sent_digest())
+    made.close()
+    return Run(RunRecording(path), seen)
+
+
+@pytest.fixture(scope="module")
+def maker(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 6.0)
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return recorded(tmp_path_factory.mktemp("nine") / "desk.mcap", load_rig("desk"), 2.5)
+
+
+def exact(tick: Tick) -> str:
+    return repr(tick._replace(detections=None, percept=None))
+
+
+def messages(path: Path, *topics: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    with path.open("rb") as file:
+        for _, channel, message in make_reader(file).iter_messages(topics):
+            yield channel.topic, json.loads(message.data)
+
+
+# --- recordings
+
+
+def test_six_joints_come_back_bit_for_bit_with_their_names(maker: Run) -> None:
+    assert list(map(exact, maker.recording.ticks())) == list(map(exact, maker.ticks))
+    for tick in maker.recording.ticks():
+        assert tick.verdict.joints == SIX and tick.joints.measured == (False,) * 6
+    shut = min(tick.pose.lower_left for tick in maker.ticks)
+    assert shut < 0.9  # lower lids move, and are kept
+
+
+def test_viewers_are_given_the_joints_that_are_there(maker: Run) -> None:
+    path = maker.recording.path
+    shown = [data for _, data in messages(path, "/joint_states")]
+    assert len(shown) > 100
+    assert {tuple(j["name"] for j in data["joints"]) for data in shown} == {SIX}
+    health = [data for _, data in messages(path, HEALTH)]
+    assert {tuple(data["temperature_c"]) for data in health} == {(None,) * 6}
+
+
+def aged(run: Run, path: Path) -> RunRecording:
+    """Write a recording as it was before ticks named their joints."""
+    info = run.recording.info
+    fd = path.open("wb")
+    writer = RunWriter(fd.fileno(), as_text(info), 0)
+    for topic, data in messages(run.recording.path, TICK, PERCEPT):
+        if topic == TICK:
+            readings = [data["joints"]]
+            readings += [b["joints"] for b in data.get("before", ()) if b["what"] == "measured"]
+            for reading in readings:
+                reading.pop("measured")
+            for part, names in NO_MORE.items():
+                for name in names:
+                    data[part].pop(name, None)
+        writer.add(Message(topic, 0.0, data))
+    end = run.recording.end
+    writer.close(RunEnd(end.stopped_by, end.lost, end.ran_s, end.tx_sha256))
+    return RunRecording(path)
+
+
+def test_a_recording_without_names_is_of_the_joints_that_all_rigs_had(
+    desk: Run, tmp_path: Path
+) -> None:
+    old = aged(desk, tmp_path / "old.mcap")
+    ticks = list(old.ticks())
+    assert len(ticks) == len(desk.ticks)
+    for tick, was in zip(ticks, desk.ticks, strict=True):
+        assert tick.verdict.joints == JOINTS and tick.joints.measured == ()
+        assert tick.pose.lower_left == tick.gaze.lower_right == 1.0
+        assert tick.verdict == was.verdict and tick.joints.position_rad == was.joints.position_rad
+    again = rerun(old)
+    assert again.same and again.tx_same, again.differs
+
+
+def test_words_for_numbers_come_back_for_any_number_of_joints(maker: Run) -> None:
+    odd = maker.ticks[9]._replace(wish_rad=(float("nan"),) * 6)
+    data = json.loads(json.dumps(as_json(flat(odd._replace(percept=None), None, 0.005, ()))))
+    assert exact(from_json(data, {}).tick) == exact(odd)
+
+
+def test_a_run_of_six_joints_is_done_again_to_the_bit(maker: Run) -> None:
+    seen: list[Tick] = []
+    found = rerun(maker.recording, note=seen.append)
+    assert found.same and found.tx_same and found.notes == ()
+    assert list(map(exact, seen)) == list(map(exact, maker.ticks))
+    assert rerun(maker.recording, joints="emulated").same
+
+
+def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, desk: Run) -> None:
+    found = rerun(desk.recording, rig="maker")
+    assert not found.same and found.joints == "emulated"
+    assert any("the rig has the joints eyes_pan" in note for note in found.notes)
+    with pytest.raises(SetupError, match=r"the rig has the joints .*: let the servos be emulated"):
+        rerun(maker.recording, rig="desk", joints="recorded")
+
+
+# --- what is said of the run
+
+
+def gathered(ticks: list[Tick]) -> Gathered:
+    gathering = Gathering()
+    for tick in ticks:
+        gathering.note(tick)
+    return gathering.gathered()
+
+
+def test_figures_and_status_say_what_is_reckoned(maker: Run, desk: Run) -> None:
+    for ticks, reckoned in ((maker.ticks, list(SIX)), (desk.ticks, [])):
+        summary, pulse = Summary(), Pulse(_Still())
+        summary.note(ticks[0])
+        pulse.note(ticks[0])
+        assert summary.figures()["reckoned"] == reckoned
+        words = pulse.words()
+        assert words["reckoned"] == reckoned
+        joints_deg = words["joints_deg"]
+        assert isinstance(joints_deg, dict) and tuple(joints_deg) == ticks[0].verdict.joints
+
+
+class _Still:
+    def now_s(self) -> float:
+        return 0.0
+
+    def sleep_until(self, t_s: float) -> None:
+        raise AssertionError("nobody waits here")
+
+
+def quiet(words: str, share: float) -> None:
+    """Tell nobody."""
+
+
+def test_a_report_of_reckoned_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
+    out = tmp_path / "six.html"
+    made = build.report(maker.ticks, About("six"), out, quiet)
+    rows = {row["key"]: row for row in json.loads(made.data.read_text())}
+    assert {row["basis"] for row in rows.values()} == {"reckoned"}
+    page = unescape(out.read_text(encoding="utf-8"))
+    assert "Nothing here is measured: the servos of this rig tell nothing" in page
+    assert "not measured" in page.partition("Saccades <span")[2][:120]
+    assert "measured from the servos" not in page
+    assert "{measured}" not in page and "line of sight of each eye, reckoned" in page
+    for key in ("head_slope", "head_share", "head_after", "head_peak", "vor", "vergence",
+                "vergence_ok", "unasked"):  # fmt: skip
+        assert key not in rows, key
+    for key in ("head_part", "vor", "vergence"):
+        assert not (tmp_path / "six_figures" / f"{key}.png").exists(), key
+    assert (tmp_path / "six_figures" / "blink_shape.png").exists()
+    assert "This rig has no neck" in page and "they stay parallel" in page
+
+
+def test_a_report_of_measured_joints_claims_it(desk: Run) -> None:
+    run = gathered(desk.ticks)
+    assert run.joints == RunJoints(JOINTS, ())
+    assert run.joints.whole_basis == "measured"
+    assert not any(run.joints.left_out(drawing.key) for drawing in build.DRAWINGS)
+    assert np.isnan(run.column("lower_lid")).all() and np.isfinite(run.column("lid")).all()
+
+
+def test_a_measured_run_beside_a_reckoned_one_is_warned_of(
+    maker: Run, desk: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawings = [d for d in build.DRAWINGS if d.key in ("overview", "vor", "blink_shape")]
+    monkeypatch.setattr(build, "DRAWINGS", tuple(drawings))
+    abouts = About("desk"), About("maker")
+    made = compare((desk.ticks, maker.ticks), abouts, tmp_path / "both.html", quiet)
+    assert made.warning.startswith("desk is measured and maker is reckoned")
+    page = unescape(made.page.read_text(encoding="utf-8"))
+    assert made.warning in page and "maker: Nothing here is measured" in page
+    assert "maker: This rig has no neck" in page
+    assert len(made.pictures) == 3  # the desk rig has a neck to draw
+    rows = json.loads(made.data.read_text())
+    assert {tuple(row["basis"]) for row in rows} == {("measured", "reckoned")}
+    assert not {"vor", "vergence"} & {row["key"] for row in rows}
+    alike = compare((desk.ticks, desk.ticks), abouts, tmp_path / "same.html", quiet)
+    assert alike.warning == "" and "not measured" not in alike.page.read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("names", "key", "words"),
+    [
+        (SIX, "vor", "no neck"),
+        (SIX, "vergence", "stay parallel"),
+        (("left_eye_pan", "neck_yaw"), "vor", ""),
+        (("left_eye_pan", "neck_yaw"), "head_slope", ""),
+        (("left_eye_pan", "neck_pitch"), "vor", ""),
+        (("left_eye_pan", "neck_pitch"), "head_part", "turns the head sideways"),
+        (("left_eye_pan", "neck_roll"), "vor", "sideways or up"),
+        (("left_eye_pan", "left_lower_lid"), "blink_rate", "no upper lids"),
+        (("left_eye_pan", "left_upper_lid"), "blink_rate", ""),
+        ((), "vor", ""),
+    ],
+)
+def test_what_cannot_be_told_says_why(names: tuple[str, ...], key: str, words: str) -> None:
+    why = RunJoints(names).left_out(key)
+    assert (words in why) if words else why == ""
+
+
+def test_a_rig_of_both_kinds_of_servos_is_measured_in_parts() -> None:
+    eyes = RunJoints(JOINTS, tuple(name for name in JOINTS if "eye" in name))
+    assert eyes.basis("Saccades") == "partly reckoned" and eyes.basis("Lids") == "measured"
+    assert eyes.whole_basis == "partly reckoned" and eyes.left_out("unasked")
+    lids = RunJoints(JOINTS, ("left_upper_lid", "right_upper_lid"))
+    assert lids.basis("Lids") == "reckoned" and lids.basis("On the face") == "measured"
+    assert not lids.left_out("unasked")
+
+
+def test_hobby_eyes_on_a_neck_that_tells_its_place(tmp_path: Path) -> None:
+    file = tmp_path / "mixed.yaml"
+    file.write_text(mixed_text(), encoding="utf-8")
+    mixed = recorded(tmp_path / "mixed.mcap", load_rig(str(file)), 1.0)
+    seen = gathered(list(mixed.recording.ticks())).joints
+    assert seen == RunJoints((*SIX, "neck_yaw", "neck_pitch"), SIX)
+    assert seen.basis("Eyes and head") == "partly reckoned" and seen.basis("Lids") == "reckoned"
+    trace = trace_of(mixed.ticks)
+    assert trace.basis("head") == "measured" and trace.basis("left") == "partly reckoned"
+    assert {"head_yaw_deg", "head_pitch_deg"} < set(columns(trace.joints))
+    assert "head_roll_deg" not in columns(trace.joints)
+    assert rerun(mixed.recording).same
+
+
+def test_absent_lids_count_for_nothing() -> None:
+    assert openings(0.2, 0.4, SIX, UPPER) == (0.2, 0.4)
+    assert openings(0.2, 1.0, ("left_upper_lid",), UPPER) == (0.2, 0.2)
+    assert openings(1.0, 1.0, ("eyes_pan",), UPPER) is None
+
+
+def test_a_run_without_lids_has_no_blinks(maker: Run) -> None:
+    bare = [
+        tick._replace(
+            verdict=tick.verdict._replace(joints=("eyes_pan", "eyes_tilt")),
+            joints=tick.joints._replace(measured=(True, True)),
+        )
+        for tick in maker.ticks[:60]
+    ]
+    run = gathered(bare)
+    assert np.isnan(run.column("lid")).all() and run.asked_blinks == ()
+    assert not {"blink_rate", "evoked"} & {measure.key for measure in build.measured(run)}
+
+
+# --- exports
+
+
+def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
+    maker: Run, desk: Run, tmp_path: Path
+) -> None:
+    for name, ticks, lids in (
+        ("six", maker.ticks, ["left_lid", "right_lid", "left_lower_lid", "right_lower_lid"]),
+        ("nine", desk.ticks, ["left_lid", "right_lid"]),
+    ):
+        trace = trace_of(ticks)
+        labels = labels_of(trace)
+        samples, *_, beside = write_csv(trace, labels, stretches_of(trace, labels), tmp_path / name)
+        with samples.open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert tuple(rows[0]) == columns(ticks[0].verdict.joints)
+        assert [column for column in rows[0] if column.endswith("lid")] == lids
+        assert ("head_yaw_deg" in rows[0]) == (name == "nine")
+        assert float(rows[300][lids[-1]]) == pytest.approx(
+            (ticks[300].pose.lower_right if name == "six" else ticks[300].pose.lid_right), abs=6e-4
+        )
+        assert "" not in {row["x_deg"] for row in rows}
+        said = json.loads(beside.read_text())
+        assert set(said["basis"].values()) == {"reckoned" if name == "six" else "measured"}
+        assert said["reckoned_joints"] == (list(SIX) if name == "six" else [])
+
+
+def test_a_data_set_says_that_its_gaze_is_reckoned(maker: Run, tmp_path: Path) -> None:
+    trace = trace_of(maker.ticks)
+    labels = labels_of(trace)
+    about = Subject("maker", "visitor", 200.0, STARTED, "gazerig")
+    write_bids(trace, labels, stretches_of(trace, labels), about, tmp_path)
+    wanted = {1: ["lid", "lower_lid"], 2: ["lid", "lower_lid"], 3: []}
+    for eye, more in wanted.items():
+        (path,) = tmp_path.rglob(f"*eye{eye}_physio.json")
+        said = json.loads(path.read_text())
+        assert said["GazeBasis"] == "reckoned" and said["ReckonedJoints"] == list(SIX)
+        assert "not measured" in said["EyeTrackingMethod"]
+        assert said["Columns"] == ["timestamp", "x_coordinate", "y_coordinate", *more]
+        with gzip.open(path.with_name(path.name.replace(".json", ".tsv.gz")), "rt") as table:
+            assert {line.count("\t") for line in table} == {2 + len(more)}
+
+
+def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
+    silent = [
+        tick._replace(joints=tick.joints._replace(missing=missing))
+        for tick, missing in zip(
+            maker.ticks[100:103], [("eyes_tilt",), ("right_lower_lid",), ()], strict=True
+        )
+    ]
+    trace = trace_of(silent)
+    for eye in (trace.left_deg, trace.right_deg, trace.cyclopean_deg):
+        assert np.isnan(eye[:, 0]).tolist() == [True, False, False]
+    assert np.isnan(trace.lower_lids).tolist() == [[False] * 2, [False, True], [False] * 2]
+    assert np.isnan(trace.head_deg).all()  # there is no neck
