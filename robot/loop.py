@@ -8,13 +8,13 @@ from math import inf, radians
 from typing import NamedTuple, Protocol
 
 from drivers.errors import DriverError, ServoFault, SetupError
-from drivers.types import Camera, Detections
+from drivers.types import Camera
 from gaze.aversion import MODES, Aversion
 from gaze.lids import Lids
 from gaze.oculomotor import Oculomotor
 from gaze.scanpath import Scanpath
 from gaze.top_down import TopDown
-from gaze.types import GazeCommand, GazeState, Percept, Target, Vec3
+from gaze.types import GazeState, Percept, Target, Vec3
 from robot.body import Body
 from robot.clock import Clock
 from robot.frames import PoseHistory
@@ -22,29 +22,9 @@ from robot.kinematics import Kinematics
 from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune, check
 from robot.safety.guard import Guard
 from robot.seeing.perception import Perception
-from robot.types import JointAngles, JointState, Verdict
-
-
-class Tick(NamedTuple):
-    """Everything one tick knew and decided; wish, permitted and measured side by side.
-
-    events: what has happened on the bus and to the camera, in words
-    orders: what people asked for, obeyed at the beginning of this tick
-    stopped: why somebody stopped the robot, "" while it moves
-    """
-
-    t_s: float
-    joints: JointState
-    pose: GazeState
-    detections: Detections | None
-    percept: Percept | None
-    target: Target
-    gaze: GazeCommand
-    wish_rad: JointAngles
-    verdict: Verdict
-    events: tuple[str, ...] = ()
-    orders: tuple[Order, ...] = ()
-    stopped: str = ""
+from robot.tick import Tick as Tick
+from robot.tick import at_rest
+from robot.types import JointAngles
 
 
 @dataclass(frozen=True)
@@ -233,7 +213,7 @@ class Robot:
         self._settled = gaze.phase != "saccade"
         wish = self._jogged or self._kinematics.inverse(gaze)
         if self.stopped:
-            verdict = _at_rest(joints, wish, self.stopped, self.body.names)
+            verdict = at_rest(joints, wish, self.stopped, self.body.names)
         else:
             # What a person chose to look at is there whatever the camera shows.
             led = bool(self._jogged) or self._looked_at is not None
@@ -356,15 +336,6 @@ class Robot:
         self._told.append("torque on again: going on slowly")
         self._guard.reset(t_s, goals)
         self._takes_over = True
-
-
-def _at_rest(
-    joints: JointState, wish_rad: JointAngles, why: str, names: tuple[str, ...]
-) -> Verdict:
-    """Say that nothing is sent, as somebody stopped the robot."""
-    reason = f"all: stopped ({why})"
-    each = ("stopped",) * len(names)
-    return Verdict(joints.position_rad, "limp", (reason,), wish_rad, each, (reason,), names)
 
 
 def _not_tunable(order: Tune, t_s: float) -> tuple[str, ...]:

@@ -310,9 +310,9 @@ def test_a_port_that_stays_away_is_given_up_and_told_at_release(here, nth):
     bus.engage()
     here.command("unplug", name)
     began_s = here.now_s()
-    with pytest.raises(BusLost, match=f"emulated {name} has been gone for 1.0 s"):
+    with pytest.raises(BusLost, match=f"emulated {name} has been gone for 1.[012] s"):
         here.run(bus, 3.0, starts(here))
-    assert here.now_s() - began_s < 1.2
+    assert here.now_s() - began_s < 1.3
     with pytest.raises(BusLost, match=f"emulated {name} is gone.*cut the servo power"):
         bus.release()
     # What could be reached was let go of all the same.

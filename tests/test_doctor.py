@@ -11,7 +11,10 @@ from robot.bringup.doctor import READ, examine
 from robot.bringup.doctor_patient import Patient
 from robot.bringup.doctor_port import UDEV_RULE, PortFacts, examine_latency, examine_port
 from robot.bringup.findings import Finding, Fix, worst
-from robot.bringup.servo_report import grouped, remarks, summed_up, together
+from robot.bringup.kinds import DYNAMIXEL
+from robot.bringup.scan_report import remarks
+from robot.bringup.searching import Looked
+from robot.bringup.servo_report import grouped, summed_up, together
 from sim_mock.ports import InProcessPort
 from sim_mock.servo import ServoSpec
 from sim_mock.servo_chain import build_chain
@@ -45,7 +48,13 @@ class Rig:
 
     def check(self):
         self.told = []
-        return check(self.port, SETUPS, BAUD, self.told.append)
+        return check(self.port, DYNAMIXEL, SETUPS, BAUD, self.told.append)
+
+    def mend(self, findings):
+        return list(mend(lambda fix: DYNAMIXEL.mend(self.port, fix), findings))
+
+    def check_all(self, host):
+        return check_all(self.port, "dynamixel", host, self.check)
 
 
 def one(findings, level, where, words):
@@ -262,13 +271,13 @@ def test_fix_mends_what_is_safe_and_says_it():
     )  # fmt: skip
     rig.set(2, bus_watchdog=255)
     before = rig.chain.positions_steps()
-    done = list(mend(rig.port, rig.check()))
+    done = rig.mend(rig.check())
     assert all(one.done for one in done)
     assert "left_eye_pan (servo 1): return delay time 250 -> 0: done" in map(str, done)
     assert "left_eye_tilt (servo 2): bus watchdog 255 -> 0: done" in map(str, done)
     assert worst(rig.check()) == "note" and not any(f.fixes for f in rig.check())
     assert rig.chain.positions_steps() == before
-    assert list(mend(rig.port, rig.check())) == []
+    assert rig.mend(rig.check()) == []
 
 
 def test_a_servo_that_answers_pings_alone_is_brought_to_speak():
@@ -277,7 +286,7 @@ def test_a_servo_that_answers_pings_alone_is_brought_to_speak():
     servo.memory.set("status_return_level", 0)
     servo.status_level = 0
     found = one(rig.check(), "error", "left_eye_tilt (servo 2)", "answers pings and nothing else")
-    (done,) = mend(rig.port, [found])
+    (done,) = rig.mend([found])
     assert done.done and worst(rig.check()) == "note"
 
 
@@ -286,7 +295,7 @@ def test_fix_leaves_a_servo_alone_whose_torque_is_on():
     rig.set(1, return_delay_time=250)
     rig.chain[1].write(64, b"\x01")
     findings = rig.check()
-    (done,) = mend(rig.port, findings)
+    (done,) = rig.mend(findings)
     assert str(done) == (
         "left_eye_pan (servo 1): return delay time 250 -> 0: not done, its torque is on"
     )
@@ -298,7 +307,7 @@ def test_a_servo_that_does_not_take_it_is_said():
     rig = Rig()
     fix = Finding("warn", "w", "neck_yaw (servo 7)", "", (Fix(7, "return_delay_time", 3, 0),))
     rig.port.faults.command("refuse 7 7")
-    (done,) = mend(rig.port, [fix])
+    (done,) = rig.mend([fix])
     assert not done.done and "does not take it" in done.what
 
 
@@ -359,7 +368,7 @@ def test_latency_timer(tmp_path):
 def test_a_port_that_is_not_there_ends_the_examination(tmp_path):
     rig = Rig()
     rig.port.port_name = str(tmp_path / "ttyUSB9")
-    (only,) = check_all(rig.port, SETUPS, BAUD, Host(), print)
+    (only,) = rig.check_all(Host())
     assert only.level == "error" and only.where.endswith("ttyUSB9")
 
 
@@ -367,14 +376,14 @@ def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
     rig, host = Rig(), Host(processes=tmp_path)
     rig.port.port_name = "/dev/null"  # a character device that may be opened
     rig.port.faults.command("deny on")
-    findings = check_all(rig.port, SETUPS, BAUD, host, lambda _: None)
+    findings = rig.check_all(host)
     assert worst(findings) == "error" and findings[-1].where == "/dev/null"
     rig.port.faults.command("clear")
-    assert len(check_all(rig.port, SETUPS, BAUD, host, lambda _: None)) > 3
+    assert len(rig.check_all(host)) > 3
     assert not rig.port.is_open
     rig.port.setBaudRate = lambda baud: False
     with pytest.raises(PortError, match="cannot run at 1000000"):
-        look(rig.port, SETUPS, BAUD, lambda _: None)
+        look(rig.port, DYNAMIXEL, SETUPS, BAUD, lambda _: None)
 
 
 # --- words
@@ -397,15 +406,20 @@ def test_findings_in_words():
 
 
 def test_remarks_of_a_scan():
-    from drivers.dynamixel_scan import Round
-
     two = (Found(1, 1190, 53, BAUD), Found(1, 1190, 53, BAUD))
-    said = " ".join(remarks([Round(BAUD, True, two)], two, "/dev/x"))
+    said = " ".join(remarks([Looked("dynamixel", BAUD, True, two)], "/dev/x"))
     assert "2 servos on /dev/x" in said and "two or more servos have id 1 at 1000000" in said
-    merged = [Round(BAUD, True, two[:1], 0, (), (1,))]
-    assert "two or more servos have id 1" in " ".join(remarks(merged, two[:1], "/dev/x"))
-    rounds = [Round(9600, True, (), 40), Round(57_600, True, (), 0, (5,)), Round(1, False, ())]
-    said = list(remarks(rounds, (), "/dev/x"))
+    merged = [Looked("dynamixel", BAUD, True, two[:1], shared=(1,))]
+    assert "two or more servos have id 1" in " ".join(remarks(merged, "/dev/x"))
+    rounds = [
+        Looked("dynamixel", 9600, junk=40),
+        Looked("dynamixel", 57_600, protocol_1=(5,)),
+        Looked("dynamixel", 1, possible=False),
+    ]
+    said = list(remarks(rounds, "/dev/x"))
     assert any("only pieces came" in line for line in said)
     assert any("Protocol 1 as id 5" in line for line in said)
-    assert "asked at 9600, 57600 bit/s" in said[0] and "supply" in said[-1]
+    assert "asked dynamixel at 9600, 57600 bit/s" in said[0] and "supply" in said[-1]
+    # Feetech servos answer the old protocol's ping: that is no riddle where they were found.
+    sts = Looked("feetech", 57_600, True, two[:1])
+    assert not any("Protocol 1" in line for line in remarks([*rounds, sts], "/dev/x"))

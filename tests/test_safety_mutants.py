@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
+from robot.safety.collisions import CollisionParams
 from robot.types import JointState
 
 ROOM = Path(__file__).parents[1] / "robot" / "safety"
@@ -321,7 +322,7 @@ def slower_in_flight(m: ModuleType) -> None:
 
 
 def collision(m: ModuleType) -> None:
-    pair = m.CollisionParams("neck_pitch", -20.0, -10.0, "left_upper_lid", 10.0, 20.0)
+    pair = CollisionParams("neck_pitch", -20.0, -10.0, "left_upper_lid", 10.0, 20.0)
 
     def wish(pitch: float, lid: float) -> tuple[float, ...]:
         angles = {PITCH: radians(pitch), LID: radians(lid)}
@@ -329,7 +330,7 @@ def collision(m: ModuleType) -> None:
 
     for swap in (False, True):
         if swap:
-            pair = m.CollisionParams("left_upper_lid", 10.0, 20.0, "neck_pitch", -20.0, -10.0)
+            pair = CollisionParams("left_upper_lid", 10.0, 20.0, "neck_pitch", -20.0, -10.0)
         bench = Bench(m, collisions=(pair,))
         rng = np.random.default_rng(9)
         places = []
@@ -351,7 +352,7 @@ def collision(m: ModuleType) -> None:
 def collision_braking(m: ModuleType) -> None:
     for way in (1.0, -1.0):
         ends = sorted((way * 10.0, way * 20.0))
-        pair = m.CollisionParams("left_upper_lid", 10.0, 20.0, "neck_yaw", *ends)
+        pair = CollisionParams("left_upper_lid", 10.0, 20.0, "neck_yaw", *ends)
         for k in range(40, 54):  # the neck turns round too late not to enter its range
             bench = Bench(m, start_deg=-way * 30.0, collisions=(pair,))
             for tick in range(150):
@@ -361,7 +362,7 @@ def collision_braking(m: ModuleType) -> None:
 
 
 def collision_lag(m: ModuleType) -> None:
-    pair = m.CollisionParams("left_upper_lid", 10.0, 20.0, "neck_yaw", -20.0, -10.0)
+    pair = CollisionParams("left_upper_lid", 10.0, 20.0, "neck_yaw", -20.0, -10.0)
     for start_deg in (-15.0, 0.0):
         bench = Bench(m, collisions=(pair,))
         for _ in range(150):
@@ -377,7 +378,7 @@ def collision_lag(m: ModuleType) -> None:
 
 def slow_joint(m: ModuleType) -> None:
     limit = m.JointLimit(LOW, HIGH, radians(20.0), radians(100.0))  # below the gentle ones
-    pair = m.CollisionParams("neck_pitch", -20.0, 5.0, "left_upper_lid", -20.0, 15.0)
+    pair = CollisionParams("neck_pitch", -20.0, 5.0, "left_upper_lid", -20.0, 15.0)
     guard = m.Guard(m.GuardParams(collisions=(pair,)), (limit,) * 9, JOINTS)
     guard.reset(0.0, (0.0,) * 9)
     path, speed = [(0.0,) * 9], np.zeros(9)
@@ -390,7 +391,7 @@ def slow_joint(m: ModuleType) -> None:
 
 
 def collision_start(m: ModuleType) -> None:
-    pair = m.CollisionParams("neck_pitch", -20.0, 5.0, "left_upper_lid", -20.0, 15.0)
+    pair = CollisionParams("neck_pitch", -20.0, 5.0, "left_upper_lid", -20.0, 15.0)
     bench = Bench(m, collisions=(pair,))
     while bench.path[-1][PITCH] < radians(5.9):
         assert bench.t_s < 1.0

@@ -6,7 +6,9 @@ from drivers.dynamixel_scan import COMMON_FIRST, Found
 from drivers.dynamixel_table import BAUD_RATES
 from drivers.errors import PortError, ServoFault, ServoMissing
 from drivers.types import ServoSetup
-from robot.bringup.servo_reboot import Standing, restart
+from robot.bringup.kinds import DYNAMIXEL
+from robot.bringup.servo_kind import Standing
+from robot.bringup.servo_reboot import restart
 from robot.bringup.servo_setup import assign, find_alone, search_order
 from sim_mock.ports import InProcessPort
 from sim_mock.servo import ServoSpec
@@ -30,10 +32,12 @@ class Bench:
         self.now = max(self.now, t_s)
 
     def find(self):
-        return find_alone(self.port, search_order(BAUD), self.told.append)
+        return find_alone(
+            self.port, DYNAMIXEL, search_order(DYNAMIXEL, BAUD), self.told.append
+        )
 
     def assign(self, setup=YAW, baud=BAUD):
-        return assign(self.port, self.find(), setup, baud, self.told.append)
+        return assign(self.port, DYNAMIXEL, self.find(), setup, baud, self.told.append)
 
 
 def test_a_factory_fresh_servo_gets_its_id_and_rate():
@@ -63,8 +67,8 @@ def test_it_is_found_whatever_its_id_and_rate(baud):
 
 
 def test_the_likely_rates_are_asked_first():
-    assert search_order(2_000_000)[:2] == (57_600, 2_000_000)
-    assert sorted(search_order(57_600)) == sorted(COMMON_FIRST)
+    assert search_order(DYNAMIXEL, 2_000_000)[:2] == (57_600, 2_000_000)
+    assert sorted(search_order(DYNAMIXEL, 57_600)) == sorted(COMMON_FIRST)
 
 
 def test_a_servo_whose_torque_is_on_is_let_go_first():
@@ -192,7 +196,7 @@ def test_a_restart_clears_what_was_latched():
     bench.port.setBaudRate(57_600)
     bench.chain[1].write(64, b"\x01")
     bench.port.faults.command("overload 1")
-    result = restart(bench.port, 1, 57_600, bench.sleep_until)
+    result = restart(bench.port, DYNAMIXEL, 1, 57_600, bench.sleep_until)
     assert result.before.errors == ("overload",)
     assert (result.after.errors, result.after.torque) == ((), False)
     assert result.after.position == 2000 and 0.3 < result.away_s < 1.0
@@ -203,7 +207,7 @@ def test_a_restart_of_a_servo_that_holds_leaves_it_limp():
     bench = Bench()
     bench.port.setBaudRate(57_600)
     bench.chain[1].write(64, b"\x01")
-    result = restart(bench.port, 1, 57_600, bench.sleep_until)
+    result = restart(bench.port, DYNAMIXEL, 1, 57_600, bench.sleep_until)
     assert (result.before.torque, result.after.torque) == (True, False)
 
 
@@ -220,7 +224,7 @@ def test_a_lost_status_of_the_restart_does_not_matter():
             bench.port.drain()
 
     bench.port.write = lossy
-    assert restart(bench.port, 1, 57_600, bench.sleep_until).after.torque is False
+    assert restart(bench.port, DYNAMIXEL, 1, 57_600, bench.sleep_until).after.torque is False
     assert bytes.fromhex("FFFFFD00010300082F4E") in tapped
 
 
@@ -228,14 +232,14 @@ def test_servos_that_do_not_answer_before_or_after():
     bench = Bench()
     bench.port.setBaudRate(57_600)
     with pytest.raises(ServoMissing, match="servo 5 does not answer at 57600"):
-        restart(bench.port, 5, 57_600, bench.sleep_until)
+        restart(bench.port, DYNAMIXEL, 5, 57_600, bench.sleep_until)
 
     def sleep_and_lose(t_s):
         bench.sleep_until(t_s)
         bench.port.faults.command("lose 1")
 
     with pytest.raises(ServoMissing, match="does not come back"):
-        restart(bench.port, 1, 57_600, sleep_and_lose)
+        restart(bench.port, DYNAMIXEL, 1, 57_600, sleep_and_lose)
 
 
 def test_a_standing_in_words():

@@ -16,13 +16,14 @@ from drivers.maestro_probe import USB_CHANNELS, MaestroFound, probe
 from drivers.serial_port import BusPort
 from drivers.types import ServoSetup
 from robot.bringup.doctor_patient import name_servo
-from robot.bringup.findings import BOARD, Finding, Fix
+from robot.bringup.findings import BOARD, Finding, Fix, Level
 from robot.bringup.maestro_settings import FACTORY_US, wide_range
 
 WHERE = "the board"
 SCRIPT = "script"
 """In place of a register: the board's own script runs (1) or not (0)."""
 
+TIMEOUT = "serial timeout"
 CURES = {
     "serial signal error": "something was sent at another baud rate, or the line is disturbed: "
     "compare bus.maestro.baud with Pololu's program, check ground and cable",
@@ -32,8 +33,8 @@ CURES = {
     "program, check the cable",
     "serial protocol error": "it was sent what it does not know: another program, another protocol "
     "or a disturbed line",
-    "serial timeout": "no commands came in time, so its channels went home: that is how a program "
-    "that died looks",
+    TIMEOUT: "no commands came for longer than its timeout, so its channels went home: as it should "
+    "be while no program runs",
     "script stack error": "its script is at fault: delete it in Pololu's program",
     "script call stack error": "its script is at fault: delete it in Pololu's program",
     "script program counter error": "its script is at fault: delete it in Pololu's program",
@@ -118,7 +119,7 @@ def _well(board: Board, found: MaestroFound) -> str:
     given = sum(1 for pulse in board.pulses.values() if pulse)
     return (
         f"answers in the {' and the '.join(found.forms)} form, CRC {'on' if found.crc else 'off'}, "
-        f"{size}, no errors, no script; pulses on {given} of {len(board.pulses)} channels"
+        f"{size}, no script; pulses on {given} of {len(board.pulses)} channels"
     )
 
 
@@ -172,7 +173,9 @@ def _state(found: MaestroFound) -> Iterator[Finding]:
     """Judge its errors and its script."""
     for name in found.errors:
         cure = CURES.get(name, "look it up in Pololu's guide")
-        yield Finding("warn", f"held an error, cleared now: {name}", WHERE, cure)
+        # Where a timeout is set every pause between two programs is one.
+        level: Level = "note" if name == TIMEOUT else "warn"
+        yield Finding(level, f"held an error, cleared now: {name}", WHERE, cure)
     if found.script:
         yield Finding(
             "warn",

@@ -60,6 +60,11 @@ def instructions(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool)
 def clipped(setup: ServoSetup, asked_steps: float, got_steps: float) -> str:
     """Say that a board does not go where it was sent, and the cure."""
     low, high = range_us(setup)
+    if not got_steps:
+        return (
+            f"{name_servo(setup)} gives no pulses: set its channel to Servo in Pololu's program; "
+            "gazerig doctor names errors of the board"
+        )
     sent, got = f"{asked_steps / US_STEPS:g} us", f"{got_steps / US_STEPS:g} us"
     return (
         f"{name_servo(setup)} is sent to {sent} and the board stays at {got}: set its Min to "

@@ -48,13 +48,23 @@ def board_words(looked: Looked) -> Iterator[str]:
     ]
 
 
-def remarks(rounds: Sequence[Looked], where: str) -> Iterator[str]:
-    """Say what tables of servos and boards do not."""
+def remarks(
+    rounds: Sequence[Looked], where: str, wished: Sequence[BusKind] = ()
+) -> Iterator[str]:
+    """Say what tables of servos and boards do not.
+
+    wished: kinds that were to be asked, unless one before them answered
+    """
     found = found_of(rounds)
     boards = sum(1 for one in rounds if one.board is not None)
     if not boards or found:
         count = f"{len(found)} servo{'s' if len(found) != 1 else ''}"
         yield f"{count} on {where}; {_asked(rounds)}"
+    unasked = [kind for kind in wished if kind not in {one.kind for one in rounds}]
+    if unasked and boards:
+        yield "nothing else was sent: packets for servos would move what hangs on the board"
+    elif unasked and found:
+        yield f"{' and '.join(unasked)} was not asked, as others answered: --kind all asks it too"
     for one in rounds:
         yield from _odd(one, {rate.baud for rate in rounds if rate.somebody})
     if not found and not boards:

@@ -20,14 +20,19 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "schema": (("schema rig.schema.json", "let an editor complete and check rig files"),),
     "scan": (
         ("scan", "ports, and the servos on the only one"),
-        ("scan --port /dev/ttyUSB0", "servos on this port at every baud rate"),
+        ("scan --port /dev/ttyUSB0", "who answers on this port, of any kind, at every baud rate"),
+        ("scan --port /dev/ttyUSB0 --kind feetech", "Feetech servos only"),
     ),
     "doctor": (
         ("doctor my.yaml", "port, servos and settings against the file, with cures"),
+        ("doctor my.yaml --fix", "mend what is safe to mend; nothing moves"),
         ("doctor my.yaml --mock", "see what it looks like without hardware"),
     ),
-    "setup": (("setup my.yaml", "give new servos their ids, one at a time"),),
-    "reboot": (("reboot my.yaml", "clear latched errors of all servos"),),
+    "setup": (
+        ("setup my.yaml", "give new servos their ids, one at a time; try a Maestro's channels"),
+        ("setup my.yaml --joint neck_yaw", "one servo only"),
+    ),
+    "reboot": (("reboot neck_yaw --rig my.yaml", "clear what a servo has latched"),),
     "jog": (("jog neck_yaw 20 --rig my.yaml", "turn the neck 20 deg to the left, slowly"),),
     "home": (("home my.yaml", "all joints to 0 deg, then torque off"),),
     "look-at": (("look-at 1 0.2 0.3 --rig my.yaml", "1 m ahead, 20 cm left, 30 cm up"),),

@@ -128,7 +128,8 @@ def _one(
             ]
     finally:
         line.closePort()
-    _show(rounds, path, as_json)
+    wished = tuple(dict.fromkeys(row[0] for row in asked))
+    _show(rounds, path, wished, as_json)
     return any(one.somebody for one in rounds)
 
 
@@ -155,7 +156,7 @@ def _show_ports(ports: Sequence[SerialPort]) -> None:
         say(f"port {port.device}: {port.description}{f' [{port.usb}]' if port.usb else ''}{alias}")
 
 
-def _show(rounds: Sequence[Looked], where: str, as_json: bool) -> None:
+def _show(rounds: Sequence[Looked], where: str, wished: Sequence[BusKind], as_json: bool) -> None:
     boards = [one for one in rounds if one.board is not None]
     found = found_of(rounds)
     if as_json:
@@ -176,5 +177,5 @@ def _show(rounds: Sequence[Looked], where: str, as_json: bool) -> None:
     for one in boards:
         for line in board_words(one):
             out.print(f"{where}: {line}", markup=False)
-    for line in remarks(rounds, where):
+    for line in remarks(rounds, where, wished):
         out.print(line, markup=False)

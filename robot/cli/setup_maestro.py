@@ -5,6 +5,7 @@ ranges are tried out with the servo supply off, when nothing moves, and which se
 which channel is seen by moving it a little.
 """
 
+import os
 from collections.abc import Mapping, Sequence
 from math import radians
 
@@ -16,6 +17,7 @@ from drivers.maestro_params import US_STEPS, MaestroParams
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from robot.bringup.doctor_patient import name_servo
+from robot.bringup.doctor_port import POLOLU
 from robot.bringup.maestro_settings import clipped, instructions
 from robot.bringup.maestro_sweep import FINE_STEPS, walk
 from robot.cli import bench as bench
@@ -42,7 +44,7 @@ def set_up_board(
         drivers.errors.ServoFault: pulses could not be stopped.
         drivers.errors.BusLost: the port is gone.
     """
-    for text in instructions(params, setups, bool(bench.usb_id(line.port_name))):
+    for text in instructions(params, setups, on_usb(line.port_name)):
         say(f"   {text}")
     if not yes:
         typer.prompt(
@@ -75,6 +77,14 @@ def _greeted(line: BlockingPort, params: MaestroParams) -> Line:
         board.send(board.speech.stop_script())
         say("   the board ran a script of its own: stopped; delete it in Pololu's program")
     return board
+
+
+def on_usb(path: str) -> bool:
+    """Tell whether a port is a board's own on USB, and not one of adaptor and serial pins."""
+    usb = bench.usb_id(path)
+    if usb:
+        return usb.startswith(POLOLU)
+    return not os.path.realpath(path).startswith(("/dev/ttyS", "/dev/ttyAMA"))
 
 
 # --- ranges
