@@ -38,6 +38,7 @@ TOP = {
     "robot.cli.monitor",
     "robot.cli.servos",
     "robot.cli.opened",
+    "robot.cli.reboot",
     "robot.cli.setup",
     "robot.cli.scan",
     "robot.cli.doctor",

@@ -12,6 +12,7 @@ from config.save import copy_shipped, save_rig
 from drivers.dynamixel_registers import Registers
 from drivers.serial_port import BlockingPort
 from drivers.serial_ports import Host, SerialPort
+from robot.cli import bench
 from robot.cli import servos as cli_servos
 from sim_mock.pty_bus import PtyBus
 from sim_mock.servo import ServoSpec
@@ -30,18 +31,19 @@ def gazerig(*words, answers=""):
 @pytest.fixture(autouse=True)
 def no_real_ports(monkeypatch, tmp_path):
     host = Host(tmp_path / "latency", tmp_path / "by-id", tmp_path / "processes")
-    monkeypatch.setattr(cli_servos, "host", host)
-    monkeypatch.setattr(cli_servos, "serial_ports", lambda host: ())
+    monkeypatch.setattr(bench, "host", host)
+    monkeypatch.setattr(bench, "serial_ports", lambda host: ())
 
 
 def test_scan_lists_every_servo():
     code, out, err = gazerig("scan", "--mock", "--bauds", "57600,1000000")
     assert code == 0
-    rows = re.findall(r"(\d) +[│|] (x[lc]330-m\d+) +[│|] (\d+) +[│|] (\d+)", out)
+    rows = re.findall(r"(\d) +[│|] (x[lc]330-m\d+) +[│|] (\d+) +[│|] (\d+) +[│|] Dynamixel", out)
     assert [int(row[0]) for row in rows] == list(range(1, 10))
     assert rows[0][1] == "xl330-m077" and rows[8][1] == "xc330-m288"
     assert {row[3] for row in rows} == {"1000000"}
-    assert "9 servos on" in out and "asked at 57600, 1000000 bit/s" in out
+    assert "9 servos on" in out and "asked dynamixel at 1000000, 57600 bit/s" in out
+    assert "feetech was not asked, as others answered" in out
 
 
 def test_scan_for_programs():
@@ -54,7 +56,8 @@ def test_scan_for_programs():
 def test_scan_of_a_port_where_nobody_answers():
     with PtyBus() as bus:
         path = bus.start(SMALL, baud=2_000_000)
-        code, out, _ = gazerig("scan", "--port", path, "--bauds", "1000000")
+        code, out, _ = gazerig("scan", "--port", path, "--bauds", "1000000",
+                               "--kind", "dynamixel")  # fmt: skip
     assert code == 1 and "nobody answers" in out and "supply" in out
 
 
@@ -65,6 +68,8 @@ def test_scan_of_a_port_where_nobody_answers():
         (("scan",), "no serial port on USB"),
         (("scan", "--port", "/dev/ttyNONE"), "no serial port /dev/ttyNONE"),
         (("scan", "--mock", "--port", "/dev/x"), "exclude each other"),
+        (("scan", "--kind", "pca9685"), "--kind pca9685: not all or one of dynamixel, feetech"),
+        (("scan", "--kind", "feetech", "--bauds", "9600", "--port", "/dev/x"), "none of them is"),
         (("doctor", "dsk"), "nothing named 'dsk'"),
         (("setup", "--joint", "neck"), "--joint neck: unknown; joints are left_eye_pan"),
         (("reboot", "neck"), "neither an id from 0 to 252 nor a joint"),
@@ -78,10 +83,10 @@ def test_what_is_asked_wrongly(words, says):
 
 def test_scan_asks_which_port_where_there_are_several(monkeypatch):
     ports = [SerialPort(f"/dev/ttyACM{i}", "board", "1:2", None) for i in range(2)]
-    monkeypatch.setattr(cli_servos, "serial_ports", lambda host: ports)
+    monkeypatch.setattr(bench, "serial_ports", lambda host: ports)
     code, _, err = gazerig("scan")
     assert code == 2 and "which port?" in err and "/dev/ttyACM1 (board)" in err
-    monkeypatch.setattr(cli_servos, "serial_ports", lambda host: ports[:1])
+    monkeypatch.setattr(bench, "serial_ports", lambda host: ports[:1])
     assert "no serial port /dev/ttyACM0" in gazerig("scan")[2]
 
 
@@ -139,9 +144,10 @@ def test_doctor_of_a_port_that_is_not_there():
     assert code == 1 and "there is no such port" in out
 
 
-def test_setup_with_flags_alone(monkeypatch):
-    monkeypatch.setattr(cli_servos, "JOINTS", ("left_eye_pan", "neck_roll"))
-    code, _, err = gazerig("setup", "--mock", "--yes")
+def test_setup_with_flags_alone():
+    code, _, err = gazerig(
+        "setup", "--mock", "--yes", "--joint", "left_eye_pan", "--joint", "neck_roll"
+    )
     assert code == 0
     for n, name, i in ((1, "left_eye_pan", 1), (2, "neck_roll", 9)):
         assert f"{n} of 2: connect the " in err and f"{name} (servo {i})" in err

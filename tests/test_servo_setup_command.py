@@ -32,9 +32,7 @@ class Bench:
         self.now = max(self.now, t_s)
 
     def find(self):
-        return find_alone(
-            self.port, DYNAMIXEL, search_order(DYNAMIXEL, BAUD), self.told.append
-        )
+        return find_alone(self.port, DYNAMIXEL, search_order(DYNAMIXEL, BAUD), self.told.append)
 
     def assign(self, setup=YAW, baud=BAUD):
         return assign(self.port, DYNAMIXEL, self.find(), setup, baud, self.told.append)
@@ -159,7 +157,7 @@ def test_an_adaptor_that_cannot_run_at_the_rate():
         baud == 57_600 and InProcessPort.setBaudRate(bench.port, baud)
     )
     with pytest.raises(PortError, match="cannot run at 1000000"):
-        assign(bench.port, found, YAW, BAUD, print)
+        assign(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
 
 
 def test_a_servo_that_is_gone_after_is_missed():
@@ -172,7 +170,7 @@ def test_a_servo_that_is_gone_after_is_missed():
     found = bench.find()
     bench.port.faults.command("lose 7")
     with pytest.raises(ServoMissing, match=f"does not answer as id 7 at {BAUD}"):
-        assign(bench.port, found, YAW, BAUD, print)
+        assign(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
 
 
 @pytest.mark.parametrize("address", [7, 8])

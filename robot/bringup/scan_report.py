@@ -48,9 +48,7 @@ def board_words(looked: Looked) -> Iterator[str]:
     ]
 
 
-def remarks(
-    rounds: Sequence[Looked], where: str, wished: Sequence[BusKind] = ()
-) -> Iterator[str]:
+def remarks(rounds: Sequence[Looked], where: str, wished: Sequence[BusKind] = ()) -> Iterator[str]:
     """Say what tables of servos and boards do not.
 
     wished: kinds that were to be asked, unless one before them answered
