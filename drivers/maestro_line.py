@@ -101,7 +101,11 @@ class Line:
         return found[0] if found is not None else None
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Ask for the pulse widths of some channels, quarter microseconds; 0: no pulses."""
+        """Ask for the pulse widths of some channels, quarter microseconds; 0: no pulses.
+
+        None where they did not come, or more came than was asked for: who has been answered
+        twice takes the next ones' pulses for his own.
+        """
         found: tuple[int, ...] = ()
         for i in range(0, len(channels), AT_ONCE):
             some = channels[i : i + AT_ONCE]
@@ -110,6 +114,12 @@ class Line:
             if got is None:
                 return None
             found += got
+        # Not in every read, as it waits for the line to fall silent: pulses are asked for
+        # where something is odd, and much follows from them.
+        if self.port.drain():
+            self.errors["damaged"] += 1
+            self._late = True
+            return None
         return found
 
     def wait(self, until_s: float) -> None:

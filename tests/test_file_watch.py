@@ -174,6 +174,21 @@ def test_files_may_change_while_it_looks(tmp_path: Path) -> None:
     assert told == [two]
 
 
+def test_an_edit_right_after_a_file_was_saved_under_a_new_name_is_heard(tmp_path: Path) -> None:
+    one, two = tmp_path / "one.yaml", tmp_path / "two.yaml"
+    one.write_text(OLD, encoding="utf-8")
+    files, told = [one], list[Path]()
+    watch = FileWatch(lambda: files, told.append)
+    watch.look()
+    two.write_text(OLD, encoding="utf-8")
+    watch.saved(two)
+    files[:] = [two]
+    two.write_text(NEW, encoding="utf-8")  # before anybody has looked
+    for _ in range(5):
+        watch.look()
+    assert told == [two]
+
+
 def test_the_thread_looks_by_itself_and_ends(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(OLD, encoding="utf-8")

@@ -8,7 +8,8 @@ import pytest
 
 from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_table import MODELS
-from robot.bringup.monitor import Monitor, as_json, load_share, look
+from robot.bringup.looks import DynamixelLooks, load_share, look
+from robot.bringup.monitor import Monitor, as_json
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
 from sim_mock.ports import InProcessPort
@@ -30,7 +31,9 @@ class Bench:
         self.port = InProcessPort(self.chain, self.sent.append, sleep_until=self.clock.sleep_until)
         self.port.setBaudRate(1_000_000)
         self.registers = Registers(self.port)
-        self.monitor = Monitor(Registers(self.port, 1), JOINTS, self.port.now_s)
+        self.monitor = Monitor(
+            {"": DynamixelLooks(Registers(self.port, 1))}, JOINTS, self.port.now_s
+        )
 
 
 def test_a_sample_says_what_the_servos_say() -> None:

@@ -32,7 +32,6 @@ from robot.report.page import band_words, gauge, number
 RIG = load_rig("desk")
 SLOWER = replace(RIG, loop=replace(RIG.loop, rate_hz=100.0))
 """Half the ticks, for what is asked about fixations alone."""
-COLUMNS = len(Row._fields)
 EMPTY = Gathered(np.zeros((0, len(Row._fields))), (), (), ())
 
 

@@ -1,12 +1,12 @@
 """Calibrating one emulated joint: turned by a hand, or driven gently between its stops."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import pytest
 
 from drivers.dynamixel_registers import Registers
 from drivers.errors import BusLost, ServoFault, ServoMissing
+from robot.bringup.one_dynamixel import OneDynamixel
 from robot.bringup.single_joint import SingleJoint, Stopped
 from robot.calibrate.calibrating import by_hand, by_motion
 from robot.calibrate.calibration import CalibrationRefused
@@ -39,7 +39,8 @@ class Bench:
         self.said: list[str] = []
         self.agreed = True
         name = "left_eye_pan" if joint.id == 1 else "neck_yaw"
-        self.joint = SingleJoint(name, joint, self.registers, self.clock, lambda: self.why)
+        servo = OneDynamixel(name, joint.id, joint.model, self.registers)
+        self.joint = SingleJoint(name, joint, servo, self.clock, lambda: self.why)
 
     @property
     def servo(self) -> object:
@@ -213,8 +214,7 @@ def test_a_homing_offset_can_be_cleared() -> None:
 
 def test_a_wrong_model_a_fault_and_a_silent_servo_are_named() -> None:
     bench = free()
-    other = replace(EYE, model="xc330-m288")
-    wrong = SingleJoint("left_eye_pan", other, bench.registers, bench.clock, lambda: None)
+    wrong = OneDynamixel("left_eye_pan", EYE.id, "xc330-m288", bench.registers)
     with pytest.raises(ServoMissing, match="is xl330-m077, not xc330-m288"):
         wrong.check()
     bench.port.faults.command("overload 1")

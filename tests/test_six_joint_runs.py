@@ -21,9 +21,11 @@ from drivers.errors import SetupError
 from robot.assemble import assemble
 from robot.choice import Choice
 from robot.loop import Tick, run
+from robot.page.link import unpack
 from robot.recording.export_bids import About as Subject
 from robot.recording.export_bids import write_bids
 from robot.recording.export_csv import columns, write_csv
+from robot.recording.frames import Frames
 from robot.recording.gaze_angles import trace_of
 from robot.recording.gaze_labels import labels_of, stretches_of
 from robot.recording.moment import as_json, flat, from_json
@@ -373,3 +375,10 @@ def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
         assert np.isnan(eye[:, 0]).tolist() == [True, False, False]
     assert np.isnan(trace.lower_lids).tolist() == [[False] * 2, [False, True], [False] * 2]
     assert np.isnan(trace.head_deg).all()  # there is no neck
+
+
+def test_the_page_shows_a_recording_of_them(maker: Run) -> None:
+    frames = Frames(iter(maker.ticks[:100]), (), 200.0)
+    shot = unpack(frames.message(len(frames) - 1))
+    assert shot.joints == shot.reckoned == SIX and shot.lower_lids is not None
+    frames.close()

@@ -18,6 +18,7 @@ class Applied(NamedTuple):
     wished, permitted: what was asked for, and what the guard let through of it in the end
     measured: where the joint is; error: measured less wished
     reasons: why permitted or measured differ, as the guard names it; empty when all is well
+    reckoned: its servo tells nothing, so measured is the goal moved by its known speed
     """
 
     joint: str
@@ -25,6 +26,7 @@ class Applied(NamedTuple):
     permitted: float
     measured: float
     reasons: tuple[str, ...]
+    reckoned: bool = False
 
     @property
     def error(self) -> float:
@@ -33,7 +35,8 @@ class Applied(NamedTuple):
 
     def __str__(self) -> str:
         """Write one line."""
-        line = f"{self.joint}: wished {_deg(self.wished)}, is at {_deg(self.measured)} deg"
+        at = "is reckoned at" if self.reckoned else "is at"
+        line = f"{self.joint}: wished {_deg(self.wished)}, {at} {_deg(self.measured)} deg"
         if abs(self.permitted - self.wished) > 0.05:
             line += f", permitted {_deg(self.permitted)}"
         return f"{line} ({', '.join(self.reasons)})" if self.reasons else line
@@ -98,11 +101,12 @@ class Notes:
 
 def outcome(step: Step, wish: JointAngles, notes: Notes) -> tuple[Applied, ...]:
     """Give every joint's part of how a movement ended."""
-    verdict = step.verdict
-    rows = zip(verdict.joints, wish, verdict.command_rad, step.joints.position_rad, strict=True)
+    verdict, joints = step.verdict, step.joints
+    told = joints.measured or (True,) * len(verdict.joints)
+    rows = zip(verdict.joints, wish, verdict.command_rad, joints.position_rad, told, strict=True)
     return tuple(
-        Applied(name, degrees(wished), degrees(permitted), degrees(measured), notes.of(name))
-        for name, wished, permitted, measured in rows
+        Applied(name, degrees(wished), degrees(let), degrees(at), notes.of(name), not tells)
+        for name, wished, let, at, tells in rows
     )
 
 

@@ -33,8 +33,8 @@ CURES = {
     "program, check the cable",
     "serial protocol error": "it was sent what it does not know: another program, another protocol "
     "or a disturbed line",
-    TIMEOUT: "no commands came for longer than its timeout, so its channels went home: as it should "
-    "be while no program runs",
+    TIMEOUT: "no commands came for longer than its timeout, so its channels went home, as they "
+    "should while no program runs",
     "script stack error": "its script is at fault: delete it in Pololu's program",
     "script call stack error": "its script is at fault: delete it in Pololu's program",
     "script program counter error": "its script is at fault: delete it in Pololu's program",

@@ -5,7 +5,7 @@ from math import degrees, isfinite
 from typing import NamedTuple
 
 from drivers.errors import SetupError
-from gaze.angles import angle_between, norm, sub
+from gaze.angles import add, angle_between, norm, sub, unit
 from gaze.field_of_view import line_of_sight
 from gaze.oculomotor import Oculomotor
 from gaze.types import GazeState, Target, Vec3
@@ -17,12 +17,18 @@ from robot.types import JointAngles, JointState
 
 AT_END_DEG = 1.0
 
+TOGETHER = "eyes_pan"
+"""The joint that turns both eyes to the sides by one linkage."""
+
 
 class LookedAt(NamedTuple):
     """How well both eyes point at a point, as measured at the end. Degrees, metres.
 
     left_error, right_error: angle between each eye's line of sight and the point
+    error: the larger of both; where one linkage turns both eyes to the sides, that of their
+        mean line of sight, from midway between them
     vergence: angle between the lines of sight; wished_vergence: what the point needs
+    converges: each eye turns to the sides by itself, so there can be vergence
     head: (yaw, pitch, roll); distance_m: from midway between the eyes
     moved: what the guard let through of the last wish, joint by joint
     """
@@ -34,6 +40,8 @@ class LookedAt(NamedTuple):
     head: tuple[float, float, float]
     distance_m: float
     moved: Moved
+    error: float
+    converges: bool
 
 
 def look_at(
@@ -73,23 +81,52 @@ def look_at(
         return "arrived" if step.t_s - start_s[0] >= seconds else None
 
     moved = control.follow(wish, over, seconds + 1.0)
-    return judged(p_world_m, kinematics.forward(moved.last.joints), moved)
+    converges = TOGETHER not in kinematics.names
+    return judged(p_world_m, kinematics.forward(moved.last.joints), moved, converges)
 
 
-def judged(p_world_m: Vec3, pose: GazeState, moved: Moved) -> LookedAt:
-    """Give how measured eyes point at a point."""
+def judged(p_world_m: Vec3, pose: GazeState, moved: Moved, converges: bool = True) -> LookedAt:
+    """Give how measured eyes point at a point.
+
+    converges: as in LookedAt
+    """
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
     to_left = sub(p_world_m, pose.p_world_eye_left_m)
     to_right = sub(p_world_m, pose.p_world_eye_right_m)
     yaw, pitch, roll = pose.head_rad
+    error_left, error_right = angle_between(left, to_left), angle_between(right, to_right)
+    error = max(error_left, error_right)
+    if not converges:
+        error = angle_between(unit(add(left, right)), unit(add(to_left, to_right)))
     return LookedAt(
-        degrees(angle_between(left, to_left)),
-        degrees(angle_between(right, to_right)),
+        degrees(error_left),
+        degrees(error_right),
         degrees(angle_between(left, right)),
         degrees(angle_between(to_left, to_right)),
         (degrees(yaw), degrees(pitch), degrees(roll)),
         norm(sub(p_world_m, pose.p_world_head_m)),
         moved,
+        degrees(error),
+        converges,
+    )
+
+
+def met(looked: LookedAt) -> tuple[str, ...]:
+    """Say in words how well the point is met, as far as the mechanism can meet it."""
+    eyes = [part for part in looked.moved.joints if part.joint.endswith(("_pan", "_tilt"))]
+    known = " (reckoned, not measured)" if any(part.reckoned for part in eyes) else ""
+    away = f"of a point {looked.distance_m:.2f} m away{known}"
+    if not looked.converges:
+        return (
+            f"gaze error: {looked.error:.2f} deg between the eyes' mean line of sight and the "
+            f"direction {away}",
+            "vergence: none, as one servo turns both eyes to the sides; the point needs "
+            f"{looked.wished_vergence:.2f} deg",
+        )
+    return (
+        f"gaze error: left eye {looked.left_error:.2f}, right eye {looked.right_error:.2f} deg "
+        f"{away}",
+        f"vergence: {looked.vergence:.2f} deg, the point needs {looked.wished_vergence:.2f}",
     )
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 
 from drivers.dynamixel_registers import Registers
 from drivers.dynamixel_table import MODELS as DYNAMIXEL
-from drivers.dynamixel_table import REGISTERS, STEPS_PER_TURN, VELOCITY_UNIT_STEPS_S, Model
+from drivers.dynamixel_table import REGISTERS, VELOCITY_UNIT_STEPS_S, Model
 from drivers.dynamixel_table import name_errors as name_dynamixel
 from drivers.feetech_registers import StsRegisters
 from drivers.feetech_table import LOAD_UNIT

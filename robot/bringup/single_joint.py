@@ -2,16 +2,10 @@
 
 from collections.abc import Callable
 
+from drivers.dynamixel_table import STEPS_PER_TURN
 from drivers.errors import DriverError, ServoFault
 from robot.bringup.one_servo import Found, OneServo
-from robot.calibrate.stop_search import (
-    STEPS_PER_DEG,
-    STEPS_PER_TURN,
-    Stop,
-    StopSearchParams,
-    go,
-    search,
-)
+from robot.calibrate.stop_search import STEPS_PER_DEG, Stop, StopSearchParams, go, search
 from robot.clock import Clock
 from robot.joint import JointParams
 

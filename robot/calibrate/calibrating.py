@@ -15,6 +15,7 @@ from robot.calibrate.calibration import (
     Unwrapped,
     calibration,
     ends_of,
+    is_lid,
     middle,
 )
 from robot.calibrate.stop_search import Stop, StopSearchParams
@@ -42,7 +43,7 @@ class Person(Protocol):
         ...
 
 
-class _Watched:
+class Watched:
     """A joint's position followed over the seam, with a line that shows it."""
 
     def __init__(self, single: SingleJoint) -> None:
@@ -75,7 +76,7 @@ def by_hand(single: SingleJoint, person: Person, margin_deg: float) -> Calibrati
         robot.bringup.single_joint.Stopped: the person wants it to end.
     """
     single.let_go()
-    watched = _Watched(single)
+    watched = Watched(single)
     positive, negative = ends_of(single.name)
     person.tell(f"{single.who}: torque off, it can be turned by hand")
 
@@ -85,7 +86,7 @@ def by_hand(single: SingleJoint, person: Person, margin_deg: float) -> Calibrati
 
     first = mark(f"to its {positive} end")
     marks = Marks(first, mark(f"to its {negative} end"), 0)
-    marks = middle(marks) if _is_lid(single) else marks._replace(zero=mark("straight ahead"))
+    marks = middle(marks) if is_lid(single.name) else marks._replace(zero=mark("straight ahead"))
     return calibration(single.name, marks, single.joint, margin_deg)
 
 
@@ -108,8 +109,8 @@ def by_motion(
     finally:
         single.leave()
     person.tell(f"{single.who}: torque off")
-    if zero_by == "person" and not _is_lid(single):
-        watched = _Watched(single)
+    if zero_by == "person" and not is_lid(single.name):
+        watched = Watched(single)
         person.wait(f"turn {single.name} straight ahead, then press Enter", watched.live)
         marks = marks._replace(zero=watched.steps())
     else:
@@ -126,9 +127,11 @@ def _find_stops(single: SingleJoint, person: Person, params: StopSearchParams) -
         f"{single.who}: torque on at {params.strength:.0%} of its strength, "
         f"moving at {params.speed_deg_s:g} deg/s"
     )
+    if single.alone:
+        person.tell(f"{single.who}: {single.alone}")
     first = _stop(single, person, params, way)
     asked = f"did {single.name} just go to its {positive} end?"
-    sign = way if person.agrees(asked, _Watched(single).live) else -way
+    sign = way if person.agrees(asked, Watched(single).live) else -way
     second = _stop(single, person, params, -way)
     single.go(params, (first + second) // 2)
     return Marks(first, second, 0) if sign == way else Marks(second, first, 0)
@@ -148,7 +151,3 @@ def _stop(single: SingleJoint, person: Person, params: StopSearchParams, way: in
         f"{stop.pushed_s * 1e3:.0f} ms, went back by {params.back_off_deg:g} deg"
     )
     return stop.position_steps
-
-
-def _is_lid(single: SingleJoint) -> bool:
-    return single.name.endswith("upper_lid")

@@ -120,6 +120,17 @@ def ends_of(joint_name: str) -> tuple[str, str]:
     return next(ends for part, ends in ENDS.items() if joint_name.endswith(part))
 
 
+def _plain(value: Value) -> Value:
+    """Give whole numbers of a linkage as such: 1500 us is no more exact as 1500.0."""
+    if not isinstance(value, tuple):
+        return value
+    return tuple((_short(angle), _short(at)) for angle, at in value)
+
+
+def _short(number: float) -> float:
+    return int(number) if number == int(number) else number
+
+
 def is_lid(joint_name: str) -> bool:
     """Tell whether a joint moves a lid: its ends are what matters, and it has no straight ahead."""
     return joint_name.endswith("_lid")
@@ -249,7 +260,7 @@ def changes(
     a parking angle outside the new range to its nearer end.
     """
     wanted: dict[str, Value] = {
-        f"joints.{name}.{key}": value
+        f"joints.{name}.{key}": _plain(value)
         for key, value in made._asdict().items()
         if getattr(joint, key) != value
     }

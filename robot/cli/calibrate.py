@@ -1,11 +1,9 @@
 """The command calibrate joints: zero, sign and range of each joint, found and written down."""
 
-import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from datetime import datetime
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -13,29 +11,15 @@ from rich.table import Table
 
 from config.save import copy_shipped, rig_file, save_rig
 from config.schema import Rig, load_rig
-from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
-from robot.bringup.single_joint import SingleJoint, Stopped
-from robot.calibrate.calibrating import by_hand, by_motion
-from robot.calibrate.calibration import Calibration, CalibrationRefused, changes
+from drivers.errors import SetupError
+from robot.bringup.single_joint import Stopped
+from robot.calibrate.calibration import Value, changes
 from robot.calibrate.stop_search import StopSearchParams
-from robot.cli.person import Lines, TerminalPerson
+from robot.cli.calibrate_joint import Bench, By, How, Made, ZeroBy, measure, refuse_impossible
+from robot.cli.person import Lines
+from robot.cli.steering import SteeringPerson
 from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
-from robot.cli.wires import MockOption, PortOption, Wires, registers, wires
-from robot.clock import RealClock
-
-
-class By(StrEnum):
-    """Who turns the joint."""
-
-    hand = "hand"
-    motion = "motion"
-
-
-class ZeroBy(StrEnum):
-    """Who says where straight ahead is, after the stops were found by motion."""
-
-    middle = "middle"
-    person = "person"
+from robot.cli.wires import MockOption, PortOption, wires
 
 
 def calibrate_joints(
@@ -56,8 +40,18 @@ def calibrate_joints(
         float, typer.Option(min=0.05, max=1.0, help="With --by motion: share of full strength.")
     ] = 0.3,
     clear_offset: Annotated[
-        bool, typer.Option("--clear-offset", help="Set a servo's Homing Offset to 0 first.")
+        bool, typer.Option("--clear-offset", help="Set the offset in a servo to 0 first.")
     ] = False,
+    set_middle: Annotated[
+        bool,
+        typer.Option("--set-middle", help="Feetech: make the middle of its travel 2048 first."),
+    ] = False,
+    pulses: Annotated[
+        str, typer.Option(metavar="US:US", help="Hobby servos: never narrower or wider pulses.")
+    ] = "500:2500",
+    more: Annotated[
+        int, typer.Option(min=0, max=5, help="Push rods: places between each two you mark.")
+    ] = 1,
     out: Annotated[
         Path | None, typer.Option(help="Copy a shipped rig to this file and write there.")
     ] = None,
@@ -71,19 +65,26 @@ def calibrate_joints(
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
-    """Find zero, sign and range of each joint and write them into the rig's YAML."""
+    """Find zero, sign and range of each joint and write them into the rig's YAML.
+
+    Hobby servos tell no place: you steer them by eye, and say the angles of some places.
+    """
     with clear_errors(), signals() as stopped:
         loaded = load_rig(rig)
         names = _names(loaded, joint)
-        if dry_run and clear_offset:
-            raise SetupError("--dry-run and --clear-offset exclude each other: that is a write")
+        if dry_run and (clear_offset or set_middle):
+            option = "--clear-offset" if clear_offset else "--set-middle"
+            raise SetupError(f"--dry-run and {option} exclude each other: that is a write")
         if not dry_run:
             refuse_unwritable(rig, out)
-        how = _How(by, margin, zero, StopSearchParams(strength=strength), clear_offset)
-        person = TerminalPerson(Lines(answers), stopped, yes)
+        search = StopSearchParams(strength=strength)
+        span_us = _span(pulses)
+        how = How(by, margin, zero, search, clear_offset, set_middle, span_us, more)
+        refuse_impossible(loaded, names, how)
+        person = SteeringPerson(Lines(answers), stopped, yes)
         try:
             with wires(loaded, mock, port) as wire:
-                found, refused = _measure(loaded, names, how, wire, person, stopped)
+                found, refused = measure(Bench(loaded, wire, how, person, stopped), names)
             if found:
                 wanted = _wanted(loaded, found)
                 Console().print(_table(rig, wanted))
@@ -97,56 +98,25 @@ def calibrate_joints(
         raise typer.Exit(FAULT)
 
 
-class _How(NamedTuple):
-    """How to calibrate, as asked on the command line."""
-
-    by: By
-    margin_deg: float
-    zero: ZeroBy
-    search: StopSearchParams
-    clear_offset: bool
-
-
-def _measure(
-    rig: Rig,
-    names: tuple[str, ...],
-    how: _How,
-    wire: Wires,
-    person: TerminalPerson,
-    stopped: Callable[[], str | None],
-) -> tuple[dict[str, Calibration], list[str]]:
-    """Calibrate one joint after the other; gives what was found and which were refused."""
-    found: dict[str, Calibration] = {}
-    refused: list[str] = []
-    with registers(wire.paths[""], rig.bus.baud) as (regs, _):
-        for name in names:
-            single = SingleJoint(name, rig.joints[name], regs, RealClock(), stopped)
-            person.hand = _hand(wire, single.joint.id)
-            try:
-                with _let_go_after(single):
-                    found[name] = _measure_one(single, how, person)
-            except (CalibrationRefused, ServoMissing, ServoFault) as error:
-                refused.append(name)
-                say(f"refused: {error}")
-    return found, refused
-
-
-def _measure_one(single: SingleJoint, how: _How, person: TerminalPerson) -> Calibration:
-    if how.clear_offset:
-        _clear_offset(single)
-    single.check()
-    if how.by is By.hand:
-        return by_hand(single, person, how.margin_deg)
-    _warn_of_neck(single.name, person)
-    return by_motion(single, person, how.margin_deg, how.search, how.zero.value)
-
-
 def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     """Give the joints to calibrate, in the order of the rig."""
     for name in asked or ():
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
     return tuple(name for name in rig.names if not asked or name in asked)
+
+
+def _span(pulses: str) -> tuple[float, float]:
+    """Read --pulses.
+
+    Raises:
+        drivers.errors.SetupError: these are no two numbers.
+    """
+    low, _, high = pulses.partition(":")
+    try:
+        return float(low), float(high)
+    except ValueError:
+        raise SetupError(f"--pulses {pulses}: two pulse widths in us, e.g. 900:2100") from None
 
 
 def refuse_unwritable(rig: str, out: Path | None) -> None:
@@ -163,54 +133,9 @@ def refuse_unwritable(rig: str, out: Path | None) -> None:
         raise SetupError(f"--out copies a shipped rig; {rig} is a file of yours: leave --out away")
 
 
-def _hand(wire: Wires, servo_id: int) -> Callable[[int], None] | None:
-    """Give what turns an emulated servo by some steps; None on real wires."""
-    if wire.buses is None:
-        return None
-
-    def turn(steps: int) -> None:
-        wire.command(f"turn {servo_id} {steps}", "")
-
-    return turn
-
-
-@contextlib.contextmanager
-def _let_go_after(single: SingleJoint) -> Iterator[None]:
-    """Take the torque away however the block ends."""
-    try:
-        yield
-    finally:
-        try:
-            single.let_go()
-        except DriverError as error:
-            say(f"{single.who}: torque-off could not be confirmed ({error})")
-
-
-def _clear_offset(single: SingleJoint) -> None:
-    was = single.clear_offset()
-    if was:
-        say(
-            f"{single.who}: Homing Offset {was} -> 0; until this calibration is written "
-            "the rig file's zero is wrong by that"
-        )
-
-
-def _warn_of_neck(name: str, person: TerminalPerson) -> None:
-    """Ask before something as heavy as a head moves by itself.
-
-    Raises:
-        robot.calibrate.calibration.CalibrationRefused: the answer was no.
-    """
-    if not name.startswith("neck"):
-        return
-    asked = f"{name} will move by itself, and sink when the torque goes off: hold the head. Go on?"
-    if not person.agrees(asked):
-        raise CalibrationRefused(f"{name}: left out as you wished")
-
-
-def _wanted(rig: Rig, found: Mapping[str, Calibration]) -> dict[str, tuple[object, int | float]]:
+def _wanted(rig: Rig, found: Mapping[str, Made]) -> dict[str, tuple[object, Value]]:
     """Give key -> old and new value for all joints found."""
-    wanted: dict[str, tuple[object, int | float]] = {}
+    wanted: dict[str, tuple[object, Value]] = {}
     for name, made in found.items():
         for key, value in changes(name, rig.joints[name], made, rig.park_deg).items():
             wanted[key] = (_old(rig, key), value)
@@ -225,20 +150,27 @@ def _old(rig: Rig, key: str) -> object:
     return value
 
 
-def _table(rig: str, wanted: Mapping[str, tuple[object, int | float]]) -> Table:
+def _table(rig: str, wanted: Mapping[str, tuple[object, Value]]) -> Table:
     table = Table(caption=f"what was found, against {rig}")
     for name in ("key", "old", "new"):
         table.add_column(name, justify="left" if name == "key" else "right", no_wrap=True)
     for key, (old, new) in wanted.items():
-        table.add_row(key, f"{old}", f"{new}", style="bold" if key.endswith("sign") else None)
+        table.add_row(key, _text(old), _text(new), style="bold" if key.endswith("sign") else None)
     return table
+
+
+def _text(value: object) -> str:
+    """Write a value; the places of a linkage one below the other."""
+    if not isinstance(value, tuple):
+        return f"{value}"
+    return "\n".join(f"{angle:g} deg: {at:g}" for angle, at in value)
 
 
 def _write(
     rig: str,
-    wanted: Mapping[str, tuple[object, int | float]],
+    wanted: Mapping[str, tuple[object, Value]],
     out: Path | None,
-    person: TerminalPerson,
+    person: SteeringPerson,
 ) -> None:
     """Write what differs after a yes, and say where the old file is."""
     if not wanted:

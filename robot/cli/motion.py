@@ -5,19 +5,20 @@ import select
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from math import degrees, inf
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
 from config.schema import Rig, load_rig
-from drivers.errors import DriverError
+from drivers.errors import DriverError, SetupError
 from robot.body import Body
 from robot.bringup.applied import PASSING, Moved, Step
 from robot.bringup.jog import JogParams, ManualControl, refuse_unknown
-from robot.bringup.look_at import LookedAt, ends_reached, look_at, refuse_not_finite
+from robot.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
 from robot.bus_events import drawn_together
 from robot.cli import calibrations as cli_calibrations
 from robot.cli import monitor as cli_monitor
+from robot.cli.servo_words import holding, left_alone
 from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from robot.cli.wires import MockOption, PortOption, RigOption, Wires, wires
 from robot.clock import RealClock
@@ -38,6 +39,9 @@ SpeedOption = Annotated[
 HoldOption = Annotated[
     bool, typer.Option("--hold", help="Stay there, torque on, until Enter or Ctrl-C.")
 ]
+YesOption = Annotated[
+    bool, typer.Option("--yes", help="Hobby servos: no hand is in the mechanism, do not ask.")
+]
 NoParkOption = Annotated[
     bool, typer.Option("--no-park", help="Torque off where it stands, without parking first.")
 ]
@@ -51,6 +55,7 @@ def jog(
     seconds: Annotated[float, typer.Option(min=0.0, help="Stay there for S seconds.")] = 1.0,
     hold: HoldOption = False,
     no_park: NoParkOption = False,
+    yes: YesOption = False,
     rig: RigOption = "desk",
     mock: MockOption = False,
     port: PortOption = None,
@@ -59,7 +64,7 @@ def jog(
     with clear_errors():
         loaded = load_rig(rig)
         refuse_unknown({joint: deg}, loaded.names)
-    with _commanded(loaded, mock, port, speed, hold, not no_park) as control:
+    with _commanded(loaded, _Way(mock, port, yes), speed, hold, not no_park) as control:
         moved = control.jog(joint, deg)
         _report(moved, (joint,))
         _stay(control, seconds, hold)
@@ -71,6 +76,7 @@ def home(
     rig: RigArgument = "desk",
     speed: SpeedOption = 20.0,
     hold: HoldOption = False,
+    yes: YesOption = False,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
@@ -79,7 +85,7 @@ def home(
         loaded = load_rig(rig)
     centre = dict.fromkeys(loaded.names, 0.0)
     centre.update({name: degrees(wide) for name, (_, wide) in lid_ends(loaded).items()})
-    with _commanded(loaded, mock, port, speed, hold, False) as control:
+    with _commanded(loaded, _Way(mock, port, yes), speed, hold, False) as control:
         moved = control.pose(centre)
         _report(moved, loaded.names)
         _stay(control, 0.0, hold)
@@ -95,6 +101,7 @@ def look_at_command(
     hold: HoldOption = False,
     no_park: NoParkOption = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of blinks.")] = 0,
+    yes: YesOption = False,
     rig: RigOption = "desk",
     mock: MockOption = False,
     port: PortOption = None,
@@ -108,28 +115,60 @@ def look_at_command(
         from robot.assemble import gaze_parts
 
         kinematics, oculomotor = gaze_parts(loaded, seed)
-    with _commanded(loaded, mock, port, 20.0, hold, not no_park) as control:
+    with _commanded(loaded, _Way(mock, port, yes), 20.0, hold, not no_park) as control:
         looked = look_at(control, kinematics, oculomotor, (x, y, z), seconds)
         good = _report_look(looked, loaded)
         _stay(control, 0.0, hold)
     _exit_unless(good)
 
 
+class _Way(NamedTuple):
+    """The way to the servos, as asked on the command line; yes: no hand is in them."""
+
+    mock: bool
+    port: str | None
+    yes: bool
+
+
 @contextlib.contextmanager
 def _commanded(
-    rig: Rig, mock: bool, port: str | None, speed: float, hold: bool, park: bool
+    rig: Rig, way: _Way, speed: float, hold: bool, park: bool
 ) -> Iterator[ManualControl]:
     """Give a rig that holds where it is; whatever happens, it ends with the torque off."""
-    with clear_errors(), signals() as stopped, wires(rig, mock, port) as wire:
+    with clear_errors(), signals() as stopped, wires(rig, way.mock, way.port) as wire:
         enter = _enter if hold and sys.stdin.isatty() else _never
         control = _control(rig, wire, speed, lambda: stopped() or enter())
+        if not way.mock:
+            _ask_for_fingers(rig, way.yes)
         control.start()
         try:
             _tell(control.body.bus.events())
-            say(f"torque on: {len(rig.names)} servos hold where they are; Ctrl-C switches it off")
+            say(f"{holding(rig)}; Ctrl-C switches it off")
             yield control
         finally:
             _leave(control, rig, park)
+
+
+def _ask_for_fingers(rig: Rig, yes: bool) -> None:
+    """Ask before servos jump that nobody knows the places of.
+
+    Raises:
+        drivers.errors.SetupError: there is nobody to ask.
+        typer.Abort: the answer was no.
+    """
+    blind = [name for name in rig.names if not rig.joints[name].facts.measured]
+    if not blind:
+        return
+    why = (
+        f"{', '.join(blind)}: hobby servos without pulses go to their parking place at once, at "
+        "their own full speed"
+    )
+    say(why)
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise SetupError(f"{why}: take your hands out of the mechanism and say --yes")
+    typer.confirm("Is no hand in the mechanism?", abort=True)
 
 
 def _control(
@@ -191,7 +230,7 @@ def _leave(control: ManualControl, rig: Rig, park: bool) -> None:
         control.stop()
         how += "torque off on all servos"
     except DriverError as error:
-        how += f"torque-off could not be sent ({error}): the servos' watchdog stops them"
+        how += f"torque-off could not be sent ({error}): {left_alone(rig)}"
     say(how)
 
 
@@ -210,22 +249,22 @@ def _why(moved: Moved) -> str:
 
 
 def _report_look(looked: LookedAt, rig: Rig) -> bool:
-    """Say how well the eyes meet the point; tells whether both do within 2 deg."""
-    good = max(looked.left_error, looked.right_error) <= 2.0
+    """Say how well the eyes meet the point; tells whether they do within 2 deg."""
+    good = looked.error <= 2.0
     ranges = rig.ranges
     narrower = {
         "eye_pan": ranges.eye_yaw_deg,
+        "eyes_pan": ranges.eye_yaw_deg,
         "eye_tilt": ranges.eye_pitch_deg,
+        "eyes_tilt": ranges.eye_pitch_deg,
         "neck_yaw": ranges.neck_yaw_deg,
     }
     _tell(looked.moved.events)
-    yaw, pitch, roll = looked.head
-    say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
-    say(
-        f"gaze error: left eye {looked.left_error:.2f}, right eye {looked.right_error:.2f} deg "
-        f"of a point {looked.distance_m:.2f} m away"
-    )
-    say(f"vergence: {looked.vergence:.2f} deg, the point needs {looked.wished_vergence:.2f}")
+    if any(name.startswith("neck") for name in rig.names):
+        yaw, pitch, roll = looked.head
+        say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
+    for line in met(looked):
+        say(line)
     for applied in looked.moved.remarkable():
         say(f"limited: {applied}")
     for line in () if good else ends_reached(rig.joints, narrower, looked.moved):

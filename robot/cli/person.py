@@ -32,6 +32,11 @@ class Lines:
         self._ready = [] if answers is None else answers.read_text("utf-8").splitlines()
         self._rest = b""
 
+    @property
+    def scripted(self) -> bool:
+        """Tell whether they come from a file."""
+        return self._file is not None
+
     def next(self, wait_s: float) -> str | None:
         """Give the next line, None where none came in time.
 

@@ -15,6 +15,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Metadata
 from mcap.stream_reader import get_chunk_data_stream
+from zstandard import ZstdError
 
 from drivers.errors import SetupError
 from gaze.types import Percept
@@ -30,7 +31,9 @@ _HEAD = 9  # bytes of a record before its content: kind and length
 _LARGEST = 1 << 30  # bytes of a record; more is damage
 _FIXED = 22  # bytes of a message before its data: channel, sequence, two times
 _PERCEPTS_KEPT = 8  # a tick goes by the newest, or by the one before
-_DAMAGE = (McapError, KeyError, TypeError, ValueError, IndexError, struct.error, zlib.error)
+_DAMAGE = (
+    McapError, KeyError, TypeError, ValueError, IndexError, struct.error, zlib.error, ZstdError,
+)  # fmt: skip
 
 
 class BadRecording(SetupError):

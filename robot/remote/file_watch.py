@@ -109,12 +109,18 @@ class FileWatch:
             self._thread.join(timeout=2.0)
 
     def saved(self, path: Path) -> None:
-        """Take a file as known: it was written by this program; from any thread."""
+        """Take a file as known: it was written by this program; from any thread.
+
+        A file that is not watched yet is from now on, so that an edit made before the next
+        look is heard of.
+        """
         same = path.resolve()
         with self._lock:
-            for watched, settling in self._watched.items():
-                if watched.resolve() == same:
-                    settling.known(look(watched))
+            known = [one for one in self._watched if one.resolve() == same]
+            for watched in known:
+                self._watched[watched].known(look(watched))
+            if not known:
+                self._watched[path] = Settling(look(path))
 
     def look(self) -> None:
         """Look at all files once and tell of those that are new or stay away."""

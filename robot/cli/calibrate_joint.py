@@ -1,0 +1,222 @@
+"""Calibrating the joints of one bus with a person at the terminal, by what their servos can do."""
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from enum import StrEnum
+from typing import NamedTuple
+
+from config.schema import Rig
+from drivers.dynamixel_registers import Registers
+from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
+from drivers.serial_port import BlockingPort
+from drivers.servo_models import SERVOS
+from robot.bringup.one_dynamixel import OneDynamixel
+from robot.bringup.one_feetech import OneFeetech
+from robot.bringup.one_hobby import OneHobby
+from robot.bringup.one_servo import OneServo
+from robot.bringup.single_joint import SingleJoint
+from robot.calibrate.calibrating import by_hand, by_motion
+from robot.calibrate.calibration import Calibration, CalibrationRefused, Places
+from robot.calibrate.placing import HandPlacer, HobbyPlacer, by_places
+from robot.calibrate.stop_search import StopSearchParams
+from robot.cli.opened import opened
+from robot.cli.steering import SteeringPerson
+from robot.cli.terminal import say
+from robot.cli.wires import Wires
+from robot.clock import RealClock
+from robot.rig_bus import bus_names, joints_on
+
+Made = Calibration | Places
+
+
+class By(StrEnum):
+    """Who turns the joint."""
+
+    hand = "hand"
+    motion = "motion"
+
+
+class ZeroBy(StrEnum):
+    """Who says where straight ahead is, after the stops were found by motion."""
+
+    middle = "middle"
+    person = "person"
+
+
+class How(NamedTuple):
+    """How to calibrate, as asked on the command line.
+
+    pulses_us: hobby servos are never sent outside
+    more: places of a linkage between each two that are marked
+    """
+
+    by: By
+    margin_deg: float
+    zero: ZeroBy
+    search: StopSearchParams
+    clear_offset: bool
+    set_middle: bool
+    pulses_us: tuple[float, float]
+    more: int
+
+
+class Measured(NamedTuple):
+    """What came of it: by joint, and which joints were refused."""
+
+    found: dict[str, Made]
+    refused: tuple[str, ...]
+
+
+class Bench(NamedTuple):
+    """What calibrating needs beside the joints."""
+
+    rig: Rig
+    wire: Wires
+    how: How
+    person: SteeringPerson
+    stopped: Callable[[], str | None]
+
+
+def measure(bench: Bench, names: Sequence[str]) -> Measured:
+    """Calibrate one joint after the other, bus by bus.
+
+    Raises:
+        drivers.errors.SetupError: a port cannot be opened, or there are no answers left.
+        robot.bringup.single_joint.Stopped: somebody wants it to end.
+    """
+    found: dict[str, Made] = {}
+    refused: list[str] = []
+    for bus in bus_names(bench.rig):
+        for name in (name for name in joints_on(bench.rig, bus) if name in names):
+            try:
+                found[name] = _one(bench, name, bus)
+            except (CalibrationRefused, ServoMissing, ServoFault) as error:
+                refused.append(name)
+                say(f"refused: {error}")
+    # In the order of the rig, whatever the buses are called.
+    return Measured({name: found[name] for name in names if name in found}, tuple(refused))
+
+
+def refuse_impossible(rig: Rig, names: Sequence[str], how: How) -> None:
+    """Refuse what the servos of these joints cannot do.
+
+    Raises:
+        drivers.errors.SetupError: says which, and what can be done.
+    """
+    kinds = {name: rig.bus_of(name).kind for name in names}
+    blind = [name for name in names if not rig.joints[name].facts.measured]
+    if how.by is By.motion and len(blind) == len(names):
+        raise SetupError(
+            f"--by motion: hobby servos do not tell where they are ({', '.join(blind)}), so no "
+            "stop can be found: leave --by away and steer them yourself"
+        )
+    other = [name for name, kind in kinds.items() if kind != "feetech"]
+    if how.set_middle and other:
+        raise SetupError(
+            f"--set-middle: only Feetech servos can be told so, not that of {', '.join(other)}: "
+            "choose joints with --joint"
+        )
+    if how.clear_offset and len(blind) == len(names):
+        raise SetupError("--clear-offset: hobby servos have no offset: leave it away")
+    low, high = how.pulses_us
+    least, most = 500.0, 2500.0
+    if not least <= low < high <= most:
+        raise SetupError(f"--pulses {low:g}:{high:g}: must ascend within {least:g}:{most:g} us")
+
+
+def _one(bench: Bench, name: str, bus: str) -> Made:
+    if not bench.rig.joints[name].facts.measured:
+        return _hobby(bench, name, bus)
+    with opened(bench.rig, bench.wire, bus) as port:
+        joint = bench.rig.joints[name]
+        servo = _servo(name, joint.id, joint.model, port)
+        single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
+        bench.person.hand = _hand(bench.wire, bus, joint.id)
+        with _let_go_after(single.who, single.let_go):
+            return _smart(bench, single)
+
+
+def _servo(name: str, servo_id: int, model: str, port: BlockingPort) -> OneServo:
+    if SERVOS[model].bus == "feetech":
+        return OneFeetech(name, servo_id, model, port)
+    return OneDynamixel(name, servo_id, model, Registers(port))
+
+
+def _smart(bench: Bench, single: SingleJoint) -> Made:
+    how, person = bench.how, bench.person
+    if how.clear_offset:
+        was = single.clear_offset()
+        if was:
+            say(f"{single.who}: its offset {was} -> 0; {_VOID}")
+    single.check()
+    if how.set_middle:
+        _set_middle(single, person)
+    if single.joint.linkage:
+        if how.by is By.motion:
+            raise CalibrationRefused(
+                f"{single.name}: its push rod has measured places (linkage), which motion cannot "
+                "find: --by hand"
+            )
+        return by_places(HandPlacer(single, person), person, how.margin_deg, how.more)
+    if how.by is By.hand:
+        return by_hand(single, person, how.margin_deg)
+    _warn_of_neck(single.name, person)
+    return by_motion(single, person, how.margin_deg, how.search, how.zero.value)
+
+
+_VOID = "until this calibration is written the rig file's zero is wrong by that"
+
+
+def _set_middle(single: SingleJoint, person: SteeringPerson) -> None:
+    single.let_go()
+    person.wait(
+        f"turn {single.name} to the middle of its travel, then press Enter",
+        lambda: f"{single.name}: step {single.position()[0]}",
+    )
+    say(f"{single.who}: its place is 2048 now (offset {single.set_middle()}); {_VOID}")
+
+
+def _hobby(bench: Bench, name: str, bus: str) -> Made:
+    config = bench.rig.buses[bus] if bus else bench.rig.bus
+    port = BlockingPort(bench.wire.paths[bus])
+    joint, how, person = bench.rig.joints[name], bench.how, bench.person
+    hobby = OneHobby(name, joint, port, config.maestro, RealClock(), bench.stopped, how.pulses_us)
+    person.hand = None
+    with _let_go_after(hobby.who, hobby.let_go):
+        return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)
+
+
+def _hand(wire: Wires, bus: str, servo_id: int) -> Callable[[int], None] | None:
+    """Give what turns an emulated servo by some steps; None on real wires."""
+    if wire.buses is None:
+        return None
+
+    def turn(steps: int) -> None:
+        wire.command(f"turn {servo_id} {steps}", bus)
+
+    return turn
+
+
+@contextlib.contextmanager
+def _let_go_after(who: str, let_go: Callable[[], None]) -> Iterator[None]:
+    """Take the torque away however the block ends."""
+    try:
+        yield
+    finally:
+        try:
+            let_go()
+        except DriverError as error:
+            say(f"{who}: torque-off could not be confirmed ({error}): cut the servo power")
+
+
+def _warn_of_neck(name: str, person: SteeringPerson) -> None:
+    """Ask before something as heavy as a head moves by itself.
+
+    Raises:
+        robot.calibrate.calibration.CalibrationRefused: the answer was no.
+    """
+    if not name.startswith("neck"):
+        return
+    asked = f"{name} will move by itself, and sink when the torque goes off: hold the head. Go on?"
+    if not person.agrees(asked):
+        raise CalibrationRefused(f"{name}: left out as you wished")
