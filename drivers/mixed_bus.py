@@ -8,7 +8,6 @@ from typing import NamedTuple
 from drivers.errors import BusLost
 from drivers.types import BusHealth, ServoBus, ServoReading, ServoSetup
 
-
 IN_A_ROW = 3
 """So many reads may stay without any answer before a bus is asked less often."""
 

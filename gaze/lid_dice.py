@@ -32,8 +32,9 @@ def evokes(params: LidParams, shift_deg: float, rng: np.random.Generator) -> boo
     if params.evoked_literal:
         return shift_deg > params.evoked_literal_deg
     beyond = shift_deg - params.evoked_middle_deg
-    chance = 1.0 / (1.0 + exp(-params.evoked_steepness_1_deg * beyond))
-    return float(rng.random()) < chance
+    # Of the steepest slope the exponential would be beyond what a number can hold.
+    against = exp(min(700.0, -params.evoked_steepness_1_deg * beyond))
+    return float(rng.random()) < 1.0 / (1.0 + against)
 
 
 def depth(params: LidParams, rng: np.random.Generator) -> float:

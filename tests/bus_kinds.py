@@ -121,10 +121,10 @@ class Twin:
 
     def reports(self) -> list[dict[str, object]]:
         """Give what servos truly are, in the order of the whole."""
-        by_bus = {
-            name: {one["id"]: one for one in json.loads(self.wires.command("status", name))["servos"]}
-            for name in self.buses
-        }
+        by_bus = {}
+        for name in self.buses:
+            servos = json.loads(self.wires.command("status", name))["servos"]
+            by_bus[name] = {one["id"]: one for one in servos}
         return [by_bus[self.on[p]][self.setups[p].id] for p in range(self.count)]
 
     def truth(self) -> list[float]:

@@ -21,7 +21,7 @@ from sim_mock.emulated import build
 from sim_mock.maestro_board import MaestroBoard
 from sim_mock.ports import InProcessPort
 
-WARM_S, STRUCK_S, PATIENCE_S = 1.6, 1.0, 6.0
+WARM_S, STRUCK_S, PATIENCE_S = 1.6, 1.0, 4.0
 FAST, HURRIED = 1.3, 1.8
 """Servos overshoot the speed of their goals so much; and more for a while after slots were
 missed, when a goal is as far ahead as the time that went by."""
@@ -56,9 +56,10 @@ def _lasting(*texts: str) -> list[Case]:
 LINE = [
     *_lasting(
         "lose {i}", "lose all", "delay {i} 5", "delay {i} 60", "delay all 3",
-        "delay all 30 count 12", "delay all 300 count 3", "truncate {i} 0", "truncate {i} 1", "truncate all 1", "duplicate {i}",
-        "duplicate all", "corrupt {i}", "corrupt {i} 20", "corrupt all", "drop {i} 0", "drop {i} 1",
-        "drop {i} -1", "drop all 0", "stall {i} 5", "stall {i} 30", "stall all 5", "stall all 60 count 9",
+        "delay all 30 count 12", "delay all 300 count 3", "truncate {i} 0", "truncate {i} 1",
+        "truncate all 1", "duplicate {i}", "duplicate all", "corrupt {i}", "corrupt {i} 20",
+        "corrupt all", "drop {i} 0", "drop {i} 1", "drop {i} -1", "drop all 0", "stall {i} 5",
+        "stall {i} 30", "stall all 5", "stall all 60 count 9",
         "noise before random", "noise after random", "noise before FF", "noise after AA",
         "echo on", "babble on", "block on", "lose-writes 1000 for 1",
     ),
@@ -71,8 +72,8 @@ LINE = [
 PACKETS = [
     *_lasting(
         "truncate {i} 5", "truncate all 11", "drop {i} 3", "drop {i} 8", "fragment {i}", "fragment",
-        "reorder", "wrong-id {i} {j}", "wrong-id {i} 77", "short {i} 2", "short all 1", "long {i} 2",
-        "long all 1", "refuse {i} 7", "refuse {i} 32", "refuse all 7", "noise before FFFFFD00",
+        "reorder", "wrong-id {i} {j}", "wrong-id {i} 77", "short {i} 2", "short all 1",
+        "long {i} 2", "long all 1", "refuse {i} 7", "refuse {i} 32", "refuse all 7", "noise before FFFFFD00",
         "noise before FFFF0102", "noise after FFFF01",
     ),
     Case(("set after-missing silence", "lose {i}")),
@@ -219,7 +220,8 @@ class Machine:
         for i, limit in enumerate(self.limits):
             middle = 0.5 * (limit.low_rad + limit.high_rad)
             size = 0.3 * (limit.high_rad - limit.low_rad)
-            rate = min(2.0, 0.35 * limit.speed_rad_s / size, (0.2 * limit.accel_rad_s2 / size) ** 0.5)
+            most = (0.2 * limit.accel_rad_s2 / size) ** 0.5
+            rate = min(2.0, 0.35 * limit.speed_rad_s / size, most)
             wave.append(middle + size * sin(rate * (t_s - self._begin_s) + i * pi / 5.0))
         return wave
 
@@ -253,9 +255,7 @@ class Machine:
             for i, name in enumerate(self.names)
         )
 
-    def _judge_command(
-        self, command: Sequence[float], rearmed: Sequence[bool], t_s: float
-    ) -> None:
+    def _judge_command(self, command: Sequence[float], rearmed: Sequence[bool], t_s: float) -> None:
         """See that commands keep range, speed and acceleration, but where a joint began anew."""
         dt_s = min(t_s - self._last_s, 0.1)
         for i, limit in enumerate(self.limits):

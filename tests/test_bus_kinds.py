@@ -229,20 +229,22 @@ def test_a_port_that_cannot_be_opened_is_named(here):
 
 def test_one_silent_servo_costs_only_itself(twin, held):
     """A Maestro answers for all its channels at once: there the board is one."""
-    for place in smart(twin)[:1]:
-        others = [p for p in range(twin.count) if p != place]
-        twin.strike("lose", place)
-        readings = twin.until(held, lambda r: r[place] is None, starts(twin))
-        for _ in range(20):
-            readings = twin.run(held, 0.0, starts(twin))
-            assert all(readings[p] is not None for p in others)
-            twin.wait(0.01)
-        assert readings[place] is None
-        assert held.health().errors["timeout"] >= 1
-        twin.until(held, lambda r: _says(held, twin, place, "does not answer"), starts(twin))
-        twin.command("clear", twin.on[place])
-        twin.until(held, well, starts(twin))
-        assert twin.near(twin.truth(), starts(twin))
+    if not smart(twin):
+        return
+    place = smart(twin)[0]
+    others = [p for p in range(twin.count) if p != place]
+    twin.strike("lose", place)
+    readings = twin.until(held, lambda r: r[place] is None, starts(twin))
+    for _ in range(20):
+        readings = twin.run(held, 0.0, starts(twin))
+        assert all(readings[p] is not None for p in others)
+        twin.wait(0.01)
+    assert readings[place] is None
+    assert held.health().errors["timeout"] >= 1
+    twin.until(held, lambda r: _says(held, twin, place, "does not answer"), starts(twin))
+    twin.command("clear", twin.on[place])
+    twin.until(held, well, starts(twin))
+    assert twin.near(twin.truth(), starts(twin))
 
 
 def _says(bus, twin, place, what):

@@ -26,7 +26,7 @@ class SlowPort:
         self.sent.append(data)
 
     def read_until(self, length, deadline_s):
-        came = self.answers.pop(0)
+        came = self.answers.pop(0) if self.answers else b""
         if came is None:
             # It is still on its way: whoever only throws away what is here misses it.
             self.answers.insert(0, self.late)
@@ -60,6 +60,15 @@ def test_the_board_is_not_asked_too_much_at_once():
     port = SlowPort(bytes(12), bytes(6))
     assert Line(port, MaestroParams()).pulses(range(9)) == (0,) * 9
     assert [len(packet) for packet in port.sent] == [12, 6]
+
+
+def test_more_than_was_asked_for_is_damage():
+    """A channel that answers twice: all behind it would have their neighbour's pulse."""
+    port = SlowPort(b"\x70\x17" * 3, b"\x70\x17", bytes(6))
+    line = Line(port, MaestroParams())
+    assert line.pulses((0, 1, 2)) is None
+    assert line.errors == {"damaged": 1}
+    assert line.pulses((0, 1, 2)) == (0, 0, 0)
 
 
 def held(setup=SETUP, pulse=6000):

@@ -146,7 +146,7 @@ def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[F
             "error",
             f"no servo answers, at {baud} bit/s or any other rate",
             "the bus",
-            kind.nobody,
+            f"{kind.nobody} gazerig scan asks other kinds of servos, too",
         )
         return
     at = {found.id: found for found in presence.elsewhere}

@@ -5,7 +5,7 @@ from math import degrees, isfinite
 from typing import NamedTuple
 
 from drivers.errors import SetupError
-from gaze.angles import add, angle_between, norm, sub, unit
+from gaze.angles import add, angle_between, norm, sub
 from gaze.field_of_view import line_of_sight
 from gaze.oculomotor import Oculomotor
 from gaze.types import GazeState, Target, Vec3
@@ -97,7 +97,7 @@ def judged(p_world_m: Vec3, pose: GazeState, moved: Moved, converges: bool = Tru
     error_left, error_right = angle_between(left, to_left), angle_between(right, to_right)
     error = max(error_left, error_right)
     if not converges:
-        error = angle_between(unit(add(left, right)), unit(add(to_left, to_right)))
+        error = angle_between(add(left, right), add(to_left, to_right))
     return LookedAt(
         degrees(error_left),
         degrees(error_right),

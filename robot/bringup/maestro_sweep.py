@@ -63,7 +63,7 @@ def walk(
             way_s = abs(asked - start) / (units * SPEED_STEPS_S) if start else SETTLE_S
             gone.append(Place(asked, _arrived(line, setup, asked, way_s, sleep_until)))
             if not nth:
-                sleep_until(line.port.now_s() + SETTLE_S)
+                _settle(line, setup, sleep_until)
     finally:
         _end(line, setup)
     return tuple(gone)
@@ -83,6 +83,14 @@ def _arrived(
         got = _pulse(line, setup)
         if abs(got - asked) <= FINE_STEPS or line.port.now_s() >= until_s:
             return got
+
+
+def _settle(line: Line, setup: ServoSetup, sleep_until: Callable[[float], None]) -> None:
+    """Wait until a servo has arrived; the board is asked meanwhile, it may have a timeout."""
+    until_s = line.port.now_s() + SETTLE_S
+    while line.port.now_s() < until_s:
+        sleep_until(line.port.now_s() + LOOK_S)
+        _pulse(line, setup)
 
 
 def _pulse(line: Line, setup: ServoSetup) -> int:

@@ -1,5 +1,6 @@
 """The command calibrate face: where one person's eyes, mouth and all else are on their face."""
 
+import os
 import sys
 from collections.abc import Callable
 from datetime import datetime
@@ -35,6 +36,7 @@ from robot.cli.terminal import (
 from robot.cli.wires import MockOption, PortOption
 from robot.loop import LoopCount, Tick
 from robot.loop import run as run_loop
+from robot.remote.stop_door import StopDoor
 from robot.session import Wanted, leave
 
 STILL_SCENE = "sits-still"
@@ -128,11 +130,17 @@ def _steered(
     keys = PageKeys(TerminalKeys() if not scripted and sys.stdin.isatty() else LineKeys(lines))
     steer = Steer(BUTTONS, keys.press, lambda: shown(steering))
     audience = Audience(made, Wished(page=page), None, page is None, say, status, steer)
-    sitting = _Sitting(steering, keys, made.clock.now_s, stopped, scripted, audience)
+    door = StopDoor(
+        made.robot.order,
+        made.clock,
+        {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"},
+        say,
+    )
+    sitting = _Sitting(steering, keys, made.clock.now_s, stopped, scripted, audience, door)
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     try:
-        count = _run(made, sitting, keys, audience)
+        count = _run(made, sitting, keys, audience, door)
     finally:
         made.close()
     if stopped() is not None or count.stopped_by.startswith("fault"):
@@ -140,7 +148,9 @@ def _steered(
     return steering.state
 
 
-def _run(made: Assembly, sitting: "_Sitting", keys: Keys, audience: Audience) -> LoopCount:
+def _run(
+    made: Assembly, sitting: "_Sitting", keys: Keys, audience: Audience, door: StopDoor
+) -> LoopCount:
     """Run the robot until the sitting is over."""
     count = LoopCount(0, 0, "fault: unexpected error")
     made.robot.start(made.clock)
@@ -148,11 +158,13 @@ def _run(made: Assembly, sitting: "_Sitting", keys: Keys, audience: Audience) ->
         for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
             say(note)
         audience.open()
+        door.open()
         with keys:
             count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.note)
         audience.tell("over: the head parks; whether to write it is asked at the terminal")
     finally:
         leave(made, count, say)
+        door.close()
         audience.close(count)
     return count
 
@@ -168,9 +180,11 @@ class _Sitting:
         stopped: Callable[[], str | None],
         scripted: bool,
         audience: Audience,
+        door: StopDoor,
     ) -> None:
         self._steering, self._keys, self._now_s = steering, keys, now_s
-        self._stopped, self._scripted, self._audience = stopped, scripted, audience
+        self._stopped, self._scripted = stopped, scripted
+        self._audience, self._door = audience, door
         self._live_line = not scripted and sys.stderr.isatty()
         self._said: tuple[str | None, bool] | None = None
         self._ready_s = self._shown_s = self._seen_s = now_s()
@@ -191,6 +205,7 @@ class _Sitting:
     def note(self, tick: Tick) -> None:
         """See what the tick did, and say what a person should know."""
         self._audience.note(tick)
+        self._door.note(tick)
         self._tell(self._steering.note(tick))
         for event in drawn_together(tick.events):
             say(event)

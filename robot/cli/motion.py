@@ -135,11 +135,12 @@ def _commanded(
     rig: Rig, way: _Way, speed: float, hold: bool, park: bool
 ) -> Iterator[ManualControl]:
     """Give a rig that holds where it is; whatever happens, it ends with the torque off."""
+    if not way.mock:
+        with clear_errors():  # before Ctrl-C is a wish that somebody has to look at
+            _ask_for_fingers(rig, way.yes)
     with clear_errors(), signals() as stopped, wires(rig, way.mock, way.port) as wire:
         enter = _enter if hold and sys.stdin.isatty() else _never
         control = _control(rig, wire, speed, lambda: stopped() or enter())
-        if not way.mock:
-            _ask_for_fingers(rig, way.yes)
         control.start()
         try:
             _tell(control.body.bus.events())
@@ -163,12 +164,11 @@ def _ask_for_fingers(rig: Rig, yes: bool) -> None:
         f"{', '.join(blind)}: hobby servos without pulses go to their parking place at once, at "
         "their own full speed"
     )
-    say(why)
-    if yes:
-        return
-    if not sys.stdin.isatty():
+    if not yes and not sys.stdin.isatty():
         raise SetupError(f"{why}: take your hands out of the mechanism and say --yes")
-    typer.confirm("Is no hand in the mechanism?", abort=True)
+    say(why)
+    if not yes:
+        typer.confirm("Is no hand in the mechanism?", abort=True)
 
 
 def _control(

@@ -94,6 +94,7 @@ def _export(
     file: Path, bids: bool, out: Path | None, subject: str | None, task: str | None
 ) -> None:
     """Write one kind of export and say what was written."""
+    from robot.reckoned import RECKONED
     from robot.recording.export_bids import About, write_bids
     from robot.recording.export_csv import write_csv
     from robot.recording.gaze_angles import trace_of
@@ -130,6 +131,8 @@ def _export(
         + ", ".join(f"{n} {kind}s" for kind, n in found.items())
         + f"; labels are the plan's, {1e3 * labels.lag_s:.0f} ms later, as the eyes follow it"
     )
+    if trace.reckoned:
+        say(f"{', '.join(trace.reckoned)}: {RECKONED}")
 
 
 _EVENTS = ("saccade", "fixation", "pursuit", "blink")

@@ -68,6 +68,7 @@ def report(
             raise SetupError("report takes a recording, or --scene NAME: one of them")
         # Drawing and models are heavy; `--help` does without them.
         from robot.report.build import report_of
+        from robot.report.page import banner
 
         with _progress() as tell:
             if file is not None:
@@ -79,6 +80,8 @@ def report(
                 layers = _Layers(rig, character, profile)
                 about, run = _simulated(choice, layers, seconds, conversation, tell)
             made = report_of(run, about, page_file(out or _beside(file, scene)), tell)
+        if words := banner(run.joints):
+            say(words)
         _tell_findings(made.findings)
         say(f"{made.page}: the whole report; {len(made.pictures)} figures beside it")
 
@@ -103,6 +106,8 @@ def compare(
         with _progress() as tell:
             ticks = recordings[0].ticks(), recordings[1].ticks()
             made = comparing(ticks, abouts, page_file(out), tell)
+        if made.warning:
+            say(made.warning)
         for difference in made.differences:
             if difference.word == "more than chance":
                 a, b = difference.a, difference.b

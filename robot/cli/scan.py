@@ -88,6 +88,9 @@ def parse_bauds(text: str) -> tuple[int, ...] | None:
 def _only_port(ports: Sequence[SerialPort]) -> str:
     """Give the one port on USB; asking strange devices needs a person's word."""
     usb = [port for port in ports if port.usb]
+    if len(usb) == 2 and usb[0].usb == usb[1].usb and usb[0].usb.startswith(POLOLU):
+        # Both ports of one Maestro: its Command Port is the first.
+        return usb[0].device
     if len(usb) == 1:
         return usb[0].by_id or usb[0].device
     if usb:

@@ -1,0 +1,145 @@
+"""What befalls every kind of bus while a head moves on it, and how each of it ends.
+
+A fault lasts for a second in a running loop of bus and guard at 100 Hz. In every tick the
+true servos are judged (struck_rigs): goals inside the limits, places inside the range,
+speeds below the top. After it all joints move as before, or some are left limp or still,
+each named with its cause. tests/bench/bench_faults.py runs the same on the shipped rigs with
+all their joints and at 200 Hz.
+"""
+
+import random
+
+import pytest
+from mixed_rig import mixed_text
+from struck_rigs import CASES, RIGS, Case, Machine, few_joints, pair_of
+
+import robot.assemble
+from config.schema import load_rig
+from robot.choice import Choice
+from robot.rig_angles import limits
+
+LEFT = {
+    "dynamixel": {
+        "overload {i}", "overheat {i}", "shock {i}", "voltage {i} 3.0", "voltage all 3.0",
+        "voltage {i} 16", "collide {i}",
+    },
+    "feetech": {"overheat {i}", "collide {i}", "reset {i}"},
+    "maestro": set[str](),
+}  # fmt: skip
+"""After these a servo is left, as only a person can help; everything else passes."""
+
+EVERY = [(kind, case) for kind in CASES for case in CASES[kind]]
+LONGEST_S = 0.1
+
+
+@pytest.fixture(scope="module")
+def rigs():
+    return {kind: few_joints(load_rig(RIGS[kind])) for kind in RIGS}
+
+
+@pytest.mark.parametrize(("kind", "case"), EVERY, ids=[f"{k}: {c.name}" for k, c in EVERY])
+def test_whatever_befalls_a_bus_ends_well(rigs, kind, case):
+    machine = Machine(rigs[kind])
+    machine.start()
+    outcome = machine.strike(*pair_of(rigs[kind], kind), case)
+    assert outcome.survived, outcome
+    assert (outcome.end == "left, named") == (case.name in LEFT[kind]), outcome
+    # An adapter that takes nothing gives up after 0.25 s.
+    assert outcome.longest_s < (0.3 if "block" in case.name else LONGEST_S)
+    machine.body.stop()
+    assert all(machine.true_goal(i) is None for i in range(len(machine.names)))
+
+
+@pytest.mark.parametrize("kind", RIGS)
+def test_many_at_once_and_nothing_leaves_its_limits(rigs, kind):
+    """Faults by the dice, three at a time; what is left of the head ends well all the same."""
+    dice = random.Random(kind)
+    gentle = [case for case in CASES[kind] if case.name not in LEFT[kind]]
+    machine = Machine(rigs[kind])
+    machine.start()
+    # Servos that catch up by their own strength have no limit but that.
+    machine.own_speed = True
+    for _ in range(6):
+        three = dice.sample(gentle, 3)
+        both = Case(
+            tuple(text for case in three for text in case.begins),
+            tuple(text for case in three for text in case.ends),
+            own_speed=True,
+        )
+        outcome = machine.strike(*pair_of(rigs[kind], kind), both)
+        assert outcome.survived, (both.name, outcome)
+
+
+# --- several kinds in one head
+
+ALONE = (
+    Case(("unplug",), ("plug",)),
+    Case(("lose all",)),
+    Case(("delay all 5",)),
+    Case(("corrupt all",)),
+    Case(("babble on",)),
+    Case(("unplug", "deny on"), ("plug", "deny off")),
+)
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory):
+    file = tmp_path_factory.mktemp("rig") / "mixed.yaml"
+    file.write_text(mixed_text(), encoding="utf-8")
+    return load_rig(str(file))
+
+
+@pytest.mark.parametrize("case", ALONE, ids=lambda case: case.name)
+@pytest.mark.parametrize("kind", RIGS)
+def test_what_befalls_one_bus_leaves_the_joints_of_the_others_moving(mixed, kind, case):
+    machine = Machine(mixed)
+    machine.start()
+    bus, i, j = pair_of(mixed, kind)
+    ticks: list[tuple[bool, ...]] = []
+    tick = machine.tick
+    machine.tick = lambda: ticks.append(tick()) or ticks[-1]
+    began_s = machine.clock.now_s()
+    outcome = machine.strike(bus, i, j, case)
+    assert outcome.end == "came back", outcome
+    others = [k for k, name in enumerate(mixed.names) if mixed.joints[name].bus != bus]
+    assert all(well[k] for well in ticks for k in others)
+    # Its own patience is paid by all, but seldom: ticks are not left out for long.
+    slots = (machine.clock.now_s() - began_s) / machine.period_s
+    assert len(ticks) > 0.8 * slots
+
+
+# --- the whole robot
+
+STRUCK = {
+    "dynamixel": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
+    "feetech": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
+    "maestro": ("lose all for 0.3", "error protocol", "unplug for 0.3", "brown-out"),
+}
+
+
+@pytest.mark.parametrize("kind", RIGS)
+def test_a_robot_that_looks_at_people_goes_on_looking(monkeypatch, kind):
+    devices, build = [], robot.assemble.build
+
+    def seen(*given):
+        devices.append(build(*given))
+        return devices[-1]
+
+    monkeypatch.setattr(robot.assemble, "build", seen)
+    rig = load_rig(RIGS[kind])
+    made = robot.assemble.assemble(rig, Choice(mock=True, fast=True, seed=0, scene="visitor"))
+    clock, head = made.clock, made.robot
+    head.start(clock)
+    bounds, missed = limits(rig.joints), 0
+    for k in range(1, 401):
+        clock.sleep_until(k * 0.01)
+        if k % 80 == 40 and k < 340:
+            devices[0].faults.command(STRUCK[kind][k // 80])
+        tick = head.tick(clock.now_s(), 0.01)
+        missed += bool(tick.joints.missing)
+        for angle, limit in zip(tick.verdict.command_rad, bounds, strict=True):
+            assert limit.low_rad - 1e-9 <= angle <= limit.high_rad + 1e-9
+    assert missed > 0
+    assert tick.joints.missing == () and all(tick.joints.torque)
+    head.stop()
+    made.close()

@@ -1,0 +1,267 @@
+"""scan, doctor, setup and reboot as typed, on hobby and STS servos and rigs of several buses."""
+
+import contextlib
+import json
+import re
+
+import pytest
+from mixed_rig import mixed_text
+from typer.testing import CliRunner
+
+from config.schema import load_rig
+from drivers.serial_port import BlockingPort
+from drivers.serial_ports import Host, SerialPort
+from robot.cli import bench
+from robot.cli import servos as cli_servos
+from robot.emulated_rig import emulated_lines
+from sim_mock.emulated import MaestroLine, StsLine
+from sim_mock.pty_bus import PtyBus, PtyBuses
+from sim_mock.servo import ServoSpec
+
+
+def gazerig(*words, answers=""):
+    """Type a command; gives exit code, standard output and standard error."""
+    result = CliRunner().invoke(cli_servos.app, list(words), input=answers)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout, result.stderr
+
+
+@pytest.fixture(autouse=True)
+def no_real_ports(monkeypatch, tmp_path):
+    host = Host(tmp_path / "latency", tmp_path / "by-id", tmp_path / "processes")
+    monkeypatch.setattr(bench, "host", host)
+    monkeypatch.setattr(bench, "serial_ports", lambda host: ())
+
+
+@pytest.fixture
+def mixed(tmp_path):
+    """Give the path of a rig with eyes on a Maestro, a Dynamixel and a Feetech neck servo."""
+    path = tmp_path / "mixed.yaml"
+    path.write_text(mixed_text(), encoding="utf-8")
+    return str(path)
+
+
+@contextlib.contextmanager
+def served(rig):
+    """Serve a rig's buses; gives what --port wants, their paths, and what lets things happen."""
+    with PtyBuses() as buses:
+        paths = buses.start(emulated_lines(load_rig(rig)))
+        given = ",".join(f"{name}={path}" if name else path for name, path in paths.items())
+        yield given, paths, buses.command
+
+
+# --- scan
+
+
+def test_scan_of_a_maestro():
+    with PtyBus() as bus:
+        path = bus.start_device(MaestroLine())
+        bus.command("error signal")
+        bus.command("script on")
+        code, out, _ = gazerig("scan", "--port", path)
+        assert code == 0 and "Pololu Maestro: 6 channels or more" in out
+        assert "serial signal error" in out and "its own script runs" in out
+        assert "nothing else was sent" in out and "asked dynamixel" not in out
+        code, out, _ = gazerig("scan", "--port", path, "--json", "--kind", "maestro")
+        (board,) = json.loads(out)["boards"]
+        assert code == 0 and board["script"] is True and board["errors"] == []
+
+
+def test_scan_of_feetech_servos():
+    with PtyBus() as bus:
+        path = bus.start_device(StsLine((ServoSpec(1, "sts3215"), ServoSpec(9, "sts3215"))))
+        code, out, _ = gazerig("scan", "--port", path, "--bauds", "1000000")
+        rows = re.findall(r"(\d) +[│|] sts3215 +[│|] (\d+\.\d+) +[│|] (\d+) +[│|] Feetech", out)
+        assert code == 0 and rows == [("1", "3.53", "1000000"), ("9", "3.53", "1000000")]
+        code, out, _ = gazerig("scan", "--port", path, "--bauds", "1000000", "--kind", "dynamixel")
+        assert code == 1 and "gazerig scan --kind feetech" in out
+
+
+def test_scan_of_every_bus_of_a_rig(mixed):
+    code, out, _ = gazerig("scan", "--mock", "--rig", mixed, "--bauds", "1000000", "--json")
+    told = [json.loads(line) for line in out.splitlines()]
+    assert code == 0 and len(told) == 3
+    assert len(told[0]["boards"]) == 1
+    assert [(s["kind"], s["id"]) for one in told for s in one["servos"]] == [
+        ("dynamixel", 7), ("feetech", 1),
+    ]  # fmt: skip
+
+
+def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
+    with PtyBus() as bus:
+        path = bus.start_device(MaestroLine())
+        board = SerialPort(path, "Pololu Mini Maestro", "1ffb:008a", None)
+        monkeypatch.setattr(bench, "serial_ports", lambda host: (board,))
+        monkeypatch.setattr("robot.bringup.doctor_port.serial_ports", lambda host: (board,))
+        for words in (
+            ("scan", "--port", path, "--kind", "feetech"),
+            ("scan", "--port", path, "--kind", "dynamixel"),
+            ("setup", "--port", path, "--joint", "neck_yaw", "--yes"),
+            ("setup", "feetech", "--port", path, "--joint", "neck_yaw", "--yes"),
+            ("reboot", "neck_yaw", "--port", path),
+        ):
+            code, _, err = gazerig(*words)
+            assert code == 2 and "board of Pololu" in err and "would move" in err, words
+        code, out, _ = gazerig("doctor", "--port", path)
+        assert code == 1 and "is a board of Pololu, the YAML says dynamixel" in out
+        state = json.loads(bus.command("status"))
+        assert state["board"]["errors"] == []
+        code, out, _ = gazerig("scan", "--port", path)
+        assert code == 0 and "12 channels" in out
+
+
+# --- doctor
+
+
+@pytest.mark.parametrize("rig", ["maker", "feetech"])
+def test_doctor_of_the_shipped_rigs(rig):
+    code, out, _ = gazerig("doctor", rig, "--mock", "--fix")
+    assert code == 0
+    after = out.partition("after that:")[2]
+    assert "error" not in after and "warn" not in after.replace("0 warn", "")
+
+
+def test_doctor_examines_every_bus_and_says_which(mixed):
+    with served(mixed) as (ports, paths, command):
+        command("error protocol")
+        command("script on")
+        command("overload 7", "neck")
+        command("voltage 1 12.0", "tilt")
+        code, out, _ = gazerig("doctor", mixed, "--port", ports)
+        assert code == 1
+        main, neck, tilt = re.split(r"^bus \w+ \(.*\):$", out, flags=re.MULTILINE)
+        assert f"bus neck (dynamixel, {paths['neck']}):" in out
+        assert f"the main bus (maestro, {paths['']}):" in main
+        assert "serial protocol error" in main and "runs a script" in main
+        assert "neck_yaw (servo 7): has latched: overload" in neck
+        assert "neck_pitch (servo 1): 12.0 V, its limits are" in tilt and "sts3215-12v" in tilt
+        code, out, _ = gazerig("doctor", mixed, "--port", ports, "--json", "--fix")
+        found = json.loads(out)
+        assert {one["bus"] for one in found} == {"", "neck", "tilt"}
+        assert not any("script" in one["what"] and one["level"] == "warn" for one in found)
+
+
+def test_doctor_of_a_bus_that_is_not_there_still_examines_the_others(mixed):
+    with served(mixed) as (_, paths, _command):
+        given = f"{paths['']},neck=/dev/ttyNONE,tilt={paths['tilt']}"
+        code, out, _ = gazerig("doctor", mixed, "--port", given)
+        assert code == 1 and "there is no such port" in out
+        assert "neck_pitch (servo 1)" in out and "pulses on 0 of 6 channels" in out
+
+
+# --- setup
+
+
+def test_setup_of_a_feetech_servo_with_answers():
+    code, _, err = gazerig(
+        "setup", "feetech", "--mock", "--joint", "neck_yaw", "--joint", "neck_roll",
+        answers="\ny\ns\n",
+    )  # fmt: skip
+    assert code == 0 and "found: sts3215, firmware 3.53, id 1 at 1000000 bit/s" in err
+    assert "neck_yaw (servo 7): id 1 -> 7; answers as id 7 at 1000000 bit/s" in err
+    assert "skipped: neck_roll" in err and "done: 1 of 2" in err
+
+
+def test_setup_finds_a_feetech_servo_anywhere_and_refuses_two():
+    with PtyBus() as bus:
+        path = bus.start_device(StsLine((ServoSpec(77, "sts3215"),), 115_200))
+        words = ("setup", "feetech", "--port", path, "--joint", "neck_yaw", "--yes")
+        code, _, err = gazerig(*words)
+        assert code == 0 and "id 77 at 115200 bit/s" in err
+        assert "id 77 -> 7; baud rate 115200 -> 1000000 bit/s; answers as id 7" in err
+        bus.command("collide 7")
+        code, _, err = gazerig(*words)
+        assert code == 2 and "connect one servo alone" in err
+
+
+def test_setup_of_a_maestro_moves_one_channel_after_another_with_a_yes():
+    answers = "\ny\n\ny\ny\nn\n"
+    code, _, err = gazerig(
+        "setup", "maker", "--mock", "--joint", "eyes_pan", "--joint", "left_upper_lid",
+        answers=answers,
+    )  # fmt: skip
+    assert code == 0 and "channel  0: Min 1088, Max 1936    eyes_pan" in err
+    assert "nothing of this can be set over the serial line" in err
+    assert "all 2 channels reach both ends" in err
+    assert "it goes to 1500 us at once" in err and "did the eyes pan move" in err
+    assert "skipped: left_upper_lid" in err and "done: 1 of 2" in err
+
+
+def test_setup_of_a_maestro_finds_a_range_that_cuts_and_a_servo_on_another_channel():
+    with served("maker") as (port, _, command):
+        command("set max-us 1900")
+        command("script 0")
+        code, _, err = gazerig(
+            "setup", "maker", "--port", port, "--joint", "eyes_pan",
+            # set; supply off; on again; move; it was another; move; that is it
+            answers="\ny\n\ny\nn\ny\ny\n",
+        )  # fmt: skip
+        assert code == 0 and "ran a script of its own: stopped" in err
+        assert "and the board stays at 1900 us: set its Min to 1088 and its Max to 1936" in err
+        assert "plug its servo into channel 0" in err and "done: 1 of 1" in err
+        first = json.loads(command("status"))["servos"][0]
+        assert first["position"] == 0
+
+
+def test_setup_of_a_maestro_with_yes_does_not_guess_about_the_supply():
+    code, _, err = gazerig("setup", "maker", "--mock", "--yes", "--joint", "eyes_tilt")
+    assert code == 0 and "--yes cannot know that the supply is off" in err and "done: 1 of 1" in err
+
+
+def test_setup_of_a_maestro_that_does_not_answer():
+    with PtyBus() as bus:
+        path = bus.start_device(MaestroLine(), choices={"mode": "mute"})
+        code, _, err = gazerig("setup", "maker", "--port", path, "--yes", "--joint", "eyes_pan")
+        assert code == 2 and "no Maestro answers as the YAML says" in err
+
+
+def test_setup_goes_through_all_buses(mixed):
+    code, _, err = gazerig(
+        "setup", mixed, "--mock", "--yes", "--joint", "neck_yaw", "--joint", "neck_pitch",
+        "--joint", "eyes_pan",
+    )  # fmt: skip
+    assert code == 0 and "the main bus: a Pololu Maestro, 1 channels to look at" in err
+    assert ", bus neck: 1 of 8 servos to set up for 1000000" in err
+    assert "neck_yaw (servo 7): id 1 -> 7" in err
+    assert "neck_pitch (servo 1): nothing to change" in err and "done: 3 of 3" in err
+
+
+# --- reboot
+
+
+def test_reboot_of_a_feetech_servo():
+    with served("feetech") as (port, paths, command):
+        command("overload 7")
+        code, _, err = gazerig("reboot", "neck_yaw", "--rig", "feetech", "--port", port)
+        assert code == 0 and "neck_yaw (servo 7): reports: overload" in err
+        assert "back after" in err and "no errors, torque off" in err
+
+
+def test_reboot_by_a_number_needs_one_bus_that_has_it(mixed):
+    code, _, err = gazerig("reboot", "1", "--rig", mixed, "--mock")
+    assert code == 2 and "1: which bus (the main bus, bus tilt)? name the joint instead" in err
+    code, _, err = gazerig("reboot", "7", "--rig", mixed, "--mock")
+    assert code == 0 and "neck_yaw (servo 7): back after" in err
+
+
+def test_reboot_of_a_maestro_says_what_there_is_instead():
+    with served("maker") as (port, _, command):
+        line = BlockingPort(port)
+        line.setBaudRate(115_200)
+        line.write(bytes.fromhex("84 00 70 2E"))
+        line.closePort()
+        words = ("reboot", "eyes_pan", "--rig", "maker", "--port", port)
+        code, _, err = gazerig(*words, answers="n\n")
+        assert code == 0 and "has no restart over its serial line" in err and "left as it is" in err
+        assert json.loads(command("status"))["servos"][0]["position"] == 6000
+        command("error crc")
+        code, _, err = gazerig(*words, "--yes")
+        assert code == 0 and "cleared now: serial CRC error" in err
+        assert json.loads(command("status"))["servos"][0]["position"] == 0
+
+
+def test_the_command_port_is_the_first_of_the_two_of_a_maestro(monkeypatch):
+    both = [SerialPort(f"/dev/ttyNONE{n}", "Maestro", "1ffb:0089", None) for n in range(2)]
+    monkeypatch.setattr(bench, "serial_ports", lambda host: both)
+    assert "no serial port /dev/ttyNONE0" in gazerig("scan")[2]
