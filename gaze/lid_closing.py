@@ -9,23 +9,19 @@ from typing import NamedTuple
 from gaze.saccade import min_jerk
 
 
-def eased(s: float) -> float:
-    """Give minimum jerk, never above 1 as its rounding errors would be just before the end."""
-    return min(1.0, min_jerk(s))
-
-
 def closure(since_onset_s: float, close_s: float, hold_s: float, open_s: float) -> float:
     """Give how far a lid is shut, 0..1, a time after the onset of a blink or wink."""
     if since_onset_s <= 0.0 or since_onset_s >= close_s + hold_s + open_s:
         return 0.0
     if since_onset_s < close_s:
-        return eased(since_onset_s / close_s)
+        return min_jerk(since_onset_s / close_s)
     if since_onset_s < close_s + hold_s:
         return 1.0
     # Opening sets off quickly and ends in a long tail: minimum jerk in a time that
     # runs fast at first.
     s = (since_onset_s - close_s - hold_s) / open_s
-    return 1.0 - eased(1.0 - (1.0 - s) ** 1.4)
+    # The polynomial comes out above 1 by a rounding error just before its end.
+    return max(0.0, 1.0 - min_jerk(1.0 - (1.0 - s) ** 1.4))
 
 
 class Closing(NamedTuple):

@@ -7,8 +7,8 @@ narrows (Read 2006: from 9.7 to 6.4 mm at 40 deg down). Nothing here throws dice
 
 from typing import NamedTuple
 
-from gaze.lid_closing import eased
 from gaze.lid_params import LidParams
+from gaze.saccade import min_jerk
 
 _DROOP_S = 1.0  # time in which lids sink or rise when the sleepiness changes
 _GLIDE_S = 0.3  # and when what they do at rest is retuned
@@ -30,12 +30,13 @@ def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> Pair
     upper = _bounded(params.rest_opening + params.follow_per_deg * share * eye_pitch_deg)
     lower = _bounded(params.lower_rest_opening - params.lower_follow_per_deg * eye_pitch_deg)
     return Pair(
-        upper * (1.0 - params.sleepy_droop * sleepiness),
-        lower * (1.0 - params.lower_sleepy_rise * sleepiness),
+        _bounded(upper * (1.0 - params.sleepy_droop * sleepiness)),
+        _bounded(lower * (1.0 - params.lower_sleepy_rise * sleepiness)),
     )
 
 
 def _bounded(opening: float) -> float:
+    """Keep an opening within 0..1, also by the rounding errors of what it is made of."""
     return min(1.0, max(0.0, opening))
 
 
@@ -79,7 +80,7 @@ class LidsAtRest:
 
     def sleepiness(self, t_s: float) -> float:
         """Give how sleepy the lids look by now, 0..1."""
-        way = eased((t_s - self._droop_since_s) / _DROOP_S)
+        way = min_jerk((t_s - self._droop_since_s) / _DROOP_S)
         return self._droop_from + way * (self._droop_to - self._droop_from)
 
     def step(self, t_s: float, eye_pitch_deg: float) -> Pair:
@@ -91,7 +92,7 @@ class LidsAtRest:
 
     def _glided(self, wanted: Pair, t_s: float) -> Pair:
         """Add what a retune has left over, which goes within a moment."""
-        kept = 1.0 - eased((t_s - self._retuned_s) / _GLIDE_S)
+        kept = 1.0 - min_jerk((t_s - self._retuned_s) / _GLIDE_S)
         left = self._left
         if kept == 0.0:
             self._left = _NOTHING

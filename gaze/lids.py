@@ -119,12 +119,13 @@ class Lids:
         blink = _shut(self._blink, t_s)
         left, right = (_more(blink, _shut(wink, t_s)) for wink in self._winks.values())
         upper, lower = self._rest.step(t_s, degrees(eye_pitch_rad))
+        # Closings come out at 1 and a rounding error just before they are done.
         return Openings(
-            upper * (1.0 - left.upper),
-            upper * (1.0 - right.upper),
+            upper * max(0.0, 1.0 - left.upper),
+            upper * max(0.0, 1.0 - right.upper),
             blink.upper > 0.0,
-            lower * (1.0 - left.lower),
-            lower * (1.0 - right.lower),
+            lower * max(0.0, 1.0 - left.lower),
+            lower * max(0.0, 1.0 - right.lower),
         )
 
     def closure(self, since_onset_s: float) -> float:

@@ -54,7 +54,7 @@ class Rig:
         return list(mend(lambda fix: DYNAMIXEL.mend(self.port, fix), findings))
 
     def check_all(self, host):
-        return check_all(self.port, "dynamixel", host, self.check)
+        return check_all(self.port, host, self.check)
 
 
 def one(findings, level, where, words):

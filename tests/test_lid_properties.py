@@ -135,15 +135,18 @@ def test_a_full_blink_shuts_all_lids_whose_share_is_whole(
     assert shut.blink and (shut.left, shut.right, shut.lower_left, shut.lower_right) == (0.0,) * 4
 
 
-def test_neither_end_of_a_closing_passes_shut_or_open() -> None:
-    # Both ends come out beyond by up to 2e-15, were it not for the bound.
+def test_rounding_errors_lead_no_lid_beyond_shut_or_open() -> None:
+    # Minimum jerk comes out beyond its end by up to 2e-15 just before it.
     near = np.linspace(0.9, 1.0, 4001)
-    assert max(closure(float(s), 1.0, 1.0, 1.0) for s in near) == 1.0
     assert min(closure(1.0 + float(s), 0.0, 1.0, 1.0) for s in near) == 0.0
-    model = Lids(LidParams(sleepy_droop=1.0, lower_sleepy_rise=1.0), np.random.default_rng(0))
-    model.sleepy(1.0)
-    drowsy = [model.step(float(t_s), 0.0, None) for t_s in near]
-    assert min(o.left for o in drowsy) == min(o.lower_left for o in drowsy) == 0.0
+    still = LidParams(sleepy_droop=1.0, lower_sleepy_rise=1.0, blinks_per_min=0.0, close_ms=500.0)
+    winking, drowsy = (Lids(still, np.random.default_rng(0)) for _ in range(2))
+    winking.wink("left", 0.0)
+    drowsy.sleepy(1.0)
+    winks = [winking.step(0.5 * float(t_s), 0.0, None) for t_s in near]
+    assert min(o.left for o in winks) == min(o.lower_left for o in winks) == 0.0
+    sinks = [drowsy.step(float(t_s), 0.0, None) for t_s in near]
+    assert min(o.left for o in sinks) == min(o.lower_left for o in sinks) == 0.0
 
 
 def test_the_steepest_rule_of_evoked_blinks_can_be_reckoned() -> None:

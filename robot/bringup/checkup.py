@@ -14,7 +14,7 @@ from drivers.serial_port import BusPort
 from drivers.serial_ports import WISHED_LATENCY_MS, Host, latency_file, latency_ms, set_latency
 from drivers.types import ServoSetup
 from robot.bringup.doctor_patient import name_servo
-from robot.bringup.doctor_port import examine_latency, examine_owner, examine_port, port_facts
+from robot.bringup.doctor_port import examine_latency, examine_port, port_facts
 from robot.bringup.findings import Finding, Fix, worst
 from robot.bringup.servo_kind import Found, ServoKind, Tell
 
@@ -46,20 +46,17 @@ class Done:
         return f"{self.where}: {self.what}"
 
 
-def check_all(
-    port: BusPort, kind: str, host: Host, examine: Callable[[], list[Finding]]
-) -> list[Finding]:
+def check_all(port: BusPort, host: Host, examine: Callable[[], list[Finding]]) -> list[Finding]:
     """Examine a port and, where it can be used, what is behind it; the port is closed after it.
 
     What goes wrong on the way is among the findings.
 
-    kind: what is asked there; examine: asks it
+    examine: asks what is behind it
     """
     device = port.port_name
-    facts = port_facts(device, host)
-    findings = [*examine_port(facts), *examine_owner(facts, kind)]
+    findings = examine_port(port_facts(device, host))
     if worst(findings) == "error":
-        return [finding for finding in findings if finding.level != "ok"]
+        return findings
     try:
         behind = examine()
         # While it is open: the program asks the adaptor itself for low latency then.

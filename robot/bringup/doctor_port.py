@@ -3,11 +3,9 @@
 Source of the latency timer: ROBOTIS e-Manual, U2D2 (FTDI adaptors wait 16 ms by default).
 """
 
-import os
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from drivers.errors import PortError
 from drivers.serial_ports import (
     WISHED_LATENCY_MS,
     Access,
@@ -20,9 +18,6 @@ from drivers.serial_ports import (
     serial_ports,
 )
 from robot.bringup.findings import Finding
-
-POLOLU = "1ffb:"
-"""USB vendor of Pololu: behind such a port FF is a command that moves a servo."""
 
 UDEV_FILE = "/etc/udev/rules.d/99-servo-bus.rules"
 UDEV_RULE = (
@@ -67,40 +62,6 @@ def name_ports(ports: Sequence[SerialPort]) -> str:
     """List ports for people."""
     named = [f"{port.by_id or port.device} ({port.description})" for port in ports]
     return ", ".join(named) or "none"
-
-
-def usb_of(device: str, ports: Sequence[SerialPort]) -> str:
-    """Give the USB vendor and product id of a port, "" where it has none or is not listed."""
-    real = os.path.realpath(device)
-    return next((port.usb for port in ports if os.path.realpath(port.device) == real), "")
-
-
-def examine_owner(facts: PortFacts, kind: str) -> list[Finding]:
-    """Judge whether a port is one that servo packets may be sent to; nothing where it is."""
-    if kind == "maestro" or not usb_of(facts.device, facts.others).startswith(POLOLU):
-        return []
-    return [
-        Finding(
-            "error",
-            f"is a board of Pololu, the YAML says {kind}: nothing was sent, as packets for "
-            "servos would move what hangs on it",
-            facts.device,
-            "name the adaptor's port with --port or in the YAML, or write kind: maestro",
-        )
-    ]
-
-
-def refuse_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
-    """See that a port is one that servo packets may be sent to.
-
-    Raises:
-        drivers.errors.PortError: it is a board that they would move.
-    """
-    if kind != "maestro" and usb_of(device, ports).startswith(POLOLU):
-        raise PortError(
-            f"{device} is a board of Pololu: {kind} packets would move what hangs on it; "
-            "name the adaptor's port with --port, or ask for a Maestro"
-        )
 
 
 def _there(facts: PortFacts) -> Finding | None:

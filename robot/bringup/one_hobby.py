@@ -56,6 +56,7 @@ class OneHobby:
         self._setup = ServoSetup(joint.id, joint.model, low, high, speed, name)
         self._bus = MaestroBus(port, [self._setup], params)
         self._goal = self._pulse = 0
+        self._said: list[str] = []
 
     @property
     def place_us(self) -> float:
@@ -119,14 +120,22 @@ class OneHobby:
         end_s = self._clock.now_s() + way / SPEED_US_S + PATIENCE_S
         while not self.look():
             if self._clock.now_s() > end_s:
-                # The board's own range ends here; what it says of that is an event.
-                self._goal = self._read().position_steps
                 break
         return self.place_us
 
+    def _begin_anew(self, pulse_steps: int) -> None:
+        """Stay where the board holds it, however it came there."""
+        sent_us, held_us = self._goal / US_STEPS, pulse_steps / US_STEPS
+        self._goal = pulse_steps
+        self._said.append(
+            f"{self.who} was sent to {sent_us:g} us and is held at {held_us:g} us: if it never "
+            "comes farther, widen the range of its channel in Pololu's program"
+        )
+
     def events(self) -> tuple[str, ...]:
         """Say what has happened since the last call."""
-        return self._bus.events()
+        said, self._said = self._said, []
+        return (*self._bus.events(), *said)
 
     def let_go(self) -> None:
         """Stop its pulses and close the port; safe to call at any time.
@@ -154,6 +163,8 @@ class OneHobby:
             (reading,) = self._bus.read(self._clock.now_s())
             if reading is not None:
                 self._pulse = reading.position_steps
+                if reading.rearmed:
+                    self._begin_anew(reading.position_steps)
                 return reading
             if self._clock.now_s() > end_s:
                 raise BusLost(f"{self.who}: the board does not answer: check its cable and power")

@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 from drivers import dynamixel_scan, feetech_scan
 from drivers.maestro_params import MaestroParams
 from drivers.maestro_probe import USB_CHANNELS, MaestroFound, probe
+from drivers.port_owner import POLOLU
 from drivers.serial_port import BusPort
 from drivers.servo_models import BUS_KINDS, BusKind
-from robot.bringup.doctor_port import POLOLU
 from robot.bringup.kinds import KINDS
 from robot.bringup.servo_kind import Found
 

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from drivers.port_owner import usb_of
 from drivers.serial_port import BlockingPort
 from drivers.serial_ports import Host, SerialPort, serial_ports
-from robot.bringup.doctor_port import refuse_owner, usb_of
 from robot.cli.terminal import status
 
 host = Host()
@@ -31,13 +31,8 @@ def usb_id(path: str) -> str:
 
 
 @contextlib.contextmanager
-def opened(path: str, kind: str) -> Iterator[BlockingPort]:
-    """Give a port to ask a kind of servos on, not opened yet, closed again at the end.
-
-    Raises:
-        drivers.errors.PortError: what is behind it would be moved by that.
-    """
-    refuse_owner(path, kind, ports_here())
+def to_open(path: str) -> Iterator[BlockingPort]:
+    """Give a port that is not opened yet, closed again at the end."""
     line = BlockingPort(path)
     try:
         yield line

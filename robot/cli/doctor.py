@@ -78,7 +78,7 @@ def _examine(rig: Rig, bus: str, line: BlockingPort) -> list[Finding]:
             return doctor_maestro.visit(line, config.maestro, setups, usb)
         return checkup.check(line, KINDS[config.kind], setups, config.baud, progress)
 
-    return checkup.check_all(line, config.kind, bench.host, behind)
+    return checkup.check_all(line, bench.host, behind)
 
 
 def _tell(line: str) -> None:

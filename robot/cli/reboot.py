@@ -12,7 +12,7 @@ from robot.bringup import servo_reboot as servo_reboot
 from robot.bringup.kinds import KINDS
 from robot.bringup.maestro_sweep import sent_home
 from robot.bringup.servo_kind import ServoKind
-from robot.cli.bench import YesOption, opened
+from robot.cli.bench import YesOption, to_open
 from robot.cli.terminal import FAULT, clear_errors, say
 from robot.cli.wires import MockOption, PortOption, bus_config, bus_label, wires
 from robot.clock import RealClock
@@ -42,7 +42,7 @@ def reboot(
         with wires(model, mock, port) as wired:
             for bus, ids in wanted.items():
                 config = bus_config(model, bus)
-                with opened(wired.paths[bus], config.kind) as line:
+                with to_open(wired.paths[bus]) as line:
                     line.setBaudRate(config.baud)
                     if config.kind == "maestro":
                         _board(model, bus, line, yes)

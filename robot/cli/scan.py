@@ -1,7 +1,8 @@
 """The command ``gazerig scan``: which ports there are, and who answers on one."""
 
+import contextlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated
 
 import typer
@@ -11,10 +12,11 @@ from rich.table import Table
 
 from config.schema import load_rig
 from drivers.errors import SetupError
+from drivers.port_owner import POLOLU
 from drivers.serial_port import BlockingPort
 from drivers.serial_ports import SerialPort
 from drivers.servo_models import BusKind
-from robot.bringup.doctor_port import POLOLU, name_ports
+from robot.bringup.doctor_port import name_ports
 from robot.bringup.kinds import KINDS
 from robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
 from robot.bringup.searching import RATES, Looked, found_of, known_kinds, plan, search
@@ -50,16 +52,22 @@ def scan(
         found_ports = bench.ports_here()
         if not as_json:
             _show_ports(found_ports)
-        model = load_rig(rig)
-        if mock or port is None:
-            refuse_both = port if mock else None
-            with wires(model, mock, refuse_both) as wired:
-                paths = list(wired.paths.values()) if mock else [_only_port(found_ports)]
-                somebody = [_one(path, kinds, rates, thorough, kind, as_json) for path in paths]
-        else:
-            somebody = [_one(port, kinds, rates, thorough, kind, as_json)]
+        with _paths(rig, mock, port, found_ports) as paths:
+            somebody = [_one(path, kinds, rates, thorough, kind, as_json) for path in paths]
     if not any(somebody):
         raise typer.Exit(FAULT)
+
+
+@contextlib.contextmanager
+def _paths(
+    rig: str, mock: bool, port: str | None, found: Sequence[SerialPort]
+) -> Iterator[list[str]]:
+    """Give the ports to search: those of an emulated rig, or one."""
+    if not mock:
+        yield [port if port is not None else _only_port(found)]
+        return
+    with wires(load_rig(rig), True, port) as wired:
+        yield list(wired.paths.values())
 
 
 def _parse_kind(text: str) -> tuple[BusKind, ...]:

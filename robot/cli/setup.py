@@ -12,7 +12,7 @@ from robot.bringup import servo_setup as servo_setup
 from robot.bringup.doctor_patient import name_servo
 from robot.bringup.kinds import KINDS
 from robot.bringup.servo_kind import ServoKind
-from robot.cli.bench import YesOption, opened, progress, wipe
+from robot.cli.bench import YesOption, progress, to_open, wipe
 from robot.cli.setup_maestro import set_up_board
 from robot.cli.terminal import RigArgument, clear_errors, say
 from robot.cli.wires import MockOption, PortOption, bus_config, bus_label, setups_on, wires
@@ -104,7 +104,7 @@ def _step(rig: Rig, bus: str, one: ServoSetup, port: str | None, mock: bool, yes
         try:
             with (
                 wires(rig, mock, port, fresh) as wired,
-                opened(wired.paths[bus], kind.name) as line,
+                to_open(wired.paths[bus]) as line,
             ):
                 return _set_up(line, kind, one, bus_config(rig, bus).baud, yes)
         except DriverError as error:
@@ -166,7 +166,7 @@ def _board(
     say(f"{title}{_where(rig, bus)}: a Pololu Maestro, {len(setups)} channels to look at.")
     with (
         wires(rig, mock, port) as wired,
-        opened(wired.paths[bus], "maestro") as line,
+        to_open(wired.paths[bus]) as line,
     ):
         joints = {one.name: rig.joints[one.name] for one in setups}
         return set_up_board(line, bus_config(rig, bus).maestro, setups, joints, yes)

@@ -14,10 +14,10 @@ import typer
 from drivers.errors import DriverError, ServoFault, ServoMissing
 from drivers.maestro_line import Line
 from drivers.maestro_params import US_STEPS, MaestroParams
+from drivers.port_owner import POLOLU
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from robot.bringup.doctor_patient import name_servo
-from robot.bringup.doctor_port import POLOLU
 from robot.bringup.maestro_settings import clipped, instructions
 from robot.bringup.maestro_sweep import FINE_STEPS, walk
 from robot.cli import bench as bench

@@ -10,7 +10,9 @@ from config.rig import BusConfig
 from config.schema import Rig
 from drivers.dynamixel_registers import Registers
 from drivers.errors import PortError, SetupError
+from drivers.port_owner import refuse_owner
 from drivers.serial_port import BlockingPort
+from drivers.serial_ports import serial_ports
 from drivers.types import ServoSetup
 from robot.emulated_rig import emulated_lines
 from robot.rig_bus import bus_names, joints_on, ports_of, rig_setups
@@ -61,11 +63,15 @@ def wires(
 
     Raises:
         drivers.errors.SetupError: the options exclude each other, or name no bus of the rig.
+        drivers.errors.PortError: a port's owner would take servo packets for commands.
     """
     if mock and port is not None:
         raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
     if not mock:
-        yield Wires(ports_of(rig, port), None)
+        paths, here = ports_of(rig, port), serial_ports()
+        for name, path in paths.items():
+            refuse_owner(path, bus_config(rig, name).kind, here)
+        yield Wires(paths, None)
         return
     with PtyBuses() as buses:
         lines = {**emulated_lines(rig), **(devices or {})}
