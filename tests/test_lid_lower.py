@@ -158,6 +158,8 @@ def test_sleepiness_raises_a_lower_lid_by_little_and_slowly() -> None:
     drowsy = model.step(2.5, 0.0, None)
     assert drowsy.lower_left == pytest.approx(0.9 * AWAKE)
     assert 1.0 - drowsy.left / 0.75 > 5.0 * (1.0 - drowsy.lower_left / AWAKE)
+    # Far down it cannot go beyond open, and sleepiness takes its part of that.
+    assert model.step(2.5, radians(-80.0), None).lower_left == pytest.approx(0.9)
 
 
 def test_lower_lids_glide_to_what_they_are_retuned_to() -> None:

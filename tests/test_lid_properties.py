@@ -137,7 +137,7 @@ def test_a_full_blink_shuts_all_lids_whose_share_is_whole(
 
 def test_rounding_errors_lead_no_lid_beyond_shut_or_open() -> None:
     # Minimum jerk comes out beyond its end by up to 2e-15 just before it.
-    near = np.linspace(0.9, 1.0, 4001)
+    near = 1.0 - np.logspace(-2.0, -8.0, 4001)
     assert min(closure(1.0 + float(s), 0.0, 1.0, 1.0) for s in near) == 0.0
     still = LidParams(sleepy_droop=1.0, lower_sleepy_rise=1.0, blinks_per_min=0.0, close_ms=500.0)
     winking, drowsy = (Lids(still, np.random.default_rng(0)) for _ in range(2))

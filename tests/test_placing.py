@@ -31,9 +31,7 @@ class Bench:
         self.clock = SimulatedClock()
         self.board = build(emulated_lines(RIG)[""], self.clock.now_s)
         self.sent: list[bytes] = []
-        self.port = InProcessPort(
-            self.board, self.sent.append, sleep_until=self.clock.sleep_until
-        )
+        self.port = InProcessPort(self.board, self.sent.append, sleep_until=self.clock.sleep_until)
         self.why: str | None = None
         self.answers = list(answers)
         self.said: list[str] = []

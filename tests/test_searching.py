@@ -32,8 +32,8 @@ class Line:
     def tap(self, data):
         self.sent += data
 
-    def search(self, kinds=ALL, rates=FEW, usb="", to_the_end=False):
-        return list(search(self.port, usb, plan(usb, kinds, rates), False, to_the_end))
+    def search(self, rates=FEW, usb="", to_the_end=False, thorough=False):
+        return list(search(self.port, usb, plan(usb, ALL, rates), thorough, to_the_end))
 
 
 def maestro(channels=12, crc=False, **chosen):
@@ -126,7 +126,7 @@ def test_no_packet_changes_dynamixel_servos():
     before = [memory(servo) for servo in chain.servos]
     places = chain.positions_steps()
     line = Line(chain)
-    rounds = line.search(to_the_end=True)
+    rounds = line.search(to_the_end=True, thorough=True)
     assert {one.kind for one in rounds} == set(ALL)
     assert bytes.fromhex("FFFF0104020009") in line.sent  # an STS packet went over the line
     assert [memory(servo) for servo in chain.servos] == before
@@ -138,7 +138,7 @@ def test_no_packet_changes_sts_servos():
     chain = build_sts([ServoSpec(i, "sts3215", 1900 + i) for i in (1, 49, 253)], lambda: 0.0)
     before = [chain[i].read(0, 56) for i in (1, 49, 253)]
     places = chain.positions_steps()
-    rounds = Line(chain).search(to_the_end=True)
+    rounds = Line(chain).search(to_the_end=True, thorough=True)
     assert {(kind, servo.id) for kind, servo in found_of(rounds)} == {
         ("feetech", 1), ("feetech", 49), ("feetech", 253),
     }  # fmt: skip
@@ -167,3 +167,14 @@ def test_words_for_kinds():
     with pytest.raises(ValueError, match="pca: not all or one of dynamixel, feetech, maestro"):
         known_kinds("pca")
     assert not Looked("feetech", 9600).somebody
+
+
+def test_sts_servos_that_answer_no_ping_to_everybody_are_found_by_a_thorough_search():
+    chain = build_sts([ServoSpec(5, "sts3215")], lambda: 0.0)
+    chain.choose("broadcast-ping", "silence")
+    line = Line(chain)
+    asked = plan("", ("feetech",), (1_000_000,))
+    assert not any(one.found for one in search(line.port, "", asked))
+    assert len(line.sent) < 100
+    (one,) = search(line.port, "", asked, thorough=True)
+    assert [servo.id for servo in one.found] == [5]

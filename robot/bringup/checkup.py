@@ -132,7 +132,7 @@ def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterato
         if other == baud:
             continue
         tell(f"somebody is missing: asking at {other} bit/s")
-        if port.setBaudRate(other):
+        if port.setBaudRate(other) and kind.anybody(port):
             yield from kind.everybody(port, other)[0]
 
 

@@ -120,6 +120,7 @@ class OneHobby:
         end_s = self._clock.now_s() + way / SPEED_US_S + PATIENCE_S
         while not self.look():
             if self._clock.now_s() > end_s:
+                self._goal = self._pulse
                 break
         return self.place_us
 

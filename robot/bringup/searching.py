@@ -95,6 +95,8 @@ def search(
     """Ask one kind after the other; ends behind the kind that has answered.
 
     asked: as ``plan`` gives it
+    thorough: wait long for Dynamixel servos, ask each STS id even where nobody answers a ping
+        to everybody
     to_the_end: servos of a kind do not end it, as a line can carry two kinds; a board does
 
     Raises:
@@ -114,10 +116,17 @@ def _look(port: BusPort, usb: str, kind: BusKind, baud: int, thorough: bool) -> 
     if kind == "maestro":
         return _board(port, usb, baud)
     if kind == "feetech":
-        (sts,) = feetech_scan.scan(port, (baud,), thorough)
-        return Looked(kind, baud, sts.possible, sts.found, sts.junk, sts.shared)
+        return _sts(port, baud, thorough)
     (one,) = dynamixel_scan.scan(port, (baud,), thorough)
     return Looked(kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1)
+
+
+def _sts(port: BusPort, baud: int, thorough: bool) -> Looked:
+    """Ask STS servos; all ids take a second or more, so unless thorough somebody must be there."""
+    if not thorough and port.setBaudRate(baud) and not feetech_scan.anybody(port):
+        return Looked("feetech", baud)
+    (sts,) = feetech_scan.scan(port, (baud,))
+    return Looked("feetech", baud, sts.possible, sts.found, sts.junk, sts.shared)
 
 
 def _board(port: BusPort, usb: str, baud: int) -> Looked:

@@ -2,7 +2,7 @@
 
 import contextlib
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from math import inf
 from typing import Annotated
 
@@ -30,7 +30,7 @@ RECKONED = (
     "~ is reckoned from the pulse (us); hobby servos tell nothing. The board's errors are not "
     "asked for: telling clears them"
 )
-_MEASURED = ("goal deg", "at deg", "step", "deg/s", "load %", "C", "V")
+_COLUMNS = 7
 _UNTOLD = "-"
 
 
@@ -108,7 +108,7 @@ def _samples(
 
 
 def _table(sample: Sample, joints: Mapping[str, JointParams], rate: float) -> Table:
-    """Lay a sample out as a table; what only some kinds of servo have gets columns if any is."""
+    """Lay a sample out as a table."""
     hobby = any(not joint.facts.measured for joint in joints.values())
     share = sample.unanswered / sample.asked
     caption = (
@@ -122,23 +122,27 @@ def _table(sample: Sample, joints: Mapping[str, JointParams], rate: float) -> Ta
         caption=f"{caption}\n{RECKONED}" if hobby else caption,
     )
     table.add_column("joint", no_wrap=True)
-    several = any(joint.bus for joint in joints.values())
-    if several:
-        table.add_column("bus", no_wrap=True)
     table.add_column("id", justify="right", no_wrap=True)
-    for name in (*_MEASURED, *(("us",) if hobby else ())):
+    for name in _columns(joints.values()):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("torque", no_wrap=True)
     table.add_column("errors")
     for name, look in sample.looks.items():
-        where = (name, joints[name].bus or "main") if several else (name,)
-        table.add_row(*where, str(joints[name].id), *_row(look, hobby))
+        bus, servo_id = joints[name].bus, joints[name].id
+        table.add_row(name, f"{bus}:{servo_id}" if bus else f"{servo_id}", *_row(look))
     return table
 
 
-def _row(look: Look | None, hobby: bool) -> tuple[str, ...]:
+def _columns(joints: Collection[JointParams]) -> tuple[str, ...]:
+    """Give the headings; a hobby servo's place is its pulse width in us."""
+    units = dict.fromkeys("step" if joint.facts.measured else "us" for joint in joints)
+    goal = "goal deg" if len(units) == 1 else "goal"  # 80 columns are soon full
+    return (goal, "at deg", "/".join(units), "deg/s", "load %", "C", "V")
+
+
+def _row(look: Look | None) -> tuple[str, ...]:
     if look is None:
-        return ("",) * (len(_MEASURED) + hobby + 1) + ("[red]no answer[/red]",)
+        return ("",) * (_COLUMNS + 1) + ("[red]no answer[/red]",)
     if look.errors:
         errors = f"[red]{', '.join(look.errors)}[/red]"
     else:
@@ -147,21 +151,21 @@ def _row(look: Look | None, hobby: bool) -> tuple[str, ...]:
     return (
         _number(look.goal_deg, 1),
         at if look.measured or at == _UNTOLD else f"~{at}",
-        _UNTOLD if look.position_steps is None else str(look.position_steps),
+        _place(look),
         _number(look.velocity_deg_s, 0),
         _number(None if look.load is None else 100.0 * look.load, 0),
         _number(look.temperature_c, 0),
         _number(look.voltage_v, 1),
-        *((_pulse(look),) if hobby else ()),
         "on" if look.torque else "off",
         errors,
     )
 
 
-def _pulse(look: Look) -> str:
-    if look.pulse_us is None:
-        return _UNTOLD
-    return f"{look.pulse_us:g}" if look.pulse_us else "none"
+def _place(look: Look) -> str:
+    """Write the servo's own position, or the pulse that it gets."""
+    if look.pulse_us is not None:
+        return f"{look.pulse_us:g}" if look.pulse_us else "none"
+    return _UNTOLD if look.position_steps is None else str(look.position_steps)
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -40,7 +40,7 @@ def scan(
     ] = None,
     bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",
     thorough: Annotated[
-        bool, typer.Option("--thorough", help="Wait longer at every baud rate for late answers.")
+        bool, typer.Option("--thorough", help="Wait long, and ask every id, at every baud rate.")
     ] = False,
     mock: MockOption = False,
     rig: Annotated[str, typer.Option(help="With --mock: the rig whose servos.")] = "desk",
@@ -131,12 +131,10 @@ def _one(
     try:
         rounds = _search(line, usb, asked, thorough, named == "all")
         if not thorough and not any(one.somebody for one in rounds):
-            # Ids that lie far apart answer after a long silence.
-            servos = [row for row in asked if row[0] == "dynamixel"]
-            rounds = [
-                *[one for one in rounds if one.kind != "dynamixel"],
-                *_search(line, usb, servos, True, True),
-            ]
+            # Ids that lie far apart answer after a long silence; some not to everybody's ping.
+            servos = [row for row in asked if row[0] != "maestro"]
+            boards = [one for one in rounds if one.kind == "maestro"]
+            rounds = [*boards, *_search(line, usb, servos, True, named == "all")]
     finally:
         line.closePort()
     wished = tuple(dict.fromkeys(row[0] for row in asked))

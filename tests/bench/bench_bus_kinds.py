@@ -1,0 +1,337 @@
+"""What a tick costs on every kind of servo bus: python tests/bench/bench_bus_kinds.py
+
+One run, six servos each: our drivers for Dynamixel, Feetech STS and a Maestro, all three as
+one bus of two servos each, and beside them the clients that others wrote, where there are
+any. A tick is one reading of all servos and one packet of goals, tick after tick without a
+pause. First in this process, where the emulator's arithmetic is part of a tick; then over
+pseudo-terminals, with the emulator in a process of its own and the bytes' time on the wire
+at each kind's usual rate. Rounds of all clients take turns, so that what else the machine
+does strikes them alike; the least and the median of the rounds are given. Nothing here
+passes or fails: compare figures of one run with each other.
+"""
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from statistics import median
+from typing import NamedTuple
+
+from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler, PortHandler
+from rich.console import Console
+from rich.table import Table
+from rustypot import Sts3215PyController, Xl330PyController
+
+from drivers.dynamixel import DynamixelBus, DynamixelParams
+from drivers.feetech import FeetechBus, FeetechParams
+from drivers.maestro import MaestroBus, MaestroParams
+from drivers.mixed_bus import MixedBus, Share
+from drivers.serial_port import BlockingPort, BusPort
+from drivers.types import ServoBus, ServoSetup
+from sim_mock.emulated import DynamixelLine, Emulated, MaestroLine, StsLine, build
+from sim_mock.hobby_servo import HobbySpec
+from sim_mock.ports import InProcessPort
+from sim_mock.pty_bus import PtyBus
+from sim_mock.servo_physics import ServoSpec
+
+IDS = (1, 2, 3, 4, 5, 6)
+BAUD = {"dynamixel": 1_000_000, "feetech": 1_000_000, "maestro": 115_200}
+MIXED = {"dynamixel": (1, 2), "feetech": (3, 4), "maestro": (5, 6)}
+
+Tick = Callable[[int], int]
+"""Reads all servos and writes goals; takes a number, gives how many values came."""
+
+out = Console(width=118)
+
+
+class Client(NamedTuple):
+    """One that ticks.
+
+    peer: whom it is compared with; reads: what it reads of each servo
+    make: opens it on ports by the kind of their bus
+    """
+
+    name: str
+    kinds: Mapping[str, tuple[int, ...]]
+    reads: str
+    make: Callable[[Mapping[str, BusPort | str]], object]
+    peer: str = ""
+    in_process: bool = True
+
+
+class Spans(NamedTuple):
+    """Of one round: half and 99 % of ticks took no longer; processor time a tick."""
+
+    p50_us: float
+    p99_us: float
+    cpu_us: float
+
+
+# --- servos and drivers
+
+
+def emulated(kind: str, ids: tuple[int, ...]) -> Emulated:
+    """Give the servos of one bus."""
+    if kind == "maestro":
+        return MaestroLine(12, servos=tuple(HobbySpec(i) for i in ids))
+    model = "sts3215" if kind == "feetech" else "xl330-m077"
+    specs = tuple(ServoSpec(i, model, 2048) for i in ids)
+    return StsLine(specs, BAUD[kind]) if kind == "feetech" else DynamixelLine(specs, BAUD[kind])
+
+
+def driver(kind: str, port: BusPort, ids: tuple[int, ...]) -> ServoBus:
+    """Make our driver of one bus, as it comes."""
+    if kind == "maestro":
+        setups = [ServoSetup(i, "hobby", 4400, 7600, 12_000.0, rest_steps=6000) for i in ids]
+        return MaestroBus(port, setups, MaestroParams(stagger_ms=0.0))
+    if kind == "feetech":
+        setups = [ServoSetup(i, "sts3215", 1000, 3000, 3000.0) for i in ids]
+        return FeetechBus(port, setups, FeetechParams())
+    setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
+    return DynamixelBus(port, setups, DynamixelParams())
+
+
+@contextmanager
+def ours(
+    kinds: Mapping[str, tuple[int, ...]], ports: Mapping[str, BusPort | str]
+) -> Iterator[Tick]:
+    """Tick with our drivers, torque on."""
+    opened = {k: BlockingPort(p) if isinstance(p, str) else p for k, p in ports.items()}
+    shares, goals = [], []
+    for kind, ids in kinds.items():
+        places = tuple(range(len(goals), len(goals) + len(ids)))
+        shares.append(Share(kind, driver(kind, opened[kind], ids), places))
+        goals += [6000 if kind == "maestro" else 2048] * len(ids)
+    bus = MixedBus(shares) if len(shares) > 1 else shares[0].bus
+    now_s = next(iter(opened.values())).now_s
+    bus.open()
+    bus.engage()
+
+    def tick(k: int) -> int:
+        readings = bus.read(now_s())
+        bus.write([goal + k % 8 for goal in goals])
+        return len(goals) - readings.count(None)
+
+    try:
+        yield tick
+    finally:
+        bus.release()
+        bus.close()
+
+
+@contextmanager
+def sdk(ports: Mapping[str, BusPort | str]) -> Iterator[Tick]:
+    """ROBOTIS' SDK: fast sync read of 10 bytes, sync write."""
+    given = ports["dynamixel"]
+    port = PortHandler(given) if isinstance(given, str) else given
+    port.setBaudRate(BAUD["dynamixel"])
+    packets = PacketHandler(2.0)
+    reads, writes = GroupSyncRead(port, packets, 126, 10), GroupSyncWrite(port, packets, 116, 4)
+    for servo_id in IDS:
+        reads.addParam(servo_id)
+
+    def tick(k: int) -> int:
+        reads.fastSyncRead()
+        values = [reads.getData(i, 132, 4) for i in IDS if reads.isAvailable(i, 132, 4)]
+        writes.clearParam()
+        for servo_id in IDS:
+            writes.addParam(servo_id, (2048 + k % 8).to_bytes(4, "little"))
+        writes.txPacket()
+        return len(values)
+
+    try:
+        yield tick
+    finally:
+        port.closePort()
+
+
+@contextmanager
+def rusty(kind: str, ports: Mapping[str, BusPort | str]) -> Iterator[Tick]:
+    """rustypot: sync read of the position alone, sync write."""
+    make = Sts3215PyController if kind == "feetech" else Xl330PyController
+    client = make(ports[kind], BAUD[kind], 0.2)
+    if kind == "dynamixel":
+        client.set_fast_sync_read(True)
+    ids = list(IDS)
+
+    def tick(k: int) -> int:
+        values = len(client.sync_read_raw_present_position(ids))
+        client.sync_write_raw_goal_position(ids, [2048 + k % 8] * len(ids))
+        return values
+
+    try:
+        yield tick
+    finally:
+        client.close()
+
+
+def of_ours(name: str, kinds: Mapping[str, tuple[int, ...]], reads: str) -> Client:
+    """Describe one of our drivers."""
+    return Client(name, kinds, reads, lambda ports: ours(kinds, ports))
+
+
+def clients() -> list[Client]:
+    """List all that tick; after each of ours those it is compared with."""
+    alone = {kind: {kind: IDS} for kind in BAUD}
+    return [
+        of_ours("Dynamixel", alone["dynamixel"], "13-14 B"),
+        Client("rustypot", alone["dynamixel"], "4 B", lambda p: rusty("dynamixel", p), "Dynamixel", False),
+        Client("ROBOTIS' SDK", alone["dynamixel"], "10 B", sdk, "Dynamixel"),
+        of_ours("Feetech", alone["feetech"], "15 B, 31 every 8th"),
+        Client("rustypot STS", alone["feetech"], "2 B", lambda p: rusty("feetech", p), "Feetech", False),
+        of_ours("Maestro (no peer)", alone["maestro"], "1 pulse, errors"),
+        of_ours("all three mixed", MIXED, "as each"),
+    ]  # fmt: skip
+
+
+# --- measuring
+
+
+def a_round(tick: Tick, ticks: int, count: int, step: Callable[[], None]) -> Spans:
+    """Run one round; ``step`` lets time pass where a clock has to be moved."""
+    spans = []
+    cpu = time.process_time()
+    for k in range(ticks):
+        step()
+        began = time.perf_counter()
+        values = tick(k)
+        spans.append(time.perf_counter() - began)
+        if values != count:
+            raise RuntimeError(f"{values} of {count} values came")
+    used = time.process_time() - cpu
+    spans.sort()
+    return Spans(1e6 * spans[ticks // 2], 1e6 * spans[int(0.99 * (ticks - 1))], 1e6 * used / ticks)
+
+
+def take_turns(
+    ticking: Mapping[str, tuple[Tick, int, Callable[[], None]]], rounds: int, ticks: int
+) -> dict[str, list[Spans]]:
+    """Let all run rounds in turn; the first, to warm up, is not counted."""
+    found: dict[str, list[Spans]] = {name: [] for name in ticking}
+    for nth in range(rounds + 1):
+        for name, (tick, count, step) in ticking.items():
+            spans = a_round(tick, ticks, count, step)
+            if nth:
+                found[name].append(spans)
+    return found
+
+
+def count_of(client: Client) -> int:
+    """Give how many servos it has."""
+    return sum(map(len, client.kinds.values()))
+
+
+def in_process(rounds: int, ticks: int) -> dict[str, list[Spans]]:
+    """Measure with the emulator in this process, on a clock that moves 10 ms a tick."""
+    now = [50.0]
+
+    def wait(t_s: float) -> None:
+        now[0] = max(now[0], t_s)
+
+    def step() -> None:
+        now[0] += 0.01
+
+    with ExitStack() as stack:
+        ticking = {}
+        for client in clients():
+            if client.in_process:
+                ports = {
+                    kind: InProcessPort(
+                        build(emulated(kind, ids), lambda: now[0]), sleep_until=wait
+                    )
+                    for kind, ids in client.kinds.items()
+                }
+                tick = stack.enter_context(client.make(ports))  # type: ignore[arg-type]
+                ticking[client.name] = (tick, count_of(client), step)
+        return take_turns(ticking, rounds, ticks)
+
+
+def over_terminals(rounds: int, ticks: int) -> dict[str, list[Spans]]:
+    """Measure over pseudo-terminals with the bytes' time on the wire."""
+    with ExitStack() as stack:
+        ticking = {}
+        for client in clients():
+            paths = {}
+            for kind, ids in client.kinds.items():
+                server = stack.enter_context(PtyBus())
+                paths[kind] = server.start_device(emulated(kind, ids), wire_time=True)
+                if client.peer:
+                    _set_up(kind, paths[kind], ids)
+            tick = stack.enter_context(client.make(paths))  # type: ignore[arg-type]
+            ticking[client.name] = (tick, count_of(client), _no_wait)
+        return take_turns(ticking, rounds, ticks)
+
+
+def _no_wait() -> None:
+    """Let the clock on the wall go by itself."""
+
+
+def _set_up(kind: str, path: str, ids: tuple[int, ...]) -> None:
+    """Let all servos answer at once, as our driver does, for the other clients."""
+    bus = driver(kind, BlockingPort(path), ids)
+    bus.open()
+    bus.close()
+
+
+# --- telling
+
+
+def row(client: Client, here: list[Spans], there: list[Spans]) -> dict[str, object]:
+    """Give the figures of one client: least and median of the rounds."""
+    figures: dict[str, object] = {"client": client.name, "reads": client.reads}
+    for where, rounds in (("here", here), ("pty", there)):
+        for key in Spans._fields:
+            values = [getattr(spans, key) for spans in rounds]
+            figures[f"{where}_{key}"] = (
+                [round(min(values), 1), round(median(values), 1)] if values else None
+            )
+    return figures
+
+
+def main() -> None:
+    """Measure, and print a table and one line of JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--ticks", type=int, default=300, help="in each round")
+    chosen = parser.parse_args()
+    load = os.getloadavg()[0]
+    out.print(
+        f"{os.cpu_count()} processors, load {load:.2f} at the start; least / median of rounds"
+    )
+    here = in_process(chosen.rounds, chosen.ticks)
+    there = over_terminals(chosen.rounds, chosen.ticks)
+    rows = [row(c, here.get(c.name, []), there[c.name]) for c in clients()]
+    by_name = {str(one["client"]): one for one in rows}
+    table = Table(title="one tick (read and write) of six servos, us")
+    heads = (
+        "client",
+        "reads",
+        "here p50",
+        "here p99",
+        "pty p50",
+        "pty p99",
+        "pty CPU",
+        "CPU of ours",
+    )
+    for head in heads:
+        table.add_column(head)
+    for client, one in zip(clients(), rows, strict=True):
+        keys = ("here_p50_us", "here_p99_us", "pty_p50_us", "pty_p99_us", "pty_cpu_us")
+        cells = [_pair(one[key]) for key in keys]
+        if client.peer:
+            mine = by_name[client.peer]["pty_cpu_us"][1]  # type: ignore[index]
+            one["cpu_times_ours"] = round(one["pty_cpu_us"][1] / mine, 2)  # type: ignore[index]
+        ratio = f"x {one['cpu_times_ours']}" if client.peer else ""
+        table.add_row(client.name, client.reads, *cells, ratio)
+    out.print(table)
+    print(json.dumps({"load": load, "rounds": chosen.rounds, "ticks": chosen.ticks, "rows": rows}))
+
+
+def _pair(values: object) -> str:
+    return "-" if values is None else " / ".join(f"{value:.0f}" for value in values)  # type: ignore[attr-defined]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,193 @@
+"""Several buses as one: who is where, and whose trouble is whose. With buses written out here."""
+
+from collections import Counter
+from math import nan
+
+import pytest
+
+from drivers.errors import BusLost, PortError, ServoMissing
+from drivers.mixed_bus import AGAIN_S, IN_A_ROW, MixedBus, Share
+from drivers.types import BusHealth, ServoReading, ServoSetup
+
+WANTED = tuple(ServoSetup(i, "xl330-m077", 0, 4095, 100.0) for i in range(5))
+
+
+class Scripted:
+    """A bus of a few servos that keeps what it was told, and fails where it is told to.
+
+    Servos are called by a letter and stand at steps of their own; wrong: methods that raise
+    """
+
+    def __init__(self, name, steps, log):
+        self.name, self.steps, self.log = name, list(steps), log
+        self.wrong, self.silent, self.reads_s = {}, False, []
+
+    def _do(self, what):
+        self.log.append(f"{self.name} {what}")
+        if what in self.wrong:
+            raise self.wrong[what]
+
+    def open(self):
+        self._do("open")
+
+    def read(self, now_s):
+        self._do("read")
+        self.reads_s.append(now_s)
+        if self.silent:
+            return (None,) * len(self.steps)
+        return tuple(ServoReading(at, 0.0, 0.0, now_s, False) for at in self.steps)
+
+    def engage(self):
+        self._do("engage")
+        return tuple(self.steps)
+
+    def write(self, goals_steps):
+        self._do("write")
+        self.steps = list(goals_steps)
+
+    def faults(self):
+        return (f"{self.name}: overload",)
+
+    def events(self):
+        return (f"{self.name} says",)
+
+    def retune(self, setups):
+        self._do("retune " + ",".join(str(setup.id) for setup in setups))
+
+    def release(self):
+        self._do("release")
+
+    def health(self):
+        return BusHealth(10, 20, Counter({"timeout": 1, self.name: 2}))
+
+    def close(self):
+        self._do("close")
+
+
+class Mixture:
+    """Servos 1, 3 and 4 on bus a, servos 2 and 0 (in this order) on bus b."""
+
+    def __init__(self):
+        self.log = []
+        self.a = Scripted("a", (11, 13, 14), self.log)
+        self.b = Scripted("b", (12, 10), self.log)
+        self.bus = MixedBus([Share("a", self.a, (1, 3, 4)), Share("b", self.b, (2, 0))])
+
+    def told(self):
+        log, self.log[:] = list(self.log), []
+        return log
+
+
+@pytest.fixture
+def mixture():
+    return Mixture()
+
+
+def steps(readings):
+    return [None if reading is None else reading.position_steps for reading in readings]
+
+
+@pytest.mark.parametrize("places", [((0, 1), (1, 2)), ((0,), (2,)), ((1,), (2,)), ((0, 1), (-1,))])
+def test_every_place_must_be_there_once(places):
+    shares = [Share(str(k), Scripted(str(k), own, []), own) for k, own in enumerate(places)]
+    with pytest.raises(ValueError, match="each from 0 on must be there once"):
+        MixedBus(shares)
+
+
+def test_every_sequence_is_in_the_order_of_the_whole(mixture):
+    assert mixture.bus.engage() == (10, 11, 12, 13, 14)
+    assert steps(mixture.bus.read(1.0)) == [10, 11, 12, 13, 14]
+    mixture.bus.write([20, 21, 22, 23, 24])
+    assert (mixture.a.steps, mixture.b.steps) == ([21, 23, 24], [22, 20])
+    mixture.told()
+    mixture.bus.retune(WANTED)
+    assert mixture.told() == ["a retune 1,3,4", "b retune 2,0"]
+
+
+def test_what_is_said_and_counted_is_that_of_all(mixture):
+    assert mixture.bus.faults() == ("a: overload", "b: overload")
+    assert mixture.bus.events() == ("a says", "b says")
+    health = mixture.bus.health()
+    assert (health.tx_bytes, health.rx_bytes) == (20, 40)
+    assert health.errors == {"timeout": 2, "a": 2, "b": 2}
+
+
+def test_open_closes_what_is_open_where_the_next_cannot_be(mixture):
+    mixture.b.wrong["open"] = PortError("no port")
+    with pytest.raises(PortError, match="no port"):
+        mixture.bus.open()
+    assert mixture.told() == ["a open", "b open", "a close"]
+
+
+def test_where_one_refuses_its_torque_all_are_let_go(mixture):
+    mixture.b.wrong["engage"] = ServoMissing("servo 2 refuses")
+    mixture.a.wrong["release"] = BusLost("port a is gone")
+    with pytest.raises(ServoMissing, match="servo 2 refuses"):
+        mixture.bus.engage()
+    assert mixture.told() == ["a engage", "b engage", "a release", "b release"]
+
+
+def test_release_reaches_all_and_names_every_port_that_is_gone(mixture):
+    mixture.a.wrong["release"] = BusLost("port a is gone")
+    with pytest.raises(BusLost, match="^port a is gone$"):
+        mixture.bus.release()
+    assert mixture.told() == ["a release", "b release"]
+    mixture.b.wrong["release"] = BusLost("port b is gone")
+    with pytest.raises(BusLost, match="^port a is gone; port b is gone$"):
+        mixture.bus.release()
+
+
+@pytest.mark.parametrize("goals", [[1, 2, 3, 4, nan], [nan, 2, 3, 4, 5], [1, 2, 3, 4], [1] * 6])
+def test_goals_that_cannot_be_reach_no_bus_at_all(mixture, goals):
+    with pytest.raises(ValueError, match="not a number|goals for 5 servos"):
+        mixture.bus.write(goals)
+    assert mixture.told() == []
+
+
+def test_other_servos_are_refused_before_any_bus_is_told(mixture):
+    with pytest.raises(ValueError, match="other servos need another bus"):
+        mixture.bus.retune(WANTED[:4])
+    assert mixture.told() == []
+
+
+def test_a_bus_that_gives_up_ends_it_for_all(mixture):
+    mixture.b.wrong["read"] = BusLost("port b has been gone for 60 s")
+    with pytest.raises(BusLost, match="port b has been gone"):
+        mixture.bus.read(0.0)
+
+
+def test_a_silent_bus_is_asked_seldom_and_the_others_as_ever(mixture):
+    mixture.b.silent = True
+    for k in range(100):
+        assert steps(mixture.bus.read(0.01 * k)) == [None, 11, None, 13, 14]
+    assert len(mixture.a.reads_s) == 100
+    # So many in a row, and then five a second.
+    assert mixture.b.reads_s[:IN_A_ROW] == [0.0, 0.01, 0.02]
+    assert len(mixture.b.reads_s) == IN_A_ROW + int(0.97 / AGAIN_S)
+    mixture.b.silent = False
+    answered = [mixture.bus.read(1.0 + 0.01 * k)[0] is not None for k in range(30)]
+    assert answered.index(True) * 0.01 <= AGAIN_S
+    assert all(answered[answered.index(True) :])
+
+
+def test_one_answer_is_enough_to_be_asked_every_time(mixture):
+    mixture.b.read = lambda now_s: (mixture.b.reads_s.append(now_s), None)[1:] * 2
+    mixture.bus.read(0.0)
+    mixture.b.read = lambda now_s: (
+        mixture.b.reads_s.append(now_s),
+        (None, ServoReading(10, 0.0, 0.0, now_s, False)),
+    )[1]
+    for k in range(1, 50):
+        assert steps(mixture.bus.read(0.01 * k)) == [10, 11, None, 13, 14]
+    assert len(mixture.b.reads_s) == 50
+
+
+def test_close_closes_all_and_open_begins_anew(mixture):
+    mixture.b.silent = True
+    for k in range(10):
+        mixture.bus.read(0.01 * k)
+    mixture.bus.close()
+    mixture.b.silent = False
+    mixture.bus.open()
+    assert mixture.told()[-4:] == ["a close", "b close", "a open", "b open"]
+    assert None not in mixture.bus.read(0.1)
