@@ -8,7 +8,7 @@ is in the tests of its own name.
 from math import nan
 
 import pytest
-from bus_kinds import KINDS, SHARES, Twin, in_process, twin_of
+from bus_kinds import KINDS, PLACES, SHARES, Twin, in_process, twin_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -31,8 +31,7 @@ def here(request):
         yield made
 
 
-@pytest.fixture
-def held(twin):
+def holding(twin):
     """Give a bus that holds every servo where it stands."""
     twin.pulses_on()
     bus = twin.bus()
@@ -42,6 +41,16 @@ def held(twin):
     yield bus
     bus.release()
     bus.close()
+
+
+@pytest.fixture
+def held(twin):
+    yield from holding(twin)
+
+
+@pytest.fixture
+def held_here(here):
+    yield from holding(here)
 
 
 def starts(twin):
@@ -105,19 +114,19 @@ def test_engage_holds_every_servo_where_it_is(twin):
     bus.close()
 
 
-def test_who_cannot_tell_his_place_goes_to_his_rest_and_that_is_said(twin):
-    bus = twin.bus()
+def test_who_cannot_tell_his_place_goes_to_his_rest_and_that_is_said(here):
+    bus = here.bus()
     bus.open()
-    before = twin.truth()
+    before = here.truth()
     bus.engage()
-    hobby = [twin.on[p] == "maestro" for p in range(twin.count)]
+    hobby = [here.on[p] == "maestro" for p in range(here.count)]
     wanted = [0.5 if one else at for one, at in zip(hobby, before, strict=True)]
-    twin.run(bus, 0.3, wanted)
-    assert twin.near(twin.truth(), wanted)
+    here.run(bus, 0.3, wanted)
+    assert here.near(here.truth(), wanted)
     told = bus.events()
     limp = [line for line in told if "had no pulses: they go to their places at once" in line]
     assert len(limp) == any(hobby)
-    for place, setup in enumerate(twin.setups):
+    for place, setup in enumerate(here.setups):
         assert not any(hobby) or hobby[place] == (f"{setup.name} (servo {setup.id})" in limp[0])
     bus.release()
     bus.close()
@@ -132,29 +141,29 @@ def test_goals_are_followed_and_told(twin, held):
     assert well(readings)
 
 
-def test_goals_are_clipped_to_the_limits(twin, held):
-    ends = [(-40.0, 60.0, -1e-3, 1.001)[place % 4] for place in range(twin.count)]
+def test_goals_are_clipped_to_the_limits(here, held_here):
+    ends = [(-40.0, 60.0, -1e-3, 1.001)[place % 4] for place in range(here.count)]
     inside = [min(1.0, max(0.0, end)) for end in ends]
-    twin.until(held, lambda r: twin.near(twin.seen(r), inside), ends, patience_s=5.0)
-    twin.run(held, 0.3, ends)
-    assert twin.near(twin.truth(), inside)
-    assert twin.goals() == twin.steps(inside)
+    here.until(held_here, lambda r: here.near(here.seen(r), inside), ends, patience_s=5.0)
+    here.run(held_here, 0.3, ends)
+    assert here.near(here.truth(), inside)
+    assert here.goals() == here.steps(inside)
 
 
-def test_what_is_no_number_is_refused_and_nothing_is_sent(twin, held):
-    twin.run(held, 0.05, starts(twin))
-    before = held.health().tx_bytes
-    for place in range(twin.count):
-        goals = twin.steps(away(twin))
+def test_what_is_no_number_is_refused_and_nothing_is_sent(here, held_here):
+    here.run(held_here, 0.05, starts(here))
+    before = held_here.health().tx_bytes
+    for place in range(here.count):
+        goals = here.steps(away(here))
         goals[place] = nan
         with pytest.raises(ValueError, match="not a number"):
-            held.write(goals)
+            held_here.write(goals)
     for wrong in (goals[:-1], [*goals, goals[0]]):
         with pytest.raises(ValueError):
-            held.write(wrong)
-    assert held.health().tx_bytes == before
-    twin.run(held, 0.2)
-    assert twin.near(twin.truth(), starts(twin))
+            held_here.write(wrong)
+    assert held_here.health().tx_bytes == before
+    here.run(held_here, 0.2)
+    assert here.near(here.truth(), starts(here))
 
 
 def test_release_takes_the_torque_of_all_and_is_confirmed(twin, held):
@@ -169,26 +178,26 @@ def test_release_takes_the_torque_of_all_and_is_confirmed(twin, held):
     assert held.events() == ()
 
 
-def test_a_bus_is_opened_again_and_closed_twice(twin):
-    bus = twin.bus()
+def test_a_bus_is_opened_again_and_closed_twice(here):
+    bus = here.bus()
     for _ in range(2):
-        twin.pulses_on()
+        here.pulses_on()
         bus.open()
         bus.engage()
-        assert twin.near(twin.seen(bus.read(twin.now_s())), starts(twin))
+        assert here.near(here.seen(bus.read(here.now_s())), starts(here))
         bus.release()
         bus.close()
         bus.close()
 
 
-def test_bytes_are_counted_and_no_errors(twin, held):
-    before = held.health()
-    twin.run(held, 0.1, starts(twin))
-    after = held.health()
+def test_bytes_are_counted_and_no_errors(here, held_here):
+    before = held_here.health()
+    here.run(held_here, 0.1, starts(here))
+    after = held_here.health()
     assert after.tx_bytes > before.tx_bytes > 0
     assert after.rx_bytes > before.rx_bytes > 0
     assert after.errors == {}
-    assert held.faults() == ()
+    assert held_here.faults() == ()
 
 
 # --- somebody is missing
@@ -301,11 +310,13 @@ def _until_back(twin, bus, gone):
     return rearmed
 
 
-@pytest.mark.parametrize("nth", range(3))
-def test_a_port_that_stays_away_is_given_up_and_told_at_release(here, nth):
-    if nth >= len(here.buses):
-        pytest.skip("no such bus in this kind")
-    name = list(here.buses)[nth]
+@pytest.mark.parametrize(("kind", "name"), [(k, name) for k in KINDS for name in PLACES[k]])
+def test_a_port_that_stays_away_is_given_up_and_told_at_release(kind, name):
+    with twin_of(kind, "in-process") as here:
+        _given_up(here, name)
+
+
+def _given_up(here, name):
     here.pulses_on()
     bus = here.bus(give_up_s=1.0)
     bus.open()

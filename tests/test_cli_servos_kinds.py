@@ -216,12 +216,24 @@ def test_setup_of_a_maestro_that_does_not_answer():
         assert code == 2 and "no Maestro answers as the YAML says" in err
 
 
+def test_setup_of_a_board_that_is_too_small(monkeypatch):
+    with PtyBus() as bus:
+        path = bus.start_device(MaestroLine(6))
+        board = SerialPort(path, "Pololu Micro Maestro", "1ffb:0089", None)
+        monkeypatch.setattr(bench, "serial_ports", lambda host: (board,))
+        code, _, err = gazerig("setup", "maker", "--port", path, "--yes", "--joint", "eyes_pan")
+        assert code == 0 and "USB Dual Port" in err
+        monkeypatch.setattr("robot.cli.setup_maestro.USB_CHANNELS", {"1ffb:0089": 2})
+        code, _, err = gazerig("setup", "maker", "--port", path, "--yes")
+        assert code == 2 and "has channels 0..1, not those of left_upper_lid (channel 2)" in err
+
+
 def test_setup_goes_through_all_buses(mixed):
     code, _, err = gazerig(
         "setup", mixed, "--mock", "--yes", "--joint", "neck_yaw", "--joint", "neck_pitch",
         "--joint", "eyes_pan",
     )  # fmt: skip
-    assert code == 0 and "the main bus: a Pololu Maestro, 1 channels to look at" in err
+    assert code == 0 and "the main bus: a Pololu Maestro; 1 of its channels to try" in err
     assert ", bus neck: 1 of 8 servos to set up for 1000000" in err
     assert "neck_yaw (servo 7): id 1 -> 7" in err
     assert "neck_pitch (servo 1): nothing to change" in err and "done: 3 of 3" in err

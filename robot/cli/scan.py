@@ -46,7 +46,10 @@ def scan(
     rig: Annotated[str, typer.Option(help="With --mock: the rig whose servos.")] = "desk",
     as_json: JsonOption = False,
 ) -> None:
-    """List serial ports, and who answers on one at every baud rate. Changes nothing."""
+    """List serial ports, and who answers on one at every baud rate.
+
+    Moves and changes nothing; only a Maestro's list of errors is cleared by asking for it.
+    """
     with clear_errors():
         rates, kinds = parse_bauds(bauds), _parse_kind(kind or "all")
         found_ports = bench.ports_here()

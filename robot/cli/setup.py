@@ -163,7 +163,7 @@ def _board(
     yes: bool,
 ) -> list[str]:
     """Say what to set on a board and try its channels; gives the joints that were skipped."""
-    say(f"{title}{_where(rig, bus)}: a Pololu Maestro, {len(setups)} channels to look at.")
+    say(f"{title}{_where(rig, bus)}: a Pololu Maestro; {len(setups)} of its channels to try.")
     with (
         wires(rig, mock, port) as wired,
         to_open(wired.paths[bus]) as line,

@@ -14,6 +14,7 @@ import typer
 from drivers.errors import DriverError, ServoFault, ServoMissing
 from drivers.maestro_line import Line
 from drivers.maestro_params import US_STEPS, MaestroParams
+from drivers.maestro_probe import USB_CHANNELS
 from drivers.port_owner import POLOLU
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
@@ -51,6 +52,7 @@ def set_up_board(
             "   Enter: it is set, and Pololu's program is closed; Ctrl-C: end ",
             default="", show_default=False, prompt_suffix="", err=True,
         )  # fmt: skip
+    _refuse_size(setups, bench.usb_id(line.port_name), line.port_name)
     board = _greeted(line, params)
     _ranges(board, setups, yes)
     say(
@@ -63,6 +65,17 @@ def set_up_board(
         if not _channel(board, setup, joints[setup.name], yes):
             left.append(setup.name)
     return left
+
+
+def _refuse_size(setups: Sequence[ServoSetup], usb: str, where: str) -> None:
+    """See that a board whose size its USB product tells has all the channels."""
+    size = USB_CHANNELS.get(usb)
+    beyond = [name_servo(setup) for setup in setups if size is not None and setup.id >= size]
+    if beyond:
+        raise ServoMissing(
+            f"{where}: this board has channels 0..{(size or 0) - 1}, not those of "
+            f"{', '.join(beyond)}: correct their ids in the YAML"
+        )
 
 
 def _greeted(line: BlockingPort, params: MaestroParams) -> Line:

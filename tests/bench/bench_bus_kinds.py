@@ -90,7 +90,8 @@ def driver(kind: str, port: BusPort, ids: tuple[int, ...]) -> ServoBus:
         setups = [ServoSetup(i, "sts3215", 1000, 3000, 3000.0) for i in ids]
         return FeetechBus(port, setups, FeetechParams())
     setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
-    return DynamixelBus(port, setups, DynamixelParams())
+    # While others have their turn it is silent for longer than servos bear.
+    return DynamixelBus(port, setups, DynamixelParams(watchdog_ms=0))
 
 
 @contextmanager
@@ -172,18 +173,23 @@ def of_ours(name: str, kinds: Mapping[str, tuple[int, ...]], reads: str) -> Clie
     return Client(name, kinds, reads, lambda ports: ours(kinds, ports))
 
 
+def rusty_one(name: str, peer: str, kind: str, reads: str) -> Client:
+    """Describe rustypot on one kind; it opens serial ports only."""
+    return Client(name, {kind: IDS}, reads, lambda ports: rusty(kind, ports), peer, False)
+
+
 def clients() -> list[Client]:
     """List all that tick; after each of ours those it is compared with."""
     alone = {kind: {kind: IDS} for kind in BAUD}
     return [
         of_ours("Dynamixel", alone["dynamixel"], "13-14 B"),
-        Client("rustypot", alone["dynamixel"], "4 B", lambda p: rusty("dynamixel", p), "Dynamixel", False),
+        rusty_one("rustypot", "Dynamixel", "dynamixel", "4 B"),
         Client("ROBOTIS' SDK", alone["dynamixel"], "10 B", sdk, "Dynamixel"),
         of_ours("Feetech", alone["feetech"], "15 B, 31 every 8th"),
-        Client("rustypot STS", alone["feetech"], "2 B", lambda p: rusty("feetech", p), "Feetech", False),
+        rusty_one("rustypot STS", "Feetech", "feetech", "2 B"),
         of_ours("Maestro (no peer)", alone["maestro"], "1 pulse, errors"),
         of_ours("all three mixed", MIXED, "as each"),
-    ]  # fmt: skip
+    ]
 
 
 # --- measuring

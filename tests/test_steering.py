@@ -1,0 +1,133 @@
+"""A servo steered at a terminal: keys as they are pressed, lines of a file, and numbers."""
+
+import contextlib
+import os
+import pty
+import re
+import select
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from config.load import shipped
+from config.schema import load_rig
+from drivers.errors import SetupError
+from robot.bringup.single_joint import Stopped
+from robot.cli.person import Lines
+from robot.cli.steering import SteeringPerson
+
+ROOT = Path(__file__).parents[1]
+
+
+class Servo:
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[str, float]] = []
+
+    def by(self, us: float) -> None:
+        self.told.append(("by", us))
+
+    def nudge(self, us: float) -> None:
+        self.told.append(("nudge", us))
+
+    def to(self, us: float) -> None:
+        self.told.append(("to", us))
+
+    def live(self) -> str:
+        return "here"
+
+
+def person(tmp_path: Path, *lines: str) -> SteeringPerson:
+    file = tmp_path / "answers"
+    file.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    return SteeringPerson(Lines(file), lambda: None, False)
+
+
+def test_lines_move_a_servo_until_enter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    servo = Servo()
+    person(tmp_path, "+40", "-12.5", "1480", "left", "nan", "").steer("move it", servo)
+    assert servo.told == [("by", 40.0), ("by", -12.5), ("to", 1480.0)]
+    assert capsys.readouterr().err.count("moves it by so many us") == 2
+
+
+def test_a_number_is_said_or_agreed_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answers = person(tmp_path, "", "-7.5", "much", "inf", "3")
+    assert answers.number("how far?", 12.5, str) == 12.5
+    assert answers.number("how far?", 12.5, str) == -7.5
+    assert answers.number("how far?", 12.5, str) == 3.0
+    said = capsys.readouterr().err
+    assert "how far? [12.5]" in said and "'much' is no number" in said
+
+
+def test_q_and_the_end_of_the_answers_end_it(tmp_path: Path) -> None:
+    with pytest.raises(Stopped, match="q"):
+        person(tmp_path, "q").steer("move it", Servo())
+    with pytest.raises(Stopped, match="q"):
+        person(tmp_path, "quit").number("how far?", 1.0, str)
+    with pytest.raises(SetupError, match=r"no answer left to: how far\? \[1\]"):
+        person(tmp_path).number("how far?", 1.0, str)
+
+
+class Terminal:
+    """gazerig calibrate on a pseudo-terminal."""
+
+    def __init__(self, *words: str) -> None:
+        self.said, self._end_s = "", time.monotonic() + 60.0
+        code = "from robot.cli.main import main; main()"
+        self.pid, self.fd = pty.fork()
+        if self.pid == 0:
+            os.chdir(ROOT)
+            os.execv(sys.executable, [sys.executable, "-c", code, "calibrate", *words])
+
+    def reads(self, pattern: str) -> re.Match[str]:
+        """Wait for what has not been waited for."""
+        while (found := re.search(pattern, self.said)) is None:
+            assert time.monotonic() < self._end_s, self.said
+            if select.select([self.fd], [], [], 0.2)[0]:
+                self.said += os.read(self.fd, 4096).decode(errors="replace")
+        self.said = self.said[found.end() :]
+        return found
+
+    def types(self, keys: bytes) -> None:
+        os.write(self.fd, keys)
+
+    def __enter__(self) -> "Terminal":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
+        os.waitpid(self.pid, 0)
+        os.close(self.fd)
+
+
+def test_keys_steer_a_hobby_servo_at_the_terminal(tmp_path: Path) -> None:
+    rig = tmp_path / "mine.yaml"
+    rig.write_text(shipped("rigs", "maker").read_text("utf-8"), encoding="utf-8")
+    words = (str(rig), "--mock", "--yes", "--joint", "eyes_tilt", "--more", "0", "--margin", "0")
+    with Terminal(*words) as terminal:
+        terminal.reads(r"shall it begin\? \[1510\]")
+        terminal.types(b"\n")
+        terminal.reads("straight ahead, then press Enter")
+        terminal.reads(r"1510 us .*step 10 us")
+        terminal.types(b"\x1b[A\x1b[C")  # a larger step, then one of those to the right
+        terminal.reads("1530 us")
+        terminal.types(b"\r")
+        terminal.reads("to its UPPER end")
+        terminal.types(b"\x1b[A\x1b[Adda")
+        terminal.reads(r"1580 us")
+        terminal.types(b"\r")
+        terminal.reads(r"eyes_tilt at 1580 us: how many degrees \(UPPER is \+\)\?")
+        terminal.types(b"8\n")
+        terminal.reads("to its LOWER end")
+        terminal.types(b"\x1b[A\x1b[Aaa")
+        terminal.reads(r"1480 us")
+        terminal.types(b"\r")
+        terminal.reads("at 1480 us: how many degrees")
+        terminal.types(b"-7\n")
+        terminal.reads("written into")
+    assert load_rig(str(rig)).joints["eyes_tilt"].linkage == ((-7, 1480), (0, 1530), (8, 1580))

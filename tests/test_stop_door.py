@@ -1,0 +1,34 @@
+"""gazerig stop reaches a head that is being calibrated, and nothing else does."""
+
+from pathlib import Path
+
+import pytest
+from test_cli_face import DESK, Sitting
+
+from drivers.errors import DriverError
+from robot.remote.running_rig import RunningRig
+
+
+def test_a_head_that_is_steered_over_a_face_can_be_stopped_and_told_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = tmp_path / "mine.yaml"
+    rig.write_text(DESK.read_text("utf-8"), encoding="utf-8")
+    # Both processes look there; a path of its own keeps other rigs that run here out of it.
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    with Sitting(rig, "--no-page") as sitting:
+        sitting.reads("1/8 the tip of your nose: 0 mm")
+        with RunningRig.connect() as running:
+            assert running.pid == sitting.pid
+            with pytest.raises((DriverError, ValueError), match="is being calibrated"):
+                running.look_at(1.0, 0.0, 0.3)
+            with pytest.raises((DriverError, ValueError), match="is being calibrated"):
+                running.set("loop.rate_hz", 90.0)
+            running.stop("a finger")
+            assert running.status()["stopped"] == "a finger"
+            sitting.reads("stopped: a finger; torque off")
+            running.resume()
+            assert not running.status()["stopped"]
+        sitting.types(b"q")
+        assert sitting.ends() == 0, sitting.said
+    assert not list(tmp_path.glob("**/*.sock"))
