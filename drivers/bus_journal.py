@@ -2,6 +2,7 @@
 
 from collections import deque
 
+from drivers.maestro_params import HOBBY
 from drivers.types import ServoSetup
 
 MOST = 200
@@ -28,8 +29,9 @@ class Journal:
 
 
 def call(setup: ServoSetup) -> str:
-    """Name a servo for people: its joint and its id."""
-    return f"{setup.name} (servo {setup.id})" if setup.name else f"servo {setup.id}"
+    """Name a servo for people: its joint and its id, or its channel where it is a hobby servo."""
+    noun = "channel" if setup.model in HOBBY else "servo"
+    return f"{setup.name} ({noun} {setup.id})" if setup.name else f"{noun} {setup.id}"
 
 
 def title(register: str) -> str:

@@ -12,7 +12,9 @@ from config.schema import Rig, load_rules, load_walk
 from drivers.camera_depth import depth_at
 from drivers.camera_poses import PoseRing
 from drivers.errors import SetupError
+from drivers.port_owner import refuse_owner
 from drivers.serial_port import BlockingPort, BusPort
+from drivers.serial_ports import serial_ports
 from gaze.attention import Attention
 from gaze.aversion import Aversion
 from gaze.bottom_up import BottomUp
@@ -256,7 +258,9 @@ def _camera_params(
 def _wires(rig: Rig, choice: Choice, clock: Clock) -> _Wires:
     """Give the real port, an emulated bus in this process, or one on a pseudo-terminal."""
     if not choice.mock:
-        paths = ports_of(rig, choice.port)
+        paths, here = ports_of(rig, choice.port), serial_ports()
+        for name, path in paths.items():
+            refuse_owner(path, (rig.buses[name] if name else rig.bus).kind, here)
         return _Wires(_opened_by(paths), {}, _no_digest, _nothing)
     lines = emulated_lines(rig)
     if not choice.fast:

@@ -210,7 +210,7 @@ def test_open_names_who_is_missing_and_leaves_the_ports_free(twin):
         told = "no Maestro answers"
         wanted = twin.setups
     else:
-        told = rf"{twin.setups[place].name} \(servo 99\) does not answer"
+        told = rf"{twin.setups[place].name} \((servo|channel) 99\) does not answer"
         lost = twin.setups[place]._replace(id=99)
         wanted = [*twin.setups[:place], lost, *twin.setups[place + 1 :]]
     with pytest.raises(ServoMissing, match=told) as caught:
@@ -374,6 +374,44 @@ def test_a_restart_is_found_and_the_servo_held_where_it_is(twin, held):
     assert held.faults() == ()
     # It follows again, with the speed that it was set up with.
     twin.until(held, lambda r: twin.near(twin.seen(r), away(twin)), away(twin))
+
+
+@pytest.mark.parametrize("befalls", ["", "brown-out", "power cut", "unplug"])
+def test_no_servo_is_faster_than_it_was_set_up_whatever_it_went_through(here, befalls):
+    """A goal far away at once: only what the servo or its board has armed holds it back."""
+    here.pulses_on()
+    slow = [s._replace(max_speed_steps_s=0.2 * s.max_speed_steps_s) for s in here.setups]
+    bus = here.bus(slow)
+    bus.open()
+    bus.engage()
+    here.run(bus, 0.3, starts(here))
+    _befall(here, bus, befalls)
+    before_s, before = here.now_s(), here.steps(here.truth())
+    for _ in range(30):
+        here.run(bus, 0.0, [0.95] * here.count)
+        here.wait(0.02)
+        now_s, now = here.now_s(), here.steps(here.truth())
+        for setup, was, is_now in zip(slow, before, now, strict=True):
+            most = 1.2 * setup.max_speed_steps_s * (now_s - before_s) + 12.0
+            assert abs(is_now - was) <= most, (setup.name, is_now - was, most)
+        before_s, before = now_s, now
+    here.until(bus, lambda r: here.near(here.seen(r), [0.95] * here.count), [0.95] * here.count)
+
+
+def _befall(here, bus, what):
+    """Let something pass over all servos while they hold, until all hold again."""
+    if what == "unplug":
+        here.command("unplug for 0.2")
+    elif what:
+        if what == "power cut":
+            here.command("lose all for 1")
+        for place in range(here.count):
+            if here.on[place] != "maestro" or place == min(here.buses["maestro"]):
+                here.strike("brown-out", place)
+    if what:
+        here.until(bus, lambda r: None in r, starts(here))
+        here.until(bus, well, starts(here))
+        bus.events()
 
 
 def test_a_fault_is_named_with_its_joint_or_board(here):

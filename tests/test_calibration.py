@@ -4,10 +4,10 @@ from dataclasses import replace
 from math import radians
 
 import pytest
-from desk import JOINTS
 from hypothesis import given
 from hypothesis import strategies as st
 
+from config.rig import LidJoints
 from robot.calibrate.calibration import (
     Calibration,
     CalibrationRefused,
@@ -17,6 +17,8 @@ from robot.calibrate.calibration import (
     calibration,
     changes,
     ends_of,
+    is_lid,
+    lid_keys,
     middle,
 )
 from robot.calibrate.stop_search import (
@@ -28,6 +30,7 @@ from robot.calibrate.stop_search import (
     search,
 )
 from robot.joint import JointParams
+from robot.types import JOINTS as EVERY
 
 JOINT = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 TURN = 4096
@@ -141,10 +144,31 @@ def test_a_geared_joint_beyond_half_a_turn_is_refused() -> None:
 
 
 def test_every_joint_has_names_for_its_ends() -> None:
-    for name in JOINTS:
+    for name in EVERY:
         positive, negative = ends_of(name)
         assert positive != negative
-    assert ends_of("right_eye_tilt") == ("UPPER", "LOWER")
+    assert ends_of("right_eye_tilt") == ends_of("eyes_tilt") == ("UPPER", "LOWER")
+    assert ends_of("left_lower_lid") == ("OPEN", "SHUT")
+
+
+def test_the_keys_of_lids_are_those_of_the_rig_file() -> None:
+    lids = [name for name in EVERY if is_lid(name)]
+    assert len(lids) == 4 and all(lid_keys(name) == LidJoints.keys(name) for name in lids)
+
+
+def test_the_cure_for_the_seam_is_what_the_servo_can_do() -> None:
+    sts = replace(JOINT, model="sts3215")
+    with pytest.raises(CalibrationRefused, match="--set-middle"):
+        calibration("neck_yaw", Marks(4200, 3900, 4050), sts, 0.0)
+    with pytest.raises(CalibrationRefused, match="take the horn off"):
+        calibration("neck_yaw", Marks(4200, 3900, 4050), JOINT, 0.0)
+
+
+def test_a_lower_lid_writes_its_own_ends() -> None:
+    wanted = changes("left_lower_lid", JOINT, Calibration(2000, -1, -20.0, 22.0), {})
+    assert wanted["lid_joints.left_lower_shut_deg"] == -20.0
+    assert wanted["lid_joints.left_lower_open_deg"] == 22.0
+    assert "lid_joints.left_shut_deg" not in wanted
 
 
 # --- what goes into the rig file

@@ -148,6 +148,17 @@ def test_what_cannot_be_is_said(
     assert Path(rigs[kind]).read_bytes() == before
 
 
+def test_places_on_several_lines_are_refused_before_anything_moves(rigs: dict[str, str]) -> None:
+    path = Path(rigs["maker"])
+    text = path.read_text("utf-8")
+    line = next(line for line in text.splitlines() if "[-24, 1801]" in line)
+    spread = "    linkage:\n      - [-24, 1801]\n      - [0, 1510]\n      - [24, 1188]"
+    path.write_text(text.replace(line, spread), encoding="utf-8")
+    done = run("calibrate", str(path), "--mock", "--joint", "eyes_tilt")
+    assert done.exit_code == 2 and "spread over several lines" in done.stderr
+    assert "gets no pulses" not in done.stderr
+
+
 # --- monitor
 
 

@@ -111,6 +111,18 @@ def test_where_the_size_is_not_known_a_missing_channel_is_found_by_its_silence()
     assert rig.errors() == []  # the doctor has cleaned up after itself
 
 
+def test_a_channel_that_may_not_be_there_is_not_asked_for_while_servos_have_pulses():
+    far = PAN._replace(id=8, name="eyes_tilt")
+    rig = Rig(6, setups=(PAN, far))
+    rig.do("84 00 70 2E")
+    assert one(rig.check(), "note", "eyes_tilt (channel 8)", "was not asked")
+    assert bytes.fromhex("9008") not in rig.sent
+    assert rig.board.faults.reports()[0]["position"] == 6000
+    known = Rig(12, setups=(PAN, far), usb=MINI)
+    known.do("84 00 70 2E")
+    assert not any(f.where == "eyes_tilt (channel 8)" for f in known.check())
+
+
 @pytest.mark.parametrize(
     ("name", "says", "level", "cure"),
     [

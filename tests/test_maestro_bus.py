@@ -178,7 +178,7 @@ def test_a_channel_that_the_board_has_not():
     bench.bus = MaestroBus(
         bench.port, (*SETUPS, SETUPS[0]._replace(id=11, name="jaw")), MaestroParams(channels=12)
     )
-    with pytest.raises(ServoMissing, match=r"jaw \(servo 11\): has the board 12 channels"):
+    with pytest.raises(ServoMissing, match=r"jaw \(channel 11\): has the board 12 channels"):
         bench.bus.open()
 
 
@@ -234,7 +234,7 @@ def test_channels_without_pulses_go_to_their_rest_one_after_another(bench):
     assert bench.now_s >= 0.2
     said = " ".join(bench.bus.events())
     assert "tell no positions" in said
-    assert "eyes (servo 0), lid (servo 1), brow (servo 5) had no pulses" in said
+    assert "eyes (channel 0), lid (channel 1), brow (channel 5) had no pulses" in said
     assert all(reading.torque for reading in bench.run(0.01)[-1])
 
 
@@ -482,7 +482,7 @@ def test_errors_again_and_again_end_without_pulses(held):
     assert held.pulses() == [0, 0, 0]
     for reading in readings:
         assert reading.alert and not reading.torque and "again and again" in reading.fault
-    assert any("eyes (servo 0): errors again and again" in line for line in held.bus.faults())
+    assert any("eyes (channel 0): errors again and again" in line for line in held.bus.faults())
     assert held.bus.engage() == tuple(reading.position_steps for reading in readings)
     assert not any(reading.fault for reading in held.run(0.1)[-1])
 

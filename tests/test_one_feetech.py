@@ -1,6 +1,7 @@
 """Calibrating one emulated STS servo: turned by a hand, or driven gently between its stops."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -10,6 +11,7 @@ from robot.bringup.one_feetech import OneFeetech
 from robot.bringup.single_joint import SingleJoint, Stopped
 from robot.calibrate.calibrating import by_hand, by_motion
 from robot.calibrate.calibration import CalibrationRefused
+from robot.calibrate.placing import HandPlacer, Steered, by_places
 from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
@@ -184,3 +186,31 @@ def test_a_servo_that_suffers_or_is_silent_is_named() -> None:
         bench.joint.check()
     with pytest.raises(BusLost, match="does not answer any more"):
         bench.joint.position()
+
+
+class Reader(Bench):
+    """Who turns a joint by hand and says the angles read off, those proposed where it is None."""
+
+    angles: list[float | None]
+
+    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        self.said.append(question)
+        live()
+        said = self.angles.pop(0)
+        return proposed if said is None else said
+
+    def steer(self, question: str, servo: Steered) -> None:
+        raise AssertionError("a servo that tells its place is turned by hand")
+
+
+def test_a_push_rod_on_an_sts_servo_is_measured_by_hand() -> None:
+    rod = replace(EYE, min_deg=-20.0, max_deg=20.0, linkage=((-25.0, 1800.0), (25.0, 2400.0)))
+    bench = Reader(2100)
+    single = SingleJoint("left_eye_pan", rod, bench.servo, bench.clock, lambda: None)
+    bench.script = [0, 250, -490, 120, 240]
+    bench.angles = [22.0, -21.0, None, 10.0]
+    made = by_places(HandPlacer(single, bench), bench, 1.0, 1)
+    assert [round(at) for _, at in made.linkage] == [1860, 1980, 2100, 2220, 2350]
+    assert [angle for angle, _ in made.linkage] == [-21.0, -10.5, 0.0, 10.0, 22.0]
+    assert (made.min_deg, made.max_deg) == (-20.0, 21.0)
+    assert any("turn left_eye_pan until it reads about step 1980" in line for line in bench.said)

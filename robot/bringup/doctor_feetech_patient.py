@@ -3,9 +3,10 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
+from drivers.bus_journal import call
 from drivers.feetech_table import MODELS, FeetechModel
 from drivers.types import ServoSetup
-from robot.bringup.doctor_patient import Verdict, name_servo
+from robot.bringup.doctor_patient import Verdict
 from robot.bringup.servo_kind import Found
 
 
@@ -30,7 +31,7 @@ class StsPatient:
     @property
     def where(self) -> str:
         """Name the joint and the servo."""
-        return name_servo(self.setup)
+        return call(self.setup)
 
     @property
     def whole(self) -> bool:

@@ -8,14 +8,14 @@ program. Source: Pololu Maestro User's Guide (0J40), sections 4.b, 4.e, 5.a and 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from drivers.bus_journal import call
 from drivers.errors import PortError
-from drivers.maestro_commands import MOST_INPUT
+from drivers.maestro_commands import MICRO, MOST_INPUT
 from drivers.maestro_line import Line
 from drivers.maestro_params import US_STEPS, MaestroParams
 from drivers.maestro_probe import USB_CHANNELS, MaestroFound, probe
 from drivers.serial_port import BusPort
 from drivers.types import ServoSetup
-from robot.bringup.doctor_patient import name_servo
 from robot.bringup.findings import BOARD, Finding, Fix, Level
 from robot.bringup.maestro_settings import FACTORY_US, wide_range
 
@@ -23,6 +23,7 @@ WHERE = "the board"
 SCRIPT = "script"
 """In place of a register: the board's own script runs (1) or not (0)."""
 
+UNASKED = "was not asked: others give pulses, and were it not there, the board would send them home"
 TIMEOUT = "serial timeout"
 CURES = {
     "serial signal error": "something was sent at another baud rate, or the line is disturbed: "
@@ -46,7 +47,8 @@ class Board:
     """A board as found, and what the rig says of it.
 
     found: None where none answers; usb: vendor and product id of its port, "" unless on USB
-    pulses: by channel, quarter microseconds, None where it kept silent
+    pulses: by channel, quarter microseconds, None where it kept silent; channels that were
+        not asked are missing
     """
 
     params: MaestroParams
@@ -77,7 +79,8 @@ def take(port: BusPort, params: MaestroParams, setups: Sequence[ServoSetup], usb
     """Ask a board for all it tells.
 
     A channel that is not there is an error to a board, on which it sends all channels home:
-    those that cannot be there are not asked for.
+    those that cannot be there are not asked for, nor, while any gives pulses, those beyond
+    the six that every board has, unless its size is known.
 
     Raises:
         drivers.errors.PortError: the port cannot be opened.
@@ -88,7 +91,10 @@ def take(port: BusPort, params: MaestroParams, setups: Sequence[ServoSetup], usb
         return Board(params, setups, None, usb, {})
     line, size = Line(port, _spoken(params, found)), USB_CHANNELS.get(usb, params.channels)
     pulses: dict[int, int | None] = {}
+    sure = MICRO if any(found.pulses) and usb not in USB_CHANNELS else size
     for channel in sorted(setup.id for setup in setups):
+        if sure <= channel < size:
+            continue
         silent = None in pulses.values()
         heard = None if silent or channel >= size else line.pulses((channel,))
         pulses[channel] = None if heard is None else heard[0]
@@ -190,9 +196,12 @@ def _channels(board: Board) -> Iterator[Finding]:
     """Judge every channel of the rig."""
     size = board.size or board.params.channels
     for setup in board.setups:
-        pulse, where = board.pulses.get(setup.id), name_servo(setup)
+        pulse, where = board.pulses.get(setup.id), call(setup)
         if setup.id >= size:
             says, cure = f"the board has channels 0..{size - 1} only", "correct its id in the YAML"
+        elif setup.id not in board.pulses:
+            yield Finding("note", UNASKED, where, "let all servos go limp and look again")
+            continue
         elif pulse is None:
             says = "the board does not answer about this channel"
             cure = "has it so many channels? correct its id, or bus.maestro.channels"
@@ -237,7 +246,7 @@ def _untold(board: Board) -> Iterator[Finding]:
             "note",
             f"goes to {setup.min_steps / US_STEPS:g}..{setup.max_steps / US_STEPS:g} us, beyond "
             f"the {FACTORY_US[0]}..{FACTORY_US[1]} us of a new board, which cuts goals silently",
-            name_servo(setup),
+            call(setup),
             f"set its Min to {low} and its Max to {high} in Pololu's program",
         )
     yield Finding(

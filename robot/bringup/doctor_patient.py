@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from drivers.bus_journal import call
 from drivers.dynamixel_table import MODELS, Model
-from drivers.servo_models import SERVOS
 from drivers.types import ServoSetup
 from robot.bringup.findings import Level
 from robot.bringup.servo_kind import Found
@@ -32,7 +32,7 @@ class Patient:
     @property
     def where(self) -> str:
         """Name the joint and the servo."""
-        return name_servo(self.setup)
+        return call(self.setup)
 
 
 class Verdict(NamedTuple):
@@ -45,10 +45,3 @@ class Verdict(NamedTuple):
 
 
 Rule = Callable[[Patient], Iterator[Verdict]]
-
-
-def name_servo(setup: ServoSetup) -> str:
-    """Name a joint with its servo, or with its channel where it is a hobby servo."""
-    facts = SERVOS.get(setup.model)
-    noun = "channel" if facts is not None and facts.bus == "maestro" else "servo"
-    return f"{setup.name} ({noun} {setup.id})" if setup.name else f"{noun} {setup.id}"

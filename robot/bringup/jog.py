@@ -11,8 +11,8 @@ what was really applied:
     finally:
         control.stop()
 
-Between two calls nothing is sent: the servos' own bus watchdog holds them, and the next
-call goes on from there.
+Between two calls nothing is sent: Dynamixel servos are held by their own bus watchdog, others
+stay at their last goal, and the next call goes on from there.
 """
 
 from collections.abc import Callable, Mapping

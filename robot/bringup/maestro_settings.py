@@ -7,9 +7,9 @@ kept in multiples of 16 us) and 4.e (serial settings).
 from collections.abc import Iterator, Sequence
 from math import ceil, floor
 
+from drivers.bus_journal import call
 from drivers.maestro_params import US_STEPS, MaestroParams
 from drivers.types import ServoSetup
-from robot.bringup.doctor_patient import name_servo
 
 FACTORY_US = (992, 2000)
 """Range of every channel of a new board."""
@@ -62,11 +62,11 @@ def clipped(setup: ServoSetup, asked_steps: float, got_steps: float) -> str:
     low, high = range_us(setup)
     if not got_steps:
         return (
-            f"{name_servo(setup)} gives no pulses: set its channel to Servo in Pololu's program; "
+            f"{call(setup)} gives no pulses: set its channel to Servo in Pololu's program; "
             "gazerig doctor names errors of the board"
         )
     sent, got = f"{asked_steps / US_STEPS:g} us", f"{got_steps / US_STEPS:g} us"
     return (
-        f"{name_servo(setup)} is sent to {sent} and the board stays at {got}: set its Min to "
+        f"{call(setup)} is sent to {sent} and the board stays at {got}: set its Min to "
         f"{low} and its Max to {high} in Pololu's program"
     )

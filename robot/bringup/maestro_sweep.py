@@ -8,13 +8,13 @@ happens.
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from drivers.bus_journal import call
 from drivers.errors import BusLost, ServoFault, ServoMissing
 from drivers.maestro_commands import MOST_INPUT, name_errors
 from drivers.maestro_hold import switch_off
 from drivers.maestro_line import Line
 from drivers.maestro_ramp import SPEED_STEPS_S, speed_units
 from drivers.types import ServoSetup
-from robot.bringup.doctor_patient import name_servo
 
 SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0
 """20 deg/s of the servo's shaft."""
@@ -52,7 +52,7 @@ def walk(
     """
     speech = line.speech
     if 0 < _pulse(line, setup) <= MOST_INPUT:
-        raise ServoMissing(f"{name_servo(setup)} is an input: set it to Servo in Pololu's program")
+        raise ServoMissing(f"{call(setup)} is an input: set it to Servo in Pololu's program")
     units = speed_units(speed_steps_s)
     line.send(speech.speed(setup.id, units) + speech.acceleration(setup.id, 0))
     gone: list[Place] = []
@@ -99,7 +99,7 @@ def _pulse(line: Line, setup: ServoSetup) -> int:
         if found is not None:
             return found[0]
     raise ServoMissing(
-        f"{line.port.port_name}: no answer about {name_servo(setup)}: check its cable"
+        f"{line.port.port_name}: no answer about {call(setup)}: check its cable"
     )
 
 
@@ -115,7 +115,7 @@ def _end(line: Line, setup: ServoSetup) -> None:
     except BusLost:
         sure = False
     if not sure:
-        raise ServoFault(f"{name_servo(setup)} may still get pulses: switch the servo supply off")
+        raise ServoFault(f"{call(setup)} may still get pulses: switch the servo supply off")
 
 
 def sent_home(line: Line) -> tuple[str, ...]:

@@ -6,10 +6,10 @@ both would make it worse.
 
 from collections.abc import Iterable, Sequence
 
+from drivers.bus_journal import call
 from drivers.errors import ServoMissing
 from drivers.serial_port import BusPort
 from drivers.types import ServoSetup
-from robot.bringup.doctor_patient import name_servo
 from robot.bringup.servo_kind import Found, ServoKind, SetUp, Tell
 
 SHARED, TRIES = 2, 6
@@ -69,7 +69,7 @@ def refuse_model(found: Found, kind: ServoKind, setup: ServoSetup, where: str) -
     """
     if found.number != kind.number(setup.model):
         raise ServoMissing(
-            f"{where}: this is {found.model}, {name_servo(setup)} wants {setup.model}: "
+            f"{where}: this is {found.model}, {call(setup)} wants {setup.model}: "
             "connect the right one, or correct the model in the YAML"
         )
 

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from config.save import copy_shipped, rig_file, save_rig
+from config.save import copy_shipped, propose, rig_file, save_rig
 from config.schema import Rig, load_rig
 from drivers.errors import SetupError
 from robot.bringup.single_joint import Stopped
@@ -77,6 +77,8 @@ def calibrate_joints(
             raise SetupError(f"--dry-run and {option} exclude each other: that is a write")
         if not dry_run:
             refuse_unwritable(rig, out)
+            if out is None:
+                _refuse_long_lists(rig, loaded, names)
         search = StopSearchParams(strength=strength)
         span_us = _span(pulses)
         how = How(by, margin, zero, search, clear_offset, set_middle, span_us, more)
@@ -104,6 +106,16 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
     return tuple(name for name in rig.names if not asked or name in asked)
+
+
+def _refuse_long_lists(rig: str, loaded: Rig, names: tuple[str, ...]) -> None:
+    """Find out before anything moves that places could not be written where they stand.
+
+    Raises:
+        config.load.ConfigError: a linkage is spread over several lines, which are kept.
+    """
+    joints = [n for n in names if loaded.joints[n].linkage or not loaded.joints[n].facts.measured]
+    propose(rig_file(rig), {f"joints.{name}.linkage": ((0, 0),) for name in joints})
 
 
 def _span(pulses: str) -> tuple[float, float]:

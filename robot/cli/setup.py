@@ -5,11 +5,11 @@ from typing import Annotated
 import typer
 
 from config.schema import Rig, load_rig
+from drivers.bus_journal import call
 from drivers.errors import DriverError, SetupError
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from robot.bringup import servo_setup as servo_setup
-from robot.bringup.doctor_patient import name_servo
 from robot.bringup.kinds import KINDS
 from robot.bringup.servo_kind import ServoKind
 from robot.cli.bench import YesOption, progress, to_open, wipe
@@ -86,7 +86,7 @@ def _chain(
     left = []
     for n, one in enumerate(setups, 1):
         say(
-            f"{n} of {len(setups)}: connect the {one.model} of {name_servo(one)}, and no other "
+            f"{n} of {len(setups)}: connect the {one.model} of {call(one)}, and no other "
             "servo"
         )
         if not _step(rig, bus, one, port, mock, yes):
@@ -136,7 +136,7 @@ def _set_up(line: BlockingPort, kind: ServoKind, wanted: ServoSetup, baud: int, 
     wipe()
     done = "; ".join(result.done) or "nothing to change"
     say(
-        f"   {name_servo(wanted)}: {done}; answers as id {result.now.id} at {result.now.baud} bit/s"
+        f"   {call(wanted)}: {done}; answers as id {result.now.id} at {result.now.baud} bit/s"
     )
     return True
 

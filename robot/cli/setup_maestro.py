@@ -11,6 +11,7 @@ from math import radians
 
 import typer
 
+from drivers.bus_journal import call
 from drivers.errors import DriverError, ServoFault, ServoMissing
 from drivers.maestro_line import Line
 from drivers.maestro_params import US_STEPS, MaestroParams
@@ -18,7 +19,6 @@ from drivers.maestro_probe import USB_CHANNELS
 from drivers.port_owner import POLOLU
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
-from robot.bringup.doctor_patient import name_servo
 from robot.bringup.maestro_settings import clipped, instructions
 from robot.bringup.maestro_sweep import FINE_STEPS, walk
 from robot.cli import bench as bench
@@ -61,7 +61,7 @@ def set_up_board(
     )
     left = []
     for n, setup in enumerate(setups, 1):
-        say(f"{n} of {len(setups)}: {name_servo(setup)}")
+        say(f"{n} of {len(setups)}: {call(setup)}")
         if not _channel(board, setup, joints[setup.name], yes):
             left.append(setup.name)
     return left
@@ -70,7 +70,7 @@ def set_up_board(
 def _refuse_size(setups: Sequence[ServoSetup], usb: str, where: str) -> None:
     """See that a board whose size its USB product tells has all the channels."""
     size = USB_CHANNELS.get(usb)
-    beyond = [name_servo(setup) for setup in setups if size is not None and setup.id >= size]
+    beyond = [call(setup) for setup in setups if size is not None and setup.id >= size]
     if beyond:
         raise ServoMissing(
             f"{where}: this board has channels 0..{(size or 0) - 1}, not those of "

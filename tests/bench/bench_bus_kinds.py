@@ -15,7 +15,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from statistics import median
 from typing import NamedTuple
 
@@ -40,6 +40,9 @@ IDS = (1, 2, 3, 4, 5, 6)
 BAUD = {"dynamixel": 1_000_000, "feetech": 1_000_000, "maestro": 115_200}
 MIXED = {"dynamixel": (1, 2), "feetech": (3, 4), "maestro": (5, 6)}
 
+Ports = Mapping[str, BusPort | str]
+"""By the kind of their bus: opened ones, or paths."""
+
 Tick = Callable[[int], int]
 """Reads all servos and writes goals; takes a number, gives how many values came."""
 
@@ -56,7 +59,7 @@ class Client(NamedTuple):
     name: str
     kinds: Mapping[str, tuple[int, ...]]
     reads: str
-    make: Callable[[Mapping[str, BusPort | str]], object]
+    make: Callable[[Ports], AbstractContextManager[Tick]]
     peer: str = ""
     in_process: bool = True
 
@@ -100,7 +103,8 @@ def ours(
 ) -> Iterator[Tick]:
     """Tick with our drivers, torque on."""
     opened = {k: BlockingPort(p) if isinstance(p, str) else p for k, p in ports.items()}
-    shares, goals = [], []
+    shares: list[Share] = []
+    goals: list[int] = []
     for kind, ids in kinds.items():
         places = tuple(range(len(goals), len(goals) + len(ids)))
         shares.append(Share(kind, driver(kind, opened[kind], ids), places))
@@ -123,7 +127,7 @@ def ours(
 
 
 @contextmanager
-def sdk(ports: Mapping[str, BusPort | str]) -> Iterator[Tick]:
+def sdk(ports: Ports) -> Iterator[Tick]:
     """ROBOTIS' SDK: fast sync read of 10 bytes, sync write."""
     given = ports["dynamixel"]
     port = PortHandler(given) if isinstance(given, str) else given
@@ -149,12 +153,15 @@ def sdk(ports: Mapping[str, BusPort | str]) -> Iterator[Tick]:
 
 
 @contextmanager
-def rusty(kind: str, ports: Mapping[str, BusPort | str]) -> Iterator[Tick]:
+def rusty(kind: str, ports: Ports) -> Iterator[Tick]:
     """rustypot: sync read of the position alone, sync write."""
-    make = Sts3215PyController if kind == "feetech" else Xl330PyController
-    client = make(ports[kind], BAUD[kind], 0.2)
-    if kind == "dynamixel":
-        client.set_fast_sync_read(True)
+    path = str(ports[kind])
+    client: Sts3215PyController | Xl330PyController
+    if kind == "feetech":
+        client = Sts3215PyController(path, BAUD[kind], 0.2)
+    else:
+        client = fast = Xl330PyController(path, BAUD[kind], 0.2)
+        fast.set_fast_sync_read(True)
     ids = list(IDS)
 
     def tick(k: int) -> int:
@@ -249,7 +256,7 @@ def in_process(rounds: int, ticks: int) -> dict[str, list[Spans]]:
                     )
                     for kind, ids in client.kinds.items()
                 }
-                tick = stack.enter_context(client.make(ports))  # type: ignore[arg-type]
+                tick = stack.enter_context(client.make(ports))
                 ticking[client.name] = (tick, count_of(client), step)
         return take_turns(ticking, rounds, ticks)
 
@@ -265,7 +272,7 @@ def over_terminals(rounds: int, ticks: int) -> dict[str, list[Spans]]:
                 paths[kind] = server.start_device(emulated(kind, ids), wire_time=True)
                 if client.peer:
                     _set_up(kind, paths[kind], ids)
-            tick = stack.enter_context(client.make(paths))  # type: ignore[arg-type]
+            tick = stack.enter_context(client.make(paths))
             ticking[client.name] = (tick, count_of(client), _no_wait)
         return take_turns(ticking, rounds, ticks)
 
