@@ -65,11 +65,15 @@ class Client(NamedTuple):
 
 
 class Spans(NamedTuple):
-    """Of one round: half and 99 % of ticks took no longer; processor time a tick."""
+    """Of one round: half and 99 % of ticks took no longer; processor time a tick; values lost.
+
+    A shared machine stops a server for longer than drivers wait, so some values are lost.
+    """
 
     p50_us: float
     p99_us: float
     cpu_us: float
+    lost: float
 
 
 # --- servos and drivers
@@ -204,18 +208,18 @@ def clients() -> list[Client]:
 
 def a_round(tick: Tick, ticks: int, count: int, step: Callable[[], None]) -> Spans:
     """Run one round; ``step`` lets time pass where a clock has to be moved."""
-    spans = []
+    spans, lost = [], 0
     cpu = time.process_time()
     for k in range(ticks):
         step()
         began = time.perf_counter()
         values = tick(k)
         spans.append(time.perf_counter() - began)
-        if values != count:
-            raise RuntimeError(f"{values} of {count} values came")
+        lost += count - values
     used = time.process_time() - cpu
     spans.sort()
-    return Spans(1e6 * spans[ticks // 2], 1e6 * spans[int(0.99 * (ticks - 1))], 1e6 * used / ticks)
+    p50_us, p99_us = (1e6 * spans[int(share * (ticks - 1))] for share in (0.5, 0.99))
+    return Spans(p50_us, p99_us, 1e6 * used / ticks, lost)
 
 
 def take_turns(
@@ -337,7 +341,9 @@ def main() -> None:
             mine = by_name[client.peer]["pty_cpu_us"][1]  # type: ignore[index]
             one["cpu_times_ours"] = round(one["pty_cpu_us"][1] / mine, 2)  # type: ignore[index]
         ratio = f"x {one['cpu_times_ours']}" if client.peer else ""
-        table.add_row(client.name, client.reads, *cells, ratio)
+        asked = chosen.rounds * chosen.ticks * count_of(client)
+        lost = f"{sum(spans.lost for spans in there[client.name]) / asked:.2%}"
+        table.add_row(client.name, client.reads, *cells, lost, ratio)
     out.print(table)
     print(json.dumps({"load": load, "rounds": chosen.rounds, "ticks": chosen.ticks, "rows": rows}))
 
