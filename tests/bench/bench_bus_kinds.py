@@ -330,6 +330,7 @@ def main() -> None:
         "pty p50",
         "pty p99",
         "pty CPU",
+        "lost",
         "CPU of ours",
     )
     for head in heads:
