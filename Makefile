@@ -24,6 +24,8 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_run.py
 	$(BIN)/python tests/bench/bench_gaze.py
 	$(BIN)/python tests/bench/bench_bus.py
+	$(BIN)/python tests/bench/bench_bus_kinds.py
+	$(BIN)/python tests/bench/bench_faults.py
 	$(BIN)/python tests/bench/bench_emulator.py
 	$(BIN)/python tests/bench/bench_motion.py
 	$(BIN)/python tests/bench/bench_camera.py

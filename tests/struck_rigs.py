@@ -10,6 +10,7 @@ from math import inf, pi, radians, sin
 from typing import NamedTuple
 
 from config.schema import Rig
+from drivers.bus_journal import call
 from robot.body import Body
 from robot.clock import SimulatedClock
 from robot.emulated_rig import emulated_lines, place_of
@@ -342,7 +343,7 @@ class Machine:
         for i, name in enumerate(self.names):
             if well[i]:
                 continue
-            if not any(f"{name} (servo" in line for line in said):
+            if not any(call(self.setups[i]) in line for line in said):
                 return f"{name} is not well and nobody says why"
             if self.clock.now_s() - self._fast_s[i] < 0.5:
                 return f"{name} is not well and moves fast"

@@ -12,6 +12,7 @@ from bus_kinds import KINDS, PLACES, SHARES, Twin, in_process, twin_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.bus_journal import call
 from drivers.errors import BusLost, PortError, ServoMissing
 
 TWINS = ("in-process", "pty")
@@ -127,7 +128,7 @@ def test_who_cannot_tell_his_place_goes_to_his_rest_and_that_is_said(here):
     limp = [line for line in told if "had no pulses: they go to their places at once" in line]
     assert len(limp) == any(hobby)
     for place, setup in enumerate(here.setups):
-        assert not any(hobby) or hobby[place] == (f"{setup.name} (servo {setup.id})" in limp[0])
+        assert not any(hobby) or hobby[place] == (call(setup) in limp[0])
     bus.release()
     bus.close()
 
@@ -258,8 +259,8 @@ def test_one_silent_servo_costs_only_itself(twin, held):
 
 def _says(bus, twin, place, what):
     """Tell whether the bus says something of a servo by its joint's name."""
-    name = twin.setups[place].name
-    return any(line.startswith(f"{name} (servo") and what in line for line in bus.events())
+    who = call(twin.setups[place])
+    return any(line.startswith(who) and what in line for line in bus.events())
 
 
 # --- a port goes away
@@ -428,7 +429,7 @@ def test_a_fault_is_named_with_its_joint_or_board(here):
         else:
             here.strike("overload", places[1])
             setup = here.setups[places[1]]
-            cause = f"{setup.name} (servo {setup.id}): overload"
+            cause = f"{call(setup)}: overload"
         readings = here.run(bus, 0.3, starts(here))
         assert any(fault.startswith(cause) for fault in bus.faults()), bus.faults()
         assert any(cause.split(": ")[1] in line for line in bus.events())
