@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from drivers.camera_params import CameraCareParams, WebcamParams
-from drivers.dynamixel import DynamixelParams
+from drivers.dynamixel.bus import DynamixelParams
 from drivers.face_params import FaceDetectorParams
-from drivers.feetech_params import FeetechParams
-from drivers.maestro_params import MaestroParams
+from drivers.feetech.params import FeetechParams
+from drivers.maestro.params import MaestroParams
 from drivers.motion_params import MotionParams
 from drivers.oak_params import OakParams
 from drivers.servo_models import BUS_KINDS

@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from drivers.maestro_params import HOBBY
+from drivers.maestro.params import HOBBY
 from drivers.types import ServoSetup
 
 MOST = 200

@@ -14,7 +14,7 @@ from serial import Serial, SerialException
 from serial.tools import list_ports
 
 from drivers.errors import BusLost, PortError
-from drivers.feetech_table import BAUD_RATES as FEETECH_RATES
+from drivers.feetech.table import BAUD_RATES as FEETECH_RATES
 
 BITS_PER_BYTE = 10
 SDK_MARGIN_S = 0.034

@@ -3,10 +3,10 @@
 from math import inf
 from typing import Literal, NamedTuple, get_args
 
-from drivers.dynamixel_table import MODELS as DYNAMIXEL
-from drivers.dynamixel_table import STEPS_PER_TURN
-from drivers.feetech_table import MODELS as FEETECH
-from drivers.maestro_params import HOBBY, US_STEPS
+from drivers.dynamixel.table import MODELS as DYNAMIXEL
+from drivers.dynamixel.table import STEPS_PER_TURN
+from drivers.feetech.table import MODELS as FEETECH
+from drivers.maestro.params import HOBBY, US_STEPS
 
 BusKind = Literal["dynamixel", "feetech", "maestro"]
 BUS_KINDS: tuple[BusKind, ...] = get_args(BusKind)

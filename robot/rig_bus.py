@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 
 from config.schema import Rig
-from drivers.dynamixel import DynamixelBus
+from drivers.dynamixel.bus import DynamixelBus
 from drivers.errors import SetupError
-from drivers.feetech import FeetechBus
-from drivers.maestro import MaestroBus
+from drivers.feetech.bus import FeetechBus
+from drivers.maestro.bus import MaestroBus
 from drivers.mixed_bus import MixedBus, Share
 from drivers.serial_port import BusPort
 from drivers.types import ServoBus, ServoSetup

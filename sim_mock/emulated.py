@@ -4,17 +4,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar
 
-from drivers.dynamixel_table import BAUD_RATES as DYNAMIXEL_BAUDS
-from drivers.feetech_table import BAUD_RATES as FEETECH_BAUDS
-from drivers.maestro_params import MaestroParams
+from drivers.dynamixel.table import BAUD_RATES as DYNAMIXEL_BAUDS
+from drivers.feetech.table import BAUD_RATES as FEETECH_BAUDS
+from drivers.maestro.params import MaestroParams
 from drivers.servo_models import BusKind
-from sim_mock import maestro_settings, servo_habits, sts_habits
+from sim_mock import servo_habits
 from sim_mock.device import Device
 from sim_mock.hobby_servo import HobbySpec
-from sim_mock.maestro_board import build_board
+from sim_mock.maestro import settings as maestro_settings
+from sim_mock.maestro.board import build_board
 from sim_mock.servo_chain import build_chain
 from sim_mock.servo_physics import Physics, Quirks, ServoSpec
-from sim_mock.sts_chain import build_sts
+from sim_mock.sts import habits as sts_habits
+from sim_mock.sts.chain import build_sts
 
 CASES: dict[BusKind, dict[str, str]] = {
     "dynamixel": servo_habits.cases(),

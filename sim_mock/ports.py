@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 from dynamixel_sdk import PortHandler
 
-from drivers.dynamixel_table import BAUD_RATES as DYNAMIXEL_BAUDS
+from drivers.dynamixel.table import BAUD_RATES as DYNAMIXEL_BAUDS
 from drivers.errors import BusLost, PortError
-from drivers.feetech_table import BAUD_RATES as FEETECH_BAUDS
+from drivers.feetech.table import BAUD_RATES as FEETECH_BAUDS
 from sim_mock.device import Device
 from sim_mock.servo_line import ServoLine
 

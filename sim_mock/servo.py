@@ -7,7 +7,7 @@ voltage in servo_protection; every physical number in servo_physics. What it doe
 play inside the gear, a blinking LED, the RC, S.Bus and iBus protocols of register 13.
 """
 
-from drivers.dynamixel_table import (
+from drivers.dynamixel.table import (
     BACKUP_SINCE,
     BAUD_RATES,
     FAST_READ_SINCE,

@@ -7,7 +7,7 @@ e-Manual, Protocol 2.0 and X series.
 
 from collections.abc import Callable, Iterable, Sequence
 
-from drivers.dynamixel_table import BAUD_RATES, EEPROM_END
+from drivers.dynamixel.table import BAUD_RATES, EEPROM_END
 from sim_mock.device import Reply
 from sim_mock.fault_commands import COMMANDS
 from sim_mock.servo import Servo, ServoSpec

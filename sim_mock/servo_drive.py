@@ -6,7 +6,7 @@ sim_mock.servo. The registers' position is ``side * shaft.x + shift``.
 
 from typing import NamedTuple
 
-from drivers.dynamixel_table import (
+from drivers.dynamixel.table import (
     ACCELERATION_UNIT_STEPS_S2,
     GAINS,
     PWM_FULL,

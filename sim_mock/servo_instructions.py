@@ -6,7 +6,7 @@ Source: ROBOTIS e-Manual, Protocol 2.0.
 import struct
 from collections.abc import Callable
 
-from drivers.dynamixel_table import EEPROM_END
+from drivers.dynamixel.table import EEPROM_END
 from sim_mock.servo import Servo
 from sim_mock.servo_memory import ACCESS, DATA_RANGE, INSTRUCTION_ERROR
 

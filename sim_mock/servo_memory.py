@@ -7,7 +7,7 @@ lock, limit registers, watchdog) is asked by sim_mock.servo.
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from drivers.dynamixel_table import (
+from drivers.dynamixel.table import (
     EEPROM_END,
     IndirectBlock,
     Model,

@@ -9,7 +9,7 @@ comes out is in units of PWM (885 are 100 %).
 from collections.abc import Callable
 from math import inf
 
-from drivers.dynamixel_table import PWM_FULL, VELOCITY_UNIT_STEPS_S, Model
+from drivers.dynamixel.table import PWM_FULL, VELOCITY_UNIT_STEPS_S, Model
 from sim_mock.servo_motion import Loop
 
 CURRENT, VELOCITY, POSITION, EXTENDED, CURRENT_POSITION, PWM = 0, 1, 3, 4, 5, 16

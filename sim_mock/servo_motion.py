@@ -10,7 +10,7 @@ is read does not depend on how often it is read.
 from math import inf, pi, sin
 from typing import NamedTuple, Protocol
 
-from drivers.dynamixel_table import STEPS_PER_TURN
+from drivers.dynamixel.table import STEPS_PER_TURN
 from sim_mock.servo_physics import Physics
 from sim_mock.servo_profile import Profile, SpeedProfile
 

@@ -1,7 +1,7 @@
 """What an emulated servo is made of and how it is built: every physical number has its place here.
 
 Stall torque, stall current and no-load speed are the model's own and stand in
-drivers.dynamixel_table. What no data sheet tells is an assumption, marked [A]; what follows
+drivers.dynamixel.table. What no data sheet tells is an assumption, marked [A]; what follows
 from a report of users, [R].
 """
 

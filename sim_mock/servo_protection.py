@@ -4,7 +4,7 @@ Looked at every 20 ms of its own time, so the result does not depend on how ofte
 asked. Thresholds and times that no data sheet tells are in sim_mock.servo_physics.
 """
 
-from drivers.dynamixel_table import HARDWARE_ERRORS, Model
+from drivers.dynamixel.table import HARDWARE_ERRORS, Model
 from sim_mock.servo_physics import Physics
 
 LOOK_MS = 20

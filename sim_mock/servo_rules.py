@@ -1,6 +1,6 @@
 """What an emulated servo lets be written now: EEPROM lock, modes, limits, tripped watchdog."""
 
-from drivers.dynamixel_table import EEPROM_END, Model, Register
+from drivers.dynamixel.table import EEPROM_END, Model, Register
 from sim_mock.servo_drive import TRIPPED, Drive
 from sim_mock.servo_memory import ACCESS, DATA_LIMIT, DATA_RANGE, Fields, Memory
 from sim_mock.servo_modes import POSITION, modes_of

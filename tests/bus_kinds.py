@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from drivers.dynamixel import DynamixelBus, DynamixelParams
-from drivers.feetech import FeetechBus, FeetechParams
-from drivers.maestro import MaestroBus, MaestroParams
-from drivers.maestro_commands import Speech
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from drivers.feetech.bus import FeetechBus, FeetechParams
+from drivers.maestro.bus import MaestroBus, MaestroParams
+from drivers.maestro.commands import Speech
 from drivers.mixed_bus import MixedBus, Share
 from drivers.serial_port import BlockingPort, BusPort
 from drivers.types import ServoBus, ServoReading, ServoSetup

@@ -19,7 +19,7 @@ from robot.rig_bus import rig_bus, rig_setups
 from robot.safety.guard import Guard
 from sim_mock.device import Device
 from sim_mock.emulated import build
-from sim_mock.maestro_board import MaestroBoard
+from sim_mock.maestro.board import MaestroBoard
 from sim_mock.ports import InProcessPort
 
 STRUCK_S, PATIENCE_S = 1.0, 3.0

@@ -1,10 +1,10 @@
 """Four moving STS servos in this process on a line whose time passes as it is waited for."""
 
-from drivers.feetech import FeetechBus, FeetechParams
+from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.types import ServoSetup
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_physics import ServoSpec
-from sim_mock.sts_chain import build_sts
+from sim_mock.sts.chain import build_sts
 
 IDS = (1, 2, 3, 4)
 NAMES = ("eye", "jaw", "neck", "lid")

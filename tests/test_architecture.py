@@ -60,7 +60,7 @@ TOP = {
 # Vendor packages, and the only modules that may see each.
 OWNERS = {
     "serial": ("drivers.serial_port", "sim_mock.ports"),
-    "dynamixel_sdk": ("drivers.dynamixel", "drivers.serial_port", "sim_mock.ports"),
+    "dynamixel_sdk": ("drivers.dynamixel.", "drivers.serial_port", "sim_mock.ports"),
     "depthai": ("drivers.oak_sdk",),
     "mcap": ("drivers.recording_", "robot.recording."),
     "zstandard": ("robot.recording.",),

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from drivers.bus_journal import MOST, Journal, call, title
 from drivers.bus_patience import WINDOW, Patience
 from drivers.bus_reconnect import Reconnect
-from drivers.dynamixel_health import AGAIN_AND_AGAIN, Health
-from drivers.dynamixel_table import MODELS, indirect_blocks
-from drivers.dynamixel_views import (
+from drivers.dynamixel.health import AGAIN_AND_AGAIN, Health
+from drivers.dynamixel.table import MODELS, indirect_blocks
+from drivers.dynamixel.views import (
     CALM_S,
     INDIRECT_MAP,
     alone_turns,

@@ -9,7 +9,7 @@ from desk import JOINTS
 from typer.testing import CliRunner
 
 from config.save import copy_shipped, save_rig
-from drivers.dynamixel_registers import Registers
+from drivers.dynamixel.registers import Registers
 from drivers.serial_port import BlockingPort
 from drivers.serial_ports import Host, SerialPort
 from robot.cli import bench

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.dynamixel_scan import Found
+from drivers.dynamixel.scan import Found
 from drivers.errors import PortError
 from drivers.serial_ports import Access, Host, SerialPort
 from drivers.types import ServoSetup

@@ -2,9 +2,9 @@
 
 import pytest
 
-from drivers.feetech_registers import StsRegisters
-from drivers.feetech_scan import Found
-from drivers.feetech_table import REGISTERS, TABLE_END
+from drivers.feetech.registers import StsRegisters
+from drivers.feetech.scan import Found
+from drivers.feetech.table import REGISTERS, TABLE_END
 from drivers.types import ServoSetup
 from robot.bringup.checkup import check, mend
 from robot.bringup.doctor_feetech import examine, take
@@ -13,7 +13,7 @@ from robot.bringup.findings import worst
 from robot.bringup.kinds import FEETECH
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_physics import ServoSpec
-from sim_mock.sts_chain import build_sts
+from sim_mock.sts.chain import build_sts
 
 BAUD = 1_000_000
 SETUPS = (

@@ -3,8 +3,8 @@
 import pytest
 
 from drivers.errors import ServoMissing
-from drivers.maestro_line import Line
-from drivers.maestro_params import MaestroParams
+from drivers.maestro.line import Line
+from drivers.maestro.params import MaestroParams
 from drivers.types import ServoSetup
 from robot.bringup.checkup import mend
 from robot.bringup.doctor_maestro import mend as mend_board
@@ -12,7 +12,7 @@ from robot.bringup.doctor_maestro import visit
 from robot.bringup.findings import worst
 from robot.bringup.maestro_settings import clipped, instructions, range_us, wide_range
 from robot.bringup.maestro_sweep import sent_home
-from sim_mock.maestro_board import build_board
+from sim_mock.maestro.board import build_board
 from sim_mock.ports import InProcessPort
 
 PAN = ServoSetup(0, "hobby", 4400, 7600, 9000.0, "eyes_pan", rest_steps=6000)

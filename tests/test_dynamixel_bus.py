@@ -7,8 +7,8 @@ from typing import NamedTuple
 import pytest
 from dynamixel_sdk import PacketHandler
 
-from drivers.dynamixel import DynamixelBus, DynamixelParams
-from drivers.dynamixel_packets import instruction
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from drivers.dynamixel.packets import instruction
 from drivers.errors import ServoMissing
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.dynamixel import DynamixelBus, DynamixelParams
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
 from sim_mock.ports import InProcessPort
 from sim_mock.servo import ServoSpec

@@ -4,8 +4,8 @@ import struct
 
 import pytest
 
-from drivers.dynamixel import DynamixelBus, DynamixelParams
-from drivers.dynamixel_packets import instruction
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from drivers.dynamixel.packets import instruction
 from drivers.errors import BusLost, ServoFault, ServoMissing
 from drivers.types import ServoSetup
 from sim_mock.ports import InProcessPort

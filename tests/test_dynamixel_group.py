@@ -5,8 +5,8 @@ import struct
 import pytest
 
 from drivers.bus_roll import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
-from drivers.dynamixel_group import FastGroup, PlainGroup
-from drivers.dynamixel_views import DIRECT, direct_turns
+from drivers.dynamixel.group import FastGroup, PlainGroup
+from drivers.dynamixel.views import DIRECT, direct_turns
 from sim_mock.servo_chain import build_chain, status
 
 IDS = (4, 1, 9)

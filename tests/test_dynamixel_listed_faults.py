@@ -49,8 +49,8 @@ import json
 
 import pytest
 
-from drivers.dynamixel import DynamixelBus, DynamixelParams
-from drivers.dynamixel_health import AGAIN_AND_AGAIN
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from drivers.dynamixel.health import AGAIN_AND_AGAIN
 from drivers.errors import BusLost, PortError, ServoMissing
 from drivers.types import ServoSetup
 from sim_mock.ports import InProcessPort

@@ -5,7 +5,7 @@ import struct
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.dynamixel_packets import (
+from drivers.dynamixel.packets import (
     SyncWrite,
     bytes_missing,
     instruction,

@@ -26,9 +26,9 @@ from itertools import pairwise
 import pytest
 from dynamixel_sdk import COMM_SUCCESS
 
-from drivers.dynamixel_packets import instruction, statuses
-from drivers.dynamixel_registers import Identity, Registers
-from drivers.dynamixel_sdk_packets import SdkPackets
+from drivers.dynamixel.packets import instruction, statuses
+from drivers.dynamixel.registers import Identity, Registers
+from drivers.dynamixel.sdk_packets import SdkPackets
 from drivers.errors import BusLost
 from sim_mock.ports import InProcessPort
 from sim_mock.servo import ServoSpec

@@ -3,9 +3,9 @@
 import pytest
 from dynamixel_sdk import PacketHandler
 
-from drivers.dynamixel import DynamixelBus, DynamixelParams
-from drivers.dynamixel_packets import HEADER
-from drivers.dynamixel_registers import Registers
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from drivers.dynamixel.packets import HEADER
+from drivers.dynamixel.registers import Registers
 from drivers.errors import PortError, ServoMissing
 from drivers.types import ServoSetup
 from sim_mock.ports import InProcessPort

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sts_rig import IDS, Rig
 
 from drivers.errors import ServoFault, ServoMissing
-from drivers.feetech import FeetechBus, FeetechParams
+from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from sim_mock.emulated import StsLine

@@ -10,9 +10,9 @@ import random
 import pytest
 from sts_rig import IDS, NAMES, Rig
 
-from drivers.dynamixel_health import AGAIN_AND_AGAIN
+from drivers.dynamixel.health import AGAIN_AND_AGAIN
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
-from drivers.feetech_revival import FAR_SIDE
+from drivers.feetech.revival import FAR_SIDE
 from drivers.types import ServoSetup
 from sim_mock.servo_physics import ServoSpec
 

@@ -4,11 +4,11 @@ import struct
 
 import pytest
 
-from drivers.feetech_group import Group
-from drivers.feetech_packets import checksum
-from drivers.feetech_reader import Heard
-from drivers.feetech_readings import LEAP_STEPS, Readings
-from drivers.feetech_views import ARMED, SENSED, View, alone_turns, together_turns
+from drivers.feetech.group import Group
+from drivers.feetech.packets import checksum
+from drivers.feetech.reader import Heard
+from drivers.feetech.readings import LEAP_STEPS, Readings
+from drivers.feetech.views import ARMED, SENSED, View, alone_turns, together_turns
 from drivers.types import ServoSetup
 
 BLOCK = struct.pack("<HHHBBBBB2xH", 0x8006, 0x8064, 0x052C, 74, 31, 0, 0x20, 1, 0x8002)

@@ -4,11 +4,11 @@ import pytest
 from sts_rig import Rig
 
 from drivers.errors import ServoFault, ServoMissing
-from drivers.feetech_assign import assign
-from drivers.feetech_middle import set_middle
-from drivers.feetech_registers import Identity, StsRegisters
-from drivers.feetech_scan import Found, everybody, garbled, ping, scan
-from drivers.feetech_table import BAUD_RATES
+from drivers.feetech.assign import assign
+from drivers.feetech.middle import set_middle
+from drivers.feetech.registers import Identity, StsRegisters
+from drivers.feetech.scan import Found, everybody, garbled, ping, scan
+from drivers.feetech.table import BAUD_RATES
 from sim_mock.servo_physics import ServoSpec
 
 

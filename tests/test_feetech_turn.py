@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.feetech_turn import lost, nearest_turn
+from drivers.feetech.turn import lost, nearest_turn
 
 STEPS = st.integers(-40000, 40000)
 RANGE = st.tuples(st.integers(0, 4095), st.integers(0, 4095)).map(lambda pair: tuple(sorted(pair)))

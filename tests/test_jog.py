@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.schema import Rig, load_rig
-from drivers.dynamixel import DynamixelBus
+from drivers.dynamixel.bus import DynamixelBus
 from drivers.errors import SetupError
 from robot.assemble import gaze_parts
 from robot.body import Body

@@ -8,8 +8,8 @@ import pytest
 from mixed_rig import mixed_text
 
 from config.schema import Rig, load_rig
-from drivers.dynamixel_registers import Registers
-from drivers.feetech_registers import StsRegisters
+from drivers.dynamixel.registers import Registers
+from drivers.feetech.registers import StsRegisters
 from robot.bringup.looks import DynamixelLooks, FeetechLooks, Look, MaestroLooks, look_at_pulse
 from robot.bringup.monitor import Monitor, as_json
 from robot.clock import SimulatedClock

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.maestro import MaestroBus, MaestroParams
+from drivers.maestro.bus import MaestroBus, MaestroParams
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from sim_mock.emulated import MaestroLine
-from sim_mock.maestro_board import build_board
+from sim_mock.maestro.board import build_board
 from sim_mock.ports import InProcessPort
 from sim_mock.pty_bus import PtyBus
 

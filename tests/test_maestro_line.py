@@ -2,10 +2,10 @@
 
 import pytest
 
-from drivers.maestro_channel import Channel
-from drivers.maestro_commands import Speech
-from drivers.maestro_line import Line
-from drivers.maestro_params import MaestroParams
+from drivers.maestro.channel import Channel
+from drivers.maestro.commands import Speech
+from drivers.maestro.line import Line
+from drivers.maestro.params import MaestroParams
 from drivers.types import ServoSetup
 
 SETUP = ServoSetup(3, "hobby", 4400, 7600, 12_000.0)

@@ -3,9 +3,9 @@
 import pytest
 from numpy.random import default_rng
 
-from drivers.maestro import MaestroBus, MaestroParams
+from drivers.maestro.bus import MaestroBus, MaestroParams
 from drivers.types import ServoSetup
-from sim_mock.maestro_board import build_board
+from sim_mock.maestro.board import build_board
 from sim_mock.ports import InProcessPort
 
 SPEED = 12_000.0

@@ -3,9 +3,9 @@
 import pytest
 
 from drivers.errors import PortError
-from drivers.maestro_params import MaestroParams
-from drivers.maestro_probe import USB_CHANNELS, probe
-from sim_mock.maestro_board import build_board
+from drivers.maestro.params import MaestroParams
+from drivers.maestro.probe import USB_CHANNELS, probe
+from sim_mock.maestro.board import build_board
 from sim_mock.ports import InProcessPort
 
 

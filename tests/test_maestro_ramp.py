@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.maestro_ramp import Ramp, accel_units, speed_units
+from drivers.maestro.ramp import Ramp, accel_units, speed_units
 
 
 def moved(ramp, goal, seconds, tick_s=0.01):

@@ -6,8 +6,8 @@ from math import radians
 
 import pytest
 
-from drivers.dynamixel_registers import Registers
-from drivers.dynamixel_table import MODELS
+from drivers.dynamixel.registers import Registers
+from drivers.dynamixel.table import MODELS
 from robot.bringup.looks import DynamixelLooks, load_share, look
 from robot.bringup.monitor import Monitor, as_json
 from robot.clock import SimulatedClock

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from drivers.errors import BusLost, ServoFault, ServoMissing
-from drivers.feetech_registers import StsRegisters
+from drivers.feetech.registers import StsRegisters
 from robot.bringup.one_feetech import OneFeetech
 from robot.bringup.single_joint import SingleJoint, Stopped
 from robot.calibrate.calibrating import by_hand, by_motion
@@ -17,7 +17,7 @@ from robot.clock import SimulatedClock
 from robot.joint import JointParams
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_physics import Physics, ServoSpec
-from sim_mock.sts_chain import build_sts
+from sim_mock.sts.chain import build_sts
 
 EYE = JointParams(3, "sts3215", -35.0, 35.0, 300.0, 20000.0)
 GENTLY = StopSearchParams()

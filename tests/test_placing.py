@@ -7,7 +7,7 @@ import pytest
 
 from config.schema import load_rig
 from drivers.errors import BusLost, ServoMissing
-from drivers.maestro_params import MaestroParams
+from drivers.maestro.params import MaestroParams
 from robot.bringup.one_hobby import SPEED_US_S, OneHobby
 from robot.bringup.single_joint import Stopped
 from robot.calibrate.calibration import CalibrationRefused

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.dynamixel_table import MODELS, indirect_blocks, registers_of
+from drivers.dynamixel.table import MODELS, indirect_blocks, registers_of
 from sim_mock.servo import Servo, ServoSpec
 from sim_mock.servo_memory import ACCESS, DATA_LENGTH, DATA_RANGE, Memory
 

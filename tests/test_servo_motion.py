@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.dynamixel_table import MODELS
+from drivers.dynamixel.table import MODELS
 from sim_mock.servo_motion import LIMP, Loop, Shaft
 from sim_mock.servo_physics import Physics, checked
 

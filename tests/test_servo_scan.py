@@ -2,7 +2,7 @@
 
 import os
 
-from drivers.dynamixel_scan import (
+from drivers.dynamixel.scan import (
     COMMON_FIRST,
     Found,
     ask_one,
@@ -13,7 +13,7 @@ from drivers.dynamixel_scan import (
     ping,
     scan,
 )
-from drivers.dynamixel_table import BAUD_RATES
+from drivers.dynamixel.table import BAUD_RATES
 from drivers.serial_ports import (
     Host,
     access,

@@ -2,8 +2,8 @@
 
 import pytest
 
-from drivers.dynamixel_scan import COMMON_FIRST, Found
-from drivers.dynamixel_table import BAUD_RATES
+from drivers.dynamixel.scan import COMMON_FIRST, Found
+from drivers.dynamixel.table import BAUD_RATES
 from drivers.errors import PortError, ServoFault, ServoMissing
 from drivers.types import ServoSetup
 from robot.bringup.kinds import DYNAMIXEL

@@ -11,7 +11,7 @@ from robot.bringup.servo_setup import assign, find_alone, search_order
 from sim_mock.ports import InProcessPort
 from sim_mock.servo_chain import build_chain
 from sim_mock.servo_physics import ServoSpec
-from sim_mock.sts_chain import build_sts
+from sim_mock.sts.chain import build_sts
 
 BAUD = 1_000_000
 YAW = ServoSetup(7, "sts3215", 1252, 2844, 2000.0, "neck_yaw")

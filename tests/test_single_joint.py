@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.dynamixel_registers import Registers
+from drivers.dynamixel.registers import Registers
 from drivers.errors import BusLost, ServoFault, ServoMissing
 from robot.bringup.one_dynamixel import OneDynamixel
 from robot.bringup.single_joint import SingleJoint, Stopped

@@ -1,13 +1,13 @@
 """What is wrong with a servo: registers as read, judged by the rig's YAML. Nothing is written.
 
 Every rule is a function of one ``Patient`` and yields verdicts. Sources: ROBOTIS e-Manual,
-X series; the numbers are those of drivers.dynamixel_table.
+X series; the numbers are those of drivers.dynamixel.table.
 """
 
 from collections.abc import Iterator
 
-from drivers.dynamixel_registers import Registers
-from drivers.dynamixel_scan import SHARED
+from drivers.dynamixel.registers import Registers
+from drivers.dynamixel.scan import SHARED
 from drivers.serial_port import BusPort
 from drivers.types import ServoSetup
 from robot.bringup.doctor_patient import Patient, Verdict

@@ -1,14 +1,14 @@
 """What is wrong with an STS servo: registers as read, judged by the rig's YAML.
 
 Nothing is written. Every rule is a function of one ``StsPatient`` and yields verdicts.
-Sources: Feetech, memory table STS3215; the numbers are those of drivers.feetech_table.
+Sources: Feetech, memory table STS3215; the numbers are those of drivers.feetech.table.
 """
 
 from collections.abc import Iterator
 
-from drivers.feetech_registers import StsRegisters
-from drivers.feetech_scan import SHARED
-from drivers.feetech_table import EEPROM_END, REGISTERS
+from drivers.feetech.registers import StsRegisters
+from drivers.feetech.scan import SHARED
+from drivers.feetech.table import EEPROM_END, REGISTERS
 from drivers.serial_port import BusPort
 from drivers.types import ServoSetup
 from robot.bringup.doctor_feetech_patient import StsPatient, StsRule

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from drivers.bus_journal import call
-from drivers.feetech_table import MODELS, FeetechModel
+from drivers.feetech.table import MODELS, FeetechModel
 from drivers.types import ServoSetup
 from robot.bringup.doctor_patient import Verdict
 from robot.bringup.servo_kind import Found

@@ -6,7 +6,7 @@ Source: Feetech, memory table STS3215.
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from drivers.feetech_table import (
+from drivers.feetech.table import (
     BAUD_RATES,
     MULTI_TURN,
     RETURN_DELAY_UNIT_S,

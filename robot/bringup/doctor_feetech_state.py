@@ -7,7 +7,7 @@ Source: Feetech, memory table STS3215, registers 13..15, 19, 34..36, 40, 55, 62,
 
 from collections.abc import Iterator
 
-from drivers.feetech_table import name_errors
+from drivers.feetech.table import name_errors
 from robot.bringup.doctor_feetech_patient import StsPatient, StsRule
 from robot.bringup.doctor_patient import Verdict
 from robot.bringup.findings import Level

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from drivers.bus_journal import call
-from drivers.dynamixel_table import MODELS, Model
+from drivers.dynamixel.table import MODELS, Model
 from drivers.types import ServoSetup
 from robot.bringup.findings import Level
 from robot.bringup.servo_kind import Found

@@ -6,7 +6,7 @@ Source: ROBOTIS e-Manual, X series.
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from drivers.dynamixel_table import (
+from drivers.dynamixel.table import (
     BAUD_RATES,
     FAST_READ_SINCE,
     HARDWARE_ERRORS,

@@ -5,7 +5,7 @@ Source: ROBOTIS e-Manual, X series.
 
 from collections.abc import Iterator
 
-from drivers.dynamixel_table import name_errors
+from drivers.dynamixel.table import name_errors
 from robot.bringup.doctor_patient import Patient, Rule, Verdict
 from robot.bringup.findings import Level
 

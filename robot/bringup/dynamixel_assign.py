@@ -3,9 +3,9 @@
 Source: ROBOTIS e-Manual (ID and Baud Rate act after the status of their own write).
 """
 
-from drivers.dynamixel_registers import Registers
-from drivers.dynamixel_scan import Found, ping
-from drivers.dynamixel_table import BAUD_RATES
+from drivers.dynamixel.registers import Registers
+from drivers.dynamixel.scan import Found, ping
+from drivers.dynamixel.table import BAUD_RATES
 from drivers.errors import PortError, ServoFault, ServoMissing
 from drivers.serial_port import BusPort
 from drivers.types import ServoSetup

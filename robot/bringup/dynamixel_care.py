@@ -1,7 +1,7 @@
 """Single Dynamixel servos in bring-up: how one stands, and one fix written."""
 
-from drivers.dynamixel_registers import Registers
-from drivers.dynamixel_table import name_errors
+from drivers.dynamixel.registers import Registers
+from drivers.dynamixel.table import name_errors
 from drivers.serial_port import BusPort
 from robot.bringup.findings import Fix
 from robot.bringup.servo_kind import Standing

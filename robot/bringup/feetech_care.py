@@ -1,8 +1,8 @@
 """Single STS servos in bring-up: how one stands, one fix written, a restart."""
 
-from drivers.feetech_packets import REBOOT, instruction
-from drivers.feetech_registers import StsRegisters
-from drivers.feetech_table import REGISTERS, name_errors
+from drivers.feetech.packets import REBOOT, instruction
+from drivers.feetech.registers import StsRegisters
+from drivers.feetech.table import REGISTERS, name_errors
 from drivers.serial_port import BusPort
 from robot.bringup.findings import Fix
 from robot.bringup.servo_kind import Standing

@@ -1,8 +1,10 @@
 """The kinds of smart servos, each as bring-up deals with it."""
 
-from drivers import dynamixel_scan, feetech_assign, feetech_scan
-from drivers.dynamixel_table import MODELS as DYNAMIXEL_MODELS
-from drivers.feetech_table import MODELS as FEETECH_MODELS
+from drivers.dynamixel import scan as dynamixel_scan
+from drivers.dynamixel.table import MODELS as DYNAMIXEL_MODELS
+from drivers.feetech import assign as feetech_assign
+from drivers.feetech import scan as feetech_scan
+from drivers.feetech.table import MODELS as FEETECH_MODELS
 from drivers.serial_port import BusPort
 from drivers.types import ServoSetup
 from robot.bringup import doctor, doctor_feetech, dynamixel_assign, dynamixel_care, feetech_care

@@ -10,18 +10,18 @@ from dataclasses import replace
 from math import degrees
 from typing import NamedTuple, Protocol
 
-from drivers.dynamixel_registers import Registers
-from drivers.dynamixel_table import MODELS as DYNAMIXEL
-from drivers.dynamixel_table import REGISTERS, VELOCITY_UNIT_STEPS_S, Model
-from drivers.dynamixel_table import name_errors as name_dynamixel
-from drivers.feetech_registers import StsRegisters
-from drivers.feetech_table import LOAD_UNIT
-from drivers.feetech_table import REGISTERS as STS
-from drivers.feetech_table import name_errors as name_feetech
-from drivers.feetech_views import ARMED
-from drivers.maestro_commands import MOST_INPUT
-from drivers.maestro_line import Line
-from drivers.maestro_params import US_STEPS, MaestroParams
+from drivers.dynamixel.registers import Registers
+from drivers.dynamixel.table import MODELS as DYNAMIXEL
+from drivers.dynamixel.table import REGISTERS, VELOCITY_UNIT_STEPS_S, Model
+from drivers.dynamixel.table import name_errors as name_dynamixel
+from drivers.feetech.registers import StsRegisters
+from drivers.feetech.table import LOAD_UNIT
+from drivers.feetech.table import REGISTERS as STS
+from drivers.feetech.table import name_errors as name_feetech
+from drivers.feetech.views import ARMED
+from drivers.maestro.commands import MOST_INPUT
+from drivers.maestro.line import Line
+from drivers.maestro.params import US_STEPS, MaestroParams
 from drivers.serial_port import BusPort
 from robot.joint import JointParams
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from math import ceil, floor
 
 from drivers.bus_journal import call
-from drivers.maestro_params import US_STEPS, MaestroParams
+from drivers.maestro.params import US_STEPS, MaestroParams
 from drivers.types import ServoSetup
 
 FACTORY_US = (992, 2000)

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from drivers.bus_journal import call
 from drivers.errors import BusLost, ServoFault, ServoMissing
-from drivers.maestro_commands import MOST_INPUT, name_errors
-from drivers.maestro_hold import switch_off
-from drivers.maestro_line import Line
-from drivers.maestro_ramp import SPEED_STEPS_S, speed_units
+from drivers.maestro.commands import MOST_INPUT, name_errors
+from drivers.maestro.hold import switch_off
+from drivers.maestro.line import Line
+from drivers.maestro.ramp import SPEED_STEPS_S, speed_units
 from drivers.types import ServoSetup
 
 SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0
@@ -98,9 +98,7 @@ def _pulse(line: Line, setup: ServoSetup) -> int:
         found = line.pulses((setup.id,))
         if found is not None:
             return found[0]
-    raise ServoMissing(
-        f"{line.port.port_name}: no answer about {call(setup)}: check its cable"
-    )
+    raise ServoMissing(f"{line.port.port_name}: no answer about {call(setup)}: check its cable")
 
 
 def _end(line: Line, setup: ServoSetup) -> None:

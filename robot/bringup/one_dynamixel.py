@@ -3,8 +3,8 @@
 The bus watchdog is armed while the torque is on, so a servo that is left alone stops.
 """
 
-from drivers.dynamixel_registers import Registers
-from drivers.dynamixel_table import (
+from drivers.dynamixel.registers import Registers
+from drivers.dynamixel.table import (
     MODELS,
     STEPS_PER_TURN,
     VELOCITY_UNIT_STEPS_S,

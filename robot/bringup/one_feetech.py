@@ -5,9 +5,9 @@ ones, so switching it off and on puts back what a killed program left.
 """
 
 from drivers.errors import ServoFault, ServoMissing
-from drivers.feetech_middle import set_middle
-from drivers.feetech_registers import StsRegisters
-from drivers.feetech_table import (
+from drivers.feetech.middle import set_middle
+from drivers.feetech.registers import StsRegisters
+from drivers.feetech.table import (
     CURRENT_UNIT_MA,
     MODELS,
     MULTI_TURN,

@@ -7,8 +7,8 @@ Its pulses go on when this program is killed: the board knows no watchdog.
 from collections.abc import Callable
 
 from drivers.errors import BusLost
-from drivers.maestro import MaestroBus
-from drivers.maestro_params import US_STEPS, MaestroParams
+from drivers.maestro.bus import MaestroBus
+from drivers.maestro.params import US_STEPS, MaestroParams
 from drivers.serial_port import BusPort
 from drivers.types import ServoReading, ServoSetup
 from robot.bringup.single_joint import Stopped

@@ -86,7 +86,7 @@ class OneServo(Protocol):
 
 
 class Registers(Protocol):
-    """Single registers by name, as drivers.dynamixel_registers and feetech_registers have them."""
+    """Single registers by name, as drivers.dynamixel.registers and feetech_registers have them."""
 
     def read(self, servo_id: int, name: str) -> int | None:
         """Give a value, None where no good answer came."""

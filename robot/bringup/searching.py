@@ -19,9 +19,10 @@ is not found out: with such a one on the line name the kind that is wished.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from drivers import dynamixel_scan, feetech_scan
-from drivers.maestro_params import MaestroParams
-from drivers.maestro_probe import USB_CHANNELS, MaestroFound, probe
+from drivers.dynamixel import scan as dynamixel_scan
+from drivers.feetech import scan as feetech_scan
+from drivers.maestro.params import MaestroParams
+from drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from drivers.port_owner import POLOLU
 from drivers.serial_port import BusPort
 from drivers.servo_models import BUS_KINDS, BusKind

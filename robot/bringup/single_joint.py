@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from drivers.dynamixel_table import STEPS_PER_TURN
+from drivers.dynamixel.table import STEPS_PER_TURN
 from drivers.errors import DriverError, ServoFault
 from robot.bringup.one_servo import Found, OneServo
 from robot.calibrate.stop_search import STEPS_PER_DEG, Stop, StopSearchParams, go, search

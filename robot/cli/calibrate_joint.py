@@ -6,7 +6,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from config.schema import Rig
-from drivers.dynamixel_registers import Registers
+from drivers.dynamixel.registers import Registers
 from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from drivers.serial_port import BlockingPort
 from drivers.servo_models import SERVOS

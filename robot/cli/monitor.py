@@ -12,8 +12,8 @@ from rich.live import Live
 from rich.table import Table
 
 from config.schema import Rig, load_rig
-from drivers.dynamixel_registers import Registers
-from drivers.feetech_registers import StsRegisters
+from drivers.dynamixel.registers import Registers
+from drivers.feetech.registers import StsRegisters
 from drivers.serial_port import BlockingPort
 from robot.bringup.looks import DynamixelLooks, FeetechLooks, Look, Looks, MaestroLooks
 from robot.bringup.monitor import Monitor, Sample, as_json

@@ -6,7 +6,7 @@ import typer
 
 from config.schema import Rig, load_rig
 from drivers.errors import SetupError
-from drivers.maestro_line import Line
+from drivers.maestro.line import Line
 from drivers.serial_port import BlockingPort
 from robot.bringup import servo_reboot as servo_reboot
 from robot.bringup.kinds import KINDS

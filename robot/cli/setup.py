@@ -85,10 +85,7 @@ def _chain(
     )
     left = []
     for n, one in enumerate(setups, 1):
-        say(
-            f"{n} of {len(setups)}: connect the {one.model} of {call(one)}, and no other "
-            "servo"
-        )
+        say(f"{n} of {len(setups)}: connect the {one.model} of {call(one)}, and no other servo")
         if not _step(rig, bus, one, port, mock, yes):
             left.append(one.name)
     return left
@@ -135,9 +132,7 @@ def _set_up(line: BlockingPort, kind: ServoKind, wanted: ServoSetup, baud: int, 
     result = servo_setup.assign(line, kind, found, wanted, baud, progress)
     wipe()
     done = "; ".join(result.done) or "nothing to change"
-    say(
-        f"   {call(wanted)}: {done}; answers as id {result.now.id} at {result.now.baud} bit/s"
-    )
+    say(f"   {call(wanted)}: {done}; answers as id {result.now.id} at {result.now.baud} bit/s")
     return True
 
 

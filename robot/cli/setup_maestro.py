@@ -13,9 +13,9 @@ import typer
 
 from drivers.bus_journal import call
 from drivers.errors import DriverError, ServoFault, ServoMissing
-from drivers.maestro_line import Line
-from drivers.maestro_params import US_STEPS, MaestroParams
-from drivers.maestro_probe import USB_CHANNELS
+from drivers.maestro.line import Line
+from drivers.maestro.params import US_STEPS, MaestroParams
+from drivers.maestro.probe import USB_CHANNELS
 from drivers.port_owner import POLOLU
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup

@@ -8,7 +8,7 @@ import typer
 
 from config.rig import BusConfig
 from config.schema import Rig
-from drivers.dynamixel_registers import Registers
+from drivers.dynamixel.registers import Registers
 from drivers.errors import PortError, SetupError
 from drivers.port_owner import refuse_owner
 from drivers.serial_port import BlockingPort

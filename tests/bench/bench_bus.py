@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Xl330PyController
 
-from drivers.dynamixel import DynamixelBus, DynamixelParams
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from sim_mock.ports import InProcessPort

@@ -24,9 +24,9 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Sts3215PyController, Xl330PyController
 
-from drivers.dynamixel import DynamixelBus, DynamixelParams
-from drivers.feetech import FeetechBus, FeetechParams
-from drivers.maestro import MaestroBus, MaestroParams
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from drivers.feetech.bus import FeetechBus, FeetechParams
+from drivers.maestro.bus import MaestroBus, MaestroParams
 from drivers.mixed_bus import MixedBus, Share
 from drivers.serial_port import BlockingPort, BusPort
 from drivers.types import ServoBus, ServoSetup

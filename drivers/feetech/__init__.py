@@ -1,0 +1,1 @@
+"""Feetech STS servos: packets, registers, and a bus with the same promises."""

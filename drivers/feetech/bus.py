@@ -1,0 +1,382 @@
+"""Feetech STS servos on one serial bus: one read and one write a tick.
+
+The packets are our own. The maker's Python SDK (feetech-servo-sdk 1.0.0, module
+scservo_sdk) is the Dynamixel SDK of old with other names: it has been left alone since its
+first release, its packet time-out is computed wrongly so that every user patches it, its
+group reads lose every answer after a missing one and its waiting spins a core. The rest on
+the package index are copies of it. The protocol is small, and the port is ours anyway.
+
+What an STS cannot do. It has no bus watchdog: when the host falls silent, a servo goes on
+to its last goal and holds it, for ever. Nothing in the servo stands in for that: whoever
+runs the bus must let go before leaving (``release``), and what bounds the force until
+somebody cuts the power is the torque limit (``strength``) and the servo's own overload
+protection, which leaves a fifth of the torque after two seconds. So goals are sent a tick
+at a time, never far ahead. Faults do not latch: their bits come and go, and so do the names
+in ``faults``.
+"""
+
+from collections.abc import Sequence
+
+from drivers.bus_journal import Journal, call
+from drivers.bus_reconnect import Reconnect
+from drivers.bus_roll import Roll
+from drivers.dynamixel.health import Health
+from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
+from drivers.feetech.care import RESTART_S, Care
+from drivers.feetech.line import StsLine
+from drivers.feetech.packets import MOST_GOALS, GoalWrite
+from drivers.feetech.params import FeetechParams as FeetechParams
+from drivers.feetech.reader import Heard, Reader
+from drivers.feetech.readings import Readings
+from drivers.feetech.registers import StsRegisters
+from drivers.feetech.revival import Revival
+from drivers.feetech.roster import find
+from drivers.feetech.setup import Fitting
+from drivers.feetech.table import STEPS_PER_TURN
+from drivers.feetech.torque import switch_off
+from drivers.feetech.views import alone_turns, together_turns
+from drivers.serial_port import BusPort
+from drivers.types import BusHealth, ServoReading, ServoSetup
+
+
+class FeetechBus:
+    """A chain of STS servos in position mode; implements drivers.types.ServoBus.
+
+    Args:
+        port: drivers.serial_port.BlockingPort, or an emulated port with its methods.
+        setups: the servos, in the order of every sequence given and taken.
+        params: how to speak with them.
+
+    Raises:
+        ValueError: more servos than one packet of goals can hold, or a range beyond one turn.
+    """
+
+    def __init__(self, port: BusPort, setups: Sequence[ServoSetup], params: FeetechParams) -> None:
+        if len(setups) > MOST_GOALS:
+            raise ValueError(f"{len(setups)} servos are too many for one bus: {MOST_GOALS} at most")
+        _check_ranges(setups)
+        self._port = port
+        self._setups = self._wanted = tuple(setups)
+        self._params = params
+        self._ids = tuple(setup.id for setup in setups)
+        self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
+        self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
+        self._goals = GoalWrite(self._ids)
+        self._journal = Journal()
+        self._line = StsLine(
+            port,
+            params.prompt_timeout_ms / 1000.0,
+            params.reply_timeout_ms / 1000.0,
+            params.baud,
+            {setup.id: call(setup) for setup in setups},
+        )
+        self._opened = False
+        self._now_s = 0.0
+        self._assemble()
+
+    def _assemble(self) -> None:
+        """Make the parts, with a clean sheet."""
+        by_id = self._by_id = {setup.id: setup for setup in self._setups}
+        line, journal = self._line, self._journal
+        self._link = Reconnect()
+        self._roll = Roll(self._ids)
+        self._readings = Readings(self._setups)
+        self._health = Health(by_id, journal)
+        turns = together_turns(self._params.torque_every)
+        self._reader = Reader(line, self._roll, turns, alone_turns())
+        self._fitting = Fitting(line, StsRegisters(self._port, tries=1), self._setups, journal)
+        self._revival = Revival(line, self._fitting, by_id, self._health, journal)
+        self._care = Care(line, by_id, self._revival, self._health, self._readings)
+        self._speeds = self._revival.speeds(self._ids, ())
+
+    # --- the bus as others see it
+
+    def open(self) -> None:
+        """Open the port, find every servo, check and prepare it; torque stays off.
+
+        Raises:
+            drivers.errors.PortError: the port cannot be opened.
+            drivers.errors.ServoMissing: servos are absent, of another model or refuse.
+        """
+        self._take_wanted()
+        where, baud = self._port.port_name, self._params.baud
+        if not self._port.setBaudRate(baud):
+            raise PortError(f"{where} cannot run at {baud} bit/s: choose 115200 or 1000000")
+        registers = StsRegisters(self._port)
+        try:
+            find(self._line, registers, self._setups)
+            self._assemble()
+            fitting = Fitting(self._line, registers, self._setups, self._journal)
+            fitting.rest(self._ids)
+            fitting.fit(self._ids)
+        except (ServoMissing, BusLost):
+            self._port.closePort()
+            raise
+        self._opened = True
+
+    def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
+        """Read all servos in one exchange; None where no fresh answer came.
+
+        A servo that keeps silent is left out of the exchange and asked alone now and
+        then, so whatever is wrong, a read takes a bounded time. While the port is gone all
+        is None, and the port is tried again now and then.
+
+        Raises:
+            drivers.errors.BusLost: port or servos have been gone for longer than ``give_up_s``.
+        """
+        self._now_s = now_s
+        if self._link.down and not self._reopened(now_s):
+            return (None,) * len(self._ids)
+        try:
+            readings = self._take(self._reader.read(now_s), now_s)
+            self._care.tend(readings, self._roll.group, now_s)
+        except BusLost as lost:
+            self._lose(lost)
+            return (None,) * len(self._ids)
+        if self._roll.troubled:
+            self._mind_silence(now_s)
+        return tuple(readings)
+
+    def engage(self) -> tuple[int, ...]:
+        """Set every goal to the present position (clipped to its limits), then torque on.
+
+        A joint outside its limits is brought inside at 30 deg/s. Returns the goals that
+        are now in force, in steps.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+            drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
+            drivers.errors.ServoFault: a servo refuses its torque, or stands beyond its
+                encoder's zero, from where it would go the wrong way into its range.
+        """
+        try:
+            self._take_wanted()
+            # A servo may have restarted since it was prepared.
+            self._fitting.fit(self._ids)
+            goals, outside = self._revival.take_on(self._ids)
+        except (ServoMissing, ServoFault):
+            self.release()
+            raise
+        self._care.take_on(outside)
+        self._speeds = self._revival.speeds(self._ids, ())
+        return goals
+
+    def write(self, goals_steps: Sequence[int]) -> None:
+        """Send one goal to every servo in one packet; goals are clipped to the limits.
+
+        Sends nothing while the torque is off or the port is gone, and nothing to servos
+        that may have restarted: the next reads set those up first.
+
+        Raises:
+            ValueError: a goal is not a number, or there are not as many as servos.
+        """
+        goals = self._clip(goals_steps)
+        if not self._care.engaged or self._link.down:
+            return
+        try:
+            self._send(goals)
+        except BusLost as lost:
+            self._lose(lost)
+
+    def retune(self, setups: Sequence[ServoSetup]) -> None:
+        """Set the servos up so when the torque comes on the next time; the same ids and models.
+
+        Ranges and gains are in the servos' EEPROM, which is written without torque, so under
+        torque everything stays as it is.
+
+        Raises:
+            ValueError: these are other servos, or a range is beyond one turn.
+        """
+        same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
+        if not same:
+            raise ValueError("other servos need another bus: ids and models must stay")
+        _check_ranges(setups)
+        self._wanted = tuple(setups)
+
+    def faults(self) -> tuple[str, ...]:
+        """Name every fault that servos suffer from now, e.g. "neck_yaw (servo 7): overload".
+
+        They come and go: a fault is no more in the list when its cause has been gone for 1 s.
+        """
+        return tuple(
+            f"{self._line.who(i)}: {fault}" for i, fault in sorted(self._health.faults.items())
+        )
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call."""
+        return self._journal.take()
+
+    def release(self) -> None:
+        """Torque off on every servo, confirmed; never raises for a servo that does not answer.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone, and stays so when tried once more.
+        """
+        self._care.let_go()
+        if not self._opened:
+            return
+        if self._link.down:
+            if not self._open_port():
+                raise BusLost(self._cannot_release())
+            self._link.back(self._now_s)
+        try:
+            released = switch_off(self._line, self._ids)
+        except BusLost as lost:
+            self._lose(lost)
+            raise BusLost(self._cannot_release()) from lost
+        self._line.errors["refused"] += len(released.holding)
+        for servo_id in released.holding:
+            self._journal.say(f"{self._line.who(servo_id)} still reports torque: {_CUT}")
+        for servo_id in released.mute:
+            who = self._line.who(servo_id)
+            self._journal.say(f"{who} does not confirm that its torque is off: {_CUT}")
+
+    def health(self) -> BusHealth:
+        """Give byte and error counts of all exchanges."""
+        errors = {kind: count for kind, count in self._line.errors.items() if count}
+        return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
+
+    def close(self) -> None:
+        """Close the port; safe to call twice."""
+        self._opened = False
+        self._care.let_go()
+        self._port.closePort()
+
+    # --- reading and writing
+
+    def _take(self, heard: dict[int, Heard], now_s: float) -> list[ServoReading | None]:
+        """Take an answer servo by servo."""
+        readings: list[ServoReading | None] = [None] * len(self._ids)
+        if heard and self._health.silent_for_s(now_s) >= RESTART_S:
+            # All were silent together: their power may have been cut.
+            self._care.suspect_all()
+        for servo_id, one in heard.items():
+            slot = self._slot[servo_id]
+            self._roll.answered(servo_id)
+            if self._readings.believes(slot, one):
+                self._care.judge(servo_id, one.sample, now_s)
+                readings[slot] = self._readings.one(slot, one)
+            else:
+                self._line.errors["implausible"] += 1
+        self._care.note_out(self._roll.out, now_s)
+        self._health.note_silent(self._roll.out, now_s, self._roll.garbling)
+        return readings
+
+    def _send(self, goals: Sequence[int]) -> None:
+        """Send goals with the speeds that may be used for them.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        entering, speeds = self._care.entering, self._speeds
+        if entering:
+            speeds = self._revival.speeds(self._ids, entering)
+        withheld = self._care.withheld(self._now_s)
+        if not withheld:
+            self._line.send(self._goals.packet(goals, speeds))
+            return
+        kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
+        if kept:
+            some = GoalWrite([self._ids[k] for k in kept])
+            self._line.send(some.packet([goals[k] for k in kept], [speeds[k] for k in kept]))
+
+    def _take_wanted(self) -> None:
+        """Put in force what was asked for since the torque was on last."""
+        if self._wanted == self._setups:
+            return
+        self._setups = self._wanted
+        self._limits = tuple((setup.min_steps, setup.max_steps) for setup in self._setups)
+        self._by_id.update({setup.id: setup for setup in self._setups})
+        self._fitting.want(self._setups)
+        self._readings.want(self._setups)
+
+    def _mind_silence(self, now_s: float) -> None:
+        """Give up where nobody has answered for too long.
+
+        Raises:
+            drivers.errors.BusLost: so it is.
+        """
+        silent_s = self._health.silent_for_s(now_s)
+        if silent_s >= self._params.give_up_s:
+            raise BusLost(
+                f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s: "
+                "check servo power and the cable"
+            )
+
+    # --- a port that goes away
+
+    def _lose(self, lost: BusLost) -> None:
+        """Note that the port is gone."""
+        self._link.lost(self._now_s)
+        self._port.closePort()
+        self._journal.say(f"port lost: {lost}")
+
+    def _reopened(self, now_s: float) -> bool:
+        """Try to open the port again where that is due."""
+        gone_s = self._link.gone_for_s(now_s)
+        if self._link.due(now_s):
+            if self._open_port():
+                self._journal.say(f"port back after {self._link.back(now_s):.1f} s")
+                return True
+            self._link.failed(now_s)
+        if gone_s >= self._params.give_up_s:
+            raise BusLost(
+                f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
+            )
+        return False
+
+    def _open_port(self) -> bool:
+        """Open the port anew and trust no servo on it."""
+        try:
+            if not self._port.setBaudRate(self._params.baud):
+                return False
+            self._port.clearPort()
+        except (PortError, BusLost):
+            self._port.closePort()
+            return False
+        self._roll = self._reader.roll = Roll(self._ids)
+        self._care.suspect_all()
+        return True
+
+    def _cannot_release(self) -> str:
+        """Say what servos do that cannot be told to let go."""
+        return (
+            f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
+            "power go on to their last goal and hold it, as this kind has no bus watchdog: "
+            f"{_CUT} to free them"
+        )
+
+    def _clip(self, steps: Sequence[int]) -> list[int]:
+        """Keep goals inside the limits."""
+        return [
+            goal if low <= goal <= high else _inside(goal, low, high)
+            for goal, (low, high) in zip(steps, self._limits, strict=True)
+        ]
+
+
+_CUT = "cut the servo power"
+
+
+def _check_ranges(setups: Sequence[ServoSetup]) -> None:
+    """See that every range lies within one turn: beyond, positions mean nothing after a restart.
+
+    Raises:
+        ValueError: one does not.
+    """
+    for setup in setups:
+        if not 0 <= setup.min_steps <= setup.max_steps < STEPS_PER_TURN:
+            raise ValueError(
+                f"{call(setup)}: {setup.min_steps}..{setup.max_steps} is no range within "
+                f"0..{STEPS_PER_TURN - 1} steps"
+            )
+
+
+def _inside(goal: float, low: int, high: int) -> int:
+    """Give the nearest limit to a goal outside.
+
+    Raises:
+        ValueError: it is not a number.
+    """
+    if goal != goal:
+        raise ValueError("a goal is not a number: every goal must be a whole number of steps")
+    return low if goal < low else high

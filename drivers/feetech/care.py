@@ -1,0 +1,237 @@
+"""Looking after STS servos between the exchanges: faults that come and go, torque, restarts."""
+
+from collections.abc import Collection, Mapping, Sequence
+from math import inf
+
+from drivers.bus_line import TRIES
+from drivers.dynamixel.health import Health
+from drivers.feetech.line import StsLine
+from drivers.feetech.readings import Readings
+from drivers.feetech.revival import FAR_SIDE, Revival
+from drivers.feetech.table import REGISTERS, TORQUE_FULL, acceleration_units, name_errors
+from drivers.feetech.views import Sample
+from drivers.types import ServoReading, ServoSetup
+
+AGAIN_S = 0.25
+"""Time between attempts to set a servo up again."""
+
+GONE_S = 1.0
+"""A fault is over when its bit has not been seen for so long: bits flicker at the threshold."""
+
+RESTART_S = 0.1
+"""A servo that was silent for so long may have restarted: it gets no goals until it is set up."""
+
+TAKES_TORQUE = REGISTERS["unloading_condition"].initial or 0
+"""Faults that take the torque away, as from the factory."""
+
+
+class Care:
+    """What is done about the servos' health.
+
+    engaged: the torque is on
+    entering: servos on their slow way into their limits
+    """
+
+    def __init__(
+        self,
+        line: StsLine,
+        setups: Mapping[int, ServoSetup],
+        revival: Revival,
+        health: Health,
+        readings: Readings,
+    ) -> None:
+        self._line = line
+        self._setups = setups
+        self._ids = tuple(setups)
+        self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
+        self._revival = revival
+        self._health = health
+        self._readings = readings
+        self.engaged = False
+        self.entering: set[int] = set()
+        self._suspects: set[int] = set()
+        self._rearmed: set[int] = set()
+        self._limp: set[int] = set()
+        self._out_since_s: dict[int, float] = {}
+        self._seen_s: dict[int, dict[int, float]] = {}
+        self._revive_at_s = -inf
+
+    def take_on(self, entering: Collection[int]) -> None:
+        """Begin to look after servos under torque; some of them are outside their limits."""
+        self.engaged = True
+        self.entering = set(entering)
+        self._suspects.clear()
+        self._limp.clear()
+        self._line.tries = 1
+        self._readings.expect_torque(True)
+        self._readings.forget_places()
+        # What was wrong of old is not: all have just taken their goals and their torque.
+        for servo_id in [i for i in self._health.faults if i not in self._health.latches]:
+            del self._health.faults[servo_id]
+            self._readings.name_fault(self._slot[servo_id], "")
+
+    def let_go(self) -> None:
+        """Leave servos without torque alone."""
+        self.engaged = False
+        for one in (self.entering, self._suspects, self._rearmed, self._limp):
+            one.clear()
+        self._line.tries = TRIES
+        self._readings.expect_torque(False)
+
+    def suspect_all(self) -> None:
+        """Trust no servo to be as it was left."""
+        self._suspects.update(self._ids)
+        self._revive_at_s = -inf
+        self._readings.forget_places()
+
+    def withheld(self, now_s: float) -> frozenset[int]:
+        """Name the servos that must get no goals now.
+
+        Some firmware switches the torque on with a goal, so whoever may have restarted, or is
+        limp, is first given its present place.
+        """
+        out = self._out_since_s
+        if not out and not self._suspects and not self._limp:
+            return frozenset()
+        away = {i for i, since_s in out.items() if now_s - since_s >= RESTART_S}
+        return frozenset(away | self._suspects | self._limp)
+
+    # --- one servo's answer
+
+    def judge(self, servo_id: int, sample: Sample, now_s: float) -> None:
+        """Look at one servo's answer: its faults, and whether it is armed as it should be."""
+        if sample.error or servo_id in self._seen_s:
+            self._mind_bits(servo_id, sample.error, now_s)
+        if not self.engaged:
+            return
+        if self._health.faults.get(servo_id) == FAR_SIDE:
+            self._mind_far_side(servo_id, sample.position)
+        if sample.torque is not None:
+            self._mind_torque(servo_id, sample)
+
+    def note_out(self, out: Collection[int], now_s: float) -> None:
+        """Note who is out of the group now; who is back after long may have restarted."""
+        for servo_id in [i for i in self._out_since_s if i not in out]:
+            since_s = self._out_since_s.pop(servo_id)
+            if self.engaged and now_s - since_s >= RESTART_S:
+                self._suspects.add(servo_id)
+        for servo_id in out:
+            self._out_since_s.setdefault(servo_id, now_s)
+
+    def _mind_bits(self, servo_id: int, error: int, now_s: float) -> None:
+        """Name faults as they come, and say when they are gone."""
+        seen_s = self._seen_s.setdefault(servo_id, {})
+        before = self._bits(servo_id)
+        for bit in range(8):
+            if error >> bit & 1:
+                seen_s[1 << bit] = now_s
+        for bit in [b for b, at_s in seen_s.items() if now_s - at_s >= GONE_S]:
+            del seen_s[bit]
+        now = self._bits(servo_id)
+        if now != before:
+            self._name_bits(servo_id, now)
+        if not seen_s:
+            del self._seen_s[servo_id]
+
+    def _bits(self, servo_id: int) -> int:
+        return sum(self._seen_s.get(servo_id, ()))
+
+    def _name_bits(self, servo_id: int, bits: int) -> None:
+        health = self._health
+        if servo_id in health.faults and servo_id not in health.latches:
+            return  # something worse is known of it
+        if bits:
+            health.name(servo_id, " and ".join(name_errors(bits)))
+            health.latches.add(servo_id)
+            self._line.errors["alert"] += 1
+        else:
+            health.cleared(servo_id)
+        self._readings.name_fault(self._slot[servo_id], health.faults.get(servo_id, ""))
+
+    def _mind_far_side(self, servo_id: int, steps: int) -> None:
+        """See whether somebody has turned a joint back into its range."""
+        if not self._revival.is_lost(servo_id, steps):
+            self._health.latches.add(servo_id)
+            self._health.cleared(servo_id)
+            self._readings.name_fault(self._slot[servo_id], "")
+            self._suspects.add(servo_id)
+
+    def _mind_torque(self, servo_id: int, sample: Sample) -> None:
+        """Suspect a servo that is not armed as it was left."""
+        setup = self._setups[servo_id]
+        strength = sample.limit if setup.strength is None else round(setup.strength * TORQUE_FULL)
+        if sample.torque != 1:
+            self._limp.add(servo_id)
+            if not self._known_reason(servo_id):
+                self._suspects.add(servo_id)
+            return
+        self._limp.discard(servo_id)
+        armed = acceleration_units(setup.max_accel_steps_s2), strength
+        if (sample.acceleration, sample.limit) != armed:
+            # A restart so short that nobody noticed, and a goal that brought the torque back.
+            self._suspects.add(servo_id)
+
+    def _known_reason(self, servo_id: int) -> bool:
+        """Tell whether it is known why a servo has no torque."""
+        if servo_id not in self._health.faults:
+            return False
+        return servo_id not in self._health.latches or bool(self._bits(servo_id) & TAKES_TORQUE)
+
+    # --- after every read
+
+    def tend(
+        self, readings: list[ServoReading | None], group: Collection[int], now_s: float
+    ) -> None:
+        """Do what is due after a read; servos that are well again get their reading here.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        if self._suspects and now_s >= self._revive_at_s:
+            self._revive(readings, group, now_s)
+        if self.entering:
+            self._mind_entry(readings)
+        if self._rearmed:
+            self._mark_rearmed(readings)
+
+    def _revive(
+        self, readings: list[ServoReading | None], group: Collection[int], now_s: float
+    ) -> None:
+        """Set up again who may have restarted and answers; tried again later where that fails."""
+        ids = tuple(i for i in self._ids if i in self._suspects and i in group)
+        if not ids:
+            return
+        self._revive_at_s = now_s + AGAIN_S
+        found = self._revival.revive(ids, self.engaged, now_s)
+        if found is None:
+            return
+        self._suspects.difference_update(ids)
+        at_s = self._line.port.now_s()
+        for servo_id in ids:
+            self._readings.name_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
+        for servo_id, position in found.items():
+            self._line.errors["rearmed"] += 1
+            slot = self._slot[servo_id]
+            readings[slot] = self._readings.held(slot, position, at_s, self.engaged)
+            self._limp.discard(servo_id)
+            if self.engaged:
+                self._rearmed.add(servo_id)
+                setup = self._setups[servo_id]
+                if not setup.min_steps <= position <= setup.max_steps:
+                    self.entering.add(servo_id)
+
+    def _mark_rearmed(self, readings: list[ServoReading | None]) -> None:
+        for i, servo_id in enumerate(self._ids):
+            reading = readings[i]
+            if servo_id in self._rearmed and reading is not None:
+                self._rearmed.discard(servo_id)
+                readings[i] = reading._replace(rearmed=True)
+
+    def _mind_entry(self, readings: Sequence[ServoReading | None]) -> None:
+        """Give back its speed to every joint that has come inside its limits."""
+        for servo_id, reading in zip(self._ids, readings, strict=True):
+            if servo_id not in self.entering or reading is None:
+                continue
+            setup = self._setups[servo_id]
+            if setup.min_steps <= reading.position_steps <= setup.max_steps:
+                self.entering.discard(servo_id)

@@ -1,0 +1,117 @@
+"""From register units to what the rest of the machine is given, with what was last known.
+
+The checksum of the bus is a sum of one byte: bytes spoilt in two places pass it now and
+then. So a position that no joint can have come to since the last one is not given, unless
+the next one says the same.
+"""
+
+from collections.abc import Sequence
+
+from drivers.feetech.reader import Heard
+from drivers.feetech.table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
+from drivers.feetech.turn import nearest_turn
+from drivers.types import ServoReading, ServoSetup
+
+LEAP_STEPS = STEPS_PER_TURN // 8
+"""A joint does not move so far between two answers, beyond what its motor can do."""
+
+MOST_CELSIUS = 125
+"""A temperature above is none."""
+
+
+class Readings:
+    """Makes readings; keeps torque, fault, temperature and voltage from one to the next."""
+
+    def __init__(self, setups: Sequence[ServoSetup]) -> None:
+        count = len(setups)
+        self.want(setups)
+        self._fastest = [MODELS[s.model].no_load_rpm / 60.0 * STEPS_PER_TURN for s in setups]
+        self._torque = [False] * count
+        self._fault = [""] * count
+        self._warm: list[float | None] = [None] * count
+        self._volts: list[float | None] = [None] * count
+        self._last: list[tuple[int, float] | None] = [None] * count
+        self._odd: list[int | None] = [None] * count
+
+    def want(self, setups: Sequence[ServoSetup]) -> None:
+        """Take other ranges for the same servos."""
+        self._ranges = [(setup.min_steps, setup.max_steps) for setup in setups]
+
+    def expect_torque(self, on: bool) -> None:
+        """Note that the torque has been switched for all."""
+        self._torque = [on] * len(self._torque)
+
+    def name_fault(self, slot: int, fault: str) -> None:
+        """Note what a servo suffers from, "" for nothing."""
+        self._fault[slot] = fault
+
+    def forget_places(self) -> None:
+        """Believe the next positions whatever they are, as after a port that was gone."""
+        self._last = [None] * len(self._last)
+
+    def believes(self, slot: int, heard: Heard) -> bool:
+        """Tell whether one servo's answer can be true; to be asked once for every answer."""
+        position = nearest_turn(heard.sample.position, *self._ranges[slot])
+        return not self._leaps(slot, position, heard.at_s)
+
+    def one(self, slot: int, heard: Heard) -> ServoReading:
+        """Take one servo's answer."""
+        sample = heard.sample
+        position = nearest_turn(sample.position, *self._ranges[slot])
+        if sample.torque is not None:
+            self._torque[slot] = sample.torque == 1
+        if sample.temperature <= MOST_CELSIUS:
+            self._warm[slot] = float(sample.temperature)
+        self._volts[slot] = 0.1 * sample.voltage
+        return self._make(
+            slot,
+            position,
+            float(sample.velocity),
+            sample.current * CURRENT_UNIT_MA,
+            heard.at_s,
+            bool(sample.error),
+            max(-1.0, min(1.0, sample.load * LOAD_UNIT)),
+        )
+
+    def held(self, slot: int, position: int, at_s: float, torque: bool) -> ServoReading:
+        """Make the first reading of a servo that was just set up again and stands still."""
+        self._torque[slot] = torque
+        position = nearest_turn(position, *self._ranges[slot])
+        self._last[slot], self._odd[slot] = (position, at_s), None
+        return self._make(slot, position, 0.0, 0.0, at_s, False, 0.0)
+
+    def _leaps(self, slot: int, position: int, at_s: float) -> bool:
+        """Tell whether a position is too far from the last one, and the first that is."""
+        last, odd = self._last[slot], self._odd[slot]
+        self._odd[slot] = None
+        if last is not None:
+            reach = LEAP_STEPS + 2.0 * self._fastest[slot] * max(0.0, at_s - last[1])
+            twice = odd is not None and abs(position - odd) <= LEAP_STEPS
+            if abs(position - last[0]) > reach and not twice:
+                self._odd[slot] = position
+                return True
+        self._last[slot] = position, at_s
+        return False
+
+    def _make(
+        self,
+        slot: int,
+        position: int,
+        velocity: float,
+        current_ma: float,
+        at_s: float,
+        alert: bool,
+        load: float,
+    ) -> ServoReading:
+        return ServoReading(
+            position,
+            velocity,
+            current_ma,
+            at_s,
+            alert,
+            self._torque[slot],
+            self._fault[slot],
+            load,
+            self._warm[slot],
+            self._volts[slot],
+        )

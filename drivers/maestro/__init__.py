@@ -1,0 +1,1 @@
+"""A Pololu Maestro and the hobby servos behind it, which tell nothing."""

@@ -1,0 +1,245 @@
+"""Looking after a board between the goals: errors, restarts, channels that lost their pulses.
+
+On any error a Maestro sends its channels to what its settings call home: no pulses, or a
+place of its own, or nothing. A restart does the same and forgets speeds and accelerations.
+Both show in one short question a tick: a channel's pulse and the error register.
+"""
+
+from collections.abc import Sequence
+from math import inf
+
+from drivers.bus_journal import Journal, call
+from drivers.maestro.channel import Channel
+from drivers.maestro.commands import ERRORS, name_errors
+from drivers.maestro.hold import Outcome, refusal, take
+from drivers.maestro.line import Line
+
+MOST_RESTARTS, WITHIN_S = 3, 10.0
+"""A board that lets go of its channels more often within such a time stays without pulses."""
+
+SAME_S = 1.0
+"""The same error is not told again within such a time."""
+
+
+class Care:
+    """What the board says about itself, and what is done about it.
+
+    engaged: goals are followed
+    """
+
+    def __init__(self, line: Line, channels: Sequence[Channel], journal: Journal) -> None:
+        self._line = line
+        self._channels = tuple(channels)
+        self._ids = tuple(channel.id for channel in channels)
+        self._journal = journal
+        self.engaged = False
+        self._pending: list[Channel] = []
+        self._asked = -1
+        self._unsure = False
+        self._unheard = 0
+        self._restarts: list[float] = []
+        self._errors_s: dict[str, float] = {}
+        self._told_s = -inf
+
+    def take_on(self) -> None:
+        """Begin to look after channels that are held."""
+        self.engaged = True
+        self._restarts.clear()
+        self._pending.clear()
+        self._unsure, self._unheard = False, 0
+
+    def let_go(self) -> None:
+        """Leave the channels alone."""
+        self.engaged = False
+        self._pending.clear()
+        for channel in self._channels:
+            channel.let_go()
+
+    def suspect_all(self) -> None:
+        """Trust no channel to be as it was left: each is taken hold of anew."""
+        self._unsure = True
+        if self.engaged:
+            for channel in self._channels:
+                self._drop(channel)
+
+    def note_errors(self, register: int, now_s: float) -> None:
+        """Note the error register, which the board has cleared now."""
+        for name in name_errors(register):
+            self._line.errors[name] += 1
+            if now_s - self._errors_s.get(name, -inf) >= SAME_S:
+                self._journal.say(f"the board reports: {name}")
+            self._errors_s[name] = now_s
+
+    def errors_of_late(self, now_s: float) -> tuple[str, ...]:
+        """Name the errors that the board has reported of late."""
+        return tuple(name for name, at_s in self._errors_s.items() if now_s - at_s < WITHIN_S)
+
+    # --- in every read
+
+    def watch(self) -> bool:
+        """Ask for the errors and one channel's pulse, and do what they call for.
+
+        Gives whether the board answered.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        self._asked = (self._asked + 1) % len(self._channels)
+        channel = self._channels[self._asked]
+        speech = self._line.speech
+        found = self._line.ask_words(speech.position(channel.id) + speech.errors(), 2)
+        if found is None:
+            self._unsure = True
+            return False
+        pulse, register = found
+        if register >> len(ERRORS):
+            # A pulse width taken for a register, or noise: such errors do not exist.
+            self._line.errors["damaged"] += 1
+            self._unsure = True
+            return False
+        now_s = self._line.port.now_s()
+        self.advance(now_s)
+        self.note_errors(register, now_s)
+        if self.engaged:
+            self._unheard |= register
+            return self._tend(channel, pulse, now_s)
+        channel.found(pulse)
+        self._unsure = False
+        return True
+
+    def advance(self, now_s: float) -> None:
+        """Let time pass for every channel."""
+        for channel in self._channels:
+            channel.advance(now_s)
+
+    def _tend(self, channel: Channel, pulse: int, now_s: float) -> bool:
+        odd = channel.held and channel.strange(pulse, now_s)
+        if self._unheard or self._unsure or odd:
+            if not self._look_at_all():
+                return False
+        elif channel.held:
+            channel.found(pulse)
+        if self._pending:
+            self._take_next(now_s)
+        for one in self._channels:
+            if one.entering and one.inside():
+                one.entering = False
+                self._line.send(one.limits(self._line.speech))
+        return True
+
+    def _look_at_all(self) -> bool:
+        """Compare every channel's pulse with what it should be; tells whether they came."""
+        pulses = self._line.pulses(self._ids)
+        if pulses is None:
+            self._unsure = True
+            return False
+        now_s = self._line.port.now_s()
+        self.advance(now_s)
+        register, unsure = self._unheard, self._unsure
+        self._unheard, self._unsure = 0, False
+        away = bool(register or unsure)
+        found = dict(zip(self._channels, pulses, strict=True))
+        held = [channel for channel in self._channels if channel.held]
+        odd = [channel for channel in held if channel.strange(found[channel], now_s, away)]
+        home = [channel for channel in odd if not found[channel]]
+        if home or (odd and (away or len(odd) == len(held))):
+            self._lost_hold(odd, register, now_s)
+        else:
+            for channel in odd:
+                self._met_end(channel, found[channel])
+        for channel in held:
+            if channel not in odd:
+                channel.found(found[channel])
+        if away or home:
+            self._remind()
+        for channel in self._pending:
+            channel.found(found[channel])
+        return True
+
+    def _remind(self) -> None:
+        """Arm the limits anew, which a restart forgets, and send the goals in force.
+
+        A board that leads its channels home at their armed speed has not yet gone far.
+        """
+        held = [channel for channel in self._channels if channel.held]
+        speech = self._line.speech
+        if held:
+            limits = b"".join(channel.limits(speech) for channel in held)
+            goals = {channel.id: channel.goal_steps for channel in held}
+            self._line.send(limits + speech.targets(goals))
+
+    def _met_end(self, channel: Channel, pulse: int) -> None:
+        """Note that a channel stays elsewhere: it meets an end of the board's own range."""
+        if channel.met_end(pulse) and not channel.told:
+            channel.told = True
+            self._line.errors["other pulse"] += 1
+            self._journal.say(refusal(channel))
+
+    def _lost_hold(self, lost: Sequence[Channel], register: int, now_s: float) -> None:
+        """Note that channels are not where they were sent, and that they are to be held anew."""
+        named = " and ".join(name_errors(register))
+        who = (
+            "the board"
+            if len(lost) == len(self._channels)
+            else ", ".join(call(channel.setup) for channel in lost)
+        )
+        self._line.errors["restarted"] += 1
+        for channel in lost:
+            self._drop(channel)
+        self._restarts = [at_s for at_s in self._restarts if now_s - at_s < WITHIN_S]
+        self._restarts.append(now_s)
+        if len(self._restarts) > MOST_RESTARTS:
+            self._give_up(named)
+        elif named:
+            self._journal.say(f"{who} was sent home by an error ({named}): set up anew")
+        else:
+            self._journal.say(f"{who} restarted: set up anew")
+
+    def _drop(self, channel: Channel) -> None:
+        if channel.held:
+            channel.let_go()
+            self._pending.append(channel)
+
+    def _give_up(self, named: str) -> None:
+        """Leave channels that lose their pulses again and again without them."""
+        fault = (
+            f"errors again and again ({named}): check cable, ground and baud rate"
+            if named
+            else "restarts again and again: supply too weak"
+        )
+        for channel in self._pending:
+            channel.fault = fault
+            self._journal.say(f"{call(channel.setup)}: {fault}")
+        self._line.send(self._line.speech.targets(dict.fromkeys([c.id for c in self._pending], 0)))
+        for channel in self._pending:
+            channel.stop()
+        self._pending.clear()
+
+    def _take_next(self, now_s: float) -> None:
+        """Take hold of one channel anew; the next at the next read, to spare the supply."""
+        channel = self._pending[0]
+        found = self._line.pulses((channel.id,))
+        if found is None:
+            return
+        channel.found(found[0])
+        outcome = take(self._line, channel, found[0])
+        if outcome is Outcome.HELD:
+            channel.rearm()
+            self._pending.remove(channel)
+        elif outcome is Outcome.ELSEWHERE and channel.on:
+            # It does give pulses, only others: that is told once, and it is held so.
+            self._met_end(channel, round(channel.ramp.pulse_steps))
+            channel.hold()
+            channel.rearm()
+            self._pending.remove(channel)
+
+    # --- what others may know
+
+    def believed(self, channel: Channel) -> bool:
+        """Tell whether anything is known of where a channel is."""
+        return channel not in self._pending
+
+    @property
+    def sure(self) -> bool:
+        """Tell that goals may be sent: the board is as it was left."""
+        return not self._unsure

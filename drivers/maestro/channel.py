@@ -1,0 +1,240 @@
+"""One channel of a Maestro as the driver knows it: what it was sent to and where it must be."""
+
+from collections import deque
+from math import inf
+
+from drivers.maestro.commands import HIGHEST, LOWEST, Speech
+from drivers.maestro.params import HOBBY
+from drivers.maestro.ramp import SPEED_STEPS_S, Ramp, accel_units, speed_units
+from drivers.types import ServoReading, ServoSetup
+
+ENTRY_STEPS_S = 30.0 / 360.0 * HOBBY["hobby"].steps_per_turn
+"""Speed at which a joint found outside its limits is brought inside."""
+
+RECENT_S = 0.1
+"""The board may be so far behind the last goals: its own period is 20 ms, and lines are slow."""
+
+BEHIND_S = 0.04
+FINE_STEPS = 8
+"""A pulse is as expected within so much time of travel and so many steps."""
+
+
+class Channel:
+    """A servo that tells nothing; its place is what the ramp computes.
+
+    on: it gives pulses, as far as known
+    held: it follows the goals that are written
+    entering: it is on its slow way into its limits
+    rearmed: it was taken hold of anew, which nobody has been told yet
+    fault: why it stays without pulses; "" where nothing is wrong
+    told: a person has been told that it does not give the pulses it should
+    """
+
+    def __init__(self, setup: ServoSetup) -> None:
+        self.setup = setup
+        self.id = setup.id
+        self.on = self.held = self.entering = self.rearmed = self.told = False
+        self.fault = ""
+        self.goal_steps = self.clip(_rest(setup))
+        self.ramp = Ramp(self.goal_steps, _own_speed(setup))
+        self._placed = False
+        self._at_s = -inf
+        self._settled_s = inf
+        self._recent: deque[tuple[float, int]] = deque()
+        self._bottom, self._top = -inf, inf
+        self._end_steps = 0
+
+    def want(self, setup: ServoSetup) -> None:
+        """Take another setup of the same servo."""
+        self.setup = setup
+        self.ramp.shaft_speed_steps_s = _own_speed(setup)
+        if not self._placed:
+            self.goal_steps = self.clip(_rest(setup))
+            self.ramp.shaft_steps = self.goal_steps
+
+    def clip(self, steps: float) -> int:
+        """Give the nearest goal within the limits.
+
+        Raises:
+            ValueError: it is not a number.
+        """
+        low, high = self.setup.min_steps, self.setup.max_steps
+        if low <= steps <= high:
+            return int(steps)
+        if steps != steps:
+            raise ValueError("a goal is not a number: every goal must be a whole number of steps")
+        return low if steps < low else high
+
+    # --- what it is told
+
+    def limits(self, speech: Speech) -> bytes:
+        """Give the commands that arm its speed and acceleration."""
+        speed = self.setup.max_speed_steps_s
+        if self.entering:
+            speed = min(speed, ENTRY_STEPS_S)
+        self.ramp.speed_units = speed_units(speed)
+        self.ramp.accel_units = accel_units(self.setup.max_accel_steps_s2)
+        return speech.speed(self.id, self.ramp.speed_units) + speech.acceleration(
+            self.id, self.ramp.accel_units
+        )
+
+    def start(self, pulse_steps: int, now_s: float) -> int:
+        """Begin to hold: at its pulse, or where there is none at its last place; gives the goal."""
+        self.goal_steps = self.clip(pulse_steps or round(self.ramp.shaft_steps))
+        self.entering = pulse_steps not in (0, self.goal_steps)
+        if not (self.on and pulse_steps):
+            # A first pulse is not ramped: there is nothing to ramp it from.
+            self.ramp.begin(pulse_steps or self.goal_steps)
+        self.on, self.fault, self.told = True, "", False
+        self._at_s = now_s
+        self._settled_s = inf
+        self._recent.clear()
+        self._bottom, self._top = -inf, inf
+        return self.goal_steps
+
+    def hold(self) -> None:
+        """Note that it holds its goal and follows others."""
+        self.held = self._placed = True
+
+    def let_go(self) -> None:
+        """Note that it follows no goals any more; its pulses may go on."""
+        self.held = self.entering = self.rearmed = False
+
+    def stop(self) -> None:
+        """Note that it gives no pulses: its servo is limp."""
+        self.let_go()
+        self.on = False
+        self.ramp.stop()
+
+    def aim(self, goal_steps: int, now_s: float) -> None:
+        """Note a goal that was sent."""
+        self.advance(now_s)
+        self._recent.append((now_s, self.goal_steps))
+        self._forget(now_s)
+        if goal_steps != self.goal_steps or self._settled_s == inf:
+            way = abs(goal_steps - self.ramp.pulse_steps)
+            self._settled_s = now_s + self.ramp.longest_s(way) + RECENT_S
+        self.goal_steps = goal_steps
+
+    # --- what is known of it
+
+    def advance(self, now_s: float) -> None:
+        """Let time pass."""
+        if self.on and self._at_s > -inf:
+            self.ramp.move(self._reached(self.goal_steps), now_s - self._at_s)
+        self._at_s = now_s
+
+    def strange(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
+        """Tell whether a pulse cannot come from the goals of late.
+
+        led_away: an error or a restart has led it towards its home for a moment
+        """
+        if not pulse_steps:
+            return True
+        self._forget(now_s)
+        places = [self.goal_steps, *(goal for _, goal in self._recent)]
+        room: float = FINE_STEPS
+        if led_away or now_s < self._settled_s:
+            places.append(round(self.ramp.pulse_steps))
+            room = self.room_steps()
+        low, high = self._reached(min(places)), self._reached(max(places))
+        return not low - room <= pulse_steps <= high + room
+
+    def _reached(self, steps: float) -> float:
+        """Give where a goal ends, as far as the board's own range is known."""
+        return min(self._top, max(self._bottom, steps))
+
+    def _forget(self, now_s: float) -> None:
+        while self._recent and self._recent[0][0] < now_s - RECENT_S:
+            self._recent.popleft()
+
+    def room_steps(self) -> float:
+        """Give how far a pulse may be from where it is expected."""
+        return FINE_STEPS + self.ramp.speed_units * SPEED_STEPS_S * BEHIND_S
+
+    def found(self, pulse_steps: int) -> None:
+        """Take the board's word for the pulse that it gives now."""
+        if pulse_steps and not self.held:
+            self.goal_steps = pulse_steps
+        if pulse_steps and self.held and not self.entering:
+            # No goal lies outside: a byte was damaged, and answers carry no check.
+            pulse_steps = self.clip(pulse_steps)
+        self.gives(pulse_steps)
+
+    def gives(self, pulse_steps: int) -> None:
+        """Note the pulse that it gives, whatever its goal is."""
+        self.on = pulse_steps > 0
+        if self.on:
+            self.ramp.found(pulse_steps)
+        else:
+            self.ramp.stop()
+
+    def met_end(self, pulse_steps: int) -> bool:
+        """Note where a goal has ended; gives whether that is elsewhere, twice at the same pulse."""
+        before, self._end_steps = self._end_steps, pulse_steps
+        short = self.goal_steps - pulse_steps
+        self._bottom = -inf
+        self._top = inf
+        self.ramp.found(pulse_steps)
+        if before != pulse_steps or abs(short) <= FINE_STEPS:
+            return False
+        if short > 0:
+            self._top = pulse_steps
+        else:
+            self._bottom = pulse_steps
+        return True
+
+    def settle(self, pulse_steps: int) -> None:
+        """Take a pulse for the servo's place: it has been there for long."""
+        self.found(pulse_steps)
+        if pulse_steps:
+            self.ramp.shaft_steps = pulse_steps
+            self._placed = True
+
+    def inside(self) -> bool:
+        """Tell whether the pulse is within the limits."""
+        return self.setup.min_steps <= self.ramp.pulse_steps <= self.setup.max_steps
+
+    def rearm(self) -> None:
+        """Note that it was taken hold of anew: plans begin at its pulse."""
+        self.rearmed = True
+        self.ramp.shaft_steps = self.ramp.pulse_steps
+
+    def reading(self, at_s: float) -> ServoReading:
+        """Give where it is taken to be; never measured."""
+        anew, self.rearmed = self.rearmed, False
+        return ServoReading(
+            round(self.ramp.shaft_steps),
+            self.ramp.shaft_steps_s,
+            0.0,
+            at_s,
+            bool(self.fault),
+            self.on,
+            self.fault,
+            rearmed=anew,
+            measured=False,
+        )
+
+
+def check(setup: ServoSetup, channels: int) -> None:
+    """Refuse a servo that no channel of the board can have.
+
+    Raises:
+        ValueError: so it is; the message names the servo and what would be right.
+    """
+    if not 0 <= setup.id < channels:
+        raise ValueError(f"channel {setup.id}: a board with {channels} has 0..{channels - 1}")
+    if not LOWEST <= setup.min_steps <= setup.max_steps <= HIGHEST:
+        raise ValueError(
+            f"channel {setup.id}: {setup.min_steps}..{setup.max_steps} steps must ascend within "
+            f"{LOWEST}..{HIGHEST} (64..4080 us)"
+        )
+
+
+def _rest(setup: ServoSetup) -> float:
+    middle = (setup.min_steps + setup.max_steps) // 2
+    return middle if setup.rest_steps is None else setup.rest_steps
+
+
+def _own_speed(setup: ServoSetup) -> float:
+    return setup.own_speed_steps_s or setup.max_speed_steps_s

@@ -1,0 +1,92 @@
+"""Switching a channel's pulses on and off, so that nothing moves that need not.
+
+Where a channel gives pulses already it is held there. Where it gives none nobody can know
+where its servo is, and a first pulse is not ramped: the servo goes there at its own speed.
+"""
+
+from collections.abc import Sequence
+from enum import Enum
+from typing import NamedTuple
+
+from drivers.bus_journal import call
+from drivers.maestro.channel import FINE_STEPS, Channel
+from drivers.maestro.line import Line
+from drivers.maestro.params import US_STEPS
+
+TRIES = 3
+
+
+class Outcome(Enum):
+    """What came of taking hold: it is held, nobody answered, or it gives another pulse."""
+
+    HELD = "held"
+    MUTE = "mute"
+    ELSEWHERE = "elsewhere"
+
+
+def take(line: Line, channel: Channel, pulse_steps: int) -> Outcome:
+    """Hold a channel at the pulse that it gives, or at its last place where it gives none.
+
+    Speed and acceleration are armed before the goal is sent, and the pulse is asked for
+    after. A joint outside its limits comes inside at 30 deg/s.
+
+    Raises:
+        drivers.errors.BusLost: the port is gone.
+    """
+    goal = channel.start(pulse_steps, line.port.now_s())
+    line.send(channel.limits(line.speech) + line.speech.target(channel.id, goal))
+    found = line.pulses((channel.id,))
+    channel.advance(line.port.now_s())
+    if found is None:
+        return Outcome.MUTE
+    low, high = sorted((pulse_steps or goal, goal))
+    # A first pulse is exact; another may have been on its way somewhere when it was asked.
+    room = channel.room_steps() if pulse_steps else FINE_STEPS
+    if not found[0] or not low - room <= found[0] <= high + room:
+        channel.gives(found[0])
+        return Outcome.ELSEWHERE
+    channel.ramp.found(found[0])
+    channel.hold()
+    return Outcome.HELD
+
+
+def refusal(channel: Channel) -> str:
+    """Say why a channel gives another pulse than asked for, and the cure."""
+    goal, pulse = channel.goal_steps, round(channel.ramp.pulse_steps) if channel.on else 0
+    if not pulse:
+        return (
+            f"{call(channel.setup)} gives no pulses: set its channel to Servo in Pololu's program"
+        )
+    sent, got = f"{goal / US_STEPS:g} us", f"{pulse / US_STEPS:g} us"
+    return (
+        f"{call(channel.setup)} is sent to {sent} and gets {got}: "
+        "widen its range in Pololu's program, or delete the board's script"
+    )
+
+
+class Released(NamedTuple):
+    """Channels that still give pulses, and those of which nothing was heard."""
+
+    holding: tuple[int, ...]
+    mute: tuple[int, ...]
+
+
+def switch_off(line: Line, channels: Sequence[int]) -> Released:
+    """Stop the pulses, and see that they are gone.
+
+    Raises:
+        drivers.errors.BusLost: the port is gone.
+    """
+    left = tuple(channels)
+    heard: set[int] = set()
+    for _ in range(TRIES):
+        # Each by its own command: one that is damaged on the way takes no other with it.
+        line.send(b"".join(line.speech.target(channel, 0) for channel in left))
+        found = line.pulses(left)
+        if found is not None:
+            heard.update(left)
+            left = tuple(channel for channel, pulse in zip(left, found, strict=True) if pulse)
+        if not left:
+            break
+    holding = tuple(channel for channel in left if channel in heard)
+    return Released(holding, tuple(channel for channel in left if channel not in heard))

@@ -1,0 +1,128 @@
+"""Exchanges with one Maestro: bounded waiting, clean lines, counts.
+
+Answers carry no address and no check, so an answer that came too late looks like any
+other. After one that stayed out the line is emptied before anything is asked again.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, Speech, words
+from drivers.maestro.params import MaestroParams
+from drivers.serial_port import BITS_PER_BYTE, QUIET_S, BusPort
+
+AT_ONCE = 6
+"""So many questions in one write: the board's receive buffer is small."""
+
+GREETINGS = 4
+
+
+class Line:
+    """A port with one board behind it; every method may raise drivers.errors.BusLost.
+
+    speech: how the board wants its commands
+    tx_bytes, rx_bytes: counts since it was made
+    errors: counts by kind
+    """
+
+    def __init__(self, port: BusPort, params: MaestroParams) -> None:
+        self.port = port
+        self.speech = Speech(params.protocol, params.device, params.crc, params.channels)
+        # A whole command in the Pololu form begins with the byte that a board waits for
+        # which detects its baud rate; any other board takes it for the question it is.
+        self._waking = Speech("pololu", params.device, params.crc).errors()
+        self.tx_bytes = self.rx_bytes = 0
+        self.errors: Counter[str] = Counter()
+        self._byte_s = BITS_PER_BYTE / params.baud
+        self._patience_s = params.reply_timeout_ms / 1000.0
+        self._late = False
+
+    def send(self, packet: bytes) -> None:
+        """Send commands that are not answered."""
+        self.port.write(packet)
+        self.tx_bytes += len(packet)
+
+    def ask(self, packet: bytes, length: int) -> bytes | None:
+        """Send questions and give their answers; None where they do not come in time."""
+        port = self.port
+        if self._late:
+            port.drain()
+        else:
+            port.clearPort()
+        self.send(packet)
+        wire_s = (len(packet) + length) * self._byte_s
+        answer = port.read_until(length, port.now_s() + wire_s + self._patience_s)
+        self.rx_bytes += len(answer)
+        self._late = len(answer) < length
+        if self._late:
+            self.errors["incomplete" if answer else "timeout"] += 1
+            return None
+        return answer
+
+    def ask_words(self, packet: bytes, count: int) -> tuple[int, ...] | None:
+        """Send questions that are answered by words; None where they are not."""
+        answer = self.ask(packet, WORD * count)
+        if answer is None:
+            return None
+        found = words(answer)
+        if max(found) > MOST:
+            # No pulse width and no error register is so large: bytes were lost or added.
+            self.errors["damaged"] += 1
+            self._late = True
+            return None
+        return found
+
+    def greet(self) -> int | None:
+        """Ask for the errors until the board answers; None where it keeps silent.
+
+        A board that is still to detect its baud rate is given the byte it waits for.
+        """
+        for attempt in range(GREETINGS):
+            packet = self._waking if attempt % 2 else self.speech.errors()
+            found = self.ask_words(packet, 1)
+            if found is not None:
+                return found[0]
+        return None
+
+    def takes_crc(self) -> bool:
+        """Tell whether the board wants the check bytes that it is sent.
+
+        One that does not answers too, but finds an error in every command.
+        """
+        if not self.speech.crc:
+            return True
+        self.ask_words(self.speech.errors(), 1)
+        found = self.ask_words(self.speech.errors(), 1)
+        return found is None or not found[0] >> PROTOCOL_ERROR & 1
+
+    def wake(self) -> int | None:
+        """Ask for the errors once, so that a board that detects its baud rate wakes up."""
+        found = self.ask_words(self._waking, 1)
+        return found[0] if found is not None else None
+
+    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+        """Ask for the pulse widths of some channels, quarter microseconds; 0: no pulses.
+
+        None where they did not come, or more came than was asked for: who has been answered
+        twice takes the next ones' pulses for his own.
+        """
+        found: tuple[int, ...] = ()
+        for i in range(0, len(channels), AT_ONCE):
+            some = channels[i : i + AT_ONCE]
+            packet = b"".join(self.speech.position(channel) for channel in some)
+            got = self.ask_words(packet, len(some))
+            if got is None:
+                return None
+            found += got
+        # Not in every read, as it takes 3 ms: all are asked for where something is odd, and much
+        # follows from what they are.
+        if len(channels) > 1 and self.port.read_until(1, self.port.now_s() + QUIET_S):
+            self.errors["damaged"] += 1
+            self._late = True
+            return None
+        return found
+
+    def wait(self, until_s: float) -> None:
+        """Let time pass; what arrives meanwhile was not asked for."""
+        while self.port.now_s() < until_s and self.port.read_until(1, until_s):
+            pass

@@ -1,0 +1,103 @@
+"""Is there a Maestro at a port, and how does it want to be spoken to? Nothing is moved on purpose.
+
+One thing is changed: a board clears its error register when it tells it, so what it held
+is in the answer. Commands that a board does not understand are errors to it, and on an
+error it sends its channels home; so forms other than the chosen one are tried only where
+it keeps silent, and channels that may not exist are asked for only where that was wished
+and no channel gives pulses.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from drivers.errors import PortError
+from drivers.maestro.commands import ERRORS, MICRO, PROTOCOL_ERROR, name_errors
+from drivers.maestro.line import Line
+from drivers.maestro.params import Form, MaestroParams
+from drivers.serial_port import BusPort
+
+USB_CHANNELS = {"1ffb:0089": 6, "1ffb:008a": 12, "1ffb:008b": 18, "1ffb:008c": 24}
+"""Channels by USB vendor and product id."""
+
+FORMS: tuple[Form, ...] = ("compact", "pololu")
+
+
+class MaestroFound(NamedTuple):
+    """A board that answers.
+
+    forms: those of the commands that it answers; "pololu" with the device number given
+    crc: it wants a check byte after every command
+    errors: what its error register held, which is cleared now
+    script: its own script runs; None where it did not say
+    pulses: by channel, quarter microseconds; 0: no pulses
+    channels: how many there are; None where that was not asked
+    """
+
+    forms: tuple[Form, ...]
+    crc: bool
+    errors: tuple[str, ...]
+    script: bool | None
+    pulses: tuple[int, ...]
+    channels: int | None
+
+
+def probe(port: BusPort, params: MaestroParams, count: bool = False) -> MaestroFound | None:
+    """Ask whether a Maestro is there; None where nothing answers as one. The port is left open.
+
+    count: find the number of channels by asking for some that may not exist, on which a
+        board sends its channels home; never done while any gives pulses. On USB the product
+        id tells it: ``USB_CHANNELS``.
+
+    Raises:
+        drivers.errors.PortError: the port cannot be opened.
+        drivers.errors.BusLost: the port went away.
+    """
+    if not port.setBaudRate(params.baud):
+        raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: choose 115200")
+    other: Form = "pololu" if params.protocol == "compact" else "compact"
+    for crc in (params.crc, not params.crc):
+        for form in (params.protocol, other):
+            line = Line(port, replace(params, protocol=form, crc=crc))
+            port.drain()
+            register = line.greet()
+            if register is not None and not register >> len(ERRORS) and line.takes_crc():
+                return _look(line, params, register, count)
+    return None
+
+
+def _look(line: Line, params: MaestroParams, register: int, count: bool) -> MaestroFound | None:
+    """Ask a board that answers for what else it tells."""
+    crc = line.speech.crc
+    forms: tuple[Form, ...] = ()
+    # Where several boards share a line all of them answer the compact form.
+    for form in FORMS if line.speech.form == "compact" else ("pololu",):
+        spoken = Line(line.port, replace(params, protocol=form, crc=crc))
+        found = spoken.ask_words(spoken.speech.errors(), 1)
+        if found is not None:
+            forms, line = (*forms, form), spoken
+            register |= found[0]
+        else:
+            line.port.drain()
+    if not forms:
+        return None
+    status = line.ask(line.speech.script_status(), 1)
+    pulses = line.pulses(range(min(MICRO, params.channels)))
+    if pulses is None:
+        return None
+    channels = _count(line) if count and not any(pulses) else None
+    if channels is not None and channels > MICRO:
+        pulses = line.pulses(range(channels)) or pulses
+    script = None if status is None else status == b"\0"
+    return MaestroFound(forms, crc, name_errors(register), script, pulses, channels)
+
+
+def _count(line: Line) -> int:
+    """Count the channels: the first of each larger board is asked for until it is not there."""
+    for channels in sorted(USB_CHANNELS.values())[:-1]:
+        question = line.speech.position(channels) + line.speech.errors()
+        found = line.ask_words(question, 2)
+        if found is None or found[1] >> PROTOCOL_ERROR & 1:
+            # What was not understood is an error in its register, and no one else's.
+            line.greet()
+            return channels
+    return max(USB_CHANNELS.values())

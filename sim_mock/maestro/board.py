@@ -1,0 +1,280 @@
+"""The device side of a Pololu Maestro: bytes in, bytes and pulses out, nothing opened.
+
+A board of 6, 12, 18 or 24 channels, all set up as servos, each with a hobby servo behind
+it. Left out: inputs, digital outputs, other periods than 20 ms, PWM (accepted, no effect),
+and scripts but for the one that a fault starts. Source: Pololu Maestro User's Guide
+(0J40), section 5; [A] is assumed.
+"""
+
+from collections.abc import Callable, Sequence
+
+from sim_mock.device import Reply
+from sim_mock.hobby_servo import HobbyServo, HobbySpec
+from sim_mock.maestro.body import Body
+from sim_mock.maestro.channel import Channel
+from sim_mock.maestro.commands import (
+    GET_ERRORS,
+    GET_MOVING,
+    GET_POSITION,
+    GET_SCRIPT,
+    GO_HOME,
+    MINI_SSC,
+    POLOLU,
+    RUN_SCRIPT,
+    RUN_SCRIPT_WITH,
+    SET_ACCELERATION,
+    SET_PWM,
+    SET_SPEED,
+    SET_TARGET,
+    SET_TARGETS,
+    STOP_SCRIPT,
+    Ear,
+    Heard,
+    word,
+)
+from sim_mock.maestro.faults import COMMANDS, BoardFaults
+from sim_mock.maestro.settings import LIMITS, Settings, chosen, width_steps
+from sim_mock.servo_packets import Piece
+from sim_mock.wire_faults import NOBODY
+
+SIZES = (6, 12, 18, 24)
+ASKING = (GET_POSITION, GET_MOVING, GET_ERRORS, GET_SCRIPT)
+
+
+class MaestroBoard:
+    """One board and its servos.
+
+    Args:
+        servos: one for each channel, in their order.
+        device: its number in the Pololu protocol.
+        settings: what it was set to over USB.
+        seed: of the dice that faults throw.
+    """
+
+    def __init__(
+        self,
+        servos: Sequence[HobbyServo],
+        now_s: Callable[[], float],
+        device: int = 12,
+        settings: Settings | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.now_s = now_s
+        self.body = Body(servos, now_s, settings or Settings())
+        self.faults = BoardFaults(self, COMMANDS, seed)
+        self._wire = self.faults.wire
+        self._ear = Ear(device, len(servos) > SIZES[0])
+        self._told_baud: int | None = None
+        self._set_up(self.body.settings)
+        self._do: dict[int, Callable[[bytes], bytes | None]] = {
+            SET_TARGET: lambda data: self._at(data, Channel.aim),
+            SET_TARGETS: self._set_targets,
+            SET_SPEED: lambda data: self._at(data, Channel.limit_speed),
+            SET_ACCELERATION: lambda data: self._at(data, Channel.limit_acceleration),
+            SET_PWM: lambda data: None,
+            GET_POSITION: self._get_position,
+            GET_MOVING: lambda data: bytes((any(c.led for c in self.body.channels),)),
+            GET_ERRORS: lambda data: self.body.told_errors().to_bytes(2, "little"),
+            GO_HOME: lambda data: self.body.send_all(self.body.settings.on_error),
+            STOP_SCRIPT: lambda data: self.body.stop_script(),
+            RUN_SCRIPT: lambda data: self._run_script(),
+            RUN_SCRIPT_WITH: lambda data: self._run_script(),
+            GET_SCRIPT: lambda data: bytes((not self.body.script_running,)),
+            MINI_SSC: self._mini_ssc,
+        }
+
+    # --- what it is, and who is heard
+
+    def hears(self, client_baud: int) -> bool:
+        """Tell whether a client at this baud rate is understood, once it has sent AA."""
+        mode = self.body.settings.mode
+        if mode == "uart-fixed":
+            return client_baud == self.body.settings.baud
+        if mode == "uart-detect":
+            return self._told_baud in (None, client_baud)
+        return mode != "mute"
+
+    def choose(self, case: str, value: str) -> None:
+        """Choose what the board is set to; it does not restart for that.
+
+        Raises:
+            ValueError: there is no such case or value.
+        """
+        self.body.advance()
+        if case in LIMITS:
+            steps = width_steps(case, value)
+            self.body.limit(*((steps, None) if case == "min-us" else (None, steps)))
+            return
+        before = self.body.settings.mode
+        self._set_up(chosen(self.body.settings, case, value))
+        if before != self.body.settings.mode:
+            self._forget()
+        self.body.feed()
+
+    def _set_up(self, settings: Settings) -> None:
+        self.body.settings = settings
+        self._ear.crc = settings.crc
+        # The client's rate matters at the serial pins alone.
+        self.heed_baud = settings.mode in ("uart-fixed", "uart-detect")
+
+    def _forget(self) -> None:
+        self._ear.forget()
+        self._told_baud = None
+
+    def restart(self) -> None:
+        """Restart as a dip of the supply makes it."""
+        self.body.restart()
+        self._forget()
+
+    def here(self, channel: int) -> HobbyServo:
+        """Give the servo of a channel, brought up to now.
+
+        Raises:
+            KeyError: the board has no such channel.
+        """
+        self.body.advance()
+        servos = self.body.servos
+        if not 0 <= channel < len(servos):
+            raise KeyError(f"no channel {channel}; there is 0 to {len(servos) - 1}")
+        return servos[channel]
+
+    def positions_steps(self) -> tuple[float, ...]:
+        """Give where the shafts truly are now, in quarter microseconds, by channel."""
+        self.body.advance()
+        return tuple(servo.place_steps for servo in self.body.servos)
+
+    # --- bytes
+
+    def receive(self, data: bytes, client_baud: int | None = None) -> bytes:
+        """Take bytes off the wire and give the bytes that the board answers with."""
+        replies = self.exchange(data, client_baud)
+        return b"".join(piece.data for reply in replies for piece in reply.pieces)
+
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Reply]:
+        """Take bytes off the wire and give what is answered to each command in them."""
+        self.body.advance()
+        came = self._what_comes(data, client_baud)
+        missing, replies = len(data) - len(came), []
+        for heard in self._ear.feed(came):
+            pieces = self._execute(heard)
+            if pieces:
+                replies.append(Reply(missing + heard.end, pieces))
+        return self.faults.around(replies, data) if self._wire.any else replies
+
+    def _what_comes(self, data: bytes, client_baud: int | None) -> bytes:
+        """Give what the board understands of a client's bytes."""
+        if not self.body.awake or self.body.settings.mode == "mute":
+            return b""
+        if self.heed_baud and client_baud is not None:
+            data = self._through_pins(data, client_baud)
+        now_s = self.now_s()
+        if not self._wire.any or not self._wire.on("lose_bytes", now_s):
+            return data
+        return bytes(b for b in data if self._wire.take("lose_bytes", None, now_s) is None)
+
+    def _through_pins(self, data: bytes, client_baud: int) -> bytes:
+        """Give what the serial pins understand: nothing before AA tells the rate, if it must."""
+        if self.body.settings.mode == "uart-detect" and self._told_baud is None:
+            sign = data.find(POLOLU)
+            if sign < 0:
+                return b""
+            self._told_baud = client_baud
+            return data[sign:]
+        if self.hears(client_baud):
+            return data
+        if data:
+            self.body.fail("signal")
+        return b""
+
+    def _execute(self, heard: Heard) -> list[Piece]:
+        """Carry out one command; gives what is answered."""
+        if heard.trouble:
+            self.body.fail(heard.trouble)
+            return []
+        if self._wire.any and heard.code not in ASKING and self._lost():
+            return []
+        answer = self._do[heard.code](heard.data)
+        self.body.feed()
+        if answer is None:
+            return []
+        asked = heard.data[0] if heard.code == GET_POSITION else NOBODY
+        return self._sent(Piece(asked, answer))
+
+    def _lost(self) -> bool:
+        """Tell whether a command that answers nothing is lost on its way."""
+        return self._wire.take("lose_writes", None, self.now_s()) is not None
+
+    def _sent(self, piece: Piece) -> list[Piece]:
+        """Give an answer as it arrives; faults of one channel spoil only its position."""
+        if not self._wire.any:
+            return [piece]
+        now_s = self.now_s()
+        if self._wire.take("lose", piece.servo_id, now_s):
+            return []
+        return self._wire.spoil_pieces([piece], False, now_s)
+
+    # --- commands
+
+    def _at(self, data: bytes, do: Callable[[Channel, int], None]) -> None:
+        """Tell one channel a number; one that does not exist is a protocol error [A]."""
+        if data[0] < len(self.body.channels):
+            do(self.body.channels[data[0]], word(data[1], data[2]))
+        else:
+            self.body.fail("protocol")
+
+    def _set_targets(self, data: bytes) -> None:
+        number, first = data[0], data[1]
+        if not number or first + number > len(self.body.channels):
+            self.body.fail("protocol")
+            return
+        for nth, channel in enumerate(self.body.channels[first : first + number], 1):
+            channel.aim(word(data[2 * nth], data[2 * nth + 1]))
+
+    def _get_position(self, data: bytes) -> bytes | None:
+        if data[0] < len(self.body.channels):
+            return self.body.channels[data[0]].position.to_bytes(2, "little")
+        self.body.fail("protocol")
+        return None
+
+    def _mini_ssc(self, data: bytes) -> None:
+        """Set a target of 8 bits: 127 is 1500 us, 0 and 254 are 476.25 us to either side."""
+        # Servo numbers beyond its own are other boards'.
+        if data[0] < len(self.body.channels):
+            self.body.channels[data[0]].aim(6000 + (data[1] - 127) * 15)
+
+    def _run_script(self) -> None:
+        """Meet the wish for a script where there is none [A]."""
+        self.body.stop_script()
+        self.body.fail("script-counter")
+
+
+def build_board(
+    channels: int,
+    now_s: Callable[[], float],
+    device: int = 12,
+    crc: bool = False,
+    baud: int | None = None,
+    seed: int = 0,
+    servos: Sequence[HobbySpec | Sequence[float]] = (),
+) -> MaestroBoard:
+    """Build a board; channels without a spec have a servo as from the shop.
+
+    With a baud rate the host is at its serial pins, set to that rate; without one it is at
+    the USB command port, where every client is heard.
+
+    Raises:
+        ValueError: such a board or servo does not exist.
+    """
+    if channels not in SIZES:
+        raise ValueError(f"{channels} channels: a Maestro has {', '.join(map(str, SIZES))}")
+    if not 0 <= device <= 127:
+        raise ValueError(f"device {device}: a Maestro's number is 0 to 127")
+    given = {int(spec[0]): HobbySpec(*spec) for spec in servos}
+    if len(given) < len(servos):
+        raise ValueError("two servos are on one channel")
+    for channel in given:
+        if not 0 <= channel < channels:
+            raise ValueError(f"servo on channel {channel}: there is 0 to {channels - 1}")
+    built = [HobbyServo(given.get(channel, HobbySpec(channel))) for channel in range(channels)]
+    settings = Settings(crc=crc) if baud is None else Settings("uart-fixed", crc, baud=baud)
+    return MaestroBoard(built, now_s, device, settings, seed)

@@ -1,0 +1,166 @@
+"""An emulated Maestro without its serial side: channels, servos, errors, a script, and time.
+
+It moves in whole periods of 10 ms and sends pulses every 20 ms, however often it is looked
+at. Source: Pololu Maestro User's Guide (0J40); [A] is assumed.
+"""
+
+from collections.abc import Callable, Sequence
+
+from sim_mock.hobby_servo import HobbyServo
+from sim_mock.maestro.channel import Channel
+from sim_mock.maestro.commands import ERRORS
+from sim_mock.maestro.settings import OnError, Settings
+
+PERIODS_S = 100
+"""Periods in a second; a pulse goes out in every second one."""
+RESTART_S = 0.1
+"""From a dip of the supply until it hears again [A]."""
+SWING = 100
+"""The script that a fault starts sends a channel to its other end every so many periods."""
+
+
+class Body:
+    """The board's body and its servos.
+
+    Args:
+        servos: one for each channel, in their order.
+        settings: what it was set to over USB.
+
+    errors: its register; servo_power: the servos have their supply
+    script_running: a script does; swung: the channel that it moves, None for no channel
+    """
+
+    def __init__(
+        self, servos: Sequence[HobbyServo], now_s: Callable[[], float], settings: Settings
+    ) -> None:
+        self.now_s = now_s
+        self.servos = tuple(servos)
+        self.channels = tuple(Channel(s.spec.min_steps, s.spec.max_steps) for s in servos)
+        self.settings = settings
+        self.errors = 0
+        self.servo_power = True
+        self.script_running = False
+        self.swung: int | None = None
+        self._period = self._fed = self._awake_from = whole_periods(now_s())
+        self._timed_out = False
+        self.send_all(settings.startup)
+
+    @property
+    def awake(self) -> bool:
+        """Tell whether it does not just restart."""
+        return self._period >= self._awake_from
+
+    # --- what it is told
+
+    def send_all(self, where: OnError) -> None:
+        """Send every channel to where it is to be at start or on an error."""
+        if where != "ignore":
+            for channel in self.channels:
+                channel.aim(self.settings.home_steps if where == "home" else 0)
+
+    def feed(self) -> None:
+        """Count the time without valid commands from now on."""
+        self._fed, self._timed_out = self._period, False
+
+    def limit(self, low: int | None, high: int | None) -> None:
+        """Set other limits of every channel's targets; None: as they are.
+
+        Raises:
+            ValueError: the lower one would be above the upper one.
+        """
+        wanted = [
+            (c.low if low is None else low, c.high if high is None else high) for c in self.channels
+        ]
+        for lowest, highest in wanted:
+            if lowest > highest:
+                raise ValueError(f"min-us {lowest / 4:g} would be above max-us {highest / 4:g}")
+        for channel, limits in zip(self.channels, wanted, strict=True):
+            channel.limit(*limits)
+
+    # --- what goes wrong
+
+    def fail(self, error: str) -> None:
+        """Register an error by its name: every channel does as it is set to do then."""
+        self.errors |= 1 << ERRORS.index(error)
+        self.send_all(self.settings.on_error)
+
+    def told_errors(self) -> int:
+        """Give the register of errors, which is empty after that."""
+        told, self.errors = self.errors, 0
+        return told
+
+    def restart(self) -> None:
+        """Restart as a dip of the supply makes it; the register of errors begins empty."""
+        self.advance()
+        self.errors = 0
+        self.stop_script()
+        for channel in self.channels:
+            channel.restart()
+        self._awake_from = self._period + round(RESTART_S * PERIODS_S)
+
+    # --- scripts
+
+    def run_script(self, channel: int | None = None) -> None:
+        """Start a script that swings a channel from end to end, or does nothing for ever."""
+        self.advance()
+        self.script_running, self.swung = True, channel
+
+    def stop_script(self) -> None:
+        """End the script."""
+        self.script_running, self.swung = False, None
+
+    # --- time
+
+    def advance(self) -> None:
+        """Let time pass up to now."""
+        now = whole_periods(self.now_s())
+        while self._period < now:
+            self._period = self._next_period(now)
+            self._pass()
+
+    def _next_period(self, now: int) -> int:
+        """Give the next period in which anything happens."""
+        if self.swung is not None or not self.awake or not self._at_rest():
+            return self._period + 1
+        due = self._due()
+        return now if due is None else max(self._period + 1, min(now, due))
+
+    def _due(self) -> int | None:
+        """Give the period in which patience with the host ends, None for never."""
+        if not self.settings.timeout_s or self._timed_out:
+            return None
+        return self._fed + round(self.settings.timeout_s * PERIODS_S)
+
+    def _at_rest(self) -> bool:
+        """Tell whether every servo has heard its last pulse and done what it can."""
+        return all(
+            not channel.moving and servo.width_steps == self._pulse(channel) and servo.resting
+            for channel, servo in zip(self.channels, self.servos, strict=True)
+        )
+
+    def _pulse(self, channel: Channel) -> int:
+        """Give the pulse that reaches a servo; 0: none."""
+        return channel.position if self.servo_power else 0
+
+    def _pass(self) -> None:
+        """Let one period pass."""
+        if self._period == self._awake_from:
+            self.feed()
+            self.send_all(self.settings.startup)
+        due = self._due()
+        if due is not None and self.awake and self._period >= due:
+            self._timed_out = True
+            self.fail("timeout")
+        if self.swung is not None and self._period % SWING == 0:
+            channel = self.channels[self.swung]
+            channel.aim(channel.low if self._period // SWING % 2 else channel.high)
+        for servo, channel in zip(self.servos, self.channels, strict=True):
+            channel.step()
+            if self._period % 2 == 0:
+                servo.width_steps = self._pulse(channel)
+            servo.step()
+
+
+def whole_periods(now_s: float) -> int:
+    """Give the whole periods of a time; the margin keeps 0.03 s from being two of them."""
+    return int(now_s * PERIODS_S + 1e-3)

@@ -1,0 +1,1 @@
+"""The device side of Feetech STS servos: bytes in, bytes out."""
