@@ -258,6 +258,7 @@ def test_the_space_bar_stops_but_not_while_somebody_types(
     person.run(f"{beside('find', 'input')}.blur(); {saying('joints')}.focus()")
     person.space()
     wait_for(lambda: rig.robot.stopped == "somebody pressed the space bar", "the stop")
+    wait_for(lambda: len(rig.orders) > before, "the tick that obeyed")
     assert len(rig.orders) == before + 1
     resumed(rig, person)
 
