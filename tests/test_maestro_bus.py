@@ -595,7 +595,7 @@ def test_unplugged_and_plugged_in_again(held):
 
 
 def test_a_port_that_stays_away(held):
-    held.bus._params = MaestroParams(give_up_s=1.0)
+    held.bus._link._give_up_s = 1.0
     held.board.faults.command("unplug")
     with pytest.raises(BusLost, match="check the USB cable"):
         held.run(2.0)

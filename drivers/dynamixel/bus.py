@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from math import ceil
 
 from drivers.bus_journal import Journal, call
-from drivers.bus_reconnect import Reconnect
 from drivers.bus_roll import Roll
 from drivers.dynamixel.care import Care
 from drivers.dynamixel.health import Health
@@ -28,6 +27,8 @@ from drivers.dynamixel.table import (
 from drivers.dynamixel.torque import switch_off
 from drivers.dynamixel.views import alone_turns, direct_turns, indirect_turns
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
+from drivers.goals import clipped
+from drivers.lasting_port import LastingPort
 from drivers.serial_port import BusPort
 from drivers.types import BusHealth, ServoReading, ServoSetup
 
@@ -72,7 +73,9 @@ class DynamixelBus:
         """Make the parts, with a clean sheet, for what the servos can do."""
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
         self._fast, self._block = fast, block
-        self._link = Reconnect()
+        self._link = LastingPort(
+            self._port, self._params.baud, self._params.give_up_s, self._journal, self._trust_nobody
+        )
         self._roll = Roll(self._ids)
         self._readings = Readings(self._setups)
         self._health = Health(by_id, self._journal)
@@ -132,7 +135,7 @@ class DynamixelBus:
             drivers.errors.BusLost: port or servos have been gone for longer than ``give_up_s``.
         """
         self._now_s = now_s
-        if self._link.down and not self._reopened(now_s):
+        if self._link.down and not self._link.returned(now_s):
             return (None,) * len(self._ids)
         try:
             readings = self._read(now_s)
@@ -175,7 +178,7 @@ class DynamixelBus:
         Raises:
             ValueError: a goal is not a number, or there are not as many as servos.
         """
-        goals = self._clip(goals_steps)
+        goals = clipped(goals_steps, self._limits)
         if not self._care.engaged or self._link.down or self._line.starved:
             return
         try:
@@ -225,10 +228,8 @@ class DynamixelBus:
         self._care.let_go()
         if not self._opened:
             return
-        if self._link.down:
-            if not self._open_port():
-                raise BusLost(self._cannot_release())
-            self._link.back(self._now_s)
+        if self._link.down and not self._link.open_once_more(self._now_s):
+            raise BusLost(self._cannot_release())
         try:
             released = switch_off(self._line, self._ids)
         except BusLost as lost:
@@ -316,38 +317,13 @@ class DynamixelBus:
     # --- a port that goes away
 
     def _lose(self, lost: BusLost) -> None:
-        """Note that the port is gone."""
-        self._link.lost(self._now_s)
-        self._port.closePort()
-        self._journal.say(f"port lost: {lost}")
+        self._link.lose(lost, self._now_s)
 
-    def _reopened(self, now_s: float) -> bool:
-        """Try to open the port again where that is due."""
-        gone_s = self._link.gone_for_s(now_s)
-        if self._link.due(now_s):
-            if self._open_port():
-                self._journal.say(f"port back after {self._link.back(now_s):.1f} s")
-                return True
-            self._link.failed(now_s)
-        if gone_s >= self._params.give_up_s:
-            raise BusLost(
-                f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
-            )
-        return False
-
-    def _open_port(self) -> bool:
-        """Open the port anew and trust no servo on it."""
-        try:
-            if not self._port.setBaudRate(self._params.baud):
-                return False
-            self._port.clearPort()
-        except (PortError, BusLost):
-            self._port.closePort()
-            return False
+    def _trust_nobody(self) -> None:
+        """Begin anew with a port that was away."""
         self._roll = self._reader.roll = Roll(self._ids)
         self._line.starved = False
         self._care.suspect_all()
-        return True
 
     def _cannot_release(self) -> str:
         """Say what servos do that cannot be told to let go."""
@@ -361,21 +337,3 @@ class DynamixelBus:
             f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
             f"power keep their torque, {rest}: cut the servo power to free them"
         )
-
-    def _clip(self, steps: Sequence[int]) -> list[int]:
-        """Keep goals inside the limits."""
-        return [
-            goal if low <= goal <= high else _inside(goal, low, high)
-            for goal, (low, high) in zip(steps, self._limits, strict=True)
-        ]
-
-
-def _inside(goal: float, low: int, high: int) -> int:
-    """Give the nearest limit to a goal outside.
-
-    Raises:
-        ValueError: it is not a number.
-    """
-    if goal != goal:
-        raise ValueError("a goal is not a number: every goal must be a whole number of steps")
-    return low if goal < low else high

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from math import inf
 
 from drivers.bus_journal import Journal, call
-from drivers.bus_reconnect import Reconnect
 from drivers.errors import BusLost, PortError, ServoMissing
+from drivers.lasting_port import LastingPort
 from drivers.maestro.care import Care
 from drivers.maestro.channel import Channel, check
 from drivers.maestro.commands import MICRO
@@ -64,7 +64,9 @@ class MaestroBus:
         self._channels = tuple(Channel(setup) for setup in self._setups)
         self._care = Care(self._line, self._channels, self._journal)
         self._silence = Silence(self._journal)
-        self._link = Reconnect()
+        self._link = LastingPort(
+            self._port, self._params.baud, self._params.give_up_s, self._journal, self._trust_nobody
+        )
         self._heard_s = -inf
 
     # --- the bus as others see it
@@ -101,7 +103,7 @@ class MaestroBus:
             drivers.errors.BusLost: port or board have been gone for longer than ``give_up_s``.
         """
         self._now_s = now_s
-        if self._link.down and not self._reopened(now_s):
+        if self._link.down and not self._link.returned(now_s):
             return (None,) * len(self._ids)
         try:
             answered = self._watch(now_s)
@@ -204,10 +206,8 @@ class MaestroBus:
         self._care.let_go()
         if not self._opened:
             return
-        if self._link.down:
-            if not self._open_port():
-                raise BusLost(self._cannot_release())
-            self._link.back(self._now_s)
+        if self._link.down and not self._link.open_once_more(self._now_s):
+            raise BusLost(self._cannot_release())
         try:
             released = switch_off(self._line, self._ids)
         except BusLost as lost:
@@ -313,36 +313,11 @@ class MaestroBus:
     # --- a port that goes away
 
     def _lose(self, lost: BusLost) -> None:
-        """Note that the port is gone."""
-        self._link.lost(self._now_s)
-        self._port.closePort()
-        self._journal.say(f"port lost: {lost}")
+        self._link.lose(lost, self._now_s)
 
-    def _reopened(self, now_s: float) -> bool:
-        """Try to open the port again where that is due."""
-        gone_s = self._link.gone_for_s(now_s)
-        if self._link.due(now_s):
-            if self._open_port():
-                self._journal.say(f"port back after {self._link.back(now_s):.1f} s")
-                return True
-            self._link.failed(now_s)
-        if gone_s >= self._params.give_up_s:
-            raise BusLost(
-                f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
-            )
-        return False
-
-    def _open_port(self) -> bool:
-        """Open the port anew and trust no channel behind it."""
-        try:
-            if not self._port.setBaudRate(self._params.baud):
-                return False
-            self._port.clearPort()
-        except (PortError, BusLost):
-            self._port.closePort()
-            return False
+    def _trust_nobody(self) -> None:
+        """Begin anew with a port that was away."""
         self._care.suspect_all()
-        return True
 
     def _cannot_release(self) -> str:
         """Say what servos do that cannot be told to let go."""
