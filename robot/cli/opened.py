@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from config.schema import Rig
 from drivers.errors import PortError
 from drivers.serial_port import BlockingPort
+from robot.cli.bench import to_open
 from robot.cli.wires import Wires
 
 
@@ -17,10 +18,7 @@ def opened(rig: Rig, wire: Wires, bus: str) -> Iterator[BlockingPort]:
         drivers.errors.PortError: it is absent, busy, not permitted, or has no such speed.
     """
     config = rig.buses[bus] if bus else rig.bus
-    port = BlockingPort(wire.paths[bus])
-    if not port.setBaudRate(config.baud):
-        raise PortError(f"{port.port_name} cannot run at {config.baud} bit/s: choose another")
-    try:
+    with to_open(wire.paths[bus]) as port:
+        if not port.setBaudRate(config.baud):
+            raise PortError(f"{port.port_name} cannot run at {config.baud} bit/s: choose another")
         yield port
-    finally:
-        port.closePort()

@@ -8,8 +8,7 @@ import typer
 
 from config.rig import BusConfig
 from config.schema import Rig
-from drivers.dynamixel.registers import Registers
-from drivers.errors import PortError, SetupError
+from drivers.errors import SetupError
 from drivers.port_owner import refuse_owner
 from drivers.serial_port import BlockingPort
 from drivers.serial_ports import serial_ports
@@ -94,19 +93,3 @@ def setups_on(rig: Rig, name: str) -> tuple[ServoSetup, ...]:
     """Give what a bus must know of its servos, in the order of the joints."""
     every = dict(zip(rig.names, rig_setups(rig), strict=True))
     return tuple(every[joint] for joint in joints_on(rig, name))
-
-
-@contextlib.contextmanager
-def registers(path: str, baud: int, tries: int = 3) -> Iterator[tuple[Registers, BlockingPort]]:
-    """Open a port for single registers of Dynamixel servos; nothing is sent.
-
-    Raises:
-        drivers.errors.PortError: it is absent, busy, not permitted, or has no such rate.
-    """
-    port = BlockingPort(path)
-    if not port.setBaudRate(baud):
-        raise PortError(f"{path} cannot run at {baud} bit/s: choose 57600 or 1000000")
-    try:
-        yield Registers(port, tries), port
-    finally:
-        port.closePort()
