@@ -137,7 +137,7 @@ def made_for(scene: str, seed: int = 0, rate_hz: float = 200.0) -> Assembly:
 @pytest.fixture(scope="module", params=[0, 7])
 def boxing(request: pytest.FixtureRequest) -> Lived:
     scene = scenes()["boxing"]
-    return Lived(made_for("boxing", request.param), scene, scene.round_s + 0.05)
+    return Lived(made_for("boxing", request.param, 100.0), scene, scene.round_s + 0.05)
 
 
 def latency(figure: dict[str, float | int | None]) -> float:
@@ -160,7 +160,9 @@ def test_e46_a_the_fist_of_a_punch_is_looked_at(boxing: Lived) -> None:
 def test_e46_a_without_the_pull_of_motion_no_fist_is_looked_at() -> None:
     rig = load_rig("desk")
     dull = replace(rig.gaze.bottom_up, slide_rad_s=20.0, loom_1_s=20.0)
-    rig = replace(rig, gaze=replace(rig.gaze, bottom_up=dull))
+    rig = replace(
+        rig, gaze=replace(rig.gaze, bottom_up=dull), loop=replace(rig.loop, rate_hz=100.0)
+    )
     made = assemble(rig, Choice(mock=True, fast=True, seed=0, scene="boxing"))
     lived = Lived(made, scenes()["boxing"], 7.0)
     figures = lived.score.figures()

@@ -89,28 +89,28 @@ def test_open_finds_all_and_nothing_moves(twin):
     bus.close()
 
 
-def test_readings_are_fresh_in_order_and_say_whether_they_are_measured(twin, held):
-    twin.run(held, 0.05)
-    before_s = twin.now_s()
-    readings = held.read(before_s)
-    assert twin.near(twin.seen(readings), starts(twin))
-    assert all(before_s <= r.at_s <= twin.now_s() for r in readings)
-    assert [r.measured for r in readings] == [twin.on[p] != "maestro" for p in range(twin.count)]
+def test_readings_are_fresh_in_order_and_say_whether_they_are_measured(here, held_here):
+    here.run(held_here, 0.05)
+    before_s = here.now_s()
+    readings = held_here.read(before_s)
+    assert here.near(here.seen(readings), starts(here))
+    assert all(before_s <= r.at_s <= here.now_s() for r in readings)
+    assert [r.measured for r in readings] == [here.on[p] != "maestro" for p in range(here.count)]
     assert not any(r.alert or r.fault or r.rearmed for r in readings)
 
 
-def test_engage_holds_every_servo_where_it_is(twin):
-    twin.pulses_on()
-    bus = twin.bus()
+def test_engage_holds_every_servo_where_it_is(here):
+    here.pulses_on()
+    bus = here.bus()
     bus.open()
-    before = twin.truth()
+    before = here.truth()
     goals = bus.engage()
-    assert twin.near(twin.shares(goals), before)
+    assert here.near(here.shares(goals), before)
     for _ in range(10):
-        readings = twin.run(bus, 0.02)
-        assert twin.near(twin.truth(), before)
+        readings = here.run(bus, 0.02)
+        assert here.near(here.truth(), before)
     assert well(readings)
-    assert twin.holding() == [True] * twin.count
+    assert here.holding() == [True] * here.count
     bus.release()
     bus.close()
 
@@ -237,24 +237,24 @@ def test_a_port_that_cannot_be_opened_is_named(here):
     bus.close()
 
 
-def test_one_silent_servo_costs_only_itself(twin, held):
+def test_one_silent_servo_costs_only_itself(here, held_here):
     """A Maestro answers for all its channels at once: there the board is one."""
-    if not smart(twin):
+    if not smart(here):
         return
-    place = smart(twin)[0]
-    others = [p for p in range(twin.count) if p != place]
-    twin.strike("lose", place)
-    readings = twin.until(held, lambda r: r[place] is None, starts(twin))
+    place = smart(here)[0]
+    others = [p for p in range(here.count) if p != place]
+    here.strike("lose", place)
+    readings = here.until(held_here, lambda r: r[place] is None, starts(here))
     for _ in range(20):
-        readings = twin.run(held, 0.0, starts(twin))
+        readings = here.run(held_here, 0.0, starts(here))
         assert all(readings[p] is not None for p in others)
-        twin.wait(0.01)
+        here.wait(0.01)
     assert readings[place] is None
-    assert held.health().errors["timeout"] >= 1
-    twin.until(held, lambda r: _says(held, twin, place, "does not answer"), starts(twin))
-    twin.command("clear", twin.on[place])
-    twin.until(held, well, starts(twin))
-    assert twin.near(twin.truth(), starts(twin))
+    assert held_here.health().errors["timeout"] >= 1
+    here.until(held_here, lambda r: _says(held_here, here, place, "does not answer"), starts(here))
+    here.command("clear", here.on[place])
+    here.until(held_here, well, starts(here))
+    assert here.near(here.truth(), starts(here))
 
 
 def _says(bus, twin, place, what):
@@ -360,21 +360,21 @@ def test_no_read_takes_long_while_nobody_answers(here):
 # --- a servo restarts
 
 
-def test_a_restart_is_found_and_the_servo_held_where_it_is(twin, held):
+def test_a_restart_is_found_and_the_servo_held_where_it_is(here, held_here):
     place = 0
     # The board of a Maestro is one: all its channels restart.
-    struck = [p for p in range(twin.count) if twin.on[p] == "maestro"]
-    struck = struck if twin.on[place] == "maestro" else [place]
-    twin.run(held, 0.2, starts(twin))
-    twin.strike("brown-out", place)
-    rearmed = _until_back(twin, held, struck)
+    struck = [p for p in range(here.count) if here.on[p] == "maestro"]
+    struck = struck if here.on[place] == "maestro" else [place]
+    here.run(held_here, 0.2, starts(here))
+    here.strike("brown-out", place)
+    rearmed = _until_back(here, held_here, struck)
     assert sorted(rearmed) == struck
-    assert all(twin.holding())
-    told = held.events()
+    assert all(here.holding())
+    told = held_here.events()
     assert any("restarted: set up anew" in line for line in told), told
-    assert held.faults() == ()
+    assert held_here.faults() == ()
     # It follows again, with the speed that it was set up with.
-    twin.until(held, lambda r: twin.near(twin.seen(r), away(twin)), away(twin))
+    here.until(held_here, lambda r: here.near(here.seen(r), away(here)), away(here))
 
 
 @pytest.mark.parametrize("befalls", ["", "brown-out", "power cut", "unplug"])
@@ -459,7 +459,7 @@ def test_retune_waits_for_the_next_torque(here):
     goals = bus.engage()
     for setup, goal in zip(narrow, goals, strict=True):
         assert setup.min_steps <= goal <= setup.max_steps
-    here.run(bus, 4.0, away(here))
+    here.run(bus, 1.0, away(here))
     for setup, goal in zip(narrow, here.goals(), strict=True):
         assert setup.min_steps <= goal <= setup.max_steps
     with pytest.raises(ValueError, match="other servos need another bus"):
@@ -475,7 +475,7 @@ FAULTS = ("", "lose all count 2", "delay all 15 count 3", "corrupt all count 3",
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(data=st.data())
 def test_no_goal_outside_the_limits_ever_reaches_a_servo(kind, data):
     inside = in_process(kind)

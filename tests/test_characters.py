@@ -45,7 +45,7 @@ def face_share(gaze: GazeConfig, seconds: float = 60.0) -> float:
         TopDown(gaze.top_down),
         Idle(gaze.idle),
     )
-    times = [k / 30 for k in range(round(30 * seconds))]
+    times = [k / 15 for k in range(round(15 * seconds))]
     kinds = [model.choose(hands_about_a_face(t), AHEAD, t).kind for t in times]
     return kinds.count("face") / len(kinds)
 

@@ -1,9 +1,11 @@
 """Tuning a running rig from a shell: gazerig get, set, save ... on a rig in another process.
 
-``python tests/test_cli_tune.py RIG`` is that process: a real-time loop before an emulated bus.
+``python tests/test_cli_tune.py RIG`` is that process: a loop before an emulated bus, in simulated
+time that passes slower than real, so that it leaves the processor to the commands.
 """
 
 import contextlib
+import io
 import json
 import os
 import shutil
@@ -27,6 +29,7 @@ from drivers.errors import SetupError
 from robot.assemble import assemble
 from robot.choice import Choice
 from robot.cli.quick import QUICK, is_quick
+from robot.cli.quick import main as quick_main
 from robot.cli.tune import app, read_pairs, read_point, read_value, state_lines
 from robot.loop import Tick
 from robot.loop import run as run_loop
@@ -37,13 +40,14 @@ from robot.tuning import Tuning
 GAZERIG = "import sys; sys.argv[0] = 'gazerig'; from robot.cli.quick import main; main()"
 SPEED = "gaze.saccade.max_speed_deg_s"
 RATE = "loop.rate_hz"
+PACE_S = 0.02  # real seconds a tick
 
 
 def serve(path: Path) -> None:
     """Run until SIGTERM; says what the rig says on standard error."""
     over: list[str] = []
     signal.signal(signal.SIGTERM, lambda *_: over.append("SIGTERM"))
-    made = assemble(load_rig(str(path)), Choice(mock=True, fast=False, seed=0, scene="visitor"))
+    made = assemble(load_rig(str(path)), Choice(mock=True, fast=True, seed=0, scene="visitor"))
     robot = made.robot
 
     def say(line: str) -> None:
@@ -57,6 +61,7 @@ def serve(path: Path) -> None:
         live.note(tick)
         for event in tick.events:
             say(event)
+        time.sleep(PACE_S)
 
     robot.start(made.clock)
     live.open()
@@ -414,17 +419,32 @@ def there_is_none() -> None:
     assert done.stderr == "no rig runs as process 1: start one with gazerig run ...\n"
 
 
-def completed(*words: str) -> list[str]:
-    environ = {
+def completing(words: tuple[str, ...]) -> dict[str, str]:
+    """Give what a shell says to a command whose words it completes."""
+    return {
         "_GAZERIG_COMPLETE": "complete_bash",
         "COMP_WORDS": " ".join(("gazerig", *words)),
         "COMP_CWORD": str(len(words)),
     }
-    return whole_gazerig(**environ).stdout.split()
+
+
+def completed(*words: str) -> list[str]:
+    """Complete in this process."""
+    said = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
+        for name, value in completing(words).items():
+            patch.setenv(name, value)
+        patch.setattr(sys, "argv", ["gazerig"])
+        patch.setattr(sys.modules["__main__"], "__package__", None)  # or it is "python -m pytest"
+        with pytest.raises(SystemExit):
+            quick_main()
+    return said.getvalue().split()
 
 
 def test_a_shell_completes_keys_and_the_values_that_there_are() -> None:
-    assert completed("get", "loop.") == ["loop.rate_hz", "loop.park_s"]
+    keys = ["loop.rate_hz", "loop.park_s"]
+    assert whole_gazerig(**completing(("get", "loop."))).stdout.split() == keys
+    assert completed("get", "loop.") == keys
     assert RATE in completed("set", "loop.r")
     assert completed("set", "gaze.scanpath.model", "") == list(
         next(k for k in knobs_of_desk() if k.key == "gaze.scanpath.model").choices

@@ -23,6 +23,7 @@ from robot.report.bands import BY_KEY
 from robot.report.compare import chance, compare, corrected, differences_of
 from robot.report.measured import Measured, mean, median
 
+SECONDS = 16.0
 DICE = np.random.default_rng(11)
 
 
@@ -95,14 +96,14 @@ def record(path: Path, seconds: float, saccade: str) -> None:
 @pytest.fixture(scope="module")
 def soft(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("runs") / "soft.mcap"
-    record(path, 22.0, "min_jerk")
+    record(path, SECONDS, "min_jerk")
     return path
 
 
 @pytest.fixture(scope="module")
 def hard(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("runs") / "hard.mcap"
-    record(path, 22.0, "literal_frame")
+    record(path, SECONDS, "literal_frame")
     return path
 
 
@@ -139,7 +140,7 @@ def test_a_run_against_itself_differs_in_nothing(
     soft: Path, few_drawings: int, tmp_path: Path
 ) -> None:
     ticks = list(RunRecording(soft).ticks())
-    abouts = About("this", duration_s=22.0), About("again", duration_s=22.0)
+    abouts = About("this", duration_s=SECONDS), About("again", duration_s=SECONDS)
     told: list[str] = []
     found = compare(
         (ticks, ticks), abouts, tmp_path / "same.html", lambda words, share: told.append(words)

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from typer.testing import CliRunner
 
 from drivers.errors import SetupError
 from drivers.serial_port import BlockingPort
+from robot.cli import emulate as command
 from robot.cli.emulate import app
 from sim_mock.emulated import DynamixelLine, StsLine
 from sim_mock.servo_words import line_of, parse_servos
@@ -23,12 +25,20 @@ COMMAND = [sys.executable, "-c", "from robot.cli.emulate import app; app()"]
 
 
 class Emulator:
-    """The command in a process of its own."""
+    """The command beside the test: in a process of its own, or in a branch of this one.
 
-    def __init__(self, *options, command=COMMAND, **how):
-        how = {"stdin": subprocess.PIPE, **how}
-        self.process = subprocess.Popen(
-            [*command, *options], cwd=ROOT, stdout=subprocess.PIPE, text=True, **how
+    A branch saves the start of Python; it has standard streams and signals of its own.
+    """
+
+    def __init__(self, *options, command=None, stdin=subprocess.PIPE, stderr=None):
+        start = Branch if command is None else subprocess.Popen
+        self.process = start(
+            [*(command or ()), *options],
+            cwd=ROOT,
+            stdin=stdin,
+            stdout=subprocess.PIPE,
+            stderr=stderr,
+            text=True,
         )
         self.ready = self.hear()
         self.path = self.ready["path"]
@@ -48,6 +58,64 @@ class Emulator:
             if pipe is not None:
                 pipe.close()
         return code
+
+
+class Branch:
+    """What a test wants of subprocess.Popen, for the command in a fork of this process."""
+
+    def __init__(self, options, cwd, stdin, stdout, stderr, text):
+        ours = [None, None, None]
+        theirs = [None if file is subprocess.PIPE else file for file in (stdin, stdout, stderr)]
+        for number, file in enumerate((stdin, stdout, stderr)):
+            if file is subprocess.PIPE:
+                read, write = os.pipe()
+                own, theirs[number] = (write, read) if number == 0 else (read, write)
+                ours[number] = os.fdopen(own, "w" if number == 0 else "r")
+        self.stdin, self.stdout, self.stderr = ours
+        self.pid = os.fork()
+        if self.pid == 0:
+            code = 1
+            try:
+                code = _command(options, cwd, ours, theirs)
+            finally:
+                os._exit(code)
+        for file in theirs:
+            if isinstance(file, int):
+                os.close(file)
+
+    def send_signal(self, number):
+        os.kill(self.pid, number)
+
+    def wait(self, patience_s):
+        deadline = time.monotonic() + patience_s
+        while time.monotonic() < deadline:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            if pid:
+                return os.waitstatus_to_exitcode(status)
+            time.sleep(0.002)
+        raise TimeoutError(f"process {self.pid} goes on")
+
+
+def _command(options, cwd, ours, theirs):
+    """Run the command in a fork, with streams as a fresh process would have them."""
+    for file in ours:
+        if file is not None:
+            file.close()
+    for number, file in enumerate(theirs):
+        if file is not None:
+            os.dup2(file if isinstance(file, int) else file.fileno(), number)
+    sys.stdin, sys.stdout = os.fdopen(0), os.fdopen(1, "w")
+    sys.stderr = os.fdopen(2, "w")
+    os.chdir(cwd)
+    sys.argv = ["emulate", *options]
+    try:
+        app()
+    except SystemExit as end:
+        return end.code or 0
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    return 0
 
 
 def connect(path, baud=1_000_000):
@@ -74,7 +142,9 @@ def ping(port, servo_id):
 
 def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
     link = tmp_path / "servos"
-    emulator = Emulator("--servos", "1-2:xl330-m077,7:xc330-m288@100", "--link", str(link))
+    emulator = Emulator(
+        *("--servos", "1-2:xl330-m077,7:xc330-m288@100", "--link", str(link)), command=COMMAND
+    )
     assert emulator.ready == {"path": str(link), "baud": 1_000_000}
     for _ in range(2):
         port = connect(link)
@@ -185,17 +255,10 @@ MIXED = {
 }
 
 
-def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path):
-    code = (
-        "import robot.cli.emulate as command; from test_emulate import MIXED; "
-        "command.emulated_lines = lambda rig: MIXED; command.app()"
-    )
+def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "emulated_lines", lambda rig: MIXED)
     link = tmp_path / "head"
-    emulator = Emulator(
-        *("--rig", "desk", "--link", str(link), "--set", "wrong-baud=silence"),
-        command=[sys.executable, "-c", code],
-        env={**os.environ, "PYTHONPATH": str(ROOT / "tests")},
-    )
+    emulator = Emulator("--rig", "desk", "--link", str(link), "--set", "wrong-baud=silence")
     assert emulator.ready == {"bus": "", "path": str(link), "baud": 1_000_000}
     assert emulator.hear() == {"bus": "eyes", "path": f"{link}-eyes", "baud": 57_600}
     assert asked(link, STS_PING, 6) == STS_PONG

@@ -8,6 +8,7 @@ others; a fault is data and a name; a restarted servo is set up anew and holds w
 import random
 
 import pytest
+from copied import copied
 from sts_rig import IDS, NAMES, Rig
 
 from drivers.dynamixel.health import AGAIN_AND_AGAIN
@@ -20,9 +21,14 @@ LONGEST_S = 0.1
 """No read takes longer, but the one that opens a port anew or sets a servo up anew."""
 
 
-@pytest.fixture
-def rig():
+@pytest.fixture(scope="module")
+def started():
     return Rig().start()
+
+
+@pytest.fixture
+def rig(started):
+    return copied(started)
 
 
 PASSING = [

@@ -107,8 +107,8 @@ def test_a_fault_on_the_way(fault):
 def test_many_faults_in_a_row(seed):
     dice, bench = default_rng(seed), Bench(seed)
     wish = [6000.0] * len(SETUPS)
-    for n in range(3000):
-        if n % 150 == 20:
+    for n in range(1500):
+        if n % 75 == 20:
             bench.board.faults.command(FAULTS[int(dice.integers(len(FAULTS)))])
         if n % 40 == 0:
             wish = [float(goal) for goal in dice.integers(LOW, HIGH, len(SETUPS))]

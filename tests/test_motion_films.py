@@ -11,7 +11,7 @@ from drivers.motion_detector import MotionDetector
 from drivers.motion_params import MotionParams
 
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
-RATE_HZ, LEARN, LOOK = 10.0, 40, 60
+RATE_HZ, LEARN, LOOK = 10.0, 40, 40
 BEGIN = 210
 
 

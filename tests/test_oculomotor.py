@@ -268,7 +268,7 @@ def test_a_target_faster_than_pursuit_is_caught_up_with_by_saccades() -> None:
     assert np.median(trace.error[40:]) < 4.0
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     eye=st.floats(15, 55),
@@ -326,7 +326,7 @@ def _any_target(rng: np.random.Generator, at_s: float, shift: int) -> Target:
     )  # fmt: skip
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=16, deadline=None)
 @given(
     eye=st.floats(15, 55),
     yaw=st.floats(-80, 80),
@@ -368,7 +368,7 @@ def test_e19_no_eye_beyond_its_limit_and_no_head_beyond_its_range() -> None:
     assert np.abs(trace.head).max() <= 60.0 + 1e-9
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=16, deadline=None)
 @given(yaw=st.floats(-70, 70), pitch=st.floats(-30, 30), pull=st.floats(0, 3), top=st.booleans())
 def test_gaze_lands_on_any_still_target(yaw: float, pitch: float, pull: float, top: bool) -> None:
     rig = Rig(eye_deg=35.0, geometry=DESK)

@@ -55,8 +55,17 @@ def test_it_looks_at_its_visitor_blinks_and_lets_go(name: str, tmp_path: Path) -
     made.close()
 
 
-def test_the_makers_eyes_have_no_neck_to_move() -> None:
-    _, ticks, said = ran(load_rig("maker"), 4.0)
+@pytest.fixture(scope="module")
+def maker() -> tuple[Assembly, list[Tick], tuple[str, ...]]:
+    """Give twelve seconds of the maker's eyes."""
+    return ran(load_rig("maker"), 12.0)
+
+
+Ran = tuple[Assembly, list[Tick], tuple[str, ...]]
+
+
+def test_the_makers_eyes_have_no_neck_to_move(maker: Ran) -> None:
+    _, ticks, said = maker
     assert any("no positions" in line for line in said)
     for tick in ticks:
         assert tick.pose.head_rad == (0.0, 0.0, 0.0)
@@ -66,9 +75,9 @@ def test_the_makers_eyes_have_no_neck_to_move() -> None:
         assert not any("not moving" in reason for reason in tick.verdict.reasons)
 
 
-def test_four_lids_follow_and_meet() -> None:
+def test_four_lids_follow_and_meet(maker: Ran) -> None:
     rig = load_rig("maker")
-    _, ticks, _ = ran(rig, 12.0)
+    _, ticks, _ = maker
     i = {name: k for k, name in enumerate(rig.names)}
     wish = np.degrees([t.verdict.command_rad for t in ticks])
     shut = np.flatnonzero([t.gaze.lid_left == 0.0 for t in ticks])
@@ -91,7 +100,7 @@ def test_same_seed_same_bytes(name: str, tmp_path: Path) -> None:
     rig = rig_of(name, tmp_path)
     sent = []
     for seed in (3, 3, 4):
-        made, _, _ = ran(rig, 1.5, seed)
+        made, _, _ = ran(rig, 0.75, seed)
         sent.append(made.sent_digest())
         made.close()
     assert sent[0] == sent[1] != sent[2]
@@ -114,7 +123,7 @@ def test_true_servos_keep_to_their_joints_ranges(tmp_path: Path) -> None:
             worst[name] = max(worst[name], angle - joint.max_deg, joint.min_deg - angle)
 
     made.robot.start(made.clock)
-    run(made.robot, made.clock, made.loop, lambda s: "over" if s >= 6.0 else None, look)
+    run(made.robot, made.clock, made.loop, lambda s: "over" if s >= 4.0 else None, look)
     assert max(worst.values()) < 0.6, worst
     made.robot.stop()
     made.close()

@@ -42,6 +42,23 @@ REPOSITORY = Path(__file__).parents[1]
 WINDOW_PX = (1280, 800)
 WINDOW_SMALL_PX = (900, 500)  # a processor that does a graphics card's work has less to do
 PANEL_PX = 370
+# A processor that does a graphics card's work draws few pictures a second, not sixty ...
+SLOW_DRAWING = """(() => {
+  const soon = window.requestAnimationFrame.bind(window)
+  window.requestAnimationFrame = draw => setTimeout(() => soon(draw), 100)
+  window.cancelAnimationFrame = clearTimeout
+})()
+"""
+# ... and of the scene only what a test asks for with drawScene: each picture costs it 0.2 s.
+RARE_DRAWING = f"""{SLOW_DRAWING};
+for (const draw of ['drawArrays', 'drawElements', 'drawRangeElements',
+                    'drawArraysInstanced', 'drawElementsInstanced']) {{
+  const drawn = WebGL2RenderingContext.prototype[draw]
+  WebGL2RenderingContext.prototype[draw] = function (...what) {{
+    if (window.drawScene) drawn.apply(this, what)
+  }}
+}}
+"""
 CLOSE_TO_THE_RIG = "?initialCameraPosition=0.45,-0.3,0.2&initialCameraLookAt=0,0,0.12"
 
 # A person's face in its own frame (x out of the face, y to the owner's left, z up), in the
@@ -166,7 +183,9 @@ def chromium() -> str | None:
 class Browser:
     """One tab of a headless Chromium, driven through its debugging port."""
 
-    def __init__(self, debugging_port: int, window_px: tuple[int, int]) -> None:
+    def __init__(
+        self, debugging_port: int, window_px: tuple[int, int], drawing: str = SLOW_DRAWING
+    ) -> None:
         self.width_px, height_px = window_px
         self._ids = itertools.count(1)
         self.asked_for: list[str] = []
@@ -179,6 +198,8 @@ class Browser:
             close_timeout=0.5,  # the browser is killed in any case
         )
         self._ask("Network.enable")
+        self._ask("Page.enable")
+        self._ask("Page.addScriptToEvaluateOnNewDocument", source=drawing)
         shape = {"width": self.width_px, "height": height_px, "deviceScaleFactor": 1}
         self._ask("Emulation.setDeviceMetricsOverride", **shape, mobile=False)
 
@@ -228,7 +249,10 @@ CHROMIUM_FLAGS = (
 
 
 @contextmanager
-def browsing(window_px: tuple[int, int] = WINDOW_PX) -> Iterator[Browser]:
+def browsing(
+    window_px: tuple[int, int] = WINDOW_PX, drawing: str = SLOW_DRAWING
+) -> Iterator[Browser]:
+    """Open a browser that first runs a script about drawing on every page."""
     program = chromium()
     if program is None:
         pytest.skip("no chromium, chromium-browser or google-chrome in the path")
@@ -240,7 +264,7 @@ def browsing(window_px: tuple[int, int] = WINDOW_PX) -> Iterator[Browser]:
             start_new_session=True,
         )
         try:
-            with closing(Browser(debugging_port(Path(folder)), window_px)) as browser:
+            with closing(Browser(debugging_port(Path(folder)), window_px, drawing)) as browser:
                 yield browser
         finally:
             os.killpg(process.pid, signal.SIGKILL)

@@ -77,6 +77,17 @@ def running_page(port: int | None = None) -> Iterator[tuple[Page, str]]:
         page.close()
 
 
+@pytest.fixture(scope="module")
+def shared() -> Iterator[tuple[Page, str, int]]:
+    """A page that found its port busy, its address, and that port; one test closes it."""
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        busy = other.getsockname()[1]
+        with running_page(busy) as (page, url):
+            yield page, url, busy
+
+
 def page_process(parent: int) -> int | None:
     """The process of the page that a process has started, alive or stopped."""
     for entry in Path("/proc").iterdir():
@@ -123,7 +134,39 @@ def test_more_than_the_page_can_show_is_passed_over() -> None:
     assert page.dropped == 101
 
 
-def test_frozen_page_holds_up_nobody_and_wakes_again() -> None:
+# A page for the four that follow.
+
+
+def test_busy_port_moves_on_and_says_so(shared: tuple[Page, str, int]) -> None:
+    page, url, busy = shared
+    port = int(url.rpartition(":")[2])
+    assert port > busy
+    assert page.notice() == f"port {busy} is busy, using {port}"
+    with urllib.request.urlopen(url) as answer:
+        assert answer.status == 200
+        assert b"<html" in answer.read().lower()
+
+
+def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(
+    shared: tuple[Page, str, int],
+) -> None:
+    page, url, _ = shared
+    page.notice()
+    port = int(url.rpartition(":")[2])
+    # The whole of 127.0.0.0/8 is this machine: a page on every address would answer here.
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.2", port))
+    process = page_process(os.getpid())
+    assert process is not None
+    os.kill(process, signal.SIGINT)
+    with urllib.request.urlopen(url) as answer:
+        assert answer.status == 200
+    assert page.notice() is None
+    assert page_process(os.getpid()) == process
+
+
+def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[Page, str, int]) -> None:
+    page = shared[0]
     times_s = itertools.count(100.0)
 
     def taken() -> bool:
@@ -135,28 +178,31 @@ def test_frozen_page_holds_up_nobody_and_wakes_again() -> None:
         for tick in range(3000):
             page.show(replace(SNAPSHOT, t_s=0.01 * tick))
 
-    with running_page() as (page, _):
-        process = page_process(os.getpid())
-        assert process is not None
-        os.kill(process, signal.SIGSTOP)
-        assert in_time(show_many)
-        assert 2000 < page.dropped < 3000
-        assert in_time(lambda: page.show_picture(bytes(100_000)))
-        assert page.pictures_dropped == 1
-        os.kill(process, signal.SIGCONT)
-        wait_for(taken, "room for a snapshot")
-        page.show_picture(b"no picture at all")
-        assert page.url() is not None
+    process = page_process(os.getpid())
+    assert process is not None
+    os.kill(process, signal.SIGSTOP)
+    assert in_time(show_many)
+    assert 2000 < page.dropped < 3000
+    assert in_time(lambda: page.show_picture(bytes(100_000)))
+    assert page.pictures_dropped == 1
+    os.kill(process, signal.SIGCONT)
+    wait_for(taken, "room for a snapshot")
+    page.show_picture(b"no picture at all")
+    assert page.url() is not None
 
 
-def test_close_ends_even_a_frozen_page() -> None:
-    with running_page() as (page, _):
-        process = page_process(os.getpid())
-        assert process is not None
-        os.kill(process, signal.SIGSTOP)
+def test_close_ends_even_a_frozen_page(shared: tuple[Page, str, int]) -> None:
+    page = shared[0]
+    process = page_process(os.getpid())
+    assert process is not None
+    os.kill(process, signal.SIGSTOP)
+    page.close()
     assert page_process(os.getpid()) is None
     page.close()
     assert page.url() is None
+
+
+# Pages of their own
 
 
 def test_crashed_page_is_reported_once_and_hurts_nobody() -> None:
@@ -204,35 +250,6 @@ def test_page_ends_when_the_parent_is_killed(habit: str) -> None:
         finally:
             if sibling > 0:
                 os.kill(sibling, signal.SIGKILL)
-
-
-def test_busy_port_moves_on_and_says_so() -> None:
-    with socket.socket() as other:
-        other.bind(("127.0.0.1", 0))
-        other.listen()
-        busy = other.getsockname()[1]
-        with running_page(busy) as (page, url):
-            port = int(url.rpartition(":")[2])
-            assert port > busy
-            assert page.notice() == f"port {busy} is busy, using {port}"
-            with urllib.request.urlopen(url) as answer:
-                assert answer.status == 200
-                assert b"<html" in answer.read().lower()
-
-
-def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c() -> None:
-    with running_page() as (page, url):
-        port = int(url.rpartition(":")[2])
-        # The whole of 127.0.0.0/8 is this machine: a page on every address would answer here.
-        with pytest.raises(ConnectionRefusedError):
-            socket.create_connection(("127.0.0.2", port))
-        process = page_process(os.getpid())
-        assert process is not None
-        os.kill(process, signal.SIGINT)
-        with urllib.request.urlopen(url) as answer:
-            assert answer.status == 200
-        assert page.notice() is None
-        assert page_process(os.getpid()) == process
 
 
 def test_address_of_another_machine_is_refused_in_words() -> None:

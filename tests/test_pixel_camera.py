@@ -162,7 +162,7 @@ def face_drawn(away_m: float, roll_deg: float, who: int) -> tuple[Picture, Pictu
     return picture, canvas, project(canvas.seen(LANDMARKS_FACE_M @ R.T + place), LENS)
 
 
-@pytest.mark.parametrize("roll_deg", [-20.0, -10.0, 0.0, 10.0, 20.0])
+@pytest.mark.parametrize("roll_deg", [-20.0, 0.0, 20.0])
 def test_a_real_detector_finds_drawn_faces_where_they_are(
     mtcnn: MtcnnDetector, roll_deg: float
 ) -> None:
@@ -313,7 +313,7 @@ def test_a_person_stands_still_in_the_world_while_the_head_turns(mtcnn: MtcnnDet
     errors = [angle_between(p.faces[0].p_world_m, place) for p in percepts[3:] if p.faces]
     assert len(errors) > 40
     assert np.degrees(np.percentile(errors, 95)) < 0.6
-    wrong = watched(mtcnn, Still(place), 1.6, placed_s=-0.06)
+    wrong = watched(mtcnn, Still(place), 0.8, placed_s=-0.06)
     off = [angle_between(p.faces[0].p_world_m, place) for p in wrong[3:] if p.faces]
     assert np.degrees(np.percentile(off, 95)) > 2.0
 

@@ -434,7 +434,7 @@ def test_times_are_written_as_minutes_and_seconds() -> None:
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording of four seconds."""
+    """A recording of two seconds."""
     path = tmp_path_factory.mktemp("recorded") / "run.mcap"
     rig = load_rig("desk")
     info = RunInfo(
@@ -447,7 +447,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made.robot.body = recorder.tapped(made.robot.body)
     made.robot.start(made.clock)
     try:
-        over = recorder.timed(lambda s: "seconds" if s > 4.0 else None)
+        over = recorder.timed(lambda s: "seconds" if s > 2.0 else None)
         run(made.robot, made.clock, made.loop, over, recorder.note)
     finally:
         made.robot.stop()
@@ -463,8 +463,8 @@ def said(*arguments: object) -> tuple[int, str]:
 
 def test_a_recording_exports_what_the_run_itself_would(recorded: Path) -> None:
     from_file = trace_of(RunRecording(recorded).ticks())
-    itself = trace_of(ticks_of(4.0))
-    assert len(from_file.time_s) == len(itself.time_s) > 700
+    itself = trace_of(ticks_of(2.0))
+    assert len(from_file.time_s) == len(itself.time_s) > 350
     assert np.array_equal(from_file.cyclopean_deg, itself.cyclopean_deg)
     assert np.array_equal(from_file.movement, itself.movement) and from_file.names == itself.names
 
@@ -475,7 +475,7 @@ def test_a_replay_knows_how_the_recorded_rig_was_built(
     built = cli_replay._built(RunRecording(recorded).info.config_yaml)
     recording = RunRecording(recorded)
     frames = Frames(recording.ticks(), recording.pictures(), RATE_HZ, "shy", built)
-    shown = unpack(frames.message(frames.at(3.0)))
+    shown = unpack(frames.message(frames.at(1.5)))
     assert shown.ghost is not None and shown.character == "shy" and shown.trail
     assert cli_replay._built("name: desk\n") is None
     assert "no longer valid (recorded.yaml" in capsys.readouterr().err
@@ -490,7 +490,7 @@ def test_a_rerun_says_that_all_is_the_same(recorded: Path) -> None:
     code, words = said("replay", recorded, "--rerun")
     assert code == 0 and "joints recorded: " in words and "run again" in words
     told = re.search(r"(\d+) of (\d+) ticks are the same to the bit", words)
-    assert told is not None and told[1] == told[2] and int(told[1]) > 700
+    assert told is not None and told[1] == told[2] and int(told[1]) > 350
 
 
 def test_a_rerun_with_another_character_shows_both(recorded: Path) -> None:

@@ -12,6 +12,17 @@ from command_line import GAZERIG
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
 
+def rig_at(file: Path, rate_hz: float, give_up_s: float = 60.0) -> str:
+    """Write the desk rig with another rate and another patience with its bus."""
+    desk = DESK.read_text(encoding="utf-8")
+    # The servo bus comes first in the file; a camera has the same key.
+    assert desk.index("give_up_s: 60.0") < desk.index("geometry:")
+    assert desk.count("rate_hz: 200.0  # Hz, 20") == 1
+    desk = desk.replace("rate_hz: 200.0  # Hz, 20", f"rate_hz: {rate_hz}  # Hz, 20")
+    file.write_text(desk.replace("give_up_s: 60.0", f"give_up_s: {give_up_s}", 1), encoding="utf-8")
+    return str(file)
+
+
 def begun(*words: str) -> "subprocess.Popen[str]":
     """Start a run in a process of its own; give it once torque is on."""
     process = subprocess.Popen(
@@ -26,10 +37,11 @@ def begun(*words: str) -> "subprocess.Popen[str]":
     return process
 
 
-def test_signals_park_and_switch_torque_off() -> None:
+def test_signals_park_and_switch_torque_off(tmp_path: Path) -> None:
+    rig = rig_at(tmp_path / "rig.yaml", 100.0)
     numbers = (signal.SIGINT, signal.SIGTERM)
-    processes = [begun() for _ in numbers]
-    time.sleep(3.0)
+    processes = [begun(rig) for _ in numbers]
+    time.sleep(2.0)
     for number, process in zip(numbers, processes, strict=True):
         process.send_signal(number)
     for number, process in zip(numbers, processes, strict=True):
@@ -43,12 +55,8 @@ def test_signals_park_and_switch_torque_off() -> None:
 
 
 def test_losing_the_bus_is_a_fault_with_its_cause(tmp_path: Path) -> None:
-    rig = tmp_path / "rig.yaml"
-    desk = DESK.read_text(encoding="utf-8")
-    # The servo bus comes first in the file; a camera has the same key.
-    assert desk.index("give_up_s: 60.0") < desk.index("geometry:")
-    rig.write_text(desk.replace("give_up_s: 60.0", "give_up_s: 1.0", 1), encoding="utf-8")
-    process = begun(str(rig), "--seconds", "30")
+    rig = rig_at(tmp_path / "rig.yaml", 100.0, give_up_s=1.0)
+    process = begun(rig, "--seconds", "30")
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
     for child in children.read_text(encoding="ascii").split():
         os.kill(int(child), signal.SIGKILL)

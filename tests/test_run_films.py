@@ -19,19 +19,8 @@ def photo(path: Path) -> Path:
     return path
 
 
-def test_a_photo_is_looked_at_and_gives_the_same_bytes_twice(tmp_path: Path) -> None:
-    picture = photo(tmp_path / "photo.png")
-    runs = [figures("--video", str(picture), "--seconds", "4") for _ in range(2)]
-    assert runs[0]["faces_seen"] == runs[0]["pictures"] >= 35
-    assert runs[0]["target_share"]["face"] > 0.9
-    assert runs[0]["bus"] == runs[1]["bus"]
-
-
-@pytest.mark.skipif(not MEDIA.is_dir(), reason=f"films are not at {MEDIA}")
-@pytest.mark.parametrize("network", ["mtcnn", "yunet"])
-def test_a_film_of_two_talking_people(network: str, tmp_path: Path) -> None:
-    rig = tmp_path / "rig.yaml"
-    # Faces are what is asked about: motion is left out, and half the rate will do.
+def faces_alone(file: Path, network: str = "mtcnn") -> str:
+    """Write a rig at half the rate that looks for no motion: faces are what is asked about."""
     text = DESK.read_text(encoding="utf-8")
     text = text.replace("  enabled: true  # look", "  enabled: false  # look")
     text = text.replace("rate_hz: 200.0  # Hz, 20", "rate_hz: 100.0  # Hz, 20")
@@ -39,8 +28,24 @@ def test_a_film_of_two_talking_people(network: str, tmp_path: Path) -> None:
         (model,) = MODELS.glob("*.onnx")
         text = re.sub(r"kind: mtcnn", "kind: yunet", text)
         text = re.sub(r'model_file: ""', f"model_file: {model}", text)
-    rig.write_text(text, encoding="utf-8")
-    run = figures(str(rig), "--video", str(MEDIA / "Megamind.avi"), "--seconds", "11.3")
-    assert run["pictures"] >= 268
+    file.write_text(text, encoding="utf-8")
+    return str(file)
+
+
+def test_a_photo_is_looked_at_and_gives_the_same_bytes_twice(tmp_path: Path) -> None:
+    picture = photo(tmp_path / "photo.png")
+    runs = [figures("--video", str(picture), "--seconds", "2") for _ in range(2)]
+    assert runs[0]["faces_seen"] == runs[0]["pictures"] >= 17
+    assert runs[0]["target_share"]["face"] > 0.9
+    assert runs[0]["bus"] == runs[1]["bus"]
+
+
+@pytest.mark.skipif(not MEDIA.is_dir(), reason=f"films are not at {MEDIA}")
+@pytest.mark.parametrize("network", ["mtcnn", "yunet"])
+def test_a_film_of_two_talking_people(network: str, tmp_path: Path) -> None:
+    # The detector's own test looks all through the film; a third of it shows the way to the gaze.
+    rig = faces_alone(tmp_path / "rig.yaml", network)
+    run = figures(rig, "--video", str(MEDIA / "Megamind.avi"), "--seconds", "4")
+    assert run["pictures"] >= 90
     assert run["faces_seen"] >= 0.95 * run["pictures"]
     assert run["target_share"]["face"] > 0.8

@@ -6,10 +6,11 @@ and names the check that notices. The same checks pass on the guard as it is.
 
 import sys
 from collections.abc import Callable
+from functools import cache
 from itertools import pairwise
 from math import degrees, inf, nan, radians
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -28,18 +29,24 @@ TOP, ACCEL = radians(200), radians(1_500)
 LOW, HIGH = radians(-60), radians(50)
 
 
+@cache
+def _source(name: str) -> tuple[str, CodeType]:
+    text = (ROOM / f"{name}.py").read_text(encoding="utf-8")
+    return text, compile(text, f"{name}.py", "exec")
+
+
 def built(part: str = "", old: str = "", new: str = "") -> ModuleType:
     """Load the guard's files from source, one of them changed, beside the real ones."""
     real = {name: sys.modules.get(f"robot.safety.{name}") for name in PARTS}
     try:
         for name in PARTS:
-            source = (ROOM / f"{name}.py").read_text(encoding="utf-8")
+            source, code = _source(name)
             if name == part:
                 assert source.count(old) == 1, f"{old!r} stands {source.count(old)} times"
-                source = source.replace(old, new)
+                code = compile(source.replace(old, new), f"{name}.py", "exec")
             module = ModuleType(f"robot.safety.{name}")
             sys.modules[f"robot.safety.{name}"] = module
-            exec(compile(source, f"{name}.py", "exec"), module.__dict__)
+            exec(code, module.__dict__)
         return module
     finally:
         for name, module_before in real.items():

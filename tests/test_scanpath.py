@@ -1,6 +1,7 @@
 """The Markov walk over face parts (Nakamoto & Tsuruno). Checks are listed in docs/checks.md."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ def walker(seed: int = 1, params: ScanpathParams = NO_FLOOR) -> Scanpath:
     return Scanpath(params, WALK, np.random.default_rng(seed))
 
 
+@cache
 def drawn(count: int) -> np.ndarray:
     walk, parts = markov_walk(NO_FLOOR, WALK, np.random.default_rng(1)), [0]
     for _ in range(count):
@@ -60,9 +62,9 @@ TARGET = Target(FACE.p_world_m, (0, 0, 0), 0.0, "face", 3, 0.5, True, None, 1, "
 
 
 def test_e37_face_time_share() -> None:
-    walk, dt = walker(2), 0.01
+    walk, dt = walker(2), 0.02
     time = dict.fromkeys(PARTS, 0.0)
-    for k in range(360_000):
+    for k in range(180_000):
         part = walk.wander(TARGET, PERCEPT, k * dt, settled=True).part
         time[part] += dt
     expected = {

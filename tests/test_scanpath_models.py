@@ -188,20 +188,20 @@ def test_whole_visit_shares_of_steps_and_rate() -> None:
     params = ScanpathParams(diagonal="whole_visit", shortest_dwell_ms=0.0)
     walk = markov_walk(params, WALK, np.random.default_rng(8))
     parts = [0]
-    for _ in range(100_000):
+    for _ in range(50_000):
         parts.append(walk.next_part(parts[-1]))
     assert (np.diff(parts) != 0).all()
     share = np.bincount(parts, minlength=8) / len(parts)
     wanted = (0.0727, 0.0648, 0.0912, 0.1119, 0.1896, 0.1019, 0.2748, 0.0931)
     assert share == pytest.approx(wanted, abs=0.008)
-    looks = looks_of(params, 600.0, 0.002)
-    shifts = sum(a.shift != b.shift for a, b in zip(looks, looks[1:], strict=False)) / 600.0
+    looks = looks_of(params, 300.0, 0.002)
+    shifts = sum(a.shift != b.shift for a, b in zip(looks, looks[1:], strict=False)) / 300.0
     assert shifts == pytest.approx(5.66, abs=0.3)
 
 
 def test_refixations_give_a_human_rate_of_gaze_shifts() -> None:
-    looks = looks_of(ScanpathParams(shortest_dwell_ms=0.0), 900.0, 0.003)
-    shifts = sum(a.shift != b.shift for a, b in zip(looks, looks[1:], strict=False)) / 900.0
+    looks = looks_of(ScanpathParams(shortest_dwell_ms=0.0), 450.0, 0.003)
+    shifts = sum(a.shift != b.shift for a, b in zip(looks, looks[1:], strict=False)) / 450.0
     assert shifts == pytest.approx(3.68, abs=0.2)
 
 

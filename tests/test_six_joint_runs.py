@@ -84,12 +84,12 @@ def recorded(path: Path, rig: Rig, seconds: float) -> Run:
 
 @pytest.fixture(scope="module")
 def maker(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 6.0)
+    return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 4.2)
 
 
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return recorded(tmp_path_factory.mktemp("nine") / "desk.mcap", load_rig("desk"), 2.5)
+    return recorded(tmp_path_factory.mktemp("nine") / "desk.mcap", load_rig("desk"), 2.0)
 
 
 def exact(tick: Tick) -> str:
