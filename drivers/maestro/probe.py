@@ -7,7 +7,9 @@ it keeps silent, and channels that may not exist are asked for only where that w
 and no channel gives pulses.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 from drivers.errors import PortError
@@ -20,6 +22,7 @@ USB_CHANNELS = {"1ffb:0089": 6, "1ffb:008a": 12, "1ffb:008b": 18, "1ffb:008c": 2
 """Channels by USB vendor and product id."""
 
 FORMS: tuple[Form, ...] = ("compact", "pololu")
+TRIES = 3
 
 
 class MaestroFound(NamedTuple):
@@ -72,7 +75,7 @@ def _look(line: Line, params: MaestroParams, register: int, count: bool) -> Maes
     # Where several boards share a line all of them answer the compact form.
     for form in FORMS if line.speech.form == "compact" else ("pololu",):
         spoken = Line(line.port, replace(params, protocol=form, crc=crc))
-        found = spoken.ask_words(spoken.speech.errors(), 1)
+        found = _patiently(partial(spoken.ask_words, spoken.speech.errors(), 1))
         if found is not None:
             forms, line = (*forms, form), spoken
             register |= found[0]
@@ -81,7 +84,7 @@ def _look(line: Line, params: MaestroParams, register: int, count: bool) -> Maes
     if not forms:
         return None
     status = line.ask(line.speech.script_status(), 1)
-    pulses = line.pulses(range(min(MICRO, params.channels)))
+    pulses = _patiently(partial(line.pulses, range(min(MICRO, params.channels))))
     if pulses is None:
         return None
     channels = _count(line) if count and not any(pulses) else None
@@ -89,6 +92,11 @@ def _look(line: Line, params: MaestroParams, register: int, count: bool) -> Maes
         pulses = line.pulses(range(channels)) or pulses
     script = None if status is None else status == b"\0"
     return MaestroFound(forms, crc, name_errors(register), script, pulses, channels)
+
+
+def _patiently(ask: Callable[[], tuple[int, ...] | None]) -> tuple[int, ...] | None:
+    """Ask again where no answer came: a busy host may have been late, not the board."""
+    return next((answer for answer in (ask() for _ in range(TRIES)) if answer is not None), None)
 
 
 def _count(line: Line) -> int:
