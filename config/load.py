@@ -9,88 +9,19 @@ import contextlib
 import importlib.resources
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
-from ruamel.yaml.reader import ReaderError
-
 from config.bounds import Step, filled, judge
+from config.entries import ConfigError as ConfigError
+from config.entries import Entry as Entry
+from config.entries import Fault as Fault
+from config.entries import read
 from config.export import Complaint, closest, complaint, shown
 
 T = TypeVar("T")
 Check = Callable[[T], Iterable[tuple[str, str]]]
 """Gives (dotted key path, rule that is broken) for what no single field can know."""
-Scalar = str | int | float | bool | None
-
-_DEPTH = 40  # levels; a rig has about 5, a file that refers to itself has no end
-_VALUES = 20_000  # aliases of aliases grow without bound
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """One thing to change in a file.
-
-    line, column: from 1, None where the file could not be read at all
-    key: dotted key path, list items counted from 0; value: what stands there, shortened
-    rule: what is wrong, and the cure
-    """
-
-    file: str
-    line: int | None
-    key: str
-    value: str
-    rule: str
-    column: int | None = None
-
-    def __str__(self) -> str:
-        """Write ``file:line: key: rule`` on one line, whatever the key holds."""
-        place = [self.file, *(str(n) for n in (self.line, self.column) if n is not None)]
-        words = ": ".join(part for part in (":".join(place), self.key, self.rule) if part)
-        return " ".join(words.splitlines())
-
-
-class ConfigError(Exception):
-    """A configuration cannot be used; the message lists every fault, one a line."""
-
-    def __init__(self, faults: Iterable[Fault]) -> None:
-        """Keep the faults; there is at least one."""
-        self.faults = tuple(faults)
-        super().__init__("\n".join(map(str, self.faults)))
-
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """A value and the place it stands at; mappings and lists hold entries."""
-
-    value: "Scalar | dict[str, Entry] | tuple[Entry, ...]"
-    file: str
-    line: int
-
-    def plain(self) -> Any:
-        """Give the value as dicts, tuples and scalars."""
-        if isinstance(self.value, dict):
-            return {key: entry.plain() for key, entry in self.value.items()}
-        if isinstance(self.value, tuple):
-            return tuple(entry.plain() for entry in self.value)
-        return self.value
-
-    def nearest(self, path: Sequence[Step]) -> "Entry":
-        """Give the entry at a path, or the last one there is on the way to it."""
-        entry = self
-        for step in path:
-            held: Entry | None = None
-            if isinstance(entry.value, dict):
-                held = entry.value.get(str(step))
-            elif isinstance(entry.value, tuple) and str(step).isdecimal():
-                held = dict(enumerate(entry.value)).get(int(step))
-            if held is None:
-                break
-            entry = held
-        return entry
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +59,7 @@ def load(
     """
     files = (*defaults, path)
     faults: list[Fault] = []
-    layers = [_read(file, faults)[1] for file in files]
+    layers = [read(file, faults)[1] for file in files]
     whole = [layer for layer in layers if layer is not None]
     if len(whole) < len(files):  # what a missing layer would have said is unknown
         raise ConfigError(faults)
@@ -170,7 +101,7 @@ def read_yaml(path: Path) -> Document:
         ConfigError: unreadable, not UTF-8, not YAML, empty, keys twice, no mapping.
     """
     faults: list[Fault] = []
-    text, root = _read(path, faults)
+    text, root = read(path, faults)
     if faults or root is None:
         raise ConfigError(faults)
     return Document(path, text, root)
@@ -197,177 +128,6 @@ def shipped_names(kind: str) -> tuple[str, ...]:
         return ()
     files = (entry.name for entry in folder.iterdir())
     return tuple(sorted(name.removesuffix(".yaml") for name in files if name.endswith(".yaml")))
-
-
-def _read(path: Path, faults: list[Fault]) -> tuple[str, Entry | None]:
-    """Read a file; no entry where nothing of it can be used."""
-    file, text = str(path), ""
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-        node = _composed(text)
-    except OSError as error:
-        faults.append(Fault(file, None, "", "", _unreadable(path, error)))
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        rule = f"is not UTF-8 text (byte 0x{error.object[error.start]:02x}); save it as UTF-8"
-        faults.append(Fault(file, line, "", "", rule))
-    except RecursionError:
-        faults.append(Fault(file, None, "", "", _TOO_DEEP))
-    except (YAMLError, ValueError, ArithmeticError, LookupError) as error:
-        # ruamel lets others out: characters past U+10FFFF, "%YAML 9.9"
-        faults.append(_syntax(file, text, error))
-    else:
-        if isinstance(node, MappingNode):
-            return text, _Reader(file, faults).whole(node)
-        rule = "is empty" if node is None else "the top level is no mapping"
-        line = 1 if node is None else _line(node)
-        faults.append(Fault(file, line, "", "", f"{rule}; write 'key: value' lines"))
-    return text, None
-
-
-@lru_cache(maxsize=16)
-def _composed(text: str) -> Node | None:
-    """Parse YAML as far as nodes, which know their lines and are only read.
-
-    The parser takes nearly all the time of loading, and a rig loads the same layers again
-    with each tuning, saving and checking.
-    """
-    yaml = YAML(typ="safe", pure=True)
-    yaml.max_depth = _DEPTH
-    yaml.composer.warn_double_anchors = False  # YAML 1.2 allows to set an anchor again
-    node: Node | None = yaml.compose(text)
-    return node
-
-
-def _unreadable(path: Path, error: OSError) -> str:
-    """Say why a file cannot be opened, and the cure."""
-    match error:
-        case FileNotFoundError():
-            beside = [p.name for p in path.parent.glob("*.yaml")] if path.parent.is_dir() else []
-            return f"no such file{closest(path.name, beside) or ';'} check the name"
-        case IsADirectoryError():
-            return "is a directory; name a file in it"
-        case PermissionError():
-            return "may not be read; give yourself the right with chmod u+r"
-    return f"cannot be read ({error.strerror}); check the path"
-
-
-def _syntax(file: str, text: str, error: Exception) -> Fault:
-    """Say where the text stops being YAML."""
-    if isinstance(error, ReaderError):
-        before = text[: error.position]
-        column = len(before) - before.rfind("\n")
-        rule = f"not valid YAML: character {text[error.position]!r} is not allowed; take it out"
-        return Fault(file, before.count("\n") + 1, "", "", rule, column)
-    if not isinstance(error, MarkedYAMLError) or error.problem_mark is None:
-        return Fault(file, None, "", "", f"not valid YAML: {' '.join(str(error).split())}")
-    mark = error.problem_mark
-    words = ", ".join(filter(None, (error.context, error.problem)))
-    if "max_depth" in words:
-        return Fault(file, mark.line + 1, "", "", _TOO_DEEP, mark.column + 1)
-    cure = "; indent with spaces" if "'\\t'" in words else "; check this line and the one above"
-    return Fault(file, mark.line + 1, "", "", f"not valid YAML: {words}{cure}", mark.column + 1)
-
-
-_TAG = "tag:yaml.org,2002:"
-_TOO_DEEP = f"nested deeper than {_DEPTH} levels, or refers to itself; write it flat"
-
-
-def _line(node: Node) -> int:
-    """Count a node's line from 1."""
-    return int(node.start_mark.line) + 1
-
-
-class _Reader:
-    """Turns the nodes of one file into entries and notes what a file may not hold."""
-
-    def __init__(self, file: str, faults: list[Fault]) -> None:
-        """Remember the file and where its faults go."""
-        self._file = file
-        self._faults = faults
-        self._values = 0
-        self._endless = False
-
-    def whole(self, node: MappingNode) -> Entry | None:
-        """Turn the top node into an entry, or None where it has no end or no meaning."""
-        root = self._entry(node, _line(node), ())
-        return root if isinstance(root.value, dict) and not self._endless else None
-
-    def _entry(self, node: Node, line: int, path: tuple[Step, ...]) -> Entry:
-        """Turn a node into an entry."""
-        self._values += 1
-        if self._endless or len(path) > _DEPTH or self._values > _VALUES:
-            if not self._endless:
-                many = f"holds more than {_VALUES} values; write less"
-                self._note(line, (), _TOO_DEEP if len(path) > _DEPTH else many)
-            self._endless = True
-            return Entry(None, self._file, line)
-        tag = str(node.tag).removeprefix(_TAG)
-        if isinstance(node, MappingNode) and tag == "map":
-            return Entry(self._mapping(node, path), self._file, line)
-        if isinstance(node, ScalarNode) and tag in _SCALARS:
-            return Entry(_SCALARS[tag](node.value), self._file, line)
-        if tag != "seq":
-            self._note(line, path, f"the tag {node.tag} is not read; take it out")
-            return Entry(None, self._file, line)
-        items = (self._entry(n, _line(n), (*path, i)) for i, n in enumerate(node.value))
-        return Entry(tuple(items), self._file, line)
-
-    def _mapping(self, node: MappingNode, path: tuple[Step, ...]) -> dict[str, Entry]:
-        """Read the entries of a mapping, each under the line of its key."""
-        entries: dict[str, Entry] = {}
-        for key, value in node.value:
-            line = _line(key)
-            if not isinstance(key, ScalarNode) or str(key.tag) != f"{_TAG}str":
-                self._note(line, path, _bad_key(key))
-            elif key.value in entries:
-                first = entries[key.value].line
-                self._note(line, (*path, key.value), f"key stands twice, first in line {first}")
-            else:
-                entries[key.value] = self._entry(value, line, (*path, key.value))
-        return entries
-
-    def _note(self, line: int, path: tuple[Step, ...], rule: str) -> None:
-        """Note a fault."""
-        self._faults.append(Fault(self._file, line, ".".join(map(str, path)), "", rule))
-
-
-def _bad_key(key: Node) -> str:
-    """Say why a key is none."""
-    if str(key.tag) == f"{_TAG}merge":
-        return "merge keys (<<) are not read; write the keys out"
-    name = shown(key.value) if isinstance(key, ScalarNode) else "this"
-    return f"key {name} is not text; put it in quotes"
-
-
-def _whole(text: str) -> int | str:
-    """Read an integer of YAML 1.2: decimal, 0o or 0x; what is no servo's number stays text."""
-    digits = text.replace("_", "")
-    for base in (0, 10):  # 10: "007" is 7
-        try:
-            return int(digits, base) if len(digits) < 40 else text
-        except ValueError:
-            continue
-    return text
-
-
-def _real(text: str) -> float | str:
-    """Read a float of YAML 1.2, .inf and .nan among them."""
-    try:
-        return float(text.replace("_", "").lower().replace(".inf", "inf").replace(".nan", "nan"))
-    except ValueError:
-        return text
-
-
-_SCALARS: dict[str, Callable[[str], Scalar]] = {
-    "null": lambda text: None,
-    "bool": lambda text: text.lower() in ("true", "yes", "on", "y"),
-    "int": _whole,
-    "float": _real,
-    "str": str,
-    "timestamp": str,  # 2026-01-31 is text in YAML 1.2
-    "value": str,
-}
 
 
 def _steps(key: str) -> tuple[str, ...]:

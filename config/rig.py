@@ -255,11 +255,18 @@ class Rig:
         """Give the names of the joints, in the order of every sequence of them."""
         return in_order(self.joints)
 
+    def bus_named(self, name: str) -> BusConfig:
+        """Give a bus by its name, "" for the one without.
+
+        Raises:
+            KeyError: there is no such bus.
+        """
+        return self.buses[name] if name else self.bus
+
     def bus_of(self, joint: str) -> BusConfig:
         """Give the bus that a joint's servo is on.
 
         Raises:
             KeyError: there is no such joint, or no such bus.
         """
-        name = self.joints[joint].bus
-        return self.buses[name] if name else self.bus
+        return self.bus_named(self.joints[joint].bus)

@@ -40,7 +40,7 @@ from robot.loop import LoopParams, Robot
 from robot.page.snapshot import ShownRig
 from robot.retune import Parts, Placed, Retuner
 from robot.rig_angles import eye_limits, head_limits, lid_ends, limits, own_parts, park_rad
-from robot.rig_bus import bus_names, ports_of, rig_bus
+from robot.rig_bus import ports_of, rig_bus
 from robot.safety.guard import Guard
 from robot.seeing.perception import Perception
 from robot.seeing.tracks import Tracker
@@ -260,7 +260,7 @@ def _wires(rig: Rig, choice: Choice, clock: Clock) -> _Wires:
     if not choice.mock:
         paths, here = ports_of(rig, choice.port), serial_ports()
         for name, path in paths.items():
-            refuse_owner(path, (rig.buses[name] if name else rig.bus).kind, here)
+            refuse_owner(path, rig.bus_named(name).kind, here)
         return _Wires(_opened_by(paths), {}, _no_digest, _nothing)
     lines = emulated_lines(rig)
     if not choice.fast:
@@ -304,21 +304,18 @@ def _true_head(devices: Mapping[str, Device], rig: Rig, poses: PoseHistory) -> H
     """
     if not devices:
         return poses.head_pose
-    kinematics, buses = _kinematics(rig), bus_names(rig)
-    axes = [rig.joints.get(name) for name in NECK]
-    places = {name: place_of(rig, name) for name in NECK if name in rig.joints}
-    found = [
-        None if joint is None else (joint.made(), joint.bus, places[name])
-        for name, joint in zip(NECK, axes, strict=True)
+    kinematics = _kinematics(rig)
+    axes = [
+        (i, rig.joints[name].made(), devices[rig.joints[name].bus], place_of(rig, name))
+        for i, name in enumerate(NECK)
+        if name in rig.joints
     ]
-    still = not places
 
     def now(_: float) -> tuple[Mat3, Vec3]:
-        steps = {} if still else {bus: devices[bus].positions_steps() for bus in buses}
-        yaw, pitch, roll = (
-            0.0 if one is None else one[0].angle_rad(steps[one[1]][one[2]]) for one in found
-        )
-        return kinematics.head_pose((yaw, pitch, roll))
+        angles = [0.0, 0.0, 0.0]
+        for i, linkage, device, place in axes:
+            angles[i] = linkage.angle_rad(device.positions_steps()[place])
+        return kinematics.head_pose((angles[0], angles[1], angles[2]))
 
     return now
 

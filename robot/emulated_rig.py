@@ -41,7 +41,7 @@ def place_of(rig: Rig, joint: str) -> int:
 
 
 def _line(rig: Rig, name: str) -> Emulated:
-    config, joints = rig.buses[name] if name else rig.bus, joints_on(rig, name)
+    config, joints = rig.bus_named(name), joints_on(rig, name)
     if config.kind == "maestro":
         board = config.maestro
         servos = tuple(_hobby(rig.joints[joint], joint) for joint in joints)

@@ -34,7 +34,7 @@ def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
     Raises:
         drivers.errors.SetupError: it names a bus that is not there.
     """
-    ports = {name: (rig.buses[name] if name else rig.bus).port for name in bus_names(rig)}
+    ports = {name: rig.bus_named(name).port for name in bus_names(rig)}
     for one in given.split(",") if given is not None else ():
         name, equals, port = one.rpartition("=")
         if not equals and "" not in ports and len(ports) == 1:
@@ -65,7 +65,7 @@ def _share(rig: Rig, name: str, port: BusPort) -> Share:
     mine = joints_on(rig, name)
     own = [every[joint] for joint in mine]
     places = tuple(rig.names.index(joint) for joint in mine)
-    config = rig.buses[name] if name else rig.bus
+    config = rig.bus_named(name)
     if config.kind == "feetech":
         return Share(name, FeetechBus(port, own, config.feetech), places)
     if config.kind == "maestro":

@@ -68,7 +68,7 @@ OWNERS = {
     "matplotlib": ("robot.report.",),
     "jinja2": ("robot.report.",),
     "aiohttp": ("robot.page.",),
-    "ruamel": ("config.load", "config.save"),
+    "ruamel": ("config.entries", "config.save"),
     "pydantic": ("config.",),
     "pydantic_core": ("config.",),
     "typer": ("robot.cli.",),

@@ -37,7 +37,7 @@ class Bench:
         }
         looks = {}
         for name in bus_names(rig):
-            config, port = rig.buses[name] if name else rig.bus, self.ports[name]
+            config, port = rig.bus_named(name), self.ports[name]
             port.setBaudRate(config.baud)
             if config.kind == "maestro":
                 looks[name] = MaestroLooks(port, config.maestro)

@@ -177,7 +177,7 @@ def _set_middle(single: SingleJoint, person: SteeringPerson) -> None:
 
 
 def _hobby(bench: Bench, name: str, bus: str) -> Made:
-    config = bench.rig.buses[bus] if bus else bench.rig.bus
+    config = bench.rig.bus_named(bus)
     port = BlockingPort(bench.wire.paths[bus])
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
     hobby = OneHobby(name, joint, port, config.maestro, RealClock(), bench.stopped, how.pulses_us)

@@ -17,7 +17,7 @@ from robot.bringup.servo_report import as_plain, grouped, summed_up
 from robot.cli import bench as bench
 from robot.cli.bench import JsonOption, console, progress, wipe
 from robot.cli.terminal import FAULT, RigArgument, clear_errors
-from robot.cli.wires import MockOption, PortOption, bus_config, bus_label, setups_on, wires
+from robot.cli.wires import MockOption, PortOption, bus_label, setups_on, wires
 
 app = typer.Typer()
 
@@ -63,14 +63,14 @@ def _examined(rig: Rig, lines: Mapping[str, BlockingPort], tell: Tell) -> dict[s
         findings[bus] = _examine(rig, bus, line)
         wipe()
         if len(lines) > 1:
-            tell(f"{bus_label(rig, bus)} ({bus_config(rig, bus).kind}, {line.port_name}):")
+            tell(f"{bus_label(rig, bus)} ({rig.bus_named(bus).kind}, {line.port_name}):")
         show_findings(findings[bus], tell)
     return findings
 
 
 def _examine(rig: Rig, bus: str, line: BlockingPort) -> list[Finding]:
     """Examine one bus."""
-    config, setups = bus_config(rig, bus), setups_on(rig, bus)
+    config, setups = rig.bus_named(bus), setups_on(rig, bus)
 
     def behind() -> list[Finding]:
         if config.kind == "maestro":
@@ -112,7 +112,7 @@ def _fix(
 
 
 def _mend(rig: Rig, bus: str, line: BlockingPort, findings: Sequence[Finding]) -> list[Done]:
-    config = bus_config(rig, bus)
+    config = rig.bus_named(bus)
     line.setBaudRate(config.baud)
     if config.kind == "maestro":
         return list(

@@ -76,7 +76,7 @@ def _looks(rig: Rig, wire: Wires) -> Iterator[dict[str, Looks]]:
 
 
 def _looks_on(rig: Rig, bus: str, port: BlockingPort) -> Looks:
-    config = rig.buses[bus] if bus else rig.bus
+    config = rig.bus_named(bus)
     if config.kind == "maestro":
         return MaestroLooks(port, config.maestro)
     if config.kind == "feetech":

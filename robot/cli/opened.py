@@ -17,7 +17,7 @@ def opened(rig: Rig, wire: Wires, bus: str) -> Iterator[BlockingPort]:
     Raises:
         drivers.errors.PortError: it is absent, busy, not permitted, or has no such speed.
     """
-    config = rig.buses[bus] if bus else rig.bus
+    config = rig.bus_named(bus)
     with to_open(wire.paths[bus]) as port:
         if not port.setBaudRate(config.baud):
             raise PortError(f"{port.port_name} cannot run at {config.baud} bit/s: choose another")

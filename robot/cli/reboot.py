@@ -14,7 +14,7 @@ from robot.bringup.maestro_sweep import sent_home
 from robot.bringup.servo_kind import ServoKind
 from robot.cli.bench import YesOption, to_open
 from robot.cli.terminal import FAULT, clear_errors, say
-from robot.cli.wires import MockOption, PortOption, bus_config, bus_label, wires
+from robot.cli.wires import MockOption, PortOption, bus_label, wires
 from robot.clock import RealClock
 from robot.rig_bus import bus_names, joints_on
 
@@ -41,7 +41,7 @@ def reboot(
         again = []
         with wires(model, mock, port) as wired:
             for bus, ids in wanted.items():
-                config = bus_config(model, bus)
+                config = model.bus_named(bus)
                 with to_open(wired.paths[bus]) as line:
                     line.setBaudRate(config.baud)
                     if config.kind == "maestro":
@@ -68,7 +68,7 @@ def _servo(rig: Rig, text: str) -> tuple[str, int]:
             return having[0], int(text)
         named = ", ".join(bus_label(rig, bus) for bus in having or buses)
         raise SetupError(f"{text}: which bus ({named})? name the joint instead")
-    most = HIGHEST_ID[bus_config(rig, buses[0]).kind]
+    most = HIGHEST_ID[rig.bus_named(buses[0]).kind]
     if text.isdecimal() and int(text) <= most:
         return buses[0], int(text)
     raise SetupError(f"{text}: neither an id from 0 to {most} nor a joint ({', '.join(rig.names)})")
@@ -80,7 +80,7 @@ def _reboot(
     """Restart one servo; tells whether it complains again."""
     names = [joint for joint in joints_on(rig, bus) if rig.joints[joint].id == servo_id]
     name = f"{names[0]} (servo {servo_id})" if names else f"servo {servo_id}"
-    baud = bus_config(rig, bus).baud
+    baud = rig.bus_named(bus).baud
     servo_reboot.present(line, kind, servo_id, baud)
     before = kind.standing(line, servo_id)
     say(f"{name}: {before}")
@@ -106,5 +106,5 @@ def _board(rig: Rig, bus: str, line: BlockingPort, yes: bool) -> None:
     if not yes and not typer.confirm("Keep fingers away. Do that?", err=True):
         say(f"{label}: left as it is")
         return
-    held = sent_home(Line(line, bus_config(rig, bus).maestro))
+    held = sent_home(Line(line, rig.bus_named(bus).maestro))
     say(f"{label}: home; errors it held, cleared now: {', '.join(held) or 'none'}")

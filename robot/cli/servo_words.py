@@ -27,5 +27,5 @@ def holding(rig: Rig) -> str:
 
 def left_alone(rig: Rig) -> str:
     """Say what the servos do that could not be told to let go."""
-    kinds = {(rig.buses[name] if name else rig.bus).kind for name in bus_names(rig)}
+    kinds = {rig.bus_named(name).kind for name in bus_names(rig)}
     return "; ".join(words for kind, words in _LEFT_ALONE.items() if kind in kinds)

@@ -15,7 +15,7 @@ from robot.bringup.servo_kind import ServoKind
 from robot.cli.bench import YesOption, progress, to_open, wipe
 from robot.cli.setup_maestro import set_up_board
 from robot.cli.terminal import RigArgument, clear_errors, say
-from robot.cli.wires import MockOption, PortOption, bus_config, bus_label, setups_on, wires
+from robot.cli.wires import MockOption, PortOption, bus_label, setups_on, wires
 from robot.rig_bus import bus_names
 from sim_mock.emulated import DynamixelLine, Emulated, StsLine
 from sim_mock.servo_physics import ServoSpec
@@ -44,7 +44,7 @@ def setup(
             mine = [one for one in setups_on(model, bus) if one.name in wanted]
             if not mine:
                 continue
-            if bus_config(model, bus).kind == "maestro":
+            if model.bus_named(bus).kind == "maestro":
                 left += _board(model, rig, bus, mine, port, mock, yes)
             else:
                 left += _chain(model, rig, bus, mine, port, mock, yes)
@@ -80,7 +80,7 @@ def _chain(
     """Set the servos of one bus up; gives the joints that were skipped."""
     say(
         f"{title}{_where(rig, bus)}: {len(setups)} of {len(rig.names)} servos to set up for "
-        f"{bus_config(rig, bus).baud} bit/s. Switch the servo supply off before you plug or "
+        f"{rig.bus_named(bus).baud} bit/s. Switch the servo supply off before you plug or "
         "unplug one."
     )
     left = []
@@ -93,7 +93,7 @@ def _chain(
 
 def _step(rig: Rig, bus: str, one: ServoSetup, port: str | None, mock: bool, yes: bool) -> bool:
     """Set one joint's servo up, again and again until it is done or skipped."""
-    kind = KINDS[bus_config(rig, bus).kind]
+    kind = KINDS[rig.bus_named(bus).kind]
     fresh = {bus: _fresh(rig, one, kind)}
     while True:
         if not yes and not _go_on("   Enter: it is connected; s: skip this one; Ctrl-C: end "):
@@ -103,7 +103,7 @@ def _step(rig: Rig, bus: str, one: ServoSetup, port: str | None, mock: bool, yes
                 wires(rig, mock, port, fresh) as wired,
                 to_open(wired.paths[bus]) as line,
             ):
-                return _set_up(line, kind, one, bus_config(rig, bus).baud, yes)
+                return _set_up(line, kind, one, rig.bus_named(bus).baud, yes)
         except DriverError as error:
             if yes:
                 raise
@@ -164,4 +164,4 @@ def _board(
         to_open(wired.paths[bus]) as line,
     ):
         joints = {one.name: rig.joints[one.name] for one in setups}
-        return set_up_board(line, bus_config(rig, bus).maestro, setups, joints, yes)
+        return set_up_board(line, rig.bus_named(bus).maestro, setups, joints, yes)

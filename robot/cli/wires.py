@@ -6,7 +6,6 @@ from typing import Annotated, NamedTuple
 
 import typer
 
-from config.rig import BusConfig
 from config.schema import Rig
 from drivers.errors import SetupError
 from drivers.port_owner import refuse_owner
@@ -69,7 +68,7 @@ def wires(
     if not mock:
         paths, here = ports_of(rig, port), serial_ports()
         for name, path in paths.items():
-            refuse_owner(path, bus_config(rig, name).kind, here)
+            refuse_owner(path, rig.bus_named(name).kind, here)
         yield Wires(paths, None)
         return
     with PtyBuses() as buses:
@@ -82,11 +81,6 @@ def bus_label(rig: Rig, name: str) -> str:
     if len(bus_names(rig)) == 1:
         return "the bus"
     return f"bus {name}" if name else "the main bus"
-
-
-def bus_config(rig: Rig, name: str) -> BusConfig:
-    """Give how the servos of a bus are reached."""
-    return rig.buses[name] if name else rig.bus
 
 
 def setups_on(rig: Rig, name: str) -> tuple[ServoSetup, ...]:

@@ -5,8 +5,10 @@ people who build arms with them. Defaults are the choice that is hardest on a cl
 report decides; they and times marked [A] are assumed.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, get_args
+
+from sim_mock.choosing import cases_of, decided
 
 AfterMissing = Literal["silence", "skip", "timeout"]
 BroadcastPing = Literal["answer", "mix", "silence"]
@@ -60,13 +62,11 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "reboot": get_args(Reboot),
     "wrong_baud": get_args(WrongBaud),
 }
-_TIMES = {"slot_timeout_ms": "slot_timeout_s", "packet_gap_ms": "packet_gap_s"}
 
 
 def cases() -> dict[str, str]:
     """Give the name of every case, as it is typed, and its possible values."""
-    named = {name.replace("_", "-"): "|".join(values) for name, values in _CHOICES.items()}
-    return named | {name.replace("_", "-"): "MS" for name in _TIMES} | {"baud": "heed|any"}
+    return cases_of(_CHOICES)
 
 
 def chosen(habits: StsHabits, case: str, value: str) -> StsHabits:
@@ -75,22 +75,4 @@ def chosen(habits: StsHabits, case: str, value: str) -> StsHabits:
     Raises:
         ValueError: there is no such case or value.
     """
-    name = case.replace("-", "_")
-    if name in _TIMES:
-        time_s = _milliseconds(case, value) / 1000.0
-        return replace(habits, **{_TIMES[name]: time_s})  # type: ignore[arg-type]
-    if name not in _CHOICES:
-        raise ValueError(f"set {case!r}: unknown; there is {', '.join(cases())}")
-    if value not in _CHOICES[name]:
-        raise ValueError(f"{case} {value!r}: it can be {', '.join(_CHOICES[name])}")
-    return replace(habits, **{name: value})  # type: ignore[arg-type]
-
-
-def _milliseconds(case: str, value: str) -> float:
-    try:
-        number = float(value)
-    except ValueError:
-        number = -1.0
-    if not 0.0 <= number < 1e6:
-        raise ValueError(f"{case} {value!r}: not a number of milliseconds of 0 or more")
-    return number
+    return decided(habits, _CHOICES, case, value)
