@@ -49,6 +49,17 @@ import json
 
 import pytest
 from copied import copied
+from moving_bus import (
+    IDS,
+    LONGEST_S,
+    NAMES,
+    MovingBus,
+    live_through_answers_out_of_order,
+    live_through_duplicates,
+    live_through_everybody_late,
+    live_through_harmless,
+    live_through_missing_ids,
+)
 
 from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.dynamixel.health import AGAIN_AND_AGAIN
@@ -58,21 +69,15 @@ from sim_mock.ports import InProcessPort
 from sim_mock.servo import ServoSpec
 from sim_mock.servo_chain import build_chain
 
-IDS = (1, 2, 3, 4)
-NAMES = ("eye", "jaw", "neck", "lid")
-LONGEST_S = 0.1
-"""No read takes longer, but the one that opens a port anew or sets a servo up anew."""
 
-
-class Rig:
+class Rig(MovingBus):
     """Four moving servos in this process on a line whose time passes as it is waited for."""
 
     def __init__(self, fast=True, indirect=True, heed_baud=False, **params):
-        self.now_s = 50.0
+        super().__init__()
         specs = [ServoSpec(i, "xl330-m077", 2000) for i in IDS]
         self.chain = build_chain(specs, lambda: self.now_s)
         self.chain.heed_baud = heed_baud
-        self.sent = []
         self.port = InProcessPort(self.chain, self.sent.append, sleep_until=self.sleep_until)
         setups = [
             ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0, name)
@@ -80,47 +85,6 @@ class Rig:
         ]
         chosen = DynamixelParams(fast_sync_read=fast, indirect_block=indirect, **params)
         self.bus = DynamixelBus(self.port, setups, chosen)
-        self.k = self.longest_s = 0
-
-    def sleep_until(self, t_s):
-        self.now_s = max(self.now_s, t_s)
-
-    def start(self):
-        self.bus.open()
-        self.bus.engage()
-        self.bus.events()
-        # So many answers it takes to know how late they are.
-        for _ in range(130):
-            self.tick()
-        self.longest_s = 0.0
-        return self
-
-    def command(self, text):
-        self.chain.faults.command(text)
-
-    def tick(self, goals=None):
-        """Run one cycle with joints in motion; every value must have been true in it."""
-        self.now_s += 0.01
-        self.k += 1
-        before, began_s = self.chain.positions_steps(), self.now_s
-        readings = self.bus.read(self.now_s)
-        self.longest_s = max(self.longest_s, self.now_s - began_s)
-        after = self.chain.positions_steps()
-        for reading, was, is_now in zip(readings, before, after, strict=True):
-            if reading is not None:
-                assert min(was, is_now) - 1 <= reading.position_steps <= max(was, is_now) + 1
-        self.bus.write(goals or [2000 + abs(self.k % 80 - 40) * 10] * len(IDS))
-        return readings
-
-    def heard(self):
-        return [reading is not None for reading in self.tick()]
-
-    def until_all(self, most=300):
-        """Run until all servos give values under torque; gives the cycles that took."""
-        for k in range(most):
-            if all(r is not None and r.torque for r in self.tick()):
-                return k
-        raise AssertionError(f"not well after {most} cycles: {self.bus.faults()}")
 
     def errors(self):
         return self.bus.health().errors
@@ -188,47 +152,26 @@ def test_passing_fault(rig, number, fault):
      "noise after", "fragment 1", "fragment", "echo on", "delay 2 0.3", "stall 3 0.3"],
 )  # fmt: skip
 def test_harmless(rig, fault):
-    rig.command(fault)
-    assert [rig.heard() for _ in range(20)] == [[True] * 4] * 20
-    assert rig.longest_s < LONGEST_S
+    live_through_harmless(rig, fault)
 
 
 def test_05_duplicates(rig):
-    rig.command("duplicate all")
-    for _ in range(30):
-        assert rig.heard() == [True] * 4
+    live_through_duplicates(rig)
 
 
 @pytest.mark.parametrize("late_ms", [3, 15, 60, 80, 200])
 def test_06_everybody_late(rig, late_ms):
-    for times in (1, 3, 12):
-        rig.command(f"delay all {late_ms} count {times}")
-        for _ in range(10):
-            rig.tick()
-        rig.until_all()
-    assert rig.longest_s < 0.3
+    live_through_everybody_late(rig, late_ms)
 
 
 def test_13_out_of_order(rig):
-    rig.command("reorder count 1")
-    rig.tick()
-    assert rig.heard() == [True] * 4
+    live_through_answers_out_of_order(rig)
 
 
 @pytest.mark.parametrize("policy", ["silence", "skip", "timeout"])
 @pytest.mark.parametrize("missing", [(1,), (4,), (2, 3)])
 def test_14_missing_id(rig, policy, missing):
-    rig.command(f"set after-missing {policy}")
-    for servo_id in missing:
-        rig.command(f"lose {servo_id}")
-    expected = [servo_id not in missing for servo_id in IDS]
-    assert [rig.heard() for _ in range(50)] == [expected] * 50
-    assert rig.longest_s < LONGEST_S
-    lines = rig.bus.events()
-    assert all(f"{NAMES[i - 1]} (servo {i}) does not answer" in lines for i in missing)
-    rig.command("clear")
-    assert rig.until_all() <= 60
-    assert any("answers again after" in line for line in rig.bus.events())
+    live_through_missing_ids(rig, policy, missing)
 
 
 def test_16_read_and_write_fail(rig):

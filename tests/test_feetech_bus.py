@@ -6,7 +6,8 @@ from math import nan
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sts_rig import IDS, Rig
+from moving_bus import IDS
+from sts_rig import Rig
 
 from drivers.errors import ServoFault, ServoMissing
 from drivers.feetech.bus import FeetechBus, FeetechParams
