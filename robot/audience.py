@@ -13,7 +13,7 @@ from robot.assemble import Assembly
 from robot.loop import LoopCount, Tick
 from robot.orders import Order, Resume, Stop, Tune
 from robot.page.feed import Fed, TuningFeed
-from robot.page.hear import PageHear
+from robot.page.hear import Confined, PageHear
 from robot.page.link import Page
 from robot.page.onlooker import InForce, Onlooker
 from robot.page.picking import Picking
@@ -30,6 +30,11 @@ STEER = "steer"
 
 class LiveTuning(FileTuning, Fed, Protocol):
     """The parameters of the running rig, as robot.tuning.Tuning has them."""
+
+    @property
+    def confined(self) -> Confined:
+        """Return what says which files a person at a browser may name."""
+        ...
 
 
 class Wished(NamedTuple):
@@ -115,6 +120,7 @@ class Audience:
             refusals=told.refusals if told is not None else (),
             saved=self._live.saved if self._live is not None else None,
             depth=self._show_depth,
+            confined=self._tuning.confined if self._tuning is not None else None,
         )
         return Page(*address, hear)
 

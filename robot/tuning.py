@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from config.apart import apart
+from config.confined import Confined
 from config.knobs import (
     NEXT_START,
     Knob,
@@ -64,6 +65,7 @@ class Tuning:
     """Gives and changes the parameters of one running rig.
 
     version: goes up at each change
+    confined: says which files a person at a browser may name
     """
 
     def __init__(
@@ -96,6 +98,9 @@ class Tuning:
         self._options = differences(read, whole)
         self._state = _State(whole, whole, rig, character, files, found, found, 0)
         self._knobs = knobs_of(whole, self._defaults)
+        # A shipped rig's own folder is the package's, where nobody has files.
+        at_home = rig in shipped_names("rigs")
+        self.confined = Confined(Path.cwd() if at_home else self.path.parent)
 
     @property
     def version(self) -> int:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import cast
+from typing import Protocol, cast
 
 from drivers.errors import DriverError
 from gaze.types import Vec3
@@ -11,6 +11,19 @@ from robot.remote.requests import Saved, Tuning
 
 _LATER = "next start"
 """Of what a change did, people are told what it did not; the controls show the rest."""
+
+
+class Confined(Protocol):
+    """Says which files a person at a browser may name (config.confined.Confined)."""
+
+    def file(self, given: str, kind: str = "") -> str:
+        """Return a shipped name or a whole path; raise where it may not be named."""
+        ...
+
+    def changes(self, changes: Mapping[str, object]) -> None:
+        """Raise where a value names a file that may not be named."""
+        ...
+
 
 Point = Callable[[float, float], Vec3 | None]
 """Place in the picture, 0..1 from the left and from the top -> point in the world."""
@@ -29,12 +42,14 @@ class PageHear:
         depth: Callable[[bool], None] | None = None,
         refusals: tuple[type[Exception], ...] = (),
         saved: Callable[[Path], None] | None = None,
+        confined: Confined | None = None,
     ) -> None:
         """Take who obeys.
 
         tuning, point, steer, replay, depth: None where there is no such thing to ask for
         refusals: what ``tuning`` raises where a value breaks a rule, besides ValueError
         saved: is told each file that was written
+        confined: says which files may be named; None: any
         """
         self._order = order
         self._tuning = tuning
@@ -46,6 +61,7 @@ class PageHear:
             ValueError, DriverError, OSError, *refusals,
         )  # fmt: skip
         self._saved = saved
+        self._confined = confined
 
     def __call__(self, data: Mapping[str, object]) -> str | None:
         """Do what is asked; None where nothing needs to be said, else words or a refusal."""
@@ -92,6 +108,8 @@ class PageHear:
             raise ValueError("these parameters cannot be changed while the rig runs")
         match asked:
             case {"set": dict(changes)}:
+                if self._confined is not None:
+                    self._confined.changes(changes)
                 notes = tuning.set(cast(Mapping[str, Value], _frozen(changes)))
                 return _lines(note for note in notes if _LATER in str(note))
             case {"save": str() | None as path}:
@@ -102,10 +120,14 @@ class PageHear:
                 lines = [f"{c.key}: {c.new} (default {c.old})" for c in tuning.differs()]
                 return "\n".join(lines) or "all is as by default"
             case {"character": str(name)}:
+                if self._confined is not None and name not in tuning.characters():
+                    name = self._confined.file(name, "characters")
                 return _lines(tuning.character(name)) or f"the character is {name}"
         raise ValueError("tuning takes set, save, revert, differs or character")
 
     def _save(self, tuning: Tuning, path: str | None) -> str:
+        if path and self._confined is not None:
+            path = self._confined.file(path)
         file = Path(path).expanduser() if path else None
         if file is not None and not file.is_absolute():
             raise ValueError(f"{path}: give the whole path; the rig has a folder of its own")

@@ -119,7 +119,7 @@ class TuningPanel:
         self._form = gui.add_form(None, order=2)
         with self._form:
             self._file = gui.add_text(
-                "save as", "", hint="the whole path of a new rig file; Enter saves"
+                "save as", "", hint="a new .yaml file in the rig's folder; Enter saves"
             )
         self._find = gui.add_text("find", "", order=3, hint="words of a key or its meaning")
         self._group = gui.add_dropdown("group", (NOTHING,), order=4)

@@ -1,0 +1,82 @@
+"""Which files may be named from outside, by a browser: shipped ones, and those beside the rig.
+
+Whoever steers a running rig from a page names characters, walks, profiles and files to save
+in. The program reads and writes them with the rights of its own user, so that only those in
+one folder may be named.
+"""
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from config.load import ConfigError, Fault, shipped_names
+
+_KIND_OF_KEY = {
+    "gaze.scanpath.walk": "scanpaths",
+    "profile": "profiles",
+    "detector.model_file": "",
+    "oak.face_model": "",
+}
+"""Keys of a rig that hold a shipped name or a file, and the kind of the names; "": no names."""
+_YAML = (".yaml", ".yml")
+
+
+class Confined:
+    """One folder, with all below it, in which files may be named."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = os.path.realpath(folder)
+
+    def file(self, given: str, kind: str = "", key: str = "", start: Path | None = None) -> str:
+        """Return a shipped name as it is, or the whole path of a file in the folder.
+
+        Args:
+            given: a name or a path
+            kind: of the shipped names that are taken, as "characters"; "": none
+            key: what a fault is about
+            start: where relative paths begin; None: in the folder
+
+        Raises:
+            config.load.ConfigError: the file lies elsewhere, links followed.
+        """
+        if kind and "/" not in given and not given.endswith(_YAML):
+            if given in shipped_names(kind):
+                return given
+            there = ", ".join(shipped_names(kind))
+            raise ConfigError(
+                [Fault("", None, key, repr(given), f"no such name; there is {there}")]
+            )
+        if given and "\0" not in given:
+            begin = self._folder if start is None else str(start)
+            path = os.path.realpath(os.path.join(begin, os.path.expanduser(given)))
+            if path.startswith(self._folder.rstrip("/") + "/"):
+                return path
+        rule = f"from the page only files in {self._folder} and below can be named"
+        raise ConfigError([Fault("", None, key, repr(given), rule)])
+
+    def changes(self, changes: Mapping[str, object]) -> None:
+        """See that the files that new values of a rig's keys name may be named.
+
+        Relative paths begin in the working folder, as they do where they are opened.
+
+        Raises:
+            config.load.ConfigError: with every file that may not.
+        """
+        faults: list[Fault] = []
+        for key, value in _leaves("", changes):
+            if isinstance(value, str) and value and key in _KIND_OF_KEY:
+                try:
+                    self.file(value, _KIND_OF_KEY[key], key, Path.cwd())
+                except ConfigError as error:
+                    faults += error.faults
+        if faults:
+            raise ConfigError(faults)
+
+
+def _leaves(above: str, value: object) -> Iterator[tuple[str, object]]:
+    """Give each value with its whole dotted key, whether it came dotted or as mappings."""
+    if not isinstance(value, Mapping):
+        yield above, value
+        return
+    for step, inner in value.items():
+        yield from _leaves(f"{above}.{step}" if above else str(step), inner)

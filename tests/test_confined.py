@@ -1,0 +1,77 @@
+"""A person at a browser names shipped files and those in the rig's folder, and no others."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from config.confined import Confined
+from config.load import ConfigError
+from config.schema import load_rig
+from robot.assemble import assemble
+from robot.choice import Choice
+from robot.page.hear import PageHear
+from robot.tuning import Tuning
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    (tmp_path / "rig").mkdir()
+    (tmp_path / "rig2").mkdir()
+    (tmp_path / "secret.yaml").write_text("a: 1\n")
+    (tmp_path / "rig" / "link.yaml").symlink_to(tmp_path / "secret.yaml")
+    (tmp_path / "rig" / "out").symlink_to(tmp_path)
+    return tmp_path / "rig"
+
+
+def test_files_beside_the_rig_and_shipped_names(home: Path) -> None:
+    confined = Confined(home)
+    for given in ("mine.yaml", "below/mine.yaml", f"{home}/mine.yaml", "./x/../mine.yaml"):
+        path = Path(confined.file(given))
+        assert path.is_absolute() and path.is_relative_to(home)
+    assert confined.file("shy", "characters") == "shy"
+    confined.changes({"gaze.scanpath.walk": "nakamoto_tsuruno", "gaze.lids.close_ms": 80.0})
+    confined.changes({"gaze": {"scanpath": {"walk": f"{home}/walk.yaml"}}})
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        "/etc/shadow", "../secret.yaml", "link.yaml", "out/secret.yaml", "..", ".", "", "/",
+        "../rig2/a.yaml", "/dev/zero", "/proc/self/environ", "a.yaml\0", "~root/a.yaml",
+        "//etc/passwd",
+    ],
+)  # fmt: skip
+def test_files_elsewhere_are_refused(home: Path, given: str) -> None:
+    with pytest.raises(ConfigError, match="only files in|no such name"):
+        Confined(home).file(given, "characters" if given else "")
+    if given not in ("", ".", ".."):
+        with pytest.raises(ConfigError):
+            Confined(home).changes({"gaze.scanpath.walk": given})
+        with pytest.raises(ConfigError):
+            Confined(home).changes({"gaze.scanpath": {"walk": given}})
+
+
+def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
+    rig = home / "mine.yaml"
+    rig.write_text(Path("config/rigs/desk.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    made = assemble(load_rig(str(rig)), Choice(True, True, 0, "visitor"))
+    tuning = Tuning(made.retuner, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
+    hear = PageHear(
+        made.robot.order, tuning, refusals=(ConfigError,), confined=tuning.confined
+    )  # fmt: skip
+    before = sorted(os.listdir(tmp_path))
+    for asked in (
+        {"character": "/etc/shadow"},
+        {"save": str(tmp_path / "made.yaml")},
+        {"save": "~/made.yaml"},
+        {"set": {"gaze.scanpath.walk": "/etc/shadow"}},
+        {"set": {"detector.model_file": "/etc/shadow"}},
+    ):
+        words = hear({"tune": asked})
+        assert words is not None and words.startswith("refused") and "root:" not in words
+        assert "only files in" in words and len(words.splitlines()) == 1
+    assert sorted(os.listdir(tmp_path)) == before and not (Path.home() / "made.yaml").exists()
+    assert hear({"tune": {"save": "copy.yaml"}}) == f"saved in {home / 'copy.yaml'}"
+    assert hear({"tune": {"character": "shy"}}) is not None
+    made.close()
