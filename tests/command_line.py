@@ -4,12 +4,16 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
+from typer.core import TyperGroup
 
-from robot.cli.main import main
+from robot.cli.calibrations import DEFAULT, JointsUnlessNamed
+from robot.cli.main import app, main
 
 _START = "import sys; from robot.cli.main import main; sys.argv[0] = 'gazerig'; main()"
 GAZERIG = [sys.executable, "-c", _START]
@@ -32,6 +36,43 @@ def typed(*words: str) -> int:
             assert end.code is None or isinstance(end.code, int), end.code
             return end.code or 0
     return 0
+
+
+def parse(words: Sequence[str]) -> None:
+    """Read a command as the program would, and do nothing.
+
+    Args:
+        words: what stands after ``gazerig``.
+
+    Raises:
+        ValueError: there is no such command or option, or a word is no value of it.
+    """
+    command, rest = typer.main.get_command(app), [word for word in words if word != "--help"]
+    while isinstance(command, TyperGroup):
+        if not rest or rest[0] not in command.commands:
+            if not isinstance(command, JointsUnlessNamed):
+                raise ValueError(f"no command {rest[:1]}; there is {', '.join(command.commands)}")
+            rest.insert(0, DEFAULT)
+        command = command.commands[rest.pop(0)]
+    # Not with resilient_parsing, which swallows options that there are not.
+    try:
+        command.make_context(command.name, rest)
+    except Exception as error:  # whatever class this version of typer has for it
+        raise ValueError(f"{' '.join(words)}: {error}") from error
+
+
+def options(of: str = "") -> set[str]:
+    """Return the options of a command, or of all."""
+    found: set[str] = set()
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    waiting = [command for name, command in group.commands.items() if of in ("", name)]
+    for command in waiting:
+        found |= {"--help", *(o for param in command.params for o in param.opts)}
+        found |= {o for param in command.params for o in param.secondary_opts}
+        if isinstance(command, TyperGroup):
+            waiting.extend(command.commands.values())
+    return found
 
 
 def figures(*words: str) -> dict[str, Any]:

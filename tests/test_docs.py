@@ -1,50 +1,188 @@
-"""The papers of the house say what is there: names, files and figures exist."""
+"""What README and docs name is there: keys, files, links, functions, tests."""
 
 import ast
 import re
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
+from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, each_of_papers, prose, spans
+from ruamel.yaml import YAML
 
-ROOT = Path(__file__).parents[1]
-PAPERS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+from config.bounds import Shape, shapes_of
+from config.knobs import NEXT_TICK, changed, knobs, value_of
+from config.load import ConfigError, shipped_names
+from config.schema import Rig, load_rig
+from drivers.servo_models import SERVOS
+from robot.cli.examples import EXAMPLES
+from robot.joint import JointParams
+from sim_mock.scenes import scenes
+
+FOLDERS = ("config", "drivers", "gaze", "robot", "sim_mock")
+RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
+
+
+# ---- the YAML
+
+
+@cache
+def keys() -> set[str]:
+    """Return every key of a rig file and every choice there is for one."""
+    found = set(RIGS)
+
+    def walk(shape: Shape) -> None:
+        found.update(str(choice) for choice in shape.choices)
+        if shape.params is not None:
+            for name, field in shapes_of(shape.params).items():
+                found.add(name)
+                walk(field)
+        elif shape.inner is not None:
+            walk(shape.inner)
+
+    walk(Shape("params", params=Rig))
+    for rig in RIGS.values():
+        found |= set(rig.joints)
+    return found
+
+
+def is_key(dotted: str) -> bool:
+    """Return whether one of the shipped rigs has this key."""
+    for rig in RIGS.values():
+        try:
+            value_of(rig, dotted)
+        except ConfigError:
+            continue
+        return True
+    return False
+
+
+@each_of_papers("paper")
+def test_keys_named_are_keys(paper: Path) -> None:
+    sections = set(shapes_of(Rig))
+    for span in spans(paper):
+        key = re.match(r"([a-z_]+(?:\.[a-z_0-9]+)+)(: \S+)?$", span)
+        if key and key[1].split(".")[0] in sections and not key[1].endswith((".py", ".yaml")):
+            assert is_key(key[1]), f"{paper.name}: {span}"
+
+
+def test_values_set_in_the_papers_are_allowed() -> None:
+    sets = [words.split()[1:] for words in COMMANDS if words.startswith("set ")]
+    pairs = [
+        (key, float(value))
+        for words in sets
+        for key, value in zip(words[::2], words[1::2], strict=True)
+    ]
+    for block in blocks("python"):
+        found = re.findall(r'rig\.set\("([\w.]+)", ([\d.]+)\)', block.text)
+        pairs += [(key, float(value)) for key, value in found]
+    assert len(pairs) >= 4
+    for key, value in pairs:
+        assert changed(RIGS["desk"], {key: value}) != RIGS["desk"], key
+    for words in COMMANDS:
+        if words.startswith("get ") and "--" not in words:
+            assert is_key(words.split()[1]), words
+
+
+def test_what_waits_for_the_next_start_is_told() -> None:
+    text = (ROOT / "docs/tuning.md").read_text(encoding="utf-8")
+    every = knobs(RIGS["desk"], RIGS["desk"])
+    later = [knob.key for knob in every if knob.live != NEXT_TICK]
+    now = len(every) - len(later)
+    assert f"{len(every)} keys {now} work so. The other {len(later)} are" in text
+    rows = text.split("| keys | wait")[1].split("\n\n")[0].splitlines()[2:]
+    told = {key for row in rows for key in re.findall(r"`([a-z_.]+)`", row)}
+    for key in later:
+        parts = key.split(".")
+        own = parts[2] if parts[0] == "joints" else parts[0]
+        assert {own, key} & told, key
+    for key in told:
+        assert any(key in (other, *other.split(".")) for other in [*later, "buses"]), key
+
+
+def test_yaml_shown_has_keys_that_there_are() -> None:
+    shown = [YAML(typ="safe").load(block.text) for block in blocks("yaml")]
+    assert len(shown) >= 2
+    for data in shown:
+        for key, value in data.items():
+            if key in shapes_of(Rig):
+                _fits(shapes_of(Rig)[key], value, key)
+            else:
+                assert key in keys(), key
+                _fits(Shape("params", params=JointParams), value, key)
+
+
+def _fits(shape: Shape, value: Any, place: str) -> None:
+    if shape.params is not None:
+        for key, item in value.items():
+            assert key in shapes_of(shape.params), f"{place}.{key}"
+            _fits(shapes_of(shape.params)[key], item, f"{place}.{key}")
+    elif isinstance(value, dict) and shape.inner is not None:
+        for key, item in value.items():
+            _fits(shape.inner, item, f"{place}.{key}")
+
+
+# ---- files, links, names
+
+
+def slugs(paper: Path) -> set[str]:
+    """Return the anchors of a paper's headings, as GitHub makes them."""
+    titles = re.findall(r"^#+ (.+)$", prose(paper), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("paper", [*PAPERS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
+def test_links_lead_somewhere(paper: Path) -> None:
+    for link in re.findall(r"\]\(([^)]+)\)", prose(paper)):
+        if not link.startswith("http"):
+            target, _, anchor = link.partition("#")
+            file = (paper.parent / target).resolve() if target else paper
+            assert file.exists(), f"{paper.name}: {link}"
+            assert not anchor or anchor in slugs(file), f"{paper.name}: {link}"
+
+
+@each_of_papers("paper")
+def test_files_named_exist(paper: Path) -> None:
+    names = {path.name for folder in (*FOLDERS, "tests") for path in (ROOT / folder).rglob("*.*")}
+    for span in spans(paper):
+        if re.fullmatch(r"(?:[\w-]+/)+(?:[\w-]+\.(?:py|yaml|md))?", span):
+            inside = (ROOT, ROOT / "robot")
+            assert any((base / span).exists() for base in inside), f"{paper.name}: {span}"
+        elif re.fullmatch(r"[\w-]+\.(?:py|yaml)", span) and span not in ("myrig.yaml", "my.yaml"):
+            assert span in names, f"{paper.name}: {span}"
 
 
 @cache
 def defined() -> set[str]:
-    """Give every name that the sources and tests define, with and without its class."""
+    """Return every name that the sources define, with and without its class, and every test."""
     names: set[str] = set()
-    for folder in ("config", "drivers", "gaze", "robot", "sim_mock", "tests"):
+    for path in (ROOT / "tests").glob("*.py"):
+        names.add(path.stem)
+        names |= set(re.findall(r"^def (\w+)", path.read_text(encoding="utf-8"), re.MULTILINE))
+    for folder in FOLDERS:
         for path in (ROOT / folder).rglob("*.py"):
-            names.add(path.stem)
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if isinstance(node, ast.ClassDef):
-                    names.add(node.name)
-                    names |= {
-                        f"{node.name}.{part.name}"
-                        for part in node.body
-                        if isinstance(part, ast.FunctionDef)
-                    }
-                    names |= {
-                        f"{node.name}.{part.target.id}"
-                        for part in node.body
-                        if isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name)
-                    }
-                elif isinstance(node, ast.FunctionDef):
-                    names.add(node.name)
+            names |= {path.stem, ".".join(path.relative_to(ROOT).with_suffix("").parts)}
+            for node in ast.parse(path.read_text(encoding="utf-8")).body:
+                names |= set(_names(node))
     return names
 
 
-@pytest.mark.parametrize("paper", PAPERS, ids=lambda path: path.name)
-def test_links_lead_somewhere(paper: Path) -> None:
-    text = paper.read_text(encoding="utf-8")
-    for target in re.findall(r"\]\(([^)#]+)\)", text):
-        if not target.startswith("http"):
-            assert (paper.parent / target).exists(), f"{paper.name}: {target}"
+def _names(node: ast.stmt, over: str = "") -> Iterator[str]:
+    if isinstance(node, ast.ClassDef):
+        yield node.name
+        for part in node.body:
+            yield from _names(part, f"{node.name}.")
+    elif isinstance(node, ast.FunctionDef):
+        yield over + node.name
+        yield node.name
+    elif isinstance(node, ast.AnnAssign | ast.Assign):
+        for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+            if isinstance(target, ast.Name):
+                yield over + target.id
 
 
-@pytest.mark.parametrize("paper", PAPERS, ids=lambda path: path.name)
+@pytest.mark.parametrize("paper", [*PAPERS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
 def test_tests_and_functions_named_exist(paper: Path) -> None:
     known = defined()
     text = paper.read_text(encoding="utf-8")
@@ -55,16 +193,53 @@ def test_tests_and_functions_named_exist(paper: Path) -> None:
         assert name in known, f"{paper.name}: {name}"
 
 
+SAID = {
+    # keys, lines and answers of the program
+    *("ok", "bus ok", "null", "None", "path", '"baud": null', '{"ok": ...}', '{"error": ...}'),
+    *("q", "n", "y", "+", "-", "@", "left 3", "enter", "skip", "back", "end", "turn 300"),
+    # formats, bytes, and what is typed elsewhere
+    *("time,x,y", "start,duration,part", "N: [x0, y0, x1, y1]", "start + k * period"),
+    *("84 00 70 2E", "2B", "83 01", "17", "FF FF 01 02 01 FB", "pytest -k e17"),
+    *("sudo udevadm control --reload", "sudo usermod -aG dialout $USER", "ls /dev/serial/by-id"),
+    *("sudo systemctl stop ModemManager", "robot", "./face", "myrig.yaml.bak-20260131-235958"),
+    *("sleep_until", "retune", "faults", "_obey", "camera.latest", "head_turn_residual"),
+}
+"""Spans that name nothing which could be looked up."""
+
+
+@each_of_papers("paper")
+def test_every_span_names_something_that_is_there(paper: Path) -> None:
+    if paper == EMULATOR:
+        return  # its tables are held against the emulator below
+    words = {*keys(), *defined(), *SERVOS, *scenes(), *EXAMPLES, *_modes()}
+    for span in spans(paper):
+        if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):
+            continue
+        first = re.split(r"[ (:]", span)[0]
+        within = re.sub(r"^[a-z_.]+\.(?=[A-Z])", "", span)  # a module's
+        looked_up = {span, first, span.rpartition(".")[0], within}
+        assert span in SAID or looked_up & words or is_key(first) or _is_file(span), (
+            f"{paper.name}: `{span}`: mend the paper, or add it to SAID"
+        )
+
+
+def _modes() -> Iterator[str]:
+    for kind in ("characters", "profiles", "rules", "rigs"):
+        yield from shipped_names(kind)
+
+
+def _is_file(span: str) -> bool:
+    return any((ROOT / base / span).exists() for base in ("", "robot")) or span.endswith(
+        (".py", ".yaml")
+    )
+
+
 def test_every_numbered_check_listed_is_a_test() -> None:
     listed = set(re.findall(r"^\| E(\d+) \|", (ROOT / "docs/checks.md").read_text("utf-8"), re.M))
-    tested = {
-        number
-        for path in (ROOT / "tests").glob("test_*.py")
-        for number in re.findall(r"^def test_e(\d+)_", path.read_text(encoding="utf-8"), re.M)
-    }
+    tested = {name[6:].split("_")[0] for name in defined() if re.match(r"test_e\d+_", name)}
     assert listed == tested and len(listed) >= 19
 
 
-def test_the_project_speaks_of_itself_alone() -> None:
-    for paper in PAPERS:
-        assert "/shared" not in paper.read_text(encoding="utf-8"), paper.name
+@pytest.mark.parametrize("paper", [*PAPERS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
+def test_the_project_speaks_of_itself_alone(paper: Path) -> None:
+    assert "/shared" not in paper.read_text(encoding="utf-8")

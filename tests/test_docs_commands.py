@@ -1,0 +1,208 @@
+"""What README and docs tell to type works: commands, options, the emulator's words, Python."""
+
+import ast
+import importlib
+import inspect
+import re
+import shlex
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from command_line import options, parse, typed
+from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, each_of_papers, spans
+
+from robot.loop import Robot
+from robot.remote.running_rig import RunningRig
+from sim_mock.fault_commands import COMMANDS as DYNAMIXEL
+from sim_mock.maestro.faults import COMMANDS as MAESTRO
+from sim_mock.pty_bus import PtyBus
+from sim_mock.sts.fault_commands import COMMANDS as STS
+
+STANDS_FOR = {"NAME": "neck_yaw", "FILE": "a.mcap", "KEY": "seed"}
+"""What to try where a paper has a word in capitals; 1 for all others."""
+
+
+# ---- commands
+
+
+def test_papers_name_most_commands() -> None:
+    assert len(COMMANDS) > 60
+
+
+@pytest.mark.parametrize("words", COMMANDS)
+def test_a_command_of_a_paper_is_one(words: str) -> None:
+    parse(shlex.split(words))
+
+
+@each_of_papers("paper")
+def test_a_command_named_in_prose_is_one(paper: Path) -> None:
+    for span in spans(paper):
+        if span.startswith("gazerig "):
+            words = [_tried(word) for word in span.split()[1:]]
+            try:
+                parse(words)
+            except ValueError as error:
+                assert "Missing " in str(error), f"{paper.name}: {span}: {error}"
+
+
+@each_of_papers("paper")
+def test_an_option_named_in_prose_is_one(paper: Path) -> None:
+    known = options("emulate") if paper == EMULATOR else options()
+    for span in spans(paper):
+        if not span.startswith("--"):
+            continue
+        for option in re.findall(r"^(--[a-z-]+)|\s(--[a-z-]+)", span):
+            assert "".join(option) in known, f"{paper.name}: {span}"
+
+
+def test_every_option_of_the_emulator_is_told() -> None:
+    text = EMULATOR.read_text(encoding="utf-8")
+    for option in options("emulate") - {"--help"}:
+        assert option.startswith("--no-") or f"`{option}" in text, option
+
+
+def _tried(word: str) -> str:
+    if word in STANDS_FOR:
+        return STANDS_FOR[word]
+    return "1" if re.fullmatch(r"[A-Z]+", word) else word
+
+
+def quick_commands() -> list[str]:
+    """Return the commands that need no terminal, camera, running rig or recording."""
+    runs = [words for words in COMMANDS if words.startswith("run ") and "--mock" in words]
+    quick = ("check ", "schema ")
+    others = [words for words in COMMANDS if words.startswith(quick)]
+    return [words for words in runs + others if "--camera" not in words]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Go to a folder with the files that the papers speak of."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "myrig.yaml").write_bytes((ROOT / "config/rigs/desk.yaml").read_bytes())
+    film = cv2.VideoWriter("film.avi", cv2.VideoWriter_fourcc(*"MJPG"), 25.0, (64, 48))
+    for _ in range(5):
+        film.write(np.zeros((48, 64, 3), np.uint8))
+    film.release()
+    return tmp_path
+
+
+@pytest.mark.parametrize("words", quick_commands())
+def test_a_quick_command_works(words: str, folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    if words.startswith("run "):
+        words = re.sub(r"--seconds \S+", "", words) + " --fast --seconds 0.05"
+    assert typed(*shlex.split(words)) == 0, capfd.readouterr().err
+
+
+@pytest.mark.parametrize("words", ["doctor --mock --fix", "setup maker --mock"])
+def test_a_paper_shows_what_is_printed(words: str, capfd: pytest.CaptureFixture[str]) -> None:
+    [block] = [block for block in blocks("") if f"$ gazerig {words}\n" in block.text]
+    typed(*shlex.split(words))  # setup ends where standard input does
+    told = "".join(capfd.readouterr())
+    printed = [" ".join(line.split()) for line in told.splitlines()]
+    for line in block.text.split("$ gazerig")[1].splitlines()[1:]:
+        if line.strip() != "...":
+            assert " ".join(line.split()) in printed, line
+
+
+def test_make_and_pip_have_what_the_papers_ask_for() -> None:
+    made = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    extras = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    for paper in PAPERS:
+        text = paper.read_text(encoding="utf-8")
+        for target in re.findall(r"(?:^|`)make (\w+)", text, re.MULTILINE):
+            assert target in made, f"{paper.name}: make {target}"
+        for package in re.findall(r"pip install (?:-\w+ )?'?([^\s'`]+)", text):
+            extra = re.fullmatch(r"\.\[(\w+)\]", package)
+            assert extra and f"\n{extra[1]} = [" in extras, f"{paper.name}: {package}"
+
+
+# ---- the emulator's tables
+
+
+def test_the_emulators_commands_are_those_of_its_page() -> None:
+    page = EMULATOR.read_text(encoding="utf-8")
+    told = set(re.findall(r"`([a-z-]+)(?: [^`]*)?`", page.split("## Fault commands")[1]))
+    for commands in (DYNAMIXEL, STS, MAESTRO):
+        assert not set(commands.verbs) - told
+        assert not set(commands.cases) - told
+    verbs = {verb for commands in (DYNAMIXEL, STS, MAESTRO) for verb in commands.verbs}
+    rows = page.split("| command | what it does |")[1].split("\n\n")[0].splitlines()
+    for row in rows[2:]:
+        for verb in re.findall(r"`([a-z-]+)", row.split("|")[1]):
+            assert verb in verbs, verb
+
+
+@pytest.mark.parametrize(
+    ("title", "device"),
+    [
+        ("## Where documents", DYNAMIXEL),
+        ("Feetech STS servos:", STS),
+        ("Pololu Maestro, as", MAESTRO),
+    ],
+    ids=["dynamixel", "feetech", "maestro"],
+)
+def test_the_emulators_cases_are_those_of_its_page(title: str, device: Any) -> None:
+    table = EMULATOR.read_text(encoding="utf-8").split(title)[1].split("\n\n")[1]
+    assert table.startswith("| case |")
+    for row in table.splitlines()[2:]:
+        cells = row.split("|")
+        cases = [device.cases[case] for case in re.findall(r"`([a-z-]+)`", cells[1])]
+        told = set(re.findall(r"`([a-z-]+)`", cells[2].split(":")[0]))
+        allowed = {value for case in cases for value in case.split("|") if value.islower()}
+        assert not told or told == allowed, row
+
+
+# ---- Python
+
+
+PYTHON = list(blocks("python"))
+
+
+@pytest.mark.parametrize("block", PYTHON, ids=lambda block: block.paper.name)
+def test_python_of_a_paper_imports_what_there_is(block: Block) -> None:
+    tree = ast.parse(block.text)
+    here: dict[str, Any] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            module = importlib.import_module(node.module)
+            for name in node.names:
+                here[name.name] = _part(module, node.module, name.name)
+    for node in ast.walk(tree):
+        match node:
+            case ast.Attribute(ast.Name(name), attribute) if name in here:
+                assert hasattr(here[name], attribute), ast.unparse(node)
+            case ast.Call(ast.Attribute(ast.Name("rig"), method), args, keywords):
+                call = inspect.signature(getattr(RunningRig, method))
+                call.bind(None, *args, **{str(k.arg): k.value for k in keywords})
+
+
+def _part(module: ModuleType, path: str, name: str) -> Any:
+    if hasattr(module, name):
+        return getattr(module, name)
+    return importlib.import_module(f"{path}.{name}")
+
+
+def test_python_that_needs_no_rig_runs(capfd: pytest.CaptureFixture[str]) -> None:
+    [code] = [b.text for b in blocks("python") if "assemble" in b.text]
+    names: dict[str, Any] = {}
+    exec(compile(code.replace("seconds=10", "seconds=0.05"), "README.md", "exec"), names)
+    assert names["figures"]["stopped_by"] == "seconds"
+    [code] = [b.text for b in blocks("python") if "with PtyBus" in b.text]
+    names = {}
+    exec(compile(code, "emulator.md", "exec"), names)
+    assert isinstance(names["bus"], PtyBus) and names["path"]
+
+
+def test_the_tick_is_told_as_it_is() -> None:
+    [block] = [b for b in blocks("python") if b.paper.name == "one-tick.md"]
+    source = " ".join(inspect.getsource(Robot.tick).split())
+    place = 0
+    for line in block.text.splitlines():
+        done = line.rpartition(" = ")[2]
+        place = source.find(done, place)
+        assert place >= 0, f"{line}: not there, or not in this order"
