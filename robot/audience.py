@@ -4,13 +4,15 @@ The page, the status line, other programs, the rig's files and the recording: ea
 has its own thread or process, and is told of a tick in next to no time.
 """
 
+import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from robot.assemble import Assembly
 from robot.loop import LoopCount, Tick
+from robot.observers import Observers, left_out
 from robot.orders import Order, Resume, Stop, Tune
 from robot.page.feed import Fed, TuningFeed
 from robot.page.hear import Confined, PageHear
@@ -108,7 +110,8 @@ class Audience:
         self._onlooker = self._made_onlooker(status if wished.status_line else None)
         self._recorder = self._made_recorder(wished, told)
         self._looking = False
-        self._watchers = self._all_watchers()
+        self._observers = Observers(say)
+        self.join(self._observers)
 
     def _made_page(self, address: tuple[str, int], told: Told | None) -> Page:
         order, steer = self._made.robot.order, self._steer
@@ -150,22 +153,21 @@ class Audience:
         robot.body = recorder.tapped(robot.body)
         return recorder
 
-    def _all_watchers(self) -> list[Callable[[Tick], None]]:
-        watchers: list[Callable[[Tick], None]] = []
+    def join(self, observers: Observers) -> None:
+        """Have all of them told of ticks; each is left out by itself where it fails."""
         if not self._fast:
-            watchers.append(self._onlooker.note)
+            observers.add("page and status line", self._onlooker.note)
         if self._page is not None:
-            watchers += [self._picking.note, self._keep_shown]
+            observers.add("picking a point on the page", self._picking.note)
+            observers.add("the page's limits", self._keep_shown)
         if self._live is not None:
-            watchers.append(self._live.note)
+            observers.add("the remote control", self._live.note)
         if self._recorder is not None:
-            watchers.append(self._recorder.note)
-        return watchers
+            observers.add("the recording", self._recorder.note)
 
     def note(self, tick: Tick) -> None:
-        """Tell all of a tick; called by the loop."""
-        for note in self._watchers:
-            note(tick)
+        """Tell all of a tick; called by the loop where they have not joined others."""
+        self._observers.note(tick)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
         """Give the loop's ``stop`` as the recording needs it."""
@@ -181,19 +183,30 @@ class Audience:
             self._recorder.open()
 
     def open(self) -> None:
-        """Open the doors, once the robot has started."""
+        """Open the doors, once the robot has started; the robot goes on without what fails."""
         if not self._fast:
             # Who computes in another thread gives the interpreter back after so long, not the
             # usual 5 ms, which is a whole slot of the loop.
             sys.setswitchinterval(_SWITCH_S)
-        if self._page is not None:
-            self._page.open()
-            self._page.offer(self._menus())
-        if self._live is not None:
-            self._live.open()
-        if not self._fast:
-            self._onlooker.start()
-            self._looking = True
+        with self._spared("the page"):
+            if self._page is not None:
+                self._page.open()
+                self._page.offer(self._menus())
+        with self._spared("the remote control"):
+            if self._live is not None:
+                self._live.open()
+        with self._spared("page and status line"):
+            if not self._fast:
+                self._onlooker.start()
+                self._looking = True
+
+    @contextlib.contextmanager
+    def _spared(self, name: str) -> Iterator[None]:
+        """Go on whatever the block raises, and say so."""
+        try:
+            yield
+        except Exception as error:
+            self._say(left_out(name, error))
 
     def tell(self, words: str) -> None:
         """Say something to everybody who looks at the page."""
@@ -211,14 +224,18 @@ class Audience:
 
     def close(self, count: LoopCount) -> None:
         """Close all, when the torque is off."""
-        if self._live is not None:
-            self._live.close()
-        if self._looking:
-            self._onlooker.stop()
-        if self._page is not None:
-            self._page.close()
-        if self._recorder is not None:
-            self._say(self._recorder.close(count.stopped_by, self._made.sent_digest()))
+        with self._spared("the remote control"):
+            if self._live is not None:
+                self._live.close()
+        with self._spared("page and status line"):
+            if self._looking:
+                self._onlooker.stop()
+        with self._spared("the page"):
+            if self._page is not None:
+                self._page.close()
+        with self._spared("the recording"):
+            if self._recorder is not None:
+                self._say(self._recorder.close(count.stopped_by, self._made.sent_digest()))
 
     def _menus(self) -> dict[str, tuple[str, ...]]:
         if self._steer is not None:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from math import inf
 
+from drivers.errors import DriverError
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from robot.joint import JointParams
 from robot.safety.motion import JointLimit
@@ -146,9 +147,20 @@ class Body:
     def stop(self) -> None:
         """Torque off and close the bus."""
         try:
-            self.bus.release()
+            self._release()
         finally:
             self.bus.close()
+
+    def _release(self) -> None:
+        try:
+            self.bus.release()
+        except DriverError:
+            raise
+        except Exception:  # no fault of the bus, such as no memory: it is tried once more
+            self.bus.release()
+        except BaseException:
+            self.bus.release()
+            raise
 
 
 def _counts_alike(one: JointParams, other: JointParams) -> bool:

@@ -1,5 +1,6 @@
 """The tick, and the loop that keeps its time."""
 
+import contextlib
 import gc
 from collections import deque
 from collections.abc import Callable
@@ -163,8 +164,10 @@ class Robot:
             "lids": tuple(LID_COMMANDS),
         }
 
-    def start(self, clock: Clock) -> None:
+    def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch torque on where the joints are, begin from there.
+
+        ready: called last before the torque comes on; what it raises ends the start
 
         Raises:
             drivers.errors.SetupError: something is absent or not as configured.
@@ -176,11 +179,21 @@ class Robot:
         gc.freeze()
         self.camera.open()
         try:
+            if ready is not None:
+                ready()
             goals = self.body.start()
         except BaseException:
             self.camera.close()
             raise
-        t_s = clock.now_s()
+        try:
+            self._begin(clock.now_s(), goals)
+        except BaseException:
+            with contextlib.suppress(DriverError):
+                self.stop()
+            raise
+
+    def _begin(self, t_s: float, goals: JointAngles) -> None:
+        """Let every part begin where the joints are."""
         self._guard.reset(t_s, goals)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
@@ -228,16 +241,28 @@ class Robot:
             self.stopped,
         )  # fmt: skip
 
-    def park(self, pose_rad: JointAngles, clock: Clock, params: LoopParams) -> bool:
+    def park(
+        self,
+        pose_rad: JointAngles,
+        clock: Clock,
+        params: LoopParams,
+        again: Callable[[], bool] | None = None,
+    ) -> bool:
         """Move slowly to the parking pose; tell whether it was reached in time.
 
         Somebody's stop ends it: the torque is off then. Other orders wait for nothing any more.
+
+        again: asked at every step, tells whether the rest is to be skipped
         """
         self._guard.go_gently()
         start_s = clock.now_s()
+        end_s = start_s + params.park_s + 0.5 / params.rate_hz
         for slot in range(1, int(params.park_s * params.rate_hz) + 1):
             clock.sleep_until(start_s + slot / params.rate_hz)
             t_s = clock.now_s()
+            # A bus that is slow to answer must not make it longer.
+            if t_s > end_s or (again is not None and again()):
+                return False
             while self._orders:
                 if isinstance(order := self._orders.popleft(), Stop):
                     self._halt(order.why)

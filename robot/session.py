@@ -1,12 +1,13 @@
 """One run from start to torque off: what the command line asks for, carried out."""
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from drivers.errors import DriverError, SetupError
+from drivers.errors import SetupError
 from robot.assemble import Assembly
 from robot.audience import Audience, Told, Wished
 from robot.behaviours import Behaviours
@@ -15,9 +16,13 @@ from robot.choice import Choice
 from robot.clock import RealClock
 from robot.face_gaze import FaceGaze
 from robot.heatmap import heatmap
+from robot.interrupts import Interrupts
+from robot.joint_faults import JointFaults
 from robot.loop import LoopCount, Robot, Tick
 from robot.loop import run as run_loop
+from robot.observers import Observers
 from robot.planner import Planner
+from robot.power_down import Again, PowerDown
 from robot.summary import Summary
 
 
@@ -124,52 +129,73 @@ def _run(
     told: Told | None,
 ) -> dict[str, object]:
     robot, wall = made.robot, RealClock()
+    say = _never_raising(say)
     audience = Audience(made, wanted.watched, told, wanted.fast, say, status)
     summary = Summary()
+    faults = JointFaults(say)
     scene = made.scene
     score = Behaviours(scene.events(), scene.round_s) if scene is not None else None
     face_gaze = FaceGaze() if wanted.heatmap is not None else None
-    watchers = [summary.note, audience.note]
+    observers = Observers(say)
+    observers.add("the summary", summary.note)
+    observers.add("the watch for faults", faults.note)
+    audience.join(observers)
     if scene is not None and score is not None:
         planner = Planner(scene.behaviour, robot.ask)
-        watchers += [lambda tick: planner.note(tick.t_s), score.note]
+        observers.add("the scene's planner", lambda tick: planner.note(tick.t_s))
+        observers.add("the scene's score", score.note)
     if face_gaze is not None:
-        watchers.append(face_gaze.note)
+        observers.add("the heat map", face_gaze.note)
     _ask_all(robot, wanted)
 
-    def watch(tick: Tick) -> None:
-        for note in watchers:
-            note(tick)
+    def tell(tick: Tick) -> None:
         for event in (*drawn_together(tick.events), *audience.events()):
             say(f"{tick.t_s - start_s:.2f} s: {event}")
 
+    observers.add("the log", tell)
     longest_s = _longest_s(made, wanted)
+    interrupts = Interrupts.of(stopped)
 
     def stop(seconds: float) -> str | None:
         over = longest_s is not None and seconds >= longest_s - 1e-9
-        return stopped() or ("seconds" if over else None)
+        return stopped() or interrupts() or ("seconds" if over else None)
 
     began_s = wall.now_s()
     count = LoopCount(0, 0, "fault: unexpected error")
     audience.open_files()
+    begun = False
     try:
-        robot.start(made.clock)
-    except BaseException:
-        audience.give_up()
-        raise
-    start_s = made.clock.now_s()
-    for note in (*made.notes, *drawn_together(robot.body.bus.events())):
-        say(note)
-    try:
-        audience.open()
-        count = run_loop(robot, made.clock, lambda: made.loop, audience.timed(stop), watch)
+        with interrupts, way_out(made, say, interrupts) as leaving:
+            leaving.switch_on(lambda: robot.start(made.clock, interrupts.refuse))
+            begun = True
+            start_s = made.clock.now_s()
+            for note in (*made.notes, *drawn_together(robot.body.bus.events())):
+                say(note)
+            audience.open()
+            count = run_loop(
+                robot, made.clock, lambda: made.loop, audience.timed(stop), observers.note
+            )
+            wall_s = wall.now_s() - began_s
+            leaving.cause = count.stopped_by
     finally:
-        wall_s = wall.now_s() - began_s
-        leave(made, count, say)
-        audience.close(count)
+        if begun:
+            audience.close(count)
+        else:
+            audience.give_up()
+    faults.close()
     if face_gaze is not None and wanted.heatmap is not None:
         _draw_heatmap(face_gaze, wanted.heatmap, wanted.heatmap_face, say)
-    return _figures(made, summary, score, count, wall_s)
+    return _figures(made, summary, score, count, wall_s, faults)
+
+
+def _never_raising(say: Callable[[str], None]) -> Callable[[str], None]:
+    """Return ``say`` so that a failure to say something ends nothing."""
+
+    def tried(line: str) -> None:
+        with contextlib.suppress(Exception):
+            say(line)
+
+    return tried
 
 
 def _longest_s(made: Assembly, wanted: Wanted) -> float | None:
@@ -199,23 +225,31 @@ def _draw_heatmap(
     say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
 
 
-def leave(made: Assembly, count: LoopCount, say: Callable[[str], None]) -> None:
-    """The one way out: park, torque off, close, and say what of it worked."""
+def leave(
+    made: Assembly,
+    count: LoopCount,
+    say: Callable[[str], None],
+    interrupts: Interrupts | None = None,
+) -> None:
+    """Park, torque off, close, and say what of it worked: the end of robot.power_down alone."""
+    leaving = way_out(made, say, interrupts if interrupts is not None else Interrupts())
+    leaving.cause = count.stopped_by
+    leaving.leave()
+
+
+def way_out(made: Assembly, say: Callable[[str], None], interrupts: Interrupts) -> PowerDown:
+    """Return the way out of a run of this robot."""
+    return PowerDown(lambda again: parked(made, again), made.robot.stop, say, interrupts)
+
+
+def parked(made: Assembly, again: Again) -> str:
+    """Park a robot unless it was stopped; return what to say of it."""
     robot = made.robot
-    how = "not parked"
-    try:
-        if robot.stopped:
-            how = "not parked, as it was stopped"
-        elif robot.park(made.park_rad, made.clock, made.loop):
-            how = "parked"
-    except (DriverError, KeyboardInterrupt) as error:
-        how = f"not parked ({error or 'interrupted'})"
-    try:
-        robot.stop()
-        how += ", torque off"
-    except DriverError as error:
-        how += f", torque-off could not be sent ({error})"
-    say(f"stopped by {count.stopped_by}: {how}")
+    if robot.stopped:
+        return "not parked, as it was stopped"
+    if robot.park(made.park_rad, made.clock, made.loop, again):
+        return "parked"
+    return "not parked (interrupted)" if again() else "not parked"
 
 
 def _figures(
@@ -224,6 +258,7 @@ def _figures(
     score: Behaviours | None,
     count: LoopCount,
     wall_s: float,
+    faults: JointFaults,
 ) -> dict[str, object]:
     """Join the figures of the ticks, the loop, the pictures and the bus."""
     robot = made.robot
@@ -248,6 +283,7 @@ def _figures(
         "pictures": robot.perception.pictures,
         "head_turn_residual": robot.perception.residual()._asdict(),
         **ticks,
+        "joint_faults": faults.figures(),
         "bus": bus,
         "stopped_by": count.stopped_by,
     }

@@ -72,6 +72,11 @@ class Moved(NamedTuple):
         """Tell whether every joint that was to move came near its wish."""
         return self.ended == "arrived"
 
+    def __str__(self) -> str:
+        """Write how it ended, with the reasons joint by joint."""
+        reasons = [f"{part.joint}: {', '.join(part.reasons)}" for part in self.remarkable()]
+        return f"{self.ended} ({'; '.join(reasons)})" if reasons else self.ended
+
     def of(self, joint: str) -> Applied:
         """Give one joint's part."""
         return next(part for part in self.joints if part.joint == joint)

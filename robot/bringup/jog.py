@@ -24,6 +24,8 @@ from gaze.quintic import Quintic
 from robot.body import Body
 from robot.bringup.applied import Moved, Notes, Step, outcome, standing
 from robot.clock import Clock
+from robot.observers import left_out
+from robot.power_down import Again
 from robot.safety.guard import Guard
 from robot.types import JointAngles, JointState
 
@@ -106,6 +108,7 @@ class ManualControl:
         self._stopped = stopped
         self._watch = watch
         self._goal: JointAngles = ()
+        self._said: list[str] = []
 
     @property
     def goal_rad(self) -> JointAngles:
@@ -181,17 +184,21 @@ class ManualControl:
             lambda *_: goal, lambda s: "arrived" if s.t_s >= end_s else None, seconds
         )
 
-    def park(self, angles_deg: Mapping[str, float]) -> Moved:
-        """Move to a pose whatever asked for a stop; joints left out go to 0.
+    def park(
+        self, angles_deg: Mapping[str, float], stopped: Callable[[], str | None] = no_reason
+    ) -> Moved:
+        """Move to a pose whatever asked for a stop so far; joints left out go to 0.
+
+        stopped: asked at every step; gives why to stop, None while there is no reason
 
         Raises:
             drivers.errors.DriverError: the bus is gone.
         """
-        stopped, self._stopped = self._stopped, no_reason
+        before, self._stopped = self._stopped, stopped
         try:
             return self.pose({name: angles_deg.get(name, 0.0) for name in self.body.names})
         finally:
-            self._stopped = stopped
+            self._stopped = before
 
     def follow(
         self,
@@ -231,6 +238,8 @@ class ManualControl:
         self._goal = step.verdict.command_rad
         applied = outcome(step, step.wish_rad if ends_on is None else ends_on, notes)
         level = step.verdict.level
+        events += self._said
+        self._said.clear()
         return Moved(ended, step.t_s - start_s, applied, level, tuple(events), step)
 
     def _step(self, wish: Wish, last_s: float) -> Step:
@@ -243,8 +252,18 @@ class ManualControl:
         self.body.write(verdict.command_rad)
         step = Step(t_s, wished, verdict, joints)
         if self._watch is not None:
-            self._watch(step)
+            try:
+                self._watch(step)
+            except Exception as error:
+                self._watch = None
+                self._said.append(left_out("who watches", error))
         return step
+
+
+def parked(control: ManualControl, park_deg: Mapping[str, float], again: Again) -> str:
+    """Park slowly unless somebody asks again for the end; return what to say of it."""
+    moved = control.park(park_deg, lambda: "interrupted" if again() else None)
+    return "parked" if moved.arrived else f"not parked ({moved})"
 
 
 def duration_s(distance_rad: float, params: JogParams) -> float:

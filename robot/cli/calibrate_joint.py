@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from config.schema import Rig
 from drivers.dynamixel.registers import Registers
-from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
+from drivers.errors import ServoFault, ServoMissing, SetupError
 from drivers.serial_port import BlockingPort
 from drivers.servo_models import SERVOS
 from robot.bringup.one_dynamixel import OneDynamixel
@@ -24,6 +24,8 @@ from robot.cli.steering import SteeringPerson
 from robot.cli.terminal import say
 from robot.cli.wires import Wires
 from robot.clock import RealClock
+from robot.interrupts import Interrupts
+from robot.power_down import PowerDown
 from robot.rig_bus import bus_names, joints_on
 
 Made = Calibration | Places
@@ -132,7 +134,7 @@ def _one(bench: Bench, name: str, bus: str) -> Made:
         servo = _servo(name, joint.id, joint.model, port)
         single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
         bench.person.hand = _hand(bench.wire, bus, joint.id)
-        with _let_go_after(single.who, single.let_go):
+        with _let_go_after(single.who, single.let_go, bench.stopped):
             return _smart(bench, single)
 
 
@@ -182,7 +184,7 @@ def _hobby(bench: Bench, name: str, bus: str) -> Made:
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
     hobby = OneHobby(name, joint, port, config.maestro, RealClock(), bench.stopped, how.pulses_us)
     person.hand = None
-    with _let_go_after(hobby.who, hobby.let_go):
+    with _let_go_after(hobby.who, hobby.let_go, bench.stopped):
         return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)
 
 
@@ -198,15 +200,19 @@ def _hand(wire: Wires, bus: str, servo_id: int) -> Callable[[int], None] | None:
 
 
 @contextlib.contextmanager
-def _let_go_after(who: str, let_go: Callable[[], None]) -> Iterator[None]:
-    """Take the torque away however the block ends."""
-    try:
+def _let_go_after(
+    who: str, let_go: Callable[[], None], stopped: Callable[[], str | None]
+) -> Iterator[None]:
+    """Take the torque away however the block ends; nothing is said where that works."""
+
+    def told(line: str) -> None:
+        say(f"{who}: {line}")
+
+    with PowerDown(
+        None, let_go, told, Interrupts.of(stopped), left=": cut the servo power", quiet=True
+    ) as way_out:
+        way_out.switch_on(lambda: None)  # what follows does it, at a time of its own
         yield
-    finally:
-        try:
-            let_go()
-        except DriverError as error:
-            say(f"{who}: torque-off could not be confirmed ({error}): cut the servo power")
 
 
 def _warn_of_neck(name: str, person: SteeringPerson) -> None:

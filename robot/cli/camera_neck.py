@@ -6,13 +6,16 @@ from math import degrees
 from typing import Any
 
 from config.schema import Rig
-from drivers.errors import DriverError, SetupError
+from drivers.errors import SetupError
 from gaze.types import Angles3
 from robot.body import Body
 from robot.calibrate.camera_calibration import CameraCalibrationRefused
+from robot.cli.servo_words import left_alone
 from robot.cli.terminal import say
 from robot.clock import RealClock
+from robot.interrupts import Interrupts
 from robot.kinematics import NECK
+from robot.power_down import PowerDown
 from robot.rig_angles import limits, park_rad
 from robot.rig_bus import rig_bus
 from robot.safety.guard import Guard
@@ -69,7 +72,7 @@ def moving_neck(
     Raises:
         drivers.errors.SetupError: port or servos are not as configured, or the answer was no.
     """
-    from robot.bringup.jog import JogParams, ManualControl  # type: ignore[import-not-found, unused-ignore]
+    from robot.bringup.jog import JogParams, ManualControl, parked  # type: ignore[import-not-found, unused-ignore]
     from robot.cli.wires import wires  # type: ignore[import-not-found, unused-ignore]
 
     if any(name not in rig.joints for name in NECK[:2]):
@@ -88,19 +91,18 @@ def moving_neck(
         guard = Guard(rig.guard, limits(rig.joints), rig.names)
         params = JogParams(speed_deg_s=_GENTLE_DEG_S)
         control = ManualControl(body, guard, RealClock(), params, stopped)
-        control.start()
-        try:
+        with PowerDown(
+            lambda again: parked(control, rig.park_deg, again),
+            control.stop,
+            say,
+            Interrupts.of(stopped),
+            "torque off on all servos",
+            f": {left_alone(rig)}",
+        ) as way_out:
+            way_out.switch_on(control.start)
             neck = JoggedNeck(control, mock, stopped)
             neck.rest(0.1)
             yield neck
-        finally:
-            try:
-                control.park(rig.park_deg)
-            except DriverError as error:
-                say(f"not parked ({error})")
-            finally:
-                control.stop()
-                say("torque off on all servos")
 
 
 def go_on(stopped: Stopped) -> None:

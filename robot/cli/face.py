@@ -1,5 +1,6 @@
 """The command calibrate face: where one person's eyes, mouth and all else are on their face."""
 
+import contextlib
 import os
 import sys
 from collections.abc import Callable
@@ -34,10 +35,11 @@ from robot.cli.terminal import (
     status,
 )
 from robot.cli.wires import MockOption, PortOption
+from robot.interrupts import Interrupts
 from robot.loop import LoopCount, Tick
 from robot.loop import run as run_loop
 from robot.remote.stop_door import StopDoor
-from robot.session import Wanted, leave
+from robot.session import Wanted, way_out
 
 STILL_SCENE = "sits-still"
 
@@ -140,7 +142,7 @@ def _steered(
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     try:
-        count = _run(made, sitting, keys, audience, door)
+        count = _run(made, sitting, keys, audience, door, Interrupts.of(stopped))
     finally:
         made.close()
     if stopped() is not None or count.stopped_by.startswith("fault"):
@@ -149,23 +151,27 @@ def _steered(
 
 
 def _run(
-    made: Assembly, sitting: "_Sitting", keys: Keys, audience: Audience, door: StopDoor
+    made: Assembly,
+    sitting: "_Sitting",
+    keys: Keys,
+    audience: Audience,
+    door: StopDoor,
+    interrupts: Interrupts,
 ) -> LoopCount:
     """Run the robot until the sitting is over."""
     count = LoopCount(0, 0, "fault: unexpected error")
-    made.robot.start(made.clock)
-    try:
+    with contextlib.ExitStack() as closed_last, way_out(made, say, interrupts) as leaving:
+        leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.refuse))
         for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
             say(note)
+        closed_last.callback(lambda: audience.close(count))
         audience.open()
+        closed_last.callback(door.close)
         door.open()
         with keys:
             count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.note)
+        leaving.cause = count.stopped_by
         audience.tell("over: the head parks; whether to write it is asked at the terminal")
-    finally:
-        leave(made, count, say)
-        door.close()
-        audience.close(count)
     return count
 
 

@@ -1,5 +1,6 @@
 """Keys of a terminal as they are pressed, or words of a script in their place."""
 
+import contextlib
 import os
 import re
 import select
@@ -100,7 +101,7 @@ class TerminalKeys:
     def __enter__(self) -> Self:
         """Switch off lines and echo."""
         self._before = termios.tcgetattr(sys.stdin)
-        tty.setcbreak(sys.stdin)
+        tty.setcbreak(sys.stdin, termios.TCSANOW)
         self._ready: list[Key] = []
         self._rest = ""
         return self
@@ -112,12 +113,18 @@ class TerminalKeys:
         trace: TracebackType | None,
     ) -> None:
         """Switch them on again; keys that nobody has read are forgotten."""
-        termios.tcsetattr(sys.stdin, termios.TCSAFLUSH, self._before)
+        # Not TCSAFLUSH: a terminal that was stopped with Ctrl-S would be waited for.
+        with contextlib.suppress(termios.error, OSError):  # it may be gone
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
+            termios.tcsetattr(sys.stdin, termios.TCSANOW, self._before)
 
     def next(self, ready: bool) -> Key | None:
         """Give the next key, None where none has been pressed; ``ready`` does not matter."""
         if not self._ready and select.select([sys.stdin.fileno()], [], [], 0.0)[0]:
-            data = os.read(sys.stdin.fileno(), 256)
+            try:
+                data = os.read(sys.stdin.fileno(), 256)
+            except OSError:
+                data = b""
             if not data:  # the terminal is gone
                 return "end"
             self._ready, self._rest = keys_of(self._rest + data.decode(errors="replace"))

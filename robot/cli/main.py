@@ -23,9 +23,9 @@ from robot.cli.examples import add_examples
 from robot.cli.start import next_steps
 from robot.cli.terminal import (
     DEBUG_LOGGER,
-    FAULT,
     RigArgument,
     clear_errors,
+    run_app,
     say,
 )
 from robot.remote.running_rig import running
@@ -110,18 +110,7 @@ def main() -> None:
     if "--debug" in words:  # wherever people put it
         words = [word for word in words if word != "--debug"]
         logging.getLogger(DEBUG_LOGGER).setLevel(logging.DEBUG)
-    try:
-        app(words)
-    except Exception as error:
-        if logging.getLogger(DEBUG_LOGGER).isEnabledFor(logging.DEBUG):
-            raise
-        what = " ".join(str(error).split()) or "no words"
-        print(
-            f"unexpected: {type(error).__name__}: {what}; say it again with --debug and report "
-            "what it shows",
-            file=sys.stderr,
-        )
-        sys.exit(FAULT)
+    run_app(app, words, "say it again with --debug and report what it shows")
 
 
 def rig_files() -> list[Path]:

@@ -10,10 +10,10 @@ from typing import Annotated, NamedTuple
 import typer
 
 from config.schema import Rig, load_rig
-from drivers.errors import DriverError, SetupError
+from drivers.errors import SetupError
 from robot.body import Body
 from robot.bringup.applied import PASSING, Moved, Step
-from robot.bringup.jog import JogParams, ManualControl, refuse_unknown
+from robot.bringup.jog import JogParams, ManualControl, parked, refuse_unknown
 from robot.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
 from robot.bus_events import drawn_together
 from robot.cli import calibrations as cli_calibrations
@@ -22,6 +22,7 @@ from robot.cli.servo_words import holding, left_alone
 from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from robot.cli.wires import MockOption, PortOption, RigOption, Wires, wires
 from robot.clock import RealClock
+from robot.power_down import PowerDown
 from robot.rig_angles import lid_ends, limits, park_rad
 from robot.rig_bus import rig_bus
 from robot.safety.guard import Guard
@@ -141,13 +142,18 @@ def _commanded(
     with clear_errors(), signals() as stopped, wires(rig, way.mock, way.port) as wire:
         enter = _enter if hold and sys.stdin.isatty() else _never
         control = _control(rig, wire, speed, lambda: stopped() or enter())
-        control.start()
-        try:
+        with PowerDown(
+            (lambda again: parked(control, rig.park_deg, again)) if park else None,
+            control.stop,
+            say,
+            stopped,
+            "torque off on all servos",
+            f": {left_alone(rig)}",
+        ) as way_out:
+            way_out.switch_on(control.start)
             _tell(control.body.bus.events())
             say(f"{holding(rig)}; Ctrl-C switches it off")
             yield control
-        finally:
-            _leave(control, rig, park)
 
 
 def _ask_for_fingers(rig: Rig, yes: bool) -> None:
@@ -206,8 +212,10 @@ def _enter() -> str | None:
     """Tell whether Enter was pressed, without waiting."""
     if not select.select([sys.stdin], [], [], 0.0)[0]:
         return None
-    sys.stdin.readline()
-    return "Enter"
+    try:
+        return "Enter" if sys.stdin.readline() else "the end of standard input"
+    except OSError:
+        return "a terminal that is gone"
 
 
 def _stay(control: ManualControl, seconds: float, hold: bool) -> None:
@@ -217,35 +225,13 @@ def _stay(control: ManualControl, seconds: float, hold: bool) -> None:
         _tell(control.hold(inf if hold else seconds).events)
 
 
-def _leave(control: ManualControl, rig: Rig, park: bool) -> None:
-    """The one way out: park where asked, torque off, close, and say what of it worked."""
-    how = ""
-    try:
-        if park:
-            parked = control.park(rig.park_deg)
-            how = "parked, " if parked.arrived else f"not parked ({_why(parked)}), "
-    except (DriverError, KeyboardInterrupt) as error:
-        how = f"not parked ({error or 'interrupted'}), "
-    try:
-        control.stop()
-        how += "torque off on all servos"
-    except DriverError as error:
-        how += f"torque-off could not be sent ({error}): {left_alone(rig)}"
-    say(how)
-
-
 def _report(moved: Moved, asked: tuple[str, ...]) -> None:
     """Say what was really applied, for the joints asked for and those that something befell."""
     _tell(moved.events)
     for applied in moved.joints:
         if applied.joint in asked or applied.reasons:
             say(str(applied))
-    say(f"{_why(moved)} after {moved.seconds:.1f} s")
-
-
-def _why(moved: Moved) -> str:
-    reasons = [f"{a.joint}: {', '.join(a.reasons)}" for a in moved.remarkable()]
-    return f"{moved.ended} ({'; '.join(reasons)})" if reasons else moved.ended
+    say(f"{moved} after {moved.seconds:.1f} s")
 
 
 def _report_look(looked: LookedAt, rig: Rig) -> bool:

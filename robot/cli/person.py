@@ -49,7 +49,10 @@ class Lines:
             raise EOFError
         if not select.select([sys.stdin.fileno()], [], [], wait_s)[0]:
             return None
-        data = os.read(sys.stdin.fileno(), 4096)
+        try:
+            data = os.read(sys.stdin.fileno(), 4096)
+        except OSError:  # a terminal that is gone
+            data = b""
         if not data:
             raise EOFError
         *lines, self._rest = (self._rest + data).split(b"\n")

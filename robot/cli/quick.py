@@ -4,8 +4,10 @@ Loading all commands takes more than a second; who types ``gazerig stop`` has no
 """
 
 import os
+import signal
 import sys
 from collections.abc import Mapping, Sequence
+from types import FrameType
 
 QUICK = frozenset(
     {
@@ -20,12 +22,40 @@ _ELSEWHERE = {"--help", "--debug"}
 
 def main() -> None:
     """Run the command line."""
-    if is_quick(sys.argv[1:], os.environ):
-        _quick()
-    else:
-        from robot.cli.main import main as whole
+    # While modules load nothing has been begun that would have to be ended, and an exception
+    # raised among them may be lost or shown as a traceback.
+    if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _gone)
+    hold_standard_files()
+    try:
+        if is_quick(sys.argv[1:], os.environ):
+            _quick()
+        else:
+            from robot.cli.main import main as whole
 
-        whole()
+            whole()
+    finally:  # all is said: nothing is left to interrupt
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _gone(number: int, frame: FrameType | None) -> None:
+    """End at once, with the one line that Ctrl-C always gives."""
+    if sys.stderr is not None:
+        os.write(2, b"interrupted\n")
+    os._exit(130)
+
+
+def hold_standard_files() -> None:
+    """Open what of standard input, output and error was closed: nothing goes there.
+
+    Else the next file that is opened gets its number, and what is said to people goes to
+    the servos.
+    """
+    for fd in (0, 1, 2):
+        try:
+            os.fstat(fd)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
 
 
 def is_quick(words: Sequence[str], environ: Mapping[str, str]) -> bool:
@@ -43,12 +73,7 @@ def is_quick(words: Sequence[str], environ: Mapping[str, str]) -> bool:
 
 
 def _quick() -> None:
-    from robot.cli.terminal import FAULT
+    from robot.cli.terminal import run_app
     from robot.cli.tune import app
 
-    try:
-        app()
-    except Exception as error:
-        what = " ".join(str(error).split()) or "no words"
-        print(f"unexpected: {type(error).__name__}: {what}; try with --debug", file=sys.stderr)
-        sys.exit(FAULT)
+    run_app(app, sys.argv[1:], "try with --debug")

@@ -3,9 +3,10 @@
 import json
 import os
 import sys
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +16,7 @@ from config.text import rig_text, walk_text
 from drivers.errors import SetupError
 from robot.cli.examples import complete_scene, complete_shipped
 from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
+from robot.joint_faults import JointFault
 
 if TYPE_CHECKING:
     from robot.assemble import Assembly
@@ -152,7 +154,7 @@ def run(
         with signals() as stopped:
             figures = session.run(made, wanted, stopped, say, status, told)
         _write_summary(figures, summary)
-    if str(figures["stopped_by"]).startswith("fault"):
+    if had_faults(figures, say):
         raise typer.Exit(FAULT)
 
 
@@ -190,6 +192,18 @@ def _told(
 
     tuning = Tuning(made.retuner, made.robot.order, rig, character, profile)
     return Told(tuning, (ConfigError,), {"rig": rig, "pid": os.getpid()}, info)
+
+
+def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
+    """Tell whether a run had faults, and say which joints they held."""
+    held = [
+        str(JointFault(joint, reason, count["times"], count["seconds"]))
+        for joint, reasons in figures["joint_faults"].items()
+        for reason, count in reasons.items()
+    ]
+    if held:
+        say(f"the run had faults: {'; '.join(held)}")
+    return bool(held) or str(figures["stopped_by"]).startswith("fault")
 
 
 def host_port(text: str) -> tuple[str, int]:

@@ -1,28 +1,40 @@
 """The terminal: lines for people, one status line, clear errors, and Ctrl-C as a wish to stop."""
 
+import atexit
 import contextlib
 import logging
+import os
 import shutil
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import FrameType
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
 from config.load import ConfigError, shipped_names
 from drivers.errors import DriverError, SetupError
+from robot.cli.line_writer import LineWriter
+from robot.interrupts import Interrupts
 
 BAD_INPUT = 2
 """Exit code: something asked for or configured is wrong."""
 FAULT = 1
 """Exit code: something failed while running."""
+INTERRUPTED = 130
+"""Exit code: Ctrl-C before there was anything to park."""
 
 DEBUG_LOGGER = "gazerig"
 """At level DEBUG errors also show where they come from."""
+
+_STDERR = 2
+_FLUSH_S = 1.0
+"""The last lines have so long to be written."""
+_writer = LineWriter(_STDERR)
+atexit.register(_writer.flush, _FLUSH_S)
 
 
 def complete_rig(incomplete: str) -> list[str]:
@@ -48,49 +60,115 @@ def clear_errors() -> Iterator[None]:
         yield
     except (ConfigError, SetupError) as error:
         _show_origin()
-        print(error, file=sys.stderr)
+        say(str(error))
         raise typer.Exit(BAD_INPUT) from None
     except DriverError as error:
         _show_origin()
-        print(error, file=sys.stderr)
+        say(str(error))
         raise typer.Exit(FAULT) from None
+    except BrokenPipeError:
+        raise  # for run_app: nobody reads what is printed
     except OSError as error:
         _show_origin()
-        print(f"{error.filename or 'file'}: {error.strerror or error}", file=sys.stderr)
+        say(f"{error.filename or 'file'}: {error.strerror or error}")
         raise typer.Exit(BAD_INPUT) from None
 
 
 def _show_origin() -> None:
     """With --debug, show where the error at hand comes from."""
     if logging.getLogger(DEBUG_LOGGER).isEnabledFor(logging.DEBUG):
-        traceback.print_exc()
+        say(traceback.format_exc().rstrip("\n"))
 
 
-@contextlib.contextmanager
-def signals() -> Iterator[Callable[[], str | None]]:
-    """Give whether Ctrl-C or SIGTERM came, by name; a second one is not waited for."""
-    came: list[str] = []
+def run_app(app: Callable[[list[str]], object], words: list[str], again: str) -> NoReturn:
+    """Run the command line and exit; whatever goes wrong is one line.
 
-    def note(number: int, _: FrameType | None) -> None:
-        came.append(signal.Signals(number).name)
-        if len(came) > 1:
-            raise KeyboardInterrupt
+    Ctrl-C is "interrupted" and exit code 130, a reader of standard output that has gone one
+    line and exit code 1.
 
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    again: what to do about an error that nobody expected
+    """
+    threading.excepthook, before = _thread_failed, threading.excepthook
+    code: str | int | None = None
     try:
-        yield lambda: came[0] if came else None
+        try:
+            if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+                signal.signal(signal.SIGINT, signal.default_int_handler)
+            app(words)
+        finally:
+            _flush_stdout()
+    except SystemExit as end:
+        code = end.code
+        if code == INTERRUPTED:
+            say("interrupted")
+    except KeyboardInterrupt:
+        say("interrupted")
+        code = INTERRUPTED
+    except OSError as error:
+        if not isinstance(error, BrokenPipeError):
+            say(f"standard output: {error.strerror or error}")
+        else:
+            say("standard output: nobody reads it any more")
+        code = FAULT
+        _drop_stdout()
+    except Exception as error:
+        if logging.getLogger(DEBUG_LOGGER).isEnabledFor(logging.DEBUG):
+            say(traceback.format_exc().rstrip("\n"))
+        what = " ".join(str(error).split()) or "no words"
+        say(f"unexpected: {type(error).__name__}: {what}; {again}")
+        code = FAULT
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        threading.excepthook = before
+    sys.exit(code)
+
+
+def _flush_stdout() -> None:
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def _drop_stdout() -> None:
+    """Let what is still to be printed go nowhere: at exit it would fail once more."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _thread_failed(args: threading.ExceptHookArgs) -> None:
+    """Say in one line that a thread has ended by an error; the others go on."""
+    name = args.thread.name if args.thread is not None else "a thread"
+    what = " ".join(str(args.exc_value).split())
+    say(f"{name} failed ({args.exc_type.__name__}: {what}); the rest runs on without")
+
+
+def signals() -> Interrupts:
+    """Return a block in which Ctrl-C and other requests to end are only noted, by name."""
+    return Interrupts()
 
 
 def say(line: str) -> None:
-    """Write a line for people; the status line before it is wiped."""
-    wipe = "\r\x1b[K" if sys.stderr.isatty() else ""
-    print(f"{wipe}{line}", file=sys.stderr, flush=True)
+    """Write a line for people; the status line before it is wiped. Never waits, never raises."""
+    _write(f"{line}\n", wiped=True)
 
 
 def status(line: str) -> None:
-    """Rewrite the status line."""
+    """Rewrite the status line. Never waits, never raises."""
     width = shutil.get_terminal_size().columns - 1
-    print(f"\r\x1b[K{line[:width]}", end="", file=sys.stderr, flush=True)
+    _write(f"\r\x1b[K{line[:width]}", status=True)
+
+
+def _write(text: str, wiped: bool = False, status: bool = False) -> None:
+    """Write to standard error: by the writer's thread where that is a file, a pipe or a tty."""
+    stderr = sys.stderr
+    if stderr is None:  # it was closed before this program began
+        return
+    try:
+        if wiped and stderr.isatty():
+            text = f"\r\x1b[K{text}"
+        if stderr.fileno() == _STDERR:
+            (_writer.status if status else _writer.line)(text)
+            return
+    except (OSError, ValueError):  # it is no file at all
+        pass
+    with contextlib.suppress(OSError, ValueError):
+        stderr.write(text)
+        stderr.flush()

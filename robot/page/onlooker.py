@@ -5,8 +5,9 @@ the page's snapshots and the camera picture with what was found in it; a slow te
 or browser delays nobody but itself.
 """
 
+import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import radians
 from typing import NamedTuple
 
@@ -80,6 +81,7 @@ class Onlooker:
         self._field_deg = horizontal_field_deg
         self.depth = False
         self._url_told = False
+        self._failed: set[str] = set()
         self._slot: Tick | None = None
         self._ticks = 0
         self._over = threading.Event()
@@ -110,15 +112,31 @@ class Onlooker:
                 continue
             round_number += 1
             rate.note(tick.t_s, self._ticks)
-            if self._page is not None:
-                shot = self._snapshots.take(self._said(tick))
-                if shot is not None:
-                    self._page.show(shot)
-                self._tell_of(self._page)
-            if round_number % round(_PICTURE_S / _SNAPSHOT_S) == 0:
-                picture_number = self._show_picture(tick, picture_number)
-            if self._say is not None and round_number % round(_LINE_S / _SNAPSHOT_S) == 0:
-                self._say(self._line(tick, rate.hz))
+            with self._spared("the page's figures"):
+                if self._page is not None:
+                    shot = self._snapshots.take(self._said(tick))
+                    if shot is not None:
+                        self._page.show(shot)
+            with self._spared("the page's notices"):
+                if self._page is not None:
+                    self._tell_of(self._page)
+            with self._spared("the page's picture"):
+                if round_number % round(_PICTURE_S / _SNAPSHOT_S) == 0:
+                    picture_number = self._show_picture(tick, picture_number)
+            with self._spared("the status line"):
+                if self._say is not None and round_number % round(_LINE_S / _SNAPSHOT_S) == 0:
+                    self._say(self._line(tick, rate.hz))
+
+    @contextlib.contextmanager
+    def _spared(self, name: str) -> Iterator[None]:
+        """Go on whatever the block raises; say so once."""
+        try:
+            yield
+        except Exception as error:
+            if name not in self._failed:
+                self._failed.add(name)
+                if self._tell is not None:
+                    self._tell(f"{name} failed ({type(error).__name__}: {error}); the rig runs on")
 
     def _said(self, tick: Tick) -> Said:
         """Gather what the tick itself does not tell."""

@@ -1,0 +1,106 @@
+"""Lines for people, written by a thread: a terminal that takes none keeps nobody waiting.
+
+A pipe that nobody reads, a terminal stopped with Ctrl-S, a full disk, a terminal that was
+closed: whoever says something goes on at once. What cannot be written is dropped and counted.
+"""
+
+import contextlib
+import errno
+import os
+import select
+import threading
+from collections import deque
+
+_MOST = 500
+"""So many lines wait; more are dropped."""
+_RETRY_S = 0.2
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""A disk may have room again."""
+
+
+class LineWriter:
+    """Writes to a file descriptor, in the order in which it is told.
+
+    dropped: lines that were not written
+    """
+
+    def __init__(self, fd: int, most: int = _MOST) -> None:
+        self._fd = fd
+        self._most = most
+        self._lines: deque[str] = deque()
+        self._status: str | None = None
+        self._busy = False
+        self._gone = False
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
+        self.dropped = 0
+
+    def line(self, text: str) -> None:
+        """Write this, line end included; returns at once."""
+        with self._changed:
+            if self._gone or len(self._lines) >= self._most:
+                self.dropped += 1
+                return
+            # What was on the status line is older than this.
+            self._status = None
+            self._lines.append(text)
+            self._wake()
+
+    def status(self, text: str) -> None:
+        """Write this unless something newer comes first; returns at once."""
+        with self._changed:
+            if not self._gone:
+                self._status = text
+                self._wake()
+
+    def flush(self, patience_s: float) -> bool:
+        """Wait until everything is written, no longer than this; return whether it is."""
+        with self._changed:
+            return self._changed.wait_for(self._idle, patience_s)
+
+    def _idle(self) -> bool:
+        return self._gone or not (self._lines or self._status is not None or self._busy)
+
+    def _wake(self) -> None:
+        if self._thread is None:
+            thread = threading.Thread(target=self._work, name="line writer", daemon=True)
+            try:
+                thread.start()
+            except RuntimeError:  # no memory for one: the next line tries again
+                return
+            self._thread = thread
+        self._changed.notify_all()
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._busy = False
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: self._lines or self._status is not None)
+                if self._lines:
+                    text = self._lines.popleft()
+                else:
+                    text, self._status = self._status or "", None
+                self._busy = True
+            self._write(text.encode(errors="replace"))
+
+    def _write(self, data: bytes) -> None:
+        while data:
+            try:
+                data = data[os.write(self._fd, data) :]
+            except BlockingIOError:  # somebody else made it so
+                with contextlib.suppress(OSError, ValueError):
+                    select.select([], [self._fd], [], _RETRY_S)
+            except OSError as error:
+                self._lose(error)
+                return
+
+    def _lose(self, error: OSError) -> None:
+        """Drop a line; where nobody can read any more, all that follow."""
+        with self._changed:
+            self.dropped += 1
+            if error.errno not in _FULL:
+                self._gone = True
+                self.dropped += len(self._lines)
+                self._lines.clear()
+                self._status = None
