@@ -12,11 +12,13 @@ and ``__post_init__`` may raise ValueError where two fields contradict each othe
 import dataclasses
 import types
 import typing
+import unicodedata
 from collections.abc import Callable, Container, Mapping
 from functools import cache, partial
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -33,6 +35,8 @@ Step = str | int
 Form = Literal["number", "whole", "bool", "text", "choice", "list", "mapping", "params"]
 
 _PLAIN: dict[object, Form] = {float: "number", int: "whole", bool: "bool", str: "text"}
+_LONGEST_TEXT = 400  # characters; names and paths
+_TURNS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # left to right and back
 _KNOWN_METADATA = {"low", "high", "unit", "says", "choices", "length"}
 
 
@@ -177,14 +181,16 @@ def _annotation(shape: Shape) -> Any:
         case Shape(form="bool"):
             kind = bool
         case Shape(form="text"):
-            kind = str
+            kind = Annotated[str, AfterValidator(_printable)]
         case Shape(form="choice"):
             kind = Annotated[Literal[shape.choices], BeforeValidator(partial(_exact, shape))]
         case Shape(form="list", inner=Shape() as inner):
             length = Field(min_length=shape.length, max_length=shape.length)
             kind = Annotated[types.GenericAlias(tuple, (_annotation(inner), ...)), length]
         case Shape(form="mapping", inner=Shape() as inner):
-            kind = types.GenericAlias(dict, (str, _annotation(inner)))
+            kind = types.GenericAlias(
+                dict, (Annotated[str, AfterValidator(_printable)], _annotation(inner))
+            )
         case Shape(params=type() as params):
             kind = _frozen(params)
     return kind | None if shape.optional else kind
@@ -193,6 +199,27 @@ def _annotation(shape: Shape) -> Any:
 def _frozen(params: type) -> Any:
     """Write a dataclass as a pydantic type whose value is the dataclass itself."""
     return Annotated[model_of(params), WrapValidator(partial(_build, params))]
+
+
+def _printable(text: str) -> str:
+    """Refuse text that cannot be shown, written to a file or told from other text."""
+    if len(text) > _LONGEST_TEXT:
+        raise PydanticCustomError(
+            "value_error", "", {"error": f"is longer than {_LONGEST_TEXT} characters; shorten it"}
+        )
+    strange = next((one for one in text if _is_unshowable(one)), None)
+    if strange is not None:
+        raise PydanticCustomError(
+            "value_error",
+            "",
+            {"error": f"holds U+{ord(strange):04X}, which cannot be shown; take it out"},
+        )
+    return text
+
+
+def _is_unshowable(one: str) -> bool:
+    """Whether a character is a control, half of one, ends a line or turns the text's direction."""
+    return unicodedata.category(one) in ("Cc", "Cs", "Zl", "Zp") or one in _TURNS
 
 
 def _exact(shape: Shape, value: object) -> object:

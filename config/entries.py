@@ -1,23 +1,29 @@
 """One YAML file to entries that know their lines, strictly, with every fault of the text."""
 
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from ruamel.yaml.reader import ReaderError
 
 from config.bounds import Step
 from config.export import closest, shown
+from drivers.file_input import FileTooLarge, NotRegularFile, read_limited
 
 Scalar = str | int | float | bool | None
 
 _DEPTH = 40  # levels; a rig has about 5, a file that refers to itself has no end
 _VALUES = 20_000  # aliases of aliases grow without bound
+_LARGEST = 1_000_000  # bytes; a rig has about 34 000
+_QUOTED = re.compile(r" *('[^']*'|\"[^\"]*\")")  # what a parser shows of the text
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +89,15 @@ class Entry:
         return entry
 
 
-def read(path: Path, faults: list[Fault]) -> tuple[str, Entry | None]:
-    """Read a file; no entry where nothing of it can be used."""
+def read(path: Path, faults: list[Fault], known: Collection[str] = ()) -> tuple[str, Entry | None]:
+    """Read a file; no entry where nothing of it can be used.
+
+    known: keys of such a file's top level. What has none of them is something else, and
+        nothing of it is shown: anybody who may choose a character could read it.
+    """
     file, text = str(path), ""
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_limited(path, _LARGEST).decode("utf-8-sig")
         node = _composed(text)
     except OSError as error:
         faults.append(Fault(file, None, "", "", _unreadable(path, error)))
@@ -102,11 +112,37 @@ def read(path: Path, faults: list[Fault]) -> tuple[str, Entry | None]:
         faults.append(_syntax(file, text, error))
     else:
         if isinstance(node, MappingNode):
+            if known and not _has_one_of(node, known):
+                rule = f"is no such configuration: none of its keys is one of {', '.join(known)}"
+                faults.append(Fault(file, _line(node), "", "", rule))
+                return text, None
             return text, _Reader(file, faults).whole(node)
         rule = "is empty" if node is None else "the top level is no mapping"
         line = 1 if node is None else _line(node)
         faults.append(Fault(file, line, "", "", f"{rule}; write 'key: value' lines"))
     return text, None
+
+
+def _has_one_of(node: MappingNode, known: Collection[str]) -> bool:
+    """Whether a key of the top level is a known one, or nearly."""
+    keys = [key.value for key, _ in node.value[:1000] if isinstance(key, ScalarNode)]
+    return any(key in known or get_close_matches(key[:60], known, n=1) for key in keys)
+
+
+class _TooMany(MarkedYAMLError):
+    """A file holds more nodes than any configuration has."""
+
+
+class _BoundedComposer(Composer):
+    """Composes so many nodes and no more: all the time of loading goes into them."""
+
+    _composed = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        self._composed += 1
+        if self._composed > 2 * _VALUES:  # keys are nodes, too
+            raise _TooMany(problem_mark=self.parser.peek_event().start_mark)
+        return super().compose_node(parent, index)
 
 
 @lru_cache(maxsize=16)
@@ -117,6 +153,7 @@ def _composed(text: str) -> Node | None:
     with each tuning, saving and checking.
     """
     yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = _BoundedComposer
     yaml.max_depth = _DEPTH
     yaml.composer.warn_double_anchors = False  # YAML 1.2 allows to set an anchor again
     node: Node | None = yaml.compose(text)
@@ -133,6 +170,8 @@ def _unreadable(path: Path, error: OSError) -> str:
             return "is a directory; name a file in it"
         case PermissionError():
             return "may not be read; give yourself the right with chmod u+r"
+    if isinstance(error, NotRegularFile | FileTooLarge):
+        return f"{error.strerror}; name a YAML file"
     return f"cannot be read ({error.strerror}); check the path"
 
 
@@ -141,20 +180,33 @@ def _syntax(file: str, text: str, error: Exception) -> Fault:
     if isinstance(error, ReaderError):
         before = text[: error.position]
         column = len(before) - before.rfind("\n")
-        rule = f"not valid YAML: character {text[error.position]!r} is not allowed; take it out"
+        code = f"U+{ord(text[error.position]):04X}"
+        rule = f"not valid YAML: character {code} is not allowed; take it out"
         return Fault(file, before.count("\n") + 1, "", "", rule, column)
     if not isinstance(error, MarkedYAMLError) or error.problem_mark is None:
-        return Fault(file, None, "", "", f"not valid YAML: {' '.join(str(error).split())}")
+        words = _unquoted(" ".join(str(error).split()))
+        return Fault(file, None, "", "", f"not valid YAML: {words}")
     mark = error.problem_mark
-    words = ", ".join(filter(None, (error.context, error.problem)))
+    if isinstance(error, _TooMany):
+        return Fault(file, mark.line + 1, "", "", _TOO_MANY)
+    words = _unquoted(", ".join(filter(None, (error.context, error.problem))))
     if "max_depth" in words:
         return Fault(file, mark.line + 1, "", "", _TOO_DEEP, mark.column + 1)
     cure = "; indent with spaces" if "'\\t'" in words else "; check this line and the one above"
     return Fault(file, mark.line + 1, "", "", f"not valid YAML: {words}{cure}", mark.column + 1)
 
 
+def _unquoted(words: str) -> str:
+    """Leave out what the parser quotes of a text that may be no configuration at all."""
+    kept = ("' '", "'\\t'")  # one character, or a parser's own name for what it met
+    return _QUOTED.sub(
+        lambda m: m[0] if len(m[1]) == 3 or m[1] in kept or m[1][1] == "<" else "", words
+    )
+
+
 _TAG = "tag:yaml.org,2002:"
 _TOO_DEEP = f"nested deeper than {_DEPTH} levels, or refers to itself; write it flat"
+_TOO_MANY = f"holds more than {_VALUES} values; write less"
 
 
 def _line(node: Node) -> int:
@@ -182,8 +234,7 @@ class _Reader:
         self._values += 1
         if self._endless or len(path) > _DEPTH or self._values > _VALUES:
             if not self._endless:
-                many = f"holds more than {_VALUES} values; write less"
-                self._note(line, (), _TOO_DEEP if len(path) > _DEPTH else many)
+                self._note(line, (), _TOO_DEEP if len(path) > _DEPTH else _TOO_MANY)
             self._endless = True
             return Entry(None, self._file, line)
         tag = str(node.tag).removeprefix(_TAG)

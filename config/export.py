@@ -42,6 +42,8 @@ def complaint(into: type, details: ErrorDetails) -> Complaint:
     """Put one pydantic error into words."""
     root = Shape("params", params=into)
     path = details["loc"]
+    if path[-1:] == ("[key]",):  # of a mapping's key, not of what it holds
+        return Complaint(path[:-1], "", _rule(Shape("text"), details))
     if details["type"] == "extra_forbidden":
         return Complaint(path, shown(details["input"]), _unknown(_at(root, path[:-1]), path))
     shape = _at(root, path)

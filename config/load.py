@@ -7,12 +7,12 @@ between two sections, still names the line to change.
 
 import contextlib
 import importlib.resources
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
-from config.bounds import Step, filled, judge
+from config.bounds import Step, filled, judge, shapes_of
 from config.entries import ConfigError as ConfigError
 from config.entries import Entry as Entry
 from config.entries import Fault as Fault
@@ -59,7 +59,8 @@ def load(
     """
     files = (*defaults, path)
     faults: list[Fault] = []
-    layers = [read(file, faults)[1] for file in files]
+    known = tuple(shapes_of(cast(Any, into)))
+    layers = [read(file, faults, known)[1] for file in files]
     whole = [layer for layer in layers if layer is not None]
     if len(whole) < len(files):  # what a missing layer would have said is unknown
         raise ConfigError(faults)
@@ -94,14 +95,16 @@ def weighed(
     return value, [_placed(root, one) for one in complaints]
 
 
-def read_yaml(path: Path) -> Document:
+def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
     """Read one YAML 1.2 file whose top level is a mapping.
+
+    known: keys of the top level; a file with none of them is refused and nothing of it shown
 
     Raises:
         ConfigError: unreadable, not UTF-8, not YAML, empty, keys twice, no mapping.
     """
     faults: list[Fault] = []
-    text, root = read(path, faults)
+    text, root = read(path, faults, known)
     if faults or root is None:
         raise ConfigError(faults)
     return Document(path, text, root)

@@ -16,6 +16,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from config.bounds import shapes_of
 from config.load import ConfigError, Fault, read_yaml, shipped
 from config.save_text import Unchangeable, Value, edited, written
 from config.schema import Rig, load_rig
@@ -130,7 +131,7 @@ def _proposal(
     target: Path, changes: Mapping[str, Value], into: type
 ) -> tuple[bytes, bytes, tuple[Change, ...]]:
     """Give the file as it is, as it would be, and the difference."""
-    before = read_yaml(target)  # refuses what is no YAML, with the line
+    before = read_yaml(target, tuple(shapes_of(into)))  # refuses what is no YAML, with the line
     raw = target.read_bytes()
     mark = b"\xef\xbb\xbf" if raw.startswith(b"\xef\xbb\xbf") else b""
     try:

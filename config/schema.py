@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from config.bounds import shapes_of
 from config.load import load, read_yaml, shipped
 from config.rig import LidJoints as LidJoints
 from config.rig import Rig as Rig
@@ -32,7 +33,7 @@ def layers_of(
         config.load.ConfigError: none of that name is shipped, or the rig cannot be read.
     """
     layers = [_find("rigs", name_or_path)]
-    named = profile or read_yaml(layers[0]).data.get("profile")
+    named = profile or read_yaml(layers[0], tuple(shapes_of(Rig))).data.get("profile")
     if isinstance(named, str):
         layers.append(_find("profiles", named))
     if character is not None:

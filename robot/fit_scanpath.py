@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from drivers.errors import SetupError
+from drivers.file_output import refuse_existing, write_file
 from gaze.scanpath import Walk
 from gaze.scanpath_fit import SMOOTHINGS, FitParams, Fixation, Interval, WalkFit, fit_walk
 from gaze.types import PART_NAMES, PARTS
@@ -27,11 +28,13 @@ def fit(
     out: Path,
     smoothing: str = "laplace",
     seed: int = 0,
+    force: bool = False,
 ) -> str:
     """Fit a walk to a recording, write it as YAML, and give a report in words.
 
     parts: where the parts lie in the recording's coordinates; needed unless parts are labelled
     smoothing: "none", "laplace" or "bootstrap"; seed: of the resampling
+    force: replace a file that is there
 
     Raises:
         drivers.errors.SetupError: a file cannot be read, trusted or written.
@@ -40,6 +43,7 @@ def fit(
         raise SetupError(f"no smoothing {smoothing!r}; there are {', '.join(SMOOTHINGS)}")
     if out.resolve() == recording.resolve():
         raise SetupError(f"{out}: is the recording itself; give another file to write to")
+    refuse_existing(out, force=force)
     source = _source(recording, parts)
     params = FitParams(smoothing=smoothing)
     try:
@@ -48,10 +52,7 @@ def fit(
     except ValueError as error:
         raise SetupError(f"{recording}: {error}") from None
     text = walk_yaml(fitted, params, (_one_line(recording.name), *source.notes, f"seed {seed}"))
-    try:
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise SetupError(f"{out}: {error.strerror or error}; give another file") from None
+    write_file(out, text, force)
     return _report(fitted, params, recording, source.notes, out)
 
 

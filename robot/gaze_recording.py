@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from drivers.errors import SetupError
+from drivers.file_input import read_limited
 from gaze.types import PART_NAMES, PARTS, Floats
 
 _NAMES = {
@@ -148,9 +149,12 @@ def _fixations(table: _Table) -> FixationTable:
     )
 
 
+_LARGEST = 200_000_000  # bytes; an hour at 1000 Hz has about 100 MB
+
+
 def _read(path: Path) -> _Table:
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_limited(path, _LARGEST).decode("utf-8-sig")
     except OSError as error:
         raise SetupError(f"{path}: {error.strerror or error}; check the name") from None
     except UnicodeDecodeError:

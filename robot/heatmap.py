@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from drivers.errors import SetupError
 from drivers.face_detector import face_detector
 from drivers.face_params import FaceDetectorParams
+from drivers.file_input import read_limited
+from drivers.file_output import write_file
 from gaze.types import PARTS, Floats
 from robot.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
 from robot.heatmap_legend import with_legend
@@ -28,6 +30,7 @@ _SPREAD_M = 0.0085
 # Below this share of the highest value nothing is painted; from the next on, most of it is.
 _FAINT, _PLAIN = 0.02, 0.45
 _COVER = 0.82
+_LARGEST = 100_000_000  # bytes of a photograph
 
 
 def share_per_part(points_face_m: ArrayLike, seconds: ArrayLike) -> dict[str, float]:
@@ -47,12 +50,16 @@ def share_per_part(points_face_m: ArrayLike, seconds: ArrayLike) -> dict[str, fl
 
 
 def heatmap(
-    points_face_m: ArrayLike, seconds: ArrayLike, out: Path, picture: Path | None = None
+    points_face_m: ArrayLike,
+    seconds: ArrayLike,
+    out: Path,
+    picture: Path | None = None,
+    force: bool = False,
 ) -> dict[str, float]:
     """Write the heat map as a PNG over a drawn face or a face picture; give the shares.
 
     points_face_m: (n, 2) y, z; seconds: (n,) time on each
-    picture: a photograph of one face from its front
+    picture: a photograph of one face from its front; force: replace a file that is there
 
     Raises:
         drivers.errors.SetupError: no face in the picture, or a file cannot be read or written.
@@ -67,10 +74,7 @@ def heatmap(
     ok, data = cv2.imencode(".png", whole)
     if not ok:
         raise SetupError(f"{out}: the picture cannot be written as PNG")
-    try:
-        out.write_bytes(data.tobytes())
-    except OSError as error:
-        raise SetupError(f"{out}: {error.strerror or error}; give another file") from None
+    write_file(out, data.tobytes(), force)
     return shares
 
 
@@ -91,7 +95,16 @@ def face_from(picture: Path) -> Picture:
     Raises:
         drivers.errors.SetupError: it cannot be read, or no face is found in it.
     """
-    image = cv2.imread(str(picture), cv2.IMREAD_COLOR)
+    try:
+        data = np.frombuffer(read_limited(picture, _LARGEST), np.uint8)
+    except OSError as error:
+        raise SetupError(
+            f"{picture}: is no picture that can be read ({error.strerror}); give a JPEG or PNG"
+        ) from None
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+    except cv2.error:  # larger than a picture may be
+        image = None
     if image is None:
         raise SetupError(f"{picture}: is no picture that can be read; give a JPEG or PNG")
     faces = face_detector(FaceDetectorParams()).find(np.asarray(image, dtype=np.uint8))

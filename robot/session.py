@@ -183,9 +183,14 @@ def _run(
         else:
             audience.give_up()
     faults.close()
+    figures = _figures(made, summary, score, count, wall_s, faults)
     if face_gaze is not None and wanted.heatmap is not None:
-        _draw_heatmap(face_gaze, wanted.heatmap, wanted.heatmap_face, say)
-    return _figures(made, summary, score, count, wall_s, faults)
+        try:
+            _draw_heatmap(face_gaze, wanted, wanted.heatmap, say)
+        except SetupError as error:  # the figures of the run are still to be had
+            say(str(error))
+            figures["not_written"] = str(wanted.heatmap)
+    return figures
 
 
 def _never_raising(say: Callable[[str], None]) -> Callable[[str], None]:
@@ -215,13 +220,14 @@ def _ask_all(robot: Robot, wanted: Wanted) -> None:
 
 
 def _draw_heatmap(
-    face_gaze: FaceGaze, out: Path, picture: Path | None, say: Callable[[str], None]
+    face_gaze: FaceGaze, wanted: Wanted, out: Path, say: Callable[[str], None]
 ) -> None:
     """Write the heat map, or say why there is none."""
     if not face_gaze.points_face_m:
         say(f"no heat map in {out}: no face was looked at")
         return
-    heatmap(np.array(face_gaze.points_face_m), np.array(face_gaze.seconds), out, picture)
+    points, seconds = np.array(face_gaze.points_face_m), np.array(face_gaze.seconds)
+    heatmap(points, seconds, out, wanted.heatmap_face, wanted.watched.over)
     say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
 
 

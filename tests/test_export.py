@@ -15,6 +15,7 @@ import pytest
 from desk import JOINTS, LIDS
 
 from config.schema import load_rig
+from drivers.errors import SetupError
 from gaze.angles import rotation
 from gaze.types import GazeState
 from robot.assemble import assemble
@@ -368,7 +369,7 @@ def test_a_second_run_joins_the_data_set_and_none_is_written_over(
 ) -> None:
     short = Run(face.ticks[:50])
     write_bids(short.trace, short.labels, short.stretches, ABOUT, tmp_path)
-    with pytest.raises(FileExistsError, match="another --subject or --task"):
+    with pytest.raises(SetupError, match="another --subject or --task"):
         write_bids(short.trace, short.labels, short.stretches, ABOUT, tmp_path)
     other = ABOUT._replace(subject="stage rig")
     write_bids(short.trace, short.labels, short.stretches, other, tmp_path)

@@ -112,6 +112,6 @@ def test_what_cannot_be_mapped_is_refused(tmp_path: Path) -> None:
     cv2.imwrite(str(blank), np.full((200, 200, 3), 128, np.uint8))
     with pytest.raises(SetupError, match="no face found"):
         heatmap(CENTRES, np.ones(8), out, blank)
-    with pytest.raises(SetupError, match="give another file"):
+    with pytest.raises(SetupError, match="name another file"):
         heatmap(CENTRES, np.ones(8), tmp_path / "nowhere" / "map.png")
     assert not out.exists()

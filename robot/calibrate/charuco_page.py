@@ -7,6 +7,7 @@ import numpy as np
 from PIL import Image
 
 from drivers.errors import SetupError
+from drivers.file_output import output_file
 from drivers.types import Picture
 from robot.calibrate.charuco_board import CharucoBoard
 
@@ -52,21 +53,23 @@ def page(board: CharucoBoard, paper: str) -> Picture:
     return sheet
 
 
-def write_page(board: CharucoBoard, paper: str, out: Path) -> None:
+def write_page(board: CharucoBoard, paper: str, out: Path, force: bool = False) -> None:
     """Write the page as PDF or PNG, by the name's ending; either prints in true size.
 
     Raises:
         drivers.errors.SetupError: see ``page``, or the ending is another one.
-        OSError: it cannot be written.
+            Or it is there already and not forced, or cannot be written.
     """
     if out.suffix.lower() not in (".pdf", ".png"):
         raise SetupError(f"{out}: a page is written as .pdf or .png; choose such a name")
     image = Image.fromarray(page(board, paper))
-    if out.suffix.lower() == ".pdf":
-        # Two grey values compressed without loss: a JPEG inside would blur the corners.
-        image.convert("1", dither=Image.Dither.NONE).save(out, resolution=_DPI)
-    else:
-        image.save(out, dpi=(_DPI, _DPI))
+    with output_file(out, force) as file:
+        if out.suffix.lower() == ".pdf":
+            # Two grey values compressed without loss: a JPEG inside would blur the corners.
+            image = image.convert("1", dither=Image.Dither.NONE)
+            image.save(file, format="PDF", resolution=_DPI)
+        else:
+            image.save(file, format="PNG", dpi=(_DPI, _DPI))
 
 
 def _ruler(sheet: Picture, left: int, top: int) -> None:

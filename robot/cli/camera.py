@@ -26,7 +26,7 @@ from robot.calibrate.charuco_board import BoardParams, CharucoBoard
 from robot.calibrate.charuco_page import RULER_MM, write_page
 from robot.calibrate.hand_eye import HandEye, HandEyeParams, camera_on_head
 from robot.cli.camera_neck import agrees, go_on, moving_neck
-from robot.cli.terminal import RigArgument, clear_errors, say, signals, status
+from robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
 from robot.clock import RealClock
 from robot.frames import CameraParams
 from robot.kinematics import NECK, Kinematics
@@ -65,10 +65,11 @@ def calibrate_board(
     columns: ColumnsOption = _BOARD.columns,
     rows: RowsOption = _BOARD.rows,
     square: SquareOption = _BOARD.square_mm,
+    force: ForceOption = False,
 ) -> None:
     """Write the ChArUco board as a page to print in true size: gazerig calibrate board."""
     with clear_errors():
-        write_page(CharucoBoard(_board(columns, rows, square, RULER_MM)), paper.value, out)
+        write_page(CharucoBoard(_board(columns, rows, square, RULER_MM)), paper.value, out, force)
         say(f"{out}: print it at 100 % on {paper.value}, glue it on something flat and stiff,")
         say(f"and measure the ruler: if it is not {RULER_MM} mm, give --ruler when calibrating")
 

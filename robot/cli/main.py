@@ -10,6 +10,8 @@ import typer
 
 from config.load import load
 from config.schema import Rig, load_rig
+from drivers.file_input import read_limited
+from drivers.file_output import write_file
 from drivers.serial_ports import serial_ports
 from robot.cli import emulate as cli_emulate
 from robot.cli import motion as cli_motion
@@ -23,6 +25,7 @@ from robot.cli.examples import add_examples
 from robot.cli.start import next_steps
 from robot.cli.terminal import (
     DEBUG_LOGGER,
+    ForceOption,
     RigArgument,
     clear_errors,
     run_app,
@@ -68,6 +71,7 @@ def fit_scanpath(
     out: Annotated[Path, typer.Option(help="YAML to write.")] = Path("walk.yaml"),
     smoothing: Annotated[str, typer.Option(help="laplace, bootstrap or none.")] = "laplace",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
+    force: ForceOption = False,
 ) -> None:
     """Fit a walk over the face to an eye-tracker recording, as YAML that run takes."""
     with clear_errors():
@@ -75,7 +79,7 @@ def fit_scanpath(
         from robot.fixations import PartBoxes
 
         boxes = load(parts, PartBoxes) if parts is not None else None
-        say(fitting.fit(recording, boxes, out, smoothing, seed))
+        say(fitting.fit(recording, boxes, out, smoothing, seed, force))
 
 
 @app.command()
@@ -89,6 +93,7 @@ def check(rig: RigArgument = "desk") -> None:
 @app.command()
 def schema(
     out: Annotated[Path | None, typer.Argument(help="File to write; default: print.")] = None,
+    force: ForceOption = False,
 ) -> None:
     """Export the JSON Schema of rig files, for editors."""
     from config.export import json_schema
@@ -98,7 +103,7 @@ def schema(
         print(text, end="")
     else:
         with clear_errors():
-            out.write_text(text, encoding="utf-8")
+            write_file(out, text, force)
 
 
 add_examples(app)
@@ -115,8 +120,11 @@ def main() -> None:
 
 def rig_files() -> list[Path]:
     """Give the YAML files of this folder that look like rigs."""
-    return [
-        path
-        for path in Path(".").glob("*.yaml")
-        if path.is_file() and "joints:" in path.read_text(encoding="utf-8", errors="replace")
-    ]
+    return [path for path in Path(".").glob("*.yaml") if _looks_like_a_rig(path)]
+
+
+def _looks_like_a_rig(path: Path) -> bool:
+    try:
+        return b"joints:" in read_limited(path, 1_000_000)
+    except OSError:
+        return False

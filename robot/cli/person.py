@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from drivers.errors import SetupError
+from drivers.file_input import read_limited
 from robot.bringup.single_joint import Stopped
 from robot.cli.terminal import say, status
 
@@ -19,6 +20,22 @@ HAND_STEPS = 100
 YES, NO = ("y", "yes"), ("n", "no")
 
 
+_LARGEST = 1_000_000  # bytes of a file of answers
+
+
+def _answers_of(file: Path) -> list[str]:
+    """Read the answers of a file.
+
+    Raises:
+        drivers.errors.SetupError: it is no text.
+        OSError: it cannot be read.
+    """
+    try:
+        return read_limited(file, _LARGEST).decode().splitlines()
+    except UnicodeDecodeError:
+        raise SetupError(f"{file}: is no UTF-8 text; write one answer a line") from None
+
+
 class Lines:
     """Lines of a file, or of standard input as they come."""
 
@@ -29,7 +46,7 @@ class Lines:
             OSError: the file cannot be read.
         """
         self._file = answers
-        self._ready = [] if answers is None else answers.read_text("utf-8").splitlines()
+        self._ready = [] if answers is None else _answers_of(answers)
         self._rest = b""
 
     @property

@@ -14,8 +14,9 @@ from rich.progress import Progress
 from rich.table import Table
 
 from drivers.errors import SetupError
+from drivers.file_output import refuse_existing
 from robot.cli.run import host_port
-from robot.cli.terminal import FAULT, clear_errors, say, signals
+from robot.cli.terminal import FAULT, ForceOption, clear_errors, say, signals
 from robot.loop import Tick
 
 if TYPE_CHECKING:
@@ -80,6 +81,7 @@ def export(
     task: Annotated[
         str | None, typer.Option(help="BIDS: name of the task (default: the scene's).")
     ] = None,
+    force: ForceOption = False,
 ) -> None:
     """Write a recorded run as eye-tracking tools read it: degrees, + left and + up."""
     with clear_errors():
@@ -87,21 +89,24 @@ def export(
             raise SetupError("export takes one of --csv and --bids")
         if csv and (subject is not None or task is not None):
             raise SetupError("--subject and --task name files of --bids")
-        _export(file, bids, out, subject, task)
+        _export(file, bids, out, subject, task, force)
 
 
 def _export(
-    file: Path, bids: bool, out: Path | None, subject: str | None, task: str | None
+    file: Path, bids: bool, out: Path | None, subject: str | None, task: str | None, force: bool
 ) -> None:
     """Write one kind of export and say what was written."""
     from robot.reckoned import RECKONED
     from robot.recording.export_bids import About, write_bids
-    from robot.recording.export_csv import write_csv
+    from robot.recording.export_csv import csv_files, write_csv
     from robot.recording.gaze_angles import trace_of
     from robot.recording.gaze_labels import labels_of, stretches_of
     from robot.recording.read import RunRecording
 
     recording = RunRecording(file)
+    stem = out or file.with_suffix("")
+    if not bids:
+        refuse_existing(*csv_files(stem), force=force)
     _warn(recording.note)
     with _progress("reading", recording.duration_s) as read:
         try:
@@ -120,10 +125,10 @@ def _export(
             ", ".join(f"{name} {version}" for name, version in sorted(info.versions.items())),
         )
         root = out or file.with_name(f"{file.stem}_bids")
-        made = write_bids(trace, labels, stretches, about, root)
+        made = write_bids(trace, labels, stretches, about, root, force)
         say(f"{len(made)} files in {root}")
     else:
-        made = write_csv(trace, labels, stretches, out or file.with_suffix(""))
+        made = write_csv(trace, labels, stretches, stem, force)
         say("\n".join(map(str, made)))
     found = {kind: sum(s.event == kind for s in stretches) for kind in _EVENTS}
     say(

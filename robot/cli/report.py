@@ -15,7 +15,8 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 from config.load import ConfigError
 from drivers.errors import SetupError
-from robot.cli.terminal import clear_errors, say, signals
+from drivers.file_output import refuse_existing
+from robot.cli.terminal import ForceOption, clear_errors, say, signals
 
 if TYPE_CHECKING:
     from config.schema import Rig
@@ -61,6 +62,7 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="The page to write; .html is added where it is missing.")
     ] = None,
+    force: ForceOption = False,
 ) -> None:
     """Say how human a run's gaze was: gazerig report run.mcap, then open report.html."""
     with clear_errors():
@@ -69,7 +71,10 @@ def report(
         # Drawing and models are heavy; `--help` does without them.
         from robot.report.build import report_of
         from robot.report.page import banner
+        from robot.report.written import numbers_file
 
+        target = page_file(out or _beside(file, scene))
+        refuse_existing(target, numbers_file(target), force=force)
         with _progress() as tell:
             if file is not None:
                 about, run = _recorded(file, file.stem, tell)
@@ -79,7 +84,7 @@ def report(
                 choice = Choice(True, True, seed, scene, scanpath=scanpath, saccade=saccade)
                 layers = _Layers(rig, character, profile)
                 about, run = _simulated(choice, layers, seconds, conversation, tell)
-            made = report_of(run, about, page_file(out or _beside(file, scene)), tell)
+            made = report_of(run, about, target, tell, force)
         if words := banner(run.joints):
             say(words)
         _tell_findings(made.findings)
@@ -93,19 +98,23 @@ def compare(
     out: Annotated[
         Path, typer.Option(help="The page to write; .html is added where it is missing.")
     ] = Path("compare.html"),
+    force: ForceOption = False,
 ) -> None:
     """Put two runs side by side and say what differs by more than chance."""
     with clear_errors():
         from robot.recording.read import RunRecording
         from robot.report.compare import LEVEL
         from robot.report.compare import compare as comparing
+        from robot.report.written import numbers_file
 
+        target = page_file(out)
+        refuse_existing(target, numbers_file(target), force=force)
         recordings = RunRecording(first), RunRecording(second)
         names = _names(first, second)
         abouts = _about(recordings[0], names[0]), _about(recordings[1], names[1])
         with _progress() as tell:
             ticks = recordings[0].ticks(), recordings[1].ticks()
-            made = comparing(ticks, abouts, page_file(out), tell)
+            made = comparing(ticks, abouts, target, tell, force)
         if made.warning:
             say(made.warning)
         for difference in made.differences:

@@ -14,6 +14,7 @@ from config.load import ConfigError
 from config.schema import load_rig
 from config.text import rig_text, walk_text
 from drivers.errors import SetupError
+from drivers.file_output import refuse_existing, write_file
 from robot.cli.examples import complete_scene, complete_shipped
 from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from robot.joint_faults import JointFault
@@ -106,7 +107,10 @@ def run(
     record_pictures: Annotated[
         float, typer.Option(min=0.0, max=60.0, help="Camera pictures a second in the recording.")
     ] = 2.0,
-    force: Annotated[bool, typer.Option("--force", help="Write over an older recording.")] = False,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Write over an older recording, heat map or summary."),
+    ] = False,
     summary: Annotated[
         str | None, typer.Option(help="Write figures as JSON to this file; - prints them.")
     ] = None,
@@ -119,6 +123,7 @@ def run(
         from robot.audience import Wished
 
         address = host_port(page)
+        refuse_existing(*_written_at_the_end(heatmap, summary), force=force)
         wanted = session.Wanted(
             mock=mock,
             fast=fast,
@@ -153,8 +158,8 @@ def run(
         told = _told(made, rig, character, profile, choice, record_pictures)
         with signals() as stopped:
             figures = session.run(made, wanted, stopped, say, status, told)
-        _write_summary(figures, summary)
-    if had_faults(figures, say):
+        _write_summary(figures, summary, force)
+    if had_faults(figures, say) or "not_written" in figures:
         raise typer.Exit(FAULT)
 
 
@@ -218,11 +223,17 @@ def host_port(text: str) -> tuple[str, int]:
     return host, int(port)
 
 
-def _write_summary(figures: dict[str, object], where: str | None) -> None:
+def _written_at_the_end(heatmap: Path | None, summary: str | None) -> tuple[Path, ...]:
+    """Return the files whose names must be free now, as nobody wants to run again."""
+    named = None if summary is None or summary == "-" else Path(summary)
+    return tuple(path for path in (heatmap, named) if path is not None)
+
+
+def _write_summary(figures: dict[str, object], where: str | None, force: bool) -> None:
     if where is None:
         return
     text = json.dumps(figures, indent=2) + "\n"
     if where == "-":
         print(text, end="")
     else:
-        Path(where).write_text(text, encoding="utf-8")
+        write_file(Path(where), text, force)

@@ -53,6 +53,11 @@ RigArgument = Annotated[
 ]
 
 
+ForceOption = Annotated[
+    bool, typer.Option("--force", help="Write over files that are there already.")
+]
+
+
 @contextlib.contextmanager
 def clear_errors() -> Iterator[None]:
     """Turn what a person can mend into its message and exit code 2."""

@@ -17,6 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from drivers.errors import SetupError
+from drivers.file_input import read_limited
+from drivers.file_output import make_folder, output_file, write_file
 from gaze.types import PART_NAMES, Floats
 from robot.reckoned import PARTLY, RECKONED, Basis
 from robot.recording.gaze_angles import Trace
@@ -28,6 +31,8 @@ _EVENT_COLUMNS = (
     "onset", "duration", "trial_type", "amplitude", "peak_velocity", "target", "part", "message",
 )  # fmt: skip
 _MISSING = "n/a"
+_GENERATOR = "gazerig"
+_LARGEST_TEXT = 1_000_000  # bytes; of a data set's own small files
 _METHODS: dict[Basis, str] = {
     "measured": "servo encoders",
     "partly reckoned": f"servo encoders, {PARTLY}",
@@ -60,26 +65,51 @@ class _Eye(NamedTuple):
 
 
 def write_bids(
-    trace: Trace, labels: Labels, stretches: Sequence[Stretch], about: About, root: Path
+    trace: Trace,
+    labels: Labels,
+    stretches: Sequence[Stretch],
+    about: About,
+    root: Path,
+    force: bool = False,
 ) -> tuple[Path, ...]:
     """Write the data set, or add this run to the one that is there; give the files.
 
+    force: replace the run of this subject and task that is there
+
     Raises:
-        FileExistsError: the data set has a run of this subject and task.
-        OSError: it cannot be written.
+        drivers.errors.SetupError: the folder holds another data set, or has a run of this
+            subject and task, or cannot be written.
     """
     subject, task = f"sub-{label_of(about.subject)}", label_of(about.task)
     folder = root / subject / "beh"
-    folder.mkdir(parents=True, exist_ok=True)
+    _refuse_foreign(root, force)
     stems = [folder / f"{subject}_task-{task}_recording-{eye.label}" for eye in _eyes(trace)]
     for stem in stems:
-        if (there := stem.with_name(f"{stem.name}_physio.tsv.gz")).exists():
-            raise FileExistsError(17, "there already: choose another --subject or --task", there)
+        there = stem.with_name(f"{stem.name}_physio.tsv.gz")
+        if there.exists() and not force:
+            raise SetupError(f"{there} is there already: choose another --subject or --task")
+    make_folder(folder)
     made = list(_write_frame(root, subject, about))
     for stem, eye in zip(stems, _eyes(trace), strict=True):
-        made += _write_eye(stem, eye, trace, about, labels)
-        made += _write_events(stem, trace, labels, stretches, about.task)
+        made += _write_eye(stem, eye, trace, about, labels, force)
+        made += _write_events(stem, trace, labels, stretches, about.task, force)
     return tuple(made)
+
+
+def _refuse_foreign(root: Path, force: bool) -> None:
+    """Refuse to put a run into somebody else's data set, or among files that are none."""
+    if force or not root.is_dir() or not any(root.iterdir()):
+        return
+    try:
+        text = read_limited(root / "dataset_description.json", _LARGEST_TEXT).decode()
+        made_by = json.loads(text).get("GeneratedBy", [])
+        if any(one.get("Name") == _GENERATOR for one in made_by):
+            return
+    except (OSError, ValueError, AttributeError, TypeError):
+        pass
+    raise SetupError(
+        f"{root} is there and is no data set of gazerig: name another folder, or say --force"
+    )
 
 
 def label_of(name: str) -> str:
@@ -121,7 +151,7 @@ def _write_frame(root: Path, subject: str, about: About) -> Iterator[Path]:
         "Name": "Gaze of an animatronic head",
         "BIDSVersion": BIDS_VERSION,
         "DatasetType": "raw",
-        "GeneratedBy": [{"Name": "gazerig", "Description": about.made_by}],
+        "GeneratedBy": [{"Name": _GENERATOR, "Description": about.made_by}],
     }
     readme = (
         "# Gaze of an animatronic head\n\nThe participants are robots. What an eye tracker would\n"
@@ -138,21 +168,21 @@ def _write_frame(root: Path, subject: str, about: About) -> Iterator[Path]:
         (root / "participants.json", _json(columns)),
     ):
         if not path.exists():
-            path.write_text(text, encoding="utf-8")
+            write_file(path, text)
             yield path
     participants = root / "participants.tsv"
     known = (
-        participants.read_text(encoding="utf-8")
+        read_limited(participants, _LARGEST_TEXT).decode()
         if participants.exists()
         else "participant_id\tspecies\n"
     )
     if f"{subject}\t" not in known:
-        participants.write_text(f"{known}{subject}\trobot\n", encoding="utf-8")
+        write_file(participants, f"{known}{subject}\trobot\n", force=True)  # all of it is kept
         yield participants
 
 
 def _write_eye(
-    stem: Path, eye: _Eye, trace: Trace, about: About, labels: Labels
+    stem: Path, eye: _Eye, trace: Trace, about: About, labels: Labels, force: bool
 ) -> tuple[Path, Path]:
     basis = trace.basis(eye.recorded)
     sidecar: dict[str, object] = {
@@ -187,7 +217,7 @@ def _write_eye(
     }
     sidecar |= {name: {"Description": says, "Units": unit} for name, unit, says, _ in eye.more}
     values = np.column_stack([trace.time_s, eye.gaze_deg, *(m[3] for m in eye.more)])
-    return _pair(f"{stem}_physio", sidecar, _even_rows(values, about.rate_hz))
+    return _pair(f"{stem}_physio", sidecar, _even_rows(values, about.rate_hz), force)
 
 
 def _even_rows(values: Floats, rate_hz: float) -> Iterator[list[str]]:
@@ -206,7 +236,12 @@ def _even_rows(values: Floats, rate_hz: float) -> Iterator[list[str]]:
 
 
 def _write_events(
-    stem: Path, trace: Trace, labels: Labels, stretches: Sequence[Stretch], task: str
+    stem: Path,
+    trace: Trace,
+    labels: Labels,
+    stretches: Sequence[Stretch],
+    task: str,
+    force: bool,
 ) -> tuple[Path, Path]:
     rows = [
         (s.onset_s, [
@@ -222,7 +257,8 @@ def _write_events(
         for time_s, words in trace.messages
     ]
     rows.sort(key=lambda row: row[0])
-    return _pair(f"{stem}_physioevents", _events_sidecar(labels, task), (row for _, row in rows))
+    lines = (row for _, row in rows)
+    return _pair(f"{stem}_physioevents", _events_sidecar(labels, task), lines, force)
 
 
 def _events_sidecar(labels: Labels, task: str) -> dict[str, object]:
@@ -256,17 +292,17 @@ def _events_sidecar(labels: Labels, task: str) -> dict[str, object]:
 
 
 def _pair(
-    stem: str, sidecar: Mapping[str, object], rows: Iterable[Sequence[str]]
+    stem: str, sidecar: Mapping[str, object], rows: Iterable[Sequence[str]], force: bool
 ) -> tuple[Path, Path]:
     table, beside = Path(f"{stem}.tsv.gz"), Path(f"{stem}.json")
     with (
-        table.open("wb") as raw,
+        output_file(table, force) as raw,
         # Without name and time inside, the same run gives the same bytes.
         gzip.GzipFile("", "wb", 6, raw, mtime=0) as packed,
         io.TextIOWrapper(packed, encoding="utf-8", newline="") as text,
     ):
         text.writelines("\t".join(row) + "\n" for row in rows)
-    beside.write_text(_json(sidecar), encoding="utf-8")
+    write_file(beside, _json(sidecar), force)
     return table, beside
 
 

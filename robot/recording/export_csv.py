@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drivers.file_output import output_text, refuse_existing, write_file
 from robot.reckoned import RECKONED
 from robot.recording.gaze_angles import MOVEMENTS, Trace
 from robot.recording.gaze_labels import Labels, Stretch
@@ -34,24 +35,34 @@ FIXATIONS = ("start_s", "duration_s", "part", "target")
 
 
 def write_csv(
-    trace: Trace, labels: Labels, stretches: Sequence[Stretch], stem: Path
+    trace: Trace, labels: Labels, stretches: Sequence[Stretch], stem: Path, force: bool = False
 ) -> tuple[Path, ...]:
     """Write STEM_samples.csv, _events.csv, _fixations.csv and _samples.json; give their paths.
 
+    force: replace files that are there
+
     Raises:
-        OSError: they cannot be written.
+        drivers.errors.SetupError: one is there already or cannot be written.
     """
+    refuse_existing(*csv_files(stem), force=force)
     made = (
         ("samples", columns(trace.joints), _sample_rows(trace, labels)),
         ("events", EVENTS, map(_event_row, stretches)),
         ("fixations", FIXATIONS, _fixation_rows(stretches)),
     )
     tables = tuple(
-        _write(stem.with_name(f"{stem.name}_{kind}.csv"), names, rows) for kind, names, rows in made
+        _write(stem.with_name(f"{stem.name}_{kind}.csv"), names, rows, force)
+        for kind, names, rows in made
     )
     beside = stem.with_name(f"{stem.name}_samples.json")
-    beside.write_text(json.dumps(_rests_on(trace), indent=2) + "\n", encoding="utf-8")
+    write_file(beside, json.dumps(_rests_on(trace), indent=2) + "\n", force)
     return (*tables, beside)
+
+
+def csv_files(stem: Path) -> tuple[Path, ...]:
+    """Return the files that ``write_csv`` writes."""
+    endings = ("samples.csv", "events.csv", "fixations.csv", "samples.json")
+    return tuple(stem.with_name(f"{stem.name}_{ending}") for ending in endings)
 
 
 def columns(joints: Collection[str]) -> tuple[str, ...]:
@@ -84,8 +95,8 @@ def number(value: float | None, decimals: int = 4) -> str:
     return "" if value is None or not isfinite(value) else f"{value:.{decimals}f}"
 
 
-def _write(path: Path, names: Sequence[str], rows: Iterable[Sequence[str]]) -> Path:
-    with path.open("w", newline="", encoding="utf-8") as file:
+def _write(path: Path, names: Sequence[str], rows: Iterable[Sequence[str]], force: bool) -> Path:
+    with output_text(path, force) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(names)
         writer.writerows(rows)

@@ -11,7 +11,10 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+from drivers.file_input import read_limited
+
 EVERY_S = 0.5
+_LARGEST = 10_000_000  # bytes; no rig is as large, so more counts as missing
 _SAME_LOOKS = 1
 """Looks that must find what the one before found."""
 _SAME_LOOKS_CUT = 5
@@ -35,7 +38,7 @@ class Look(NamedTuple):
 def look(path: Path) -> Look | None:
     """Look at a file; None where there is nothing to read: absent, empty or not permitted."""
     try:
-        stat, data = path.stat(), path.read_bytes()
+        stat, data = path.stat(), read_limited(path, _LARGEST)
     except OSError:
         return None
     if not data:

@@ -50,18 +50,23 @@ class Report(NamedTuple):
     data: Path
 
 
-def report(ticks: Iterable[Tick], about: About, out: Path, progress: Progress) -> Report:
+def report(
+    ticks: Iterable[Tick], about: About, out: Path, progress: Progress, force: bool = False
+) -> Report:
     """Write one HTML page, a PNG a figure, and the numbers as JSON; give what was found.
 
     out: the page to write; the PNGs go into a folder beside it, NAME_figures
+    force: replace files that are there
 
     Raises:
         drivers.errors.SetupError: a file cannot be written.
     """
-    return report_of(read(ticks, about, progress), about, out, progress)
+    return report_of(read(ticks, about, progress), about, out, progress, force)
 
 
-def report_of(run: Gathered, about: About, out: Path, progress: Progress) -> Report:
+def report_of(
+    run: Gathered, about: About, out: Path, progress: Progress, force: bool = False
+) -> Report:
     """Do the same with a run that is gathered already.
 
     Raises:
@@ -70,7 +75,7 @@ def report_of(run: Gathered, about: About, out: Path, progress: Progress) -> Rep
     findings = found(run)
     pictures = drawn([Shown(about.name, run, COLOURS[0], about.model)], progress)
     page = report_page(about, run, findings, pictures)
-    written = write_all(out, page, pictures, [_numbers(f, run) for f in findings])
+    written = write_all(out, page, pictures, [_numbers(f, run) for f in findings], force)
     return Report(findings, out, *written)
 
 

@@ -52,8 +52,11 @@ def compare(
     abouts: tuple[About, About],
     out: Path,
     progress: Progress,
+    force: bool = False,
 ) -> Comparison:
     """Write a page that puts two runs side by side, its figures and numbers; give what differs.
+
+    force: replace files that are there
 
     Raises:
         drivers.errors.SetupError: a file cannot be written, or there is nothing in a run.
@@ -68,7 +71,7 @@ def compare(
     ]
     pictures = drawn(shown, progress)
     page = compare_page(abouts, runs, differences, pictures)
-    written = write_all(out, page, pictures, [_numbers(d, runs) for d in differences])
+    written = write_all(out, page, pictures, [_numbers(d, runs) for d in differences], force)
     return Comparison(differences, out, *written, mixed(abouts, runs))
 
 

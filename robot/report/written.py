@@ -4,27 +4,35 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from drivers.errors import SetupError
+from drivers.file_output import make_folder, refuse_existing, write_file
 from robot.report.page import Picture
 
 
+def numbers_file(out: Path) -> Path:
+    """Return where the numbers of a page go: never the name that a run's own summary has."""
+    return out.with_name(f"{out.stem}_measures.json")
+
+
 def write_all(
-    out: Path, page: str, pictures: Sequence[Picture], numbers: Sequence[dict[str, object]]
+    out: Path,
+    page: str,
+    pictures: Sequence[Picture],
+    numbers: Sequence[dict[str, object]],
+    force: bool = False,
 ) -> tuple[tuple[Path, ...], Path]:
     """Write page, pictures and numbers; give the pictures' paths and that of the numbers.
 
+    force: replace files that are there
+
     Raises:
-        drivers.errors.SetupError: something cannot be written.
+        drivers.errors.SetupError: something is there already or cannot be written.
     """
-    folder, data = out.with_name(f"{out.stem}_figures"), out.with_suffix(".json")
+    folder, data = out.with_name(f"{out.stem}_figures"), numbers_file(out)
     paths = tuple(folder / f"{picture.drawing.key}.png" for picture in pictures)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for path, picture in zip(paths, pictures, strict=True):
-            path.write_bytes(picture.png)
-        data.write_text(json.dumps(list(numbers), indent=1) + "\n", encoding="utf-8")
-        out.write_text(page, encoding="utf-8")
-    except OSError as error:
-        where = error.filename or out
-        raise SetupError(f"{where}: {error.strerror or error}; give another file") from None
+    refuse_existing(*paths, data, out, force=force)
+    make_folder(folder)
+    for path, picture in zip(paths, pictures, strict=True):
+        write_file(path, picture.png, force)
+    write_file(data, json.dumps(list(numbers), indent=1) + "\n", force)
+    write_file(out, page, force)
     return paths, data

@@ -1,0 +1,70 @@
+"""Reading files that a user named: regular files only, and never more than is wanted.
+
+A named pipe would be waited for, a device has no end, and opening a serial port moves its lines.
+"""
+
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+
+class NotRegularFile(OSError):
+    """A path leads to a pipe, a device or a socket."""
+
+
+class FileTooLarge(OSError):
+    """A file holds more than its kind may."""
+
+
+_KINDS = {
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+def open_regular(path: Path | str) -> BinaryIO:
+    """Open a regular file for reading; never waits for a writer.
+
+    Raises:
+        NotRegularFile: it is a pipe, a device or a socket.
+        OSError: it is absent, a directory or not permitted.
+    """
+    try:
+        _refuse_other_kinds(os.stat(path), path)
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except ValueError:  # a NUL byte
+        raise FileNotFoundError(2, "no such file", str(path)) from None
+    try:
+        _refuse_other_kinds(os.fstat(descriptor), path)
+    except OSError:
+        os.close(descriptor)
+        raise
+    return os.fdopen(descriptor, "rb")
+
+
+def read_limited(path: Path | str, largest: int) -> bytes:
+    """Return the content of a regular file of at most ``largest`` bytes.
+
+    Raises:
+        FileTooLarge: it holds more.
+        OSError: see ``open_regular``.
+    """
+    with open_regular(path) as file:
+        # Files of /proc have size 0 and any content, so the size alone is no bound.
+        content = file.read(largest + 1) if os.fstat(file.fileno()).st_size <= largest else b""
+        if len(content) > largest or os.fstat(file.fileno()).st_size > largest:
+            what = f"is larger than the {largest / 1e6:g} MB that such a file may have"
+            raise FileTooLarge(27, what, str(path))
+    return content
+
+
+def _refuse_other_kinds(found: os.stat_result, path: Path | str) -> None:
+    if stat.S_ISREG(found.st_mode):
+        return
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(21, "is a directory", str(path))
+    kind = _KINDS.get(stat.S_IFMT(found.st_mode), "no file")
+    raise NotRegularFile(22, f"is {kind}, not a regular file", str(path))

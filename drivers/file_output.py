@@ -1,0 +1,148 @@
+"""Writing files that a user named: nothing that is there is lost, whatever goes wrong.
+
+A file appears whole or not at all: it is written beside its place and then takes it in one
+step. One that is there already is kept unless the user forces it.
+"""
+
+import contextlib
+import io
+import os
+import secrets
+import shutil
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, TextIO
+
+from drivers.errors import SetupError
+
+
+def refuse_existing(*paths: Path, force: bool = False) -> None:
+    """Refuse before any work what could not be written in the end.
+
+    Pipes and devices (``/dev/stdout``) hold nothing that could be lost, and pass.
+
+    Raises:
+        drivers.errors.SetupError: a file is there and not forced, or is a directory, or its
+            folder is absent or not writable.
+    """
+    for path in paths:
+        with _clear(path):
+            if _is_stream(path):
+                continue
+            if path.is_dir():
+                raise SetupError(f"{path} is a directory: name a file in it")
+            if not force and (path.exists() or path.is_symlink()):
+                raise SetupError(_there(path))
+            folder = path.parent
+            if folder.exists() and not folder.is_dir():
+                raise SetupError(f"{folder} is no folder: name another file than {path}")
+            if folder.is_dir() and not os.access(folder, os.W_OK):
+                raise SetupError(f"cannot write {path}: its folder is read-only; name another")
+
+
+@contextlib.contextmanager
+def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
+    """Give a file to write to, which takes its place only when all of it is on the disk.
+
+    Args:
+        path: the file wanted; a pipe or a device is written to directly.
+        force: Replace a file that is there; else it is refused.
+
+    Raises:
+        drivers.errors.SetupError: it is there already, or cannot be written; what was there is
+            as it was.
+    """
+    refuse_existing(path, force=force)
+    with _clear(path):
+        if _is_stream(path):
+            with path.open("wb") as stream:
+                yield stream
+            return
+        target = Path(os.path.realpath(path))
+        fresh = target.with_name(f".{target.name[:80]}-{secrets.token_hex(4)}")
+        with fresh.open("xb") as file:
+            try:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+                _put_in_place(fresh, target, path, force)
+            finally:
+                fresh.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def output_text(path: Path, force: bool = False) -> Iterator[TextIO]:
+    """Give a text file to write to, UTF-8 and with the line ends as written.
+
+    Raises:
+        drivers.errors.SetupError: see ``output_file``.
+    """
+    with output_file(path, force) as raw:
+        text = io.TextIOWrapper(raw, encoding="utf-8", newline="")
+        try:
+            yield text
+            text.flush()
+        finally:
+            with contextlib.suppress(OSError, ValueError):
+                text.detach()  # ``output_file`` closes what lies below
+
+
+def write_file(path: Path, content: str | bytes, force: bool = False) -> None:
+    """Write a whole file; see ``output_file``.
+
+    Raises:
+        drivers.errors.SetupError: see ``output_file``.
+    """
+    with output_file(path, force) as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, with those above it, where it is not there.
+
+    Raises:
+        drivers.errors.SetupError: it cannot be made.
+    """
+    with _clear(path):
+        path.mkdir(parents=True, exist_ok=True)
+
+
+def _put_in_place(fresh: Path, target: Path, path: Path, force: bool) -> None:
+    """Let a finished file take its place."""
+    if target.exists():
+        shutil.copymode(target, fresh)
+    if force:
+        os.replace(fresh, target)
+        return
+    try:
+        os.link(fresh, target)  # unlike a replace, never over a file made meanwhile
+    except FileExistsError:
+        raise SetupError(_there(path)) from None
+    except OSError:  # a file system without links
+        if target.exists():
+            raise SetupError(_there(path)) from None
+        os.replace(fresh, target)
+
+
+def _there(path: Path) -> str:
+    return f"{path} is there already: name another file, or say --force"
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether a path is there and neither a file nor a folder."""
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+@contextlib.contextmanager
+def _clear(path: Path) -> Iterator[None]:
+    """Say in one line what the disk refuses."""
+    try:
+        yield
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise SetupError(f"cannot write {path} ({why}): name another file") from error

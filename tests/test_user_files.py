@@ -1,0 +1,292 @@
+"""Files that a user names: whatever they are, one clear line, and nothing of theirs is lost."""
+
+import os
+import resource
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from command_line import typed
+
+from config.load import ConfigError
+from config.schema import load_rig, load_rules, load_walk
+from drivers.errors import SetupError
+from drivers.file_input import FileTooLarge, NotRegularFile, read_limited
+from drivers.file_output import output_file, output_text, refuse_existing, write_file
+from robot.gaze_recording import read_recording
+from robot.heatmap import face_from
+from robot.remote.file_watch import look
+from robot.report.written import write_all
+
+SECRET = "root:$6$abcdefgh:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n"
+
+
+def refused(read: Callable[[], object]) -> str:
+    """Return what is said of a file that cannot be used: one line."""
+    with pytest.raises((ConfigError, SetupError)) as told:
+        read()
+    text = str(told.value)
+    assert "\n" not in text and text
+    return text
+
+
+@pytest.fixture
+def pipe(tmp_path: Path) -> Path:
+    path = tmp_path / "pipe.yaml"
+    os.mkfifo(path)
+    return path
+
+
+# -- reading ---------------------------------------------------------------------------
+
+
+READERS: dict[str, Callable[[str], object]] = {
+    "rig": load_rig,
+    "character": lambda path: load_rig("desk", path),
+    "profile": lambda path: load_rig("desk", None, path),
+    "rules": load_rules,
+    "walk": load_walk,
+    "fixations": lambda path: read_recording(Path(path)),
+    "face": lambda path: face_from(Path(path)),
+}
+
+
+@pytest.mark.parametrize("reader", READERS.values(), ids=READERS)
+def test_what_is_no_regular_file_is_refused_at_once(
+    reader: Callable[[str], object], pipe: Path, tmp_path: Path
+) -> None:
+    assert "is a named pipe, not a regular file" in refused(lambda: reader(str(pipe)))
+    for device in ("/dev/zero", "/dev/full", "/dev/tty", "/dev/null"):
+        if os.path.exists(device):
+            assert "is a device" in refused(lambda device=device: reader(device))  # type: ignore[misc]
+    folder = tmp_path / "folder.yaml"
+    folder.mkdir()
+    assert "is a directory" in refused(lambda: reader(str(folder)))
+    assert "absent" in refused(lambda: reader(str(tmp_path / "absent.yaml")))
+    empty = tmp_path / "empty.yaml"
+    empty.touch()
+    refused(lambda: reader(str(empty)))
+    binary = tmp_path / "binary.yaml"
+    binary.write_bytes(bytes(range(256)) * 9)
+    refused(lambda: reader(str(binary)))
+
+
+@pytest.mark.parametrize(
+    "reader", [READERS[k] for k in ("rig", "character", "profile", "rules", "walk")]
+)
+def test_nothing_of_a_file_that_is_no_configuration_is_shown(
+    reader: Callable[[str], object], tmp_path: Path
+) -> None:
+    file = tmp_path / "secret.yaml"
+    for text in (
+        SECRET,
+        "token: hunter2\npassword: hunter2\n",
+        "hunter2: &hunter2 {hunter2: 1\n",
+        "a: *hunter2\n",
+        "hunter2: 1\nhunter2: 2\n",
+        "? {hunter2: 1}\n: 2\n",
+        "!hunter2 {a: 1}\n",
+        'a: "hunter2\\q"\n',
+        "%hunter2\n---\na: 1\n",
+        "@hunter2\n",
+    ):
+        file.write_text(text)
+        said = refused(lambda: reader(str(file)))
+        assert str(file) in said
+        assert not any(word in said for word in ("hunter2", "root:", "daemon", "$6$")), said
+
+
+def test_a_configuration_with_a_typo_is_still_told_what_was_meant(tmp_path: Path) -> None:
+    file = tmp_path / "rig.yaml"
+    file.write_text("nome: x\n")
+    assert "did you mean 'name'" in str(pytest.raises(ConfigError, load_rig, str(file)).value)
+
+
+def test_yaml_is_bounded_in_size_and_in_what_it_stands_for(tmp_path: Path) -> None:
+    file = tmp_path / "big.yaml"
+    with file.open("wb") as big:
+        big.truncate(100_000_000)
+    assert "larger than the 1 MB" in refused(lambda: load_rig(str(file)))
+    bomb = "name: &a0 [1]\n" + "".join(
+        f"a{n + 1}: &a{n + 1} [{f'*a{n},' * 9}]\n" for n in range(12)
+    )
+    file.write_text(bomb)
+    assert "more than 20000 values" in str(pytest.raises(ConfigError, load_rig, str(file)).value)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (r'"\ud800"', "U+D800"),
+        (r'"a\u0000b"', "U+0000"),
+        (r'"a\e[2Jb"', "U+001B"),
+        (r'"\u202Egpj.exe"', "U+202E"),
+        (f'"{"n" * 401}"', "longer than 400"),
+    ],
+)
+def test_names_can_be_shown_and_recorded(tmp_path: Path, name: str, said: str) -> None:
+    desk = (Path(__file__).parents[1] / "config/rigs/desk.yaml").read_text()
+    file = tmp_path / "rig.yaml"
+    file.write_text(desk.replace("name: desk", f"name: {name}", 1))
+    assert said in str(pytest.raises(ConfigError, load_rig, str(file)).value)
+    file.write_text(desk.replace("name: desk", 'name: "Kopf 頭 👩‍🚀"', 1))
+    assert load_rig(str(file)).name.startswith("Kopf")
+
+
+def test_a_watched_file_that_becomes_a_pipe_is_not_waited_for(pipe: Path) -> None:
+    assert look(pipe) is None and look(Path("/dev/zero")) is None
+
+
+def test_a_file_is_read_up_to_its_limit(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_bytes(b"12345")
+    assert read_limited(file, 5) == b"12345"
+    with pytest.raises(FileTooLarge):
+        read_limited(file, 4)
+    with pytest.raises(NotRegularFile):
+        read_limited("/dev/zero", 4)
+    with pytest.raises(FileNotFoundError):
+        read_limited("a\0b", 4)
+
+
+# -- writing ---------------------------------------------------------------------------
+
+
+def test_what_is_there_is_kept_unless_forced(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    write_file(file, "old")
+    with pytest.raises(SetupError, match="is there already: name another file, or say --force"):
+        write_file(file, "new")
+    assert file.read_text() == "old"
+    file.chmod(0o640)
+    write_file(file, "new", force=True)
+    assert file.read_text() == "new" and file.stat().st_mode & 0o777 == 0o640
+    assert os.listdir(tmp_path) == ["file"]
+
+
+def test_a_file_made_meanwhile_is_kept(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    with pytest.raises(SetupError, match="is there already"), output_file(file) as out:
+        out.write(b"new")
+        file.write_text("theirs")
+    assert file.read_text() == "theirs" and os.listdir(tmp_path) == ["file"]
+
+
+def test_what_fails_half_way_leaves_the_old_file(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("old")
+    with pytest.raises(RuntimeError), output_text(file, force=True) as out:
+        out.write("half")
+        raise RuntimeError
+    assert file.read_text() == "old" and os.listdir(tmp_path) == ["file"]
+
+
+def test_a_link_is_followed_and_stays_one(tmp_path: Path) -> None:
+    file, link = tmp_path / "file", tmp_path / "link"
+    file.write_text("old")
+    link.symlink_to(file)
+    with pytest.raises(SetupError, match="is there already"):
+        write_file(link, "new")
+    write_file(link, "new", force=True)
+    assert link.is_symlink() and file.read_text() == "new"
+
+
+def test_pipes_and_devices_are_written_to(pipe: Path) -> None:
+    refuse_existing(pipe, Path("/dev/null"))
+    write_file(Path("/dev/null"), "x")
+    got: list[bytes] = []
+    reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()), daemon=True)
+    reader.start()
+    write_file(pipe, "through")
+    reader.join(20)
+    assert got == [b"through"]
+    with pytest.raises(SetupError, match="No space left on device"):
+        write_file(Path("/dev/full"), "x" * 100_000)
+
+
+@pytest.fixture
+def small_disk() -> Iterator[None]:
+    """No file may grow beyond 10 kB, as on a disk that is full."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+def test_a_full_disk_leaves_the_old_file_whole(tmp_path: Path, small_disk: None) -> None:
+    file = tmp_path / "file"
+    file.write_text("old")
+    with pytest.raises(SetupError, match="File too large"):
+        write_file(file, b"x" * 20_000, force=True)
+    with pytest.raises(SetupError, match="File too large"), output_text(file, force=True) as out:
+        out.write("x" * 20_000)
+    assert file.read_text() == "old" and os.listdir(tmp_path) == ["file"]
+
+
+def test_folders_are_told_apart(tmp_path: Path) -> None:
+    with pytest.raises(SetupError, match="is a directory: name a file in it"):
+        refuse_existing(tmp_path, force=True)
+    with pytest.raises(SetupError, match="No such file or directory"):
+        write_file(tmp_path / "absent" / "file", "x")
+
+
+# -- the commands ----------------------------------------------------------------------
+
+
+def test_a_report_leaves_the_summary_of_the_run_and_is_refused_before_any_work(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    run, summary = tmp_path / "x.mcap", tmp_path / "x.json"
+    words = ["run", "--mock", "--fast", "--seconds", "1", "--record", str(run)]
+    assert typed(*words, "--summary", str(summary)) == 0
+    figures = summary.read_bytes()
+    for page in ("a page", "a newer page"):
+        paths, data = write_all(tmp_path / "x.html", page, (), [{"key": 1}], page != "a page")
+        assert summary.read_bytes() == figures and data.name == "x_measures.json" and not paths
+    with pytest.raises(SetupError, match="is there already"):
+        write_all(tmp_path / "x.html", "another page", (), [])
+    capfd.readouterr()
+    for reporting in (["report"], ["compare", str(run), "--out", str(tmp_path / "x.html")]):
+        assert typed(*reporting, str(run)) == 2
+        said = capfd.readouterr().err
+        assert "x.html is there already" in said and said.count("\n") == 1
+    assert (tmp_path / "x.html").read_text() == "a newer page"
+    assert typed("export", str(run), "--csv") == 0
+    assert typed("export", str(run), "--csv") == 2
+    assert typed("export", str(run), "--csv", "--force") == 0
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    (theirs / "participants.tsv").write_text("precious")
+    assert typed("export", str(run), "--bids", "--out", str(theirs)) == 2
+    assert (theirs / "participants.tsv").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("schema", "{}"),
+        ("calibrate-board", "{}"),
+        ("run", "--mock", "--fast", "--seconds", "1", "--summary", "{}"),
+        ("run", "--mock", "--fast", "--seconds", "1", "--heatmap", "{}"),
+        ("run", "--mock", "--fast", "--seconds", "1", "--record", "{}"),
+        ("report", "--scene", "visitor", "--out", "{}.html"),
+        ("compare", "a.mcap", "b.mcap", "--out", "{}.html"),
+        ("record-camera", "{}", "--video", "none.avi"),
+        ("calibrate", "desk", "--mock", "--out", "{}"),
+    ],
+    ids=lambda words: words[0] + words[-1][:9],
+)
+def test_no_command_writes_over_a_file_of_yours(
+    words: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for ending in (".png", ".png.html"):
+        (tmp_path / f"mine{ending}").write_text("precious")
+    mine = str(tmp_path / "mine.png")
+    assert typed(*(word.replace("{}", mine) for word in words)) != 0
+    assert "unexpected" not in capfd.readouterr().err
+    for ending in (".png", ".png.html"):
+        assert (tmp_path / f"mine{ending}").read_text() == "precious"
