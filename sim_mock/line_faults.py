@@ -178,6 +178,16 @@ class LineFaults(ABC):
         says = f"noise ({what}) {where} answers"
         return self._begin(f"noise_{where}", None, says, count, seconds, (), data)
 
+    def static(self, percent: float, count: int | None = None, seconds: float | None = None) -> str:
+        """Let a share of all bytes be changed, lost or doubled by noise, in both directions."""
+        says = f"noise hits {percent:g} % of all bytes, to and fro"
+        return self._begin("static", None, says, count, seconds, (percent / 100.0,))
+
+    def repeat(self, count: int | None = None, seconds: float | None = None) -> str:
+        """Let what was answered before arrive once more before the next answer."""
+        says = "the answers of before arrive again before the next ones"
+        return self._begin("repeat", None, says, count, seconds)
+
     def fragment(
         self,
         servo_id: int | None = None,

@@ -10,6 +10,7 @@ from sim_mock.fault_words import (
     anything,
     count,
     hex_bytes,
+    number,
     one_of,
     or_all,
     whole,
@@ -39,6 +40,9 @@ def line_verbs(one: Word) -> dict[str, Verb]:
         "noise": Verb(LineFaults.noise, (Word("before|after", one_of("before", "after")),
                                          Word("HEX|random", hex_bytes, True)),
                       "bytes around whatever is answered", BOTH),
+        "static": Verb(LineFaults.static, (Word("PERCENT", number(0.0, 100.0, "a percentage")),),
+                       "so much of all bytes is hit by noise, to and fro", TIME),
+        "repeat": Verb(LineFaults.repeat, (), "the last answers come again first", BOTH),
     }
 
 

@@ -17,6 +17,8 @@ Dynamixel servos, is 0 unless asked for.
 from collections import deque
 
 from sim_mock.device import Device, Reply
+from sim_mock.servo_packets import Piece
+from sim_mock.wire_faults import NOBODY
 
 BITS_PER_BYTE = 10
 PACK_S = 0.001
@@ -39,6 +41,7 @@ class ServoLine:
         self.turnaround_s = turnaround_s
         self._late: deque[tuple[float, bytes]] = deque()
         self._host_free_s = self._line_free_s = 0.0
+        self._said = b""
 
     @property
     def busy(self) -> bool:
@@ -64,7 +67,12 @@ class ServoLine:
 
     def send(self, data: bytes, baud: int, now_s: float | None = None) -> bytes:
         """Send the host's bytes now, or at ``now_s``; gives what arrives at once."""
+        faulty = self.device.faults.wire.any
+        if faulty:
+            data = self.device.faults.wire.roughened(data, self.device.now_s())
         replies = self.device.exchange(data, baud)
+        if faulty:
+            replies = self._disturbed(replies)
         if self.wire_time:
             self._on_the_wire(data, replies, baud, self.device.now_s() if now_s is None else now_s)
             return self.arrived()
@@ -74,6 +82,20 @@ class ServoLine:
             return b"".join([piece[1] for reply in replies for piece in reply[1]])
         self._queue_late(replies, self.device.now_s())
         return self.arrived()
+
+    def _disturbed(self, replies: list[Reply]) -> list[Reply]:
+        """Let noise strike the answers, and a line with a memory say the last ones again first."""
+        wire, now_s = self.device.faults.wire, self.device.now_s()
+        said = b"".join(piece.data for reply in replies for piece in reply.pieces)
+        before, self._said = self._said, said or self._said
+        replies = [
+            Reply(r.end, [p._replace(data=wire.roughened(p.data, now_s)) for p in r.pieces])
+            for r in replies
+        ]
+        if said and before and wire.take("repeat", None, now_s) is not None:
+            first = replies[0]
+            replies[0] = Reply(first.end, [Piece(NOBODY, before), *first.pieces])
+        return replies
 
     def _any_late(self, replies: list[Reply]) -> bool:
         return any(piece.late_s for reply in replies for piece in reply.pieces)

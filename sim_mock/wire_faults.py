@@ -5,6 +5,7 @@ A ``Fault`` lasts for a number of answers, for a time, or until it is cleared.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import log
 from random import Random
 
 from sim_mock.servo_packets import HEADER, Answer, Piece
@@ -93,6 +94,32 @@ class ActiveFaults:
     def _forget(self, now_s: float) -> None:
         self._faults = [fault for fault in self._faults if fault.lasts(now_s)]
         self.any = bool(self._faults)
+
+    # --- electrical noise, in both directions
+
+    def roughened(self, data: bytes, now_s: float) -> bytes:
+        """Give bytes as they arrive over a noisy line: some changed, lost or added.
+
+        The share of bytes that are hit is the fault's number; of four that are hit two are
+        changed, one is lost, and one has another put before it.
+        """
+        noise = next((f for f in self._faults if f.kind == "static" and f.lasts(now_s)), None)
+        if noise is None:
+            return data
+        rng, out, share, at = self._dice, bytearray(), noise.numbers[0], 0
+        while True:
+            # The distance to the next byte hit, instead of dice for each byte.
+            ahead = int(log(1.0 - rng.random()) / log(1.0 - share)) if share < 1.0 else 0
+            out += data[at : at + ahead]
+            at += ahead
+            if at >= len(data):
+                return bytes(out)
+            how = rng.randrange(4)
+            if how < 2:
+                out.append(data[at] ^ rng.randrange(1, 256))
+            elif how == 3:
+                out += bytes((rng.randrange(256), data[at]))
+            at += 1
 
     # --- what the servos say
 

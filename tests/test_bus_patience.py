@@ -9,12 +9,12 @@ from drivers.bus_reconnect import Reconnect
 from drivers.dynamixel.health import AGAIN_AND_AGAIN, Health
 from drivers.dynamixel.table import MODELS, indirect_blocks
 from drivers.dynamixel.views import (
-    CALM_S,
     INDIRECT_MAP,
     alone_turns,
     direct_turns,
     indirect_turns,
 )
+from drivers.read_turns import CALM_S
 from drivers.types import ServoSetup
 
 
@@ -67,11 +67,11 @@ def test_after_trouble_views_differ_until_it_has_been_calm_for_a_while():
         turns.trouble(5.0 + k)
         seen.append(turns.next().length)
     assert len(set(seen)) == 4
-    assert 10 not in seen
+    assert not {10, 11}.intersection(seen)
     turns.calm(8.0 + 0.9 * CALM_S)
-    assert turns.next().length != 10
+    assert turns.next().length not in (10, 11)
     turns.calm(8.0 + CALM_S)
-    assert turns.next().length == 10
+    assert turns.next().length in (10, 11)
 
 
 def test_the_indirect_map_fits_every_window():

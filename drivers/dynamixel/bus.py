@@ -8,7 +8,7 @@ from drivers.bus_roll import Roll
 from drivers.dynamixel.care import Care
 from drivers.dynamixel.health import Health
 from drivers.dynamixel.line import Line
-from drivers.dynamixel.packets import SyncWrite
+from drivers.dynamixel.packets import ERROR_NUMBER, SyncWrite
 from drivers.dynamixel.params import DynamixelParams as DynamixelParams
 from drivers.dynamixel.reader import Heard, Reader, Whole
 from drivers.dynamixel.readings import Readings
@@ -293,11 +293,12 @@ class DynamixelBus:
             believed = self._care.judge(servo_id, one.sample)
             if was_out and self._care.engaged:
                 self._care.check(servo_id)
-            reading = self._readings.one(slot, one)
-            if reading is None:
+            if one.sample.error & ERROR_NUMBER:
                 self._line.errors["refused"] += 1
+            elif believed and self._readings.believes(slot, one):
+                readings[slot] = self._readings.one(slot, one)
             elif believed:
-                readings[slot] = reading
+                self._line.errors["implausible"] += 1
         self._health.note_silent(self._roll.out, now_s, self._roll.garbling)
         return readings
 

@@ -11,7 +11,7 @@ from drivers.dynamixel.readings import Readings
 from drivers.dynamixel.revival import Revival
 from drivers.dynamixel.setup import speed_units
 from drivers.dynamixel.table import REGISTERS, WATCHDOG_UNIT_S
-from drivers.dynamixel.torque import TRIPPED, find_latched, heal_tripped
+from drivers.dynamixel.torque import TRIPPED, heal_tripped
 from drivers.dynamixel.views import Sample
 from drivers.types import ServoReading, ServoSetup
 
@@ -65,6 +65,7 @@ class Care:
         self._entering = set(entering)
         self._line.starving_s, self._line.tries = self._watchdog * WATCHDOG_UNIT_S or inf, 1
         self._readings.expect_torque(True)
+        self._readings.places.forget()
 
     def let_go(self) -> None:
         """Leave servos without torque alone."""
@@ -79,6 +80,7 @@ class Care:
         """Trust no servo to be as it was left."""
         self._suspects.update(self._ids)
         self._revive_at_s = self._due_s = -inf
+        self._readings.places.forget()
 
     def alert(self, servo_id: int) -> None:
         """Note that a servo has raised the alert bit."""
@@ -90,7 +92,11 @@ class Care:
         """Look at one servo's answer; gives whether its values can be believed."""
         error, torque = sample.hardware_error, sample.torque
         if error:
-            self._latched(servo_id, error)
+            # Damaged bytes may pass for a fault, which ends a run: the servo is asked once more.
+            if servo_id in self._health.latches:
+                self._latched(servo_id, error)
+            else:
+                self.alert(servo_id)
         elif sample.error & ALERT:
             self.alert(servo_id)
         elif servo_id in self._health.latches or sample.blank or self._limp(servo_id, torque):
@@ -184,9 +190,10 @@ class Care:
 
     def find_alerts(self, ids: Sequence[int]) -> None:
         """Ask servos whether they have latched an error, and which."""
-        latched = find_latched(self._line, ids)
+        found = self._line.ask(ids, "hardware_error_status")
+        self._unnamed.difference_update(found)
+        latched = {servo_id: status for servo_id, status in found.items() if status}
         for servo_id, status in latched.items():
-            self._unnamed.discard(servo_id)
             self._latched(servo_id, status)
         if latched and not self._covered:
             for servo_id, torque in self._line.ask(tuple(latched), "torque_enable").items():

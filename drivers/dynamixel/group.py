@@ -89,9 +89,10 @@ class PlainGroup:
         if missing:
             return missing
         # Repeated statuses, and others' than asked for, are not those waited for.
-        found = [status.id for status in statuses(raw)]
-        there = len(set(self.ids).intersection(found))
-        return bytes_missing(raw, len(found) + count - there, self.view.length)
+        found, length = statuses(raw), self.view.length
+        fits = {s.id for s in found if len(s.params) == length or s.error & ERROR_NUMBER}
+        there = len(fits.intersection(self.ids))
+        return bytes_missing(raw, len(found) + count - there, length)
 
     def pieces(self, raw: bytes) -> Pieces:
         """Save what can be proved right."""
@@ -152,7 +153,10 @@ class FastGroup:
 
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""
-        at = max(0, raw.find(self._head))
+        at = raw.find(self._head)
+        if at < 0:
+            # An answer of another length is one of before, and stands in front of ours.
+            at = _past_packet(raw)
         return max(0, at + self.reply_length - len(raw))
 
     def pieces(self, raw: bytes) -> Pieces:
@@ -188,6 +192,21 @@ class FastGroup:
 
 
 Group = PlainGroup | FastGroup
+
+
+_OTHERS = HEADER + bytes((BROADCAST,))
+
+
+def _past_packet(raw: bytes) -> int:
+    """Give where a packet of all that stands in front ends, 0 where none does."""
+    if not raw.startswith(_OTHERS) or len(raw) < len(_OTHERS) + 2:
+        return 0
+    length = int.from_bytes(raw[5:7], "little")
+    return 7 + length if length <= _LONGEST else 0
+
+
+_LONGEST = 2048
+"""Length of a fast answer of more servos than there can be: noise."""
 
 
 def _columns(error: int, first: int, view: View, stride: int) -> Columns:

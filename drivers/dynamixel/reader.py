@@ -11,7 +11,8 @@ from typing import NamedTuple
 from drivers.bus_roll import Roll, silent_ones
 from drivers.dynamixel.group import FastGroup, Group, PlainGroup, Values
 from drivers.dynamixel.line import Line
-from drivers.dynamixel.views import Sample, Turns
+from drivers.dynamixel.views import Sample, View
+from drivers.read_turns import Turns
 
 MOST_GROUPS = 64
 """So many prepared exchanges are kept."""
@@ -48,7 +49,9 @@ class Reader:
         fast: ask for one packet of all instead of one status each.
     """
 
-    def __init__(self, line: Line, roll: Roll, together: Turns, alone: Turns, fast: bool) -> None:
+    def __init__(
+        self, line: Line, roll: Roll, together: Turns[View], alone: Turns[View], fast: bool
+    ) -> None:
         self._line = line
         self.roll = roll
         self._together, self._alone = together, alone
@@ -88,7 +91,7 @@ class Reader:
         return heard
 
     def _read(
-        self, ids: tuple[int, ...], heard: dict[int, Heard], now_s: float, turns: Turns
+        self, ids: tuple[int, ...], heard: dict[int, Heard], now_s: float, turns: Turns[View]
     ) -> None:
         if not ids:
             return
@@ -98,7 +101,7 @@ class Reader:
         self._until_s = min(self._until_s, self._line.whole_s + self._line.most_s)
         self._save(group, raw, at_s, heard, now_s, turns)
 
-    def _group(self, ids: tuple[int, ...], turns: Turns) -> Group:
+    def _group(self, ids: tuple[int, ...], turns: Turns[View]) -> Group:
         """Give the prepared exchange for some servos."""
         view = turns.next()
         key = ids, view.address, view.length
@@ -116,7 +119,7 @@ class Reader:
         at_s: float,
         heard: dict[int, Heard],
         now_s: float,
-        turns: Turns,
+        turns: Turns[View],
     ) -> None:
         """Save what is right of an answer; ask again those who lost theirs through another."""
         while True:
@@ -136,7 +139,7 @@ class Reader:
             raw, at_s = self._line.exchange(group.request, group.reply_length)
 
     def _blame(
-        self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: Turns
+        self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: Turns[View]
     ) -> None:
         """Note who failed; what still comes must not be taken for the next answer."""
         line, roll = self._line, self.roll

@@ -3,16 +3,20 @@
 from collections.abc import Sequence
 from math import copysign
 
-from drivers.dynamixel.packets import ALERT, ERROR_NUMBER
+from drivers.dynamixel.packets import ALERT
 from drivers.dynamixel.reader import Heard, Whole
 from drivers.dynamixel.table import MODELS, VELOCITY_UNIT_STEPS_S
+from drivers.plausibility import Plausibility
 from drivers.types import ServoReading, ServoSetup
 
 _new = tuple.__new__
 
 
 class Readings:
-    """Makes readings; keeps torque, fault, temperature and voltage from one to the next."""
+    """Makes readings; keeps torque, fault, temperature and voltage from one to the next.
+
+    places: which positions can be true
+    """
 
     def __init__(self, setups: Sequence[ServoSetup]) -> None:
         models = [MODELS[setup.model] for setup in setups]
@@ -26,6 +30,7 @@ class Readings:
             for model in models
         )
         count = len(models)
+        self.places = Plausibility([model.no_load_steps_s for model in models])
         self._torque: list[bool] = [False] * count
         self._fault: list[str] = [""] * count
         self._warm: Sequence[float | None] = [None] * count
@@ -65,6 +70,8 @@ class Readings:
             if not self._engaged and 0 in positions:
                 return None
             self._torque = [self._engaged] * len(positions)
+        if not self.places.whole(positions, at_s):
+            return None
         if at.temperature is not None:
             self._warm = values[at.temperature]
         if at.voltage is not None:
@@ -103,11 +110,13 @@ class Readings:
             )
         ]
 
-    def one(self, slot: int, heard: Heard) -> ServoReading | None:
-        """Take one servo's answer; None where it was refused."""
+    def believes(self, slot: int, heard: Heard) -> bool:
+        """Tell whether one servo's answer can be true; to be asked once for every answer."""
+        return self.places.one(slot, heard.sample.position, heard.at_s)
+
+    def one(self, slot: int, heard: Heard) -> ServoReading:
+        """Take one servo's answer, which was not refused."""
         sample = heard.sample
-        if sample.error & ERROR_NUMBER:
-            return None
         if sample.torque is not None:
             self._torque[slot] = bool(sample.torque)
         if sample.temperature is not None and not sample.blank:
@@ -126,6 +135,7 @@ class Readings:
     def held(self, slot: int, position: int, at_s: float, torque: bool) -> ServoReading:
         """Make the first reading of a servo that was just set up again and stands still."""
         self._torque[slot] = torque
+        self.places.place(slot, position, at_s)
         return self._make(slot, position, 0.0, 0, at_s, False)
 
     def _make(

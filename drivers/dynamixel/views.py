@@ -15,19 +15,16 @@ not the one waited for.
 """
 
 import struct
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from drivers.dynamixel.table import IndirectBlock
+from drivers.read_turns import Turns
 
 SENSED = ("current", "velocity", "position")
 ARMED = ("torque", "hardware_error")
 
 INDIRECT_MAP = (146, 64, 70, *range(126, 136), 144, 145, *range(120, 125))
 """Address behind every byte of the indirect block."""
-
-CALM_S = 0.25
-"""So long after the last trouble no answer is late any more."""
 
 
 class Sample(NamedTuple):
@@ -65,6 +62,8 @@ class View(NamedTuple):
 
 
 DIRECT = View(126, 10, "hii")
+LONGER = View(126, 11, "hiix")
+"""The same in another length: a line that says its last answer again is not taken at its word."""
 
 _DIRECT_SPARE = (
     View(124, 12, "2xhii"),
@@ -91,48 +90,17 @@ _ALONE = (
 """For servos asked alone: never as long as a reading of the group, and never twice the same."""
 
 
-class Turns:
-    """Says which view is read next: the usual ones in turn, after trouble others for a while."""
-
-    def __init__(self, usual: Iterable[View], spare: Iterable[View]) -> None:
-        self._usual, self._spare = tuple(usual), tuple(spare)
-        self._views = self._usual
-        self._at, self._spares = 0, -1
-        self._calm_at_s = 0.0
-        self.troubled = False
-
-    def next(self) -> View:
-        """Give the view of the next reading."""
-        if self.troubled:
-            return self._spare[self._spares]
-        self._at += 1
-        if self._at >= len(self._usual):
-            self._at = 0
-        return self._usual[self._at]
-
-    def trouble(self, now_s: float) -> None:
-        """Note that an answer stayed out: the next reading has another length."""
-        self.troubled = True
-        self._spares = (self._spares + 1) % len(self._spare)
-        self._calm_at_s = now_s + CALM_S
-
-    def calm(self, now_s: float) -> None:
-        """Note the time; the usual views come back when nothing can be late any more."""
-        if now_s >= self._calm_at_s:
-            self.troubled = False
-
-
-def alone_turns() -> Turns:
+def alone_turns() -> Turns[View]:
     """Give the views for servos that are asked alone."""
     return Turns(_ALONE, _ALONE)
 
 
-def direct_turns() -> Turns:
+def direct_turns() -> Turns[View]:
     """Give the views of servos whose registers are read where they are."""
-    return Turns((DIRECT,), _DIRECT_SPARE)
+    return Turns((DIRECT, LONGER), _DIRECT_SPARE)
 
 
-def indirect_turns(block: IndirectBlock) -> Turns:
+def indirect_turns(block: IndirectBlock) -> Turns[View]:
     """Give the views of servos with ``INDIRECT_MAP`` in this block."""
     base, armed = block.data_base, (*ARMED, *SENSED)
     both = ("temperature", *armed, "voltage")

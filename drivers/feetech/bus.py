@@ -33,7 +33,7 @@ from drivers.feetech.roster import find
 from drivers.feetech.setup import Fitting
 from drivers.feetech.table import STEPS_PER_TURN
 from drivers.feetech.torque import switch_off
-from drivers.feetech.views import alone_turns, together_turns
+from drivers.feetech.views import again_turns, alone_turns, together_turns
 from drivers.goals import clipped
 from drivers.lasting_port import LastingPort
 from drivers.serial_port import BusPort
@@ -73,6 +73,7 @@ class FeetechBus:
         )
         self._opened = False
         self._now_s = 0.0
+        self._damaged = 0
         self._assemble()
 
     def _assemble(self) -> None:
@@ -86,7 +87,7 @@ class FeetechBus:
         self._readings = Readings(self._setups)
         self._health = Health(by_id, journal)
         turns = together_turns(self._params.torque_every)
-        self._reader = Reader(line, self._roll, turns, alone_turns())
+        self._reader = Reader(line, self._roll, turns, alone_turns(), again_turns())
         self._fitting = Fitting(line, StsRegisters(self._port, tries=1), self._setups, journal)
         self._revival = Revival(line, self._fitting, by_id, self._health, journal)
         self._care = Care(line, by_id, self._revival, self._health, self._readings)
@@ -251,6 +252,12 @@ class FeetechBus:
         if heard and self._health.silent_for_s(now_s) >= RESTART_S:
             # All were silent together: their power may have been cut.
             self._care.suspect_all()
+        places = self._readings.places
+        if (damaged := self._line.errors["corrupt"]) != self._damaged:
+            self._damaged = damaged
+            places.damaged(now_s)
+        if heard and places.disturbed(now_s):
+            heard = self._confirmed(heard)
         for servo_id, one in heard.items():
             slot = self._slot[servo_id]
             self._roll.answered(servo_id)
@@ -262,6 +269,24 @@ class FeetechBus:
         self._care.note_out(self._roll.out, now_s)
         self._health.note_silent(self._roll.out, now_s, self._roll.garbling)
         return readings
+
+    def _confirmed(self, heard: dict[int, Heard]) -> dict[int, Heard]:
+        """Ask everybody who answered once more, and keep what both answers say.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        again = self._reader.again(tuple(heard))
+        kept: dict[int, Heard] = {}
+        for servo_id, first in heard.items():
+            self._roll.answered(servo_id)
+            second = again.get(servo_id)
+            both = second and self._readings.confirmed(self._slot[servo_id], first, second)
+            if both:
+                kept[servo_id] = both
+            else:
+                self._line.errors["unconfirmed"] += 1
+        return kept
 
     def _send(self, goals: Sequence[int]) -> None:
         """Send goals with the speeds that may be used for them.

@@ -9,11 +9,14 @@ from drivers.feetech.line import StsLine
 from drivers.feetech.readings import Readings
 from drivers.feetech.revival import FAR_SIDE, Revival
 from drivers.feetech.table import REGISTERS, TORQUE_FULL, acceleration_units, name_errors
-from drivers.feetech.views import Sample
+from drivers.feetech.views import ARMED, Sample
 from drivers.types import ServoReading, ServoSetup
 
 AGAIN_S = 0.25
 """Time between attempts to set a servo up again."""
+
+CHECK_S = 0.1
+"""On a disturbed line one servo's settings are compared so often, each in turn."""
 
 GONE_S = 1.0
 """A fault is over when its bit has not been seen for so long: bits flicker at the threshold."""
@@ -54,7 +57,10 @@ class Care:
         self._limp: set[int] = set()
         self._out_since_s: dict[int, float] = {}
         self._seen_s: dict[int, dict[int, float]] = {}
-        self._revive_at_s = -inf
+        self._told_before: dict[int, int] = {}
+        self._doubted: set[int] = set()
+        self._revive_at_s = self._check_at_s = -inf
+        self._checked = 0
 
     def take_on(self, entering: Collection[int]) -> None:
         """Begin to look after servos under torque; some of them are outside their limits."""
@@ -62,9 +68,10 @@ class Care:
         self.entering = set(entering)
         self._suspects.clear()
         self._limp.clear()
+        self._doubted.clear()
         self._line.tries = 1
         self._readings.expect_torque(True)
-        self._readings.forget_places()
+        self._readings.places.forget()
         # What was wrong of old is not: all have just taken their goals and their torque.
         for servo_id in [i for i in self._health.faults if i not in self._health.latches]:
             del self._health.faults[servo_id]
@@ -73,7 +80,7 @@ class Care:
     def let_go(self) -> None:
         """Leave servos without torque alone."""
         self.engaged = False
-        for one in (self.entering, self._suspects, self._rearmed, self._limp):
+        for one in (self.entering, self._suspects, self._rearmed, self._limp, self._doubted):
             one.clear()
         self._line.tries = TRIES
         self._readings.expect_torque(False)
@@ -82,7 +89,7 @@ class Care:
         """Trust no servo to be as it was left."""
         self._suspects.update(self._ids)
         self._revive_at_s = -inf
-        self._readings.forget_places()
+        self._readings.places.forget()
 
     def withheld(self, now_s: float) -> frozenset[int]:
         """Name the servos that must get no goals now.
@@ -100,8 +107,11 @@ class Care:
 
     def judge(self, servo_id: int, sample: Sample, now_s: float) -> None:
         """Look at one servo's answer: its faults, and whether it is armed as it should be."""
-        if sample.error or servo_id in self._seen_s:
-            self._mind_bits(servo_id, sample.error, now_s)
+        # Damaged bytes may pass for a fault, which ends a run: it must be told twice in a row.
+        told = sample.error & self._told_before.get(servo_id, 0)
+        self._told_before[servo_id] = sample.error
+        if told or servo_id in self._seen_s:
+            self._mind_bits(servo_id, told, now_s)
         if not self.engaged:
             return
         if self._health.faults.get(servo_id) == FAR_SIDE:
@@ -157,18 +167,57 @@ class Care:
             self._suspects.add(servo_id)
 
     def _mind_torque(self, servo_id: int, sample: Sample) -> None:
-        """Suspect a servo that is not armed as it was left."""
+        """Doubt a servo that does not seem armed as it was left: it is asked once more."""
+        if sample.torque == 1 and self._armed(servo_id, sample):
+            self._limp.discard(servo_id)
+            self._doubted.discard(servo_id)
+        elif servo_id not in self._limp or not self._known_reason(servo_id):
+            self._doubted.add(servo_id)
+
+    def _armed(self, servo_id: int, sample: Sample) -> bool:
+        """Tell whether speed and torque limits are as they were written."""
         setup = self._setups[servo_id]
         strength = sample.limit if setup.strength is None else round(setup.strength * TORQUE_FULL)
-        if sample.torque != 1:
-            self._limp.add(servo_id)
-            if not self._known_reason(servo_id):
-                self._suspects.add(servo_id)
-            return
-        self._limp.discard(servo_id)
         armed = acceleration_units(setup.max_accel_steps_s2), strength
-        if (sample.acceleration, sample.limit) != armed:
-            # A restart so short that nobody noticed, and a goal that brought the torque back.
+        return (sample.acceleration, sample.limit) == armed
+
+    def _look_again(self, group: Collection[int]) -> None:
+        """Ask those in doubt once more, and suspect who is not armed indeed.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        ids = tuple(i for i in self._ids if i in self._doubted and i in group)
+        found = self._line.ask_bytes(ids, ARMED.address, ARMED.length)
+        for servo_id, data in found.items():
+            self._doubted.discard(servo_id)
+            sample = ARMED.sample(0, data)
+            if sample.torque != 1:
+                self._limp.add(servo_id)
+                if not self._known_reason(servo_id):
+                    self._suspects.add(servo_id)
+            elif not self._armed(servo_id, sample):
+                # A restart so short that nobody noticed, and a goal that brought the torque back.
+                self._suspects.add(servo_id)
+
+    def _check_next(self, group: Collection[int], now_s: float) -> None:
+        """On a disturbed line compare one servo's settings, the next at the next time.
+
+        An order that noise has changed may pass the sum of one byte and be written anywhere:
+        limits, gains, mode. A servo that differs is set up anew, softly.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        self._check_at_s = now_s + CHECK_S
+        self._checked = (self._checked + 1) % len(self._ids)
+        servo_id = self._ids[self._checked]
+        if servo_id not in group:
+            return
+        # The readings of a line that has just been in trouble do not tell the torque.
+        self._doubted.add(servo_id)
+        if self._revival.differs(servo_id):
+            self._line.errors["setting changed"] += 1
             self._suspects.add(servo_id)
 
     def _known_reason(self, servo_id: int) -> bool:
@@ -187,6 +236,10 @@ class Care:
         Raises:
             drivers.errors.BusLost: the port is gone.
         """
+        if self.engaged and now_s >= self._check_at_s and self._readings.places.disturbed(now_s):
+            self._check_next(group, now_s)
+        if self._doubted and group:
+            self._look_again(group)
         if self._suspects and now_s >= self._revive_at_s:
             self._revive(readings, group, now_s)
         if self.entering:

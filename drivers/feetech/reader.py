@@ -4,14 +4,15 @@ A servo that keeps silent or garbles costs only itself: those whose answers were
 its own are asked again at once without it.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from math import inf
 from typing import NamedTuple
 
 from drivers.bus_roll import Roll, silent_ones
 from drivers.feetech.group import Group
 from drivers.feetech.line import StsLine
-from drivers.feetech.views import Sample, Turns
+from drivers.feetech.views import Sample, View
+from drivers.read_turns import Turns
 
 MOST_GROUPS = 64
 """So many prepared exchanges are kept."""
@@ -31,12 +32,20 @@ class Reader:
         line: the bus.
         roll: who is asked; told who failed.
         together, alone: the views of the group's reading, and of servos asked alone.
+        second: those of readings that confirm others, and have other lengths than they.
     """
 
-    def __init__(self, line: StsLine, roll: Roll, together: Turns, alone: Turns) -> None:
+    def __init__(
+        self,
+        line: StsLine,
+        roll: Roll,
+        together: Turns[View],
+        alone: Turns[View],
+        second: Turns[View],
+    ) -> None:
         self._line = line
         self.roll = roll
-        self._together, self._alone = together, alone
+        self._together, self._alone, self._second = together, alone, second
         self._until_s = inf
         self._groups: dict[tuple[tuple[int, ...], int], Group] = {}
 
@@ -56,8 +65,22 @@ class Reader:
             self._read((due,), heard, now_s, self._alone)
         return heard
 
+    def again(self, ids: Sequence[int]) -> dict[int, Heard]:
+        """Ask some servos once more, in one exchange; who is not in the answer gave no good one.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        group = self._group(tuple(ids), self._second)
+        raw, at_s = self._line.exchange(group.request, group.reply_length)
+        raw = self._line.complete(raw, group.missing, self._line.deadline_s)
+        samples = group.pieces(raw).samples
+        if len(samples) < len(group.ids) and not self._line.quiet:
+            self._line.drain(self._line.patience.seconds)
+        return {servo_id: Heard(sample, at_s) for servo_id, sample in samples.items()}
+
     def _read(
-        self, ids: tuple[int, ...], heard: dict[int, Heard], now_s: float, turns: Turns
+        self, ids: tuple[int, ...], heard: dict[int, Heard], now_s: float, turns: Turns[View]
     ) -> None:
         if not ids:
             return
@@ -72,7 +95,7 @@ class Reader:
         for servo_id, sample in whole.items():
             heard[servo_id] = Heard(sample, at_s)
 
-    def _group(self, ids: tuple[int, ...], turns: Turns) -> Group:
+    def _group(self, ids: tuple[int, ...], turns: Turns[View]) -> Group:
         """Give the prepared exchange for some servos."""
         view = turns.next()
         key = ids, view.address
@@ -90,7 +113,7 @@ class Reader:
         at_s: float,
         heard: dict[int, Heard],
         now_s: float,
-        turns: Turns,
+        turns: Turns[View],
     ) -> None:
         """Save what is right of an answer; ask again those who lost theirs through another."""
         while True:
@@ -110,7 +133,7 @@ class Reader:
             raw, at_s = self._line.exchange(group.request, group.reply_length)
 
     def _blame(
-        self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: Turns
+        self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: Turns[View]
     ) -> None:
         """Note who failed; what still comes must not be taken for the next answer."""
         line, roll = self._line, self.roll

@@ -1,8 +1,9 @@
 """From register units to what the rest of the machine is given, with what was last known.
 
 The checksum of the bus is a sum of one byte: bytes spoilt in two places pass it now and
-then. So a position that no joint can have come to since the last one is not given, unless
-the next one says the same.
+then. So a position that no joint can have come to since the last one is not given
+(``drivers.plausibility``), and on a disturbed line every answer needs a second one that says
+the same.
 """
 
 from collections.abc import Sequence
@@ -10,28 +11,32 @@ from collections.abc import Sequence
 from drivers.feetech.reader import Heard
 from drivers.feetech.table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
 from drivers.feetech.turn import nearest_turn
+from drivers.plausibility import Plausibility
 from drivers.types import ServoReading, ServoSetup
 
-LEAP_STEPS = STEPS_PER_TURN // 8
-"""A joint does not move so far between two answers, beyond what its motor can do."""
+ALIKE_C, ALIKE_TENTH_V = 3, 10
+"""So far apart temperatures and voltages of two answers right after one another may be."""
 
 MOST_CELSIUS = 125
 """A temperature above is none."""
 
 
 class Readings:
-    """Makes readings; keeps torque, fault, temperature and voltage from one to the next."""
+    """Makes readings; keeps torque, fault, temperature and voltage from one to the next.
+
+    places: which positions can be true
+    """
 
     def __init__(self, setups: Sequence[ServoSetup]) -> None:
         count = len(setups)
         self.want(setups)
-        self._fastest = [MODELS[s.model].no_load_rpm / 60.0 * STEPS_PER_TURN for s in setups]
+        self.places = Plausibility(
+            [MODELS[s.model].no_load_rpm / 60.0 * STEPS_PER_TURN for s in setups]
+        )
         self._torque = [False] * count
         self._fault = [""] * count
         self._warm: list[float | None] = [None] * count
         self._volts: list[float | None] = [None] * count
-        self._last: list[tuple[int, float] | None] = [None] * count
-        self._odd: list[int | None] = [None] * count
 
     def want(self, setups: Sequence[ServoSetup]) -> None:
         """Take other ranges for the same servos."""
@@ -45,14 +50,31 @@ class Readings:
         """Note what a servo suffers from, "" for nothing."""
         self._fault[slot] = fault
 
-    def forget_places(self) -> None:
-        """Believe the next positions whatever they are, as after a port that was gone."""
-        self._last = [None] * len(self._last)
-
     def believes(self, slot: int, heard: Heard) -> bool:
         """Tell whether one servo's answer can be true; to be asked once for every answer."""
         position = nearest_turn(heard.sample.position, *self._ranges[slot])
-        return not self._leaps(slot, position, heard.at_s)
+        return self.places.one(slot, position, heard.at_s)
+
+    def confirmed(self, slot: int, first: Heard, second: Heard) -> Heard | None:
+        """Give what two answers right after one another both say; None where they differ."""
+        one, other = first.sample, second.sample
+        alike = (
+            abs(one.temperature - other.temperature) <= ALIKE_C
+            and abs(one.voltage - other.voltage) <= ALIKE_TENTH_V
+            and self.places.pair(slot, one.position, first.at_s, other.position, second.at_s)
+        )
+        if not alike:
+            return None
+        # The middle of both, and the smaller of what nothing else can tell damage of.
+        return first._replace(
+            sample=one._replace(
+                error=one.error & other.error,
+                position=(one.position + other.position) // 2,
+                velocity=min(one.velocity, other.velocity, key=abs),
+                load=min(one.load, other.load, key=abs),
+                current=min(one.current, other.current, key=abs),
+            )
+        )
 
     def one(self, slot: int, heard: Heard) -> ServoReading:
         """Take one servo's answer."""
@@ -77,21 +99,8 @@ class Readings:
         """Make the first reading of a servo that was just set up again and stands still."""
         self._torque[slot] = torque
         position = nearest_turn(position, *self._ranges[slot])
-        self._last[slot], self._odd[slot] = (position, at_s), None
+        self.places.place(slot, position, at_s)
         return self._make(slot, position, 0.0, 0.0, at_s, False, 0.0)
-
-    def _leaps(self, slot: int, position: int, at_s: float) -> bool:
-        """Tell whether a position is too far from the last one, and the first that is."""
-        last, odd = self._last[slot], self._odd[slot]
-        self._odd[slot] = None
-        if last is not None:
-            reach = LEAP_STEPS + 2.0 * self._fastest[slot] * max(0.0, at_s - last[1])
-            twice = odd is not None and abs(position - odd) <= LEAP_STEPS
-            if abs(position - last[0]) > reach and not twice:
-                self._odd[slot] = position
-                return True
-        self._last[slot] = position, at_s
-        return False
 
     def _make(
         self,

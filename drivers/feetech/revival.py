@@ -63,6 +63,17 @@ class Revival:
         finally:
             self._line.tries = before
 
+    def differs(self, servo_id: int) -> bool:
+        """Tell whether a servo's settings are not as they should be; one that is silent may be.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        try:
+            return bool(self._fitting.differences((servo_id,)))
+        except ServoMissing:
+            return False
+
     def _revive(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
         line = self._line
         line.write_all(ids, "status_return_level", [1] * len(ids))
@@ -95,6 +106,11 @@ class Revival:
     def _same_models(self, ids: tuple[int, ...]) -> tuple[int, ...]:
         """Leave out servos of another model than before."""
         numbers = self._line.ask(ids, "model_number")
+        others = [i for i, n in numbers.items() if n != MODELS[self._setups[i].model].number]
+        if others:
+            # Damaged bytes may pass for another model: who has been exchanged says so twice.
+            again = self._line.ask(others, "model_number")
+            numbers = {i: n for i, n in numbers.items() if i not in others or again.get(i) == n}
         same = []
         for servo_id, number in numbers.items():
             model = self._setups[servo_id].model
@@ -112,6 +128,10 @@ class Revival:
         """
         present = dict(zip(ids, positions(self._line, ids), strict=True))
         astray = [i for i in ids if self.is_lost(i, present[i])]
+        if astray:
+            # Damaged bytes may pass for such a place.
+            again = dict(zip(astray, positions(self._line, astray), strict=True))
+            astray = [i for i in astray if self.is_lost(i, again[i])]
         for servo_id in astray:
             self._health.name(servo_id, FAR_SIDE)
         if astray:

@@ -9,13 +9,10 @@ not the one waited for.
 """
 
 import struct
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from drivers.feetech.table import REGISTERS
-
-CALM_S = 0.25
-"""So long after the last trouble no answer is late any more."""
+from drivers.read_turns import Turns
 
 
 class Sample(NamedTuple):
@@ -77,46 +74,32 @@ class View:
 
 
 SENSED = View(REGISTERS["present_position"].address)
+LONGER = View(SENSED.address - 1)
+"""The same in another length: a line that says its last answer again is not taken at its word."""
+
 ARMED = View(REGISTERS["torque_enable"].address)
 
-_SPARE = tuple(View(SENSED.address - more) for more in range(1, 6))
+_SPARE = tuple(View(SENSED.address - more) for more in range(2, 7))
+_SECOND = tuple(View(SENSED.address - more) for more in range(7, 11))
+"""For readings that confirm others: an answer must not pass for its own proof."""
+
 _ALONE = tuple(View(ARMED.address - more) for more in range(1, 11))
 """For servos asked alone: never as long as a reading of the group, and never twice the same."""
 
 
-class Turns:
-    """Says which view is read next: the usual ones in turn, after trouble others for a while."""
-
-    def __init__(self, usual: Sequence[View], spare: Sequence[View]) -> None:
-        self._usual, self._spare = tuple(usual), tuple(spare)
-        self._at, self._spares = -1, -1
-        self._calm_at_s = 0.0
-        self.troubled = False
-
-    def next(self) -> View:
-        """Give the view of the next reading."""
-        if self.troubled:
-            return self._spare[self._spares]
-        self._at = (self._at + 1) % len(self._usual)
-        return self._usual[self._at]
-
-    def trouble(self, now_s: float) -> None:
-        """Note that an answer stayed out: the next reading has another length."""
-        self.troubled = True
-        self._spares = (self._spares + 1) % len(self._spare)
-        self._calm_at_s = now_s + CALM_S
-
-    def calm(self, now_s: float) -> None:
-        """Note the time; the usual views come back when nothing can be late any more."""
-        if now_s >= self._calm_at_s:
-            self.troubled = False
-
-
-def together_turns(torque_every: int) -> Turns:
+def together_turns(torque_every: int) -> Turns[View]:
     """Give the views of the group's reading; every so many tell the torque as well."""
-    return Turns((ARMED, *(SENSED,) * (torque_every - 1)), _SPARE)
+    usual = [ARMED, *(SENSED, LONGER) * torque_every][:torque_every]
+    if torque_every == 1:
+        usual.append(View(ARMED.address - 1))
+    return Turns(usual, _SPARE)
 
 
-def alone_turns() -> Turns:
+def alone_turns() -> Turns[View]:
     """Give the views for servos that are asked alone."""
     return Turns(_ALONE, _ALONE)
+
+
+def again_turns() -> Turns[View]:
+    """Give the views of readings that confirm others."""
+    return Turns(_SECOND, _SECOND)

@@ -1,0 +1,104 @@
+"""Positions that a joint can have, told from those that noise has made. Numbers in, masks out.
+
+A check over the bytes of an answer lets some damaged ones pass: a sum of one byte one in
+256, a CRC of two bytes one in 65,536. Between two answers a joint moves no farther than its
+motor can turn it, so a position farther away is not given as fresh. A joint that really is
+elsewhere - pushed by hand, restarted, counted anew by a turn - says so again and again, and
+is believed then.
+"""
+
+from collections.abc import Sequence
+
+SLACK_STEPS = 64
+"""So far apart two answers may be whatever the time between them: play, and jitter."""
+
+LATE_S = 0.01
+"""An answer may have been given so long before it was taken."""
+
+MARGIN = 1.5
+"""A joint may move so much faster than its motor without load: it is pushed, or it falls."""
+
+AGREEING = 3
+"""So many answers in a row that agree with each other are believed wherever they are."""
+
+DISTURBED_S = 5.0
+"""So long after a damaged answer the line counts as disturbed."""
+
+PAIR_STEPS = 8
+"""Two answers right after one another may be so far apart, beyond what the motor can do."""
+
+
+class Plausibility:
+    """Knows where each servo was last, and how far it can have come since.
+
+    Args:
+        fastest_steps_s: speed of each servo's motor without load.
+    """
+
+    def __init__(self, fastest_steps_s: Sequence[float]) -> None:
+        self._fastest = tuple(fastest_steps_s)
+        self._pace = tuple(MARGIN * speed for speed in fastest_steps_s)
+        self._free = tuple(SLACK_STEPS + LATE_S * pace for pace in self._pace)
+        self._damaged_s = float("-inf")
+        self.forget()
+
+    def forget(self) -> None:
+        """Believe the next positions whatever they are, as after a port that was gone."""
+        count = len(self._fastest)
+        self._last: list[int | None] = [None] * count
+        self._at_s = [0.0] * count
+        self._odd: list[list[tuple[int, float]]] = [[] for _ in range(count)]
+        self._whole_s = float("nan")
+
+    def place(self, slot: int, position: int, at_s: float) -> None:
+        """Note where a servo was found by other means than its cyclic answer."""
+        self._last[slot], self._at_s[slot] = position, at_s
+        self._odd[slot].clear()
+        self._whole_s = float("nan")
+
+    def whole(self, positions: Sequence[int], at_s: float) -> bool:
+        """Tell whether all positions of one answer can be true; they are noted only then."""
+        last, since_s = self._last, at_s - self._whole_s
+        # Every tick: where all were last heard together there is one time for all of them.
+        if not since_s >= 0.0 or None in last:
+            return False
+        for now, before, free, pace in zip(positions, last, self._free, self._pace, strict=True):
+            if not -free - pace * since_s <= now - before <= free + pace * since_s:  # type: ignore[operator]
+                return False
+        self._last[:] = positions
+        self._whole_s = at_s
+        self._at_s[:] = [at_s] * len(last)
+        return True
+
+    def one(self, slot: int, position: int, at_s: float) -> bool:
+        """Tell whether one servo's position can be true; to be asked once for every answer."""
+        last, odd = self._last[slot], self._odd[slot]
+        if last is not None and not self._near(slot, last, self._at_s[slot], position, at_s):
+            if odd and not self._near(slot, *odd[-1], position, at_s):
+                odd.clear()
+            odd.append((position, at_s))
+            if len(odd) < AGREEING:
+                return False
+        self.place(slot, position, at_s)
+        if all(at == at_s for at in self._at_s) and None not in self._last:
+            self._whole_s = at_s
+        return True
+
+    def _near(self, slot: int, before: int, before_s: float, now: int, now_s: float) -> bool:
+        reach = self._free[slot] + self._pace[slot] * max(0.0, now_s - before_s)
+        return abs(now - before) <= reach
+
+    # --- a line on which answers have been damaged of late
+
+    def damaged(self, at_s: float) -> None:
+        """Note that an answer arrived damaged, or was not plausible."""
+        self._damaged_s = at_s
+
+    def disturbed(self, now_s: float) -> bool:
+        """Tell whether answers have been damaged of late."""
+        return now_s - self._damaged_s <= DISTURBED_S
+
+    def pair(self, slot: int, first: int, first_s: float, second: int, second_s: float) -> bool:
+        """Tell whether two answers right after one another can both be true."""
+        reach = PAIR_STEPS + self._fastest[slot] * max(0.0, second_s - first_s)
+        return abs(second - first) <= reach

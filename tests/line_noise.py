@@ -1,0 +1,206 @@
+"""Servo buses over a noisy emulated line, tick by tick: what they give as fresh, against the truth.
+
+Everything is in this process and on simulated time. Steps are the servos' own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import pi, sin
+
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from drivers.errors import DriverError
+from drivers.feetech.bus import FeetechBus, FeetechParams
+from drivers.maestro.bus import MaestroBus, MaestroParams
+from drivers.types import ServoBus, ServoReading, ServoSetup
+from sim_mock.device import Device
+from sim_mock.emulated import DynamixelLine, Emulated, MaestroLine, StsLine, build
+from sim_mock.hobby_servo import HobbySpec
+from sim_mock.ports import InProcessPort
+from sim_mock.servo_physics import ServoSpec
+
+TICK_S = 0.005
+IDS = (1, 2, 3, 4, 5, 6)
+KINDS = ("dynamixel", "dynamixel direct", "feetech", "maestro", "maestro crc")
+RANGES = {"dynamixel": (1000, 3000), "feetech": (1000, 3000), "maestro": (4400, 7600)}
+SPEED_STEPS_S = {"dynamixel": 4000.0, "feetech": 3000.0, "maestro": 12_000.0}
+"""Armed in the servos, or in the board."""
+
+WRONG_STEPS = 6
+"""A value given as fresh is wrong from so far off on: half a degree from where the joint was
+while it was asked."""
+
+OUTSIDE_STEPS = 30
+"""A joint swings so far beyond its range by its own inertia where its servo stops it."""
+
+
+@dataclass
+class Outcome:
+    """What came of a run.
+
+    damaged: answers of servos, or of the board, that were spoilt or stayed out
+    fresh: values given as measured; wrong: those that were not true; worst: by how many steps
+    outside: ticks in which a joint was outside its range; farthest: by how many steps
+    ended: a reason for which a run would have ended, "" where there was none
+    recover_s: from the end of the noise to all servos fresh, under torque and near their goals
+    fastest: largest speed of a joint as a multiple of what was armed
+    """
+
+    kind: str
+    rate: float
+    cycles: int = 0
+    damaged: int = 0
+    fresh: int = 0
+    wrong: int = 0
+    worst: float = 0.0
+    outside: int = 0
+    farthest: float = 0.0
+    ended: str = ""
+    recover_s: float | None = None
+    fastest: float = 0.0
+    said: list[str] = field(default_factory=list)
+    errors: dict[str, int] = field(default_factory=dict)
+
+
+class Noisy:
+    """Six servos of one kind, the truth about them, and a line that faults strike.
+
+    Args:
+        kind: one of ``KINDS``.
+        seed: of the line's noise.
+    """
+
+    def __init__(self, kind: str, seed: int = 1) -> None:
+        self.kind = kind
+        self._make = kind.split()[0]
+        self.low, self.high = RANGES[self._make]
+        self.now = 10.0
+        self.device: Device = build(self._emulated(kind), lambda: self.now, seed)
+        if kind == "maestro crc":
+            self.device.choose("crc", "on")
+        self._seen: list[tuple[float, ...]] = []
+        self.port = InProcessPort(self.device, self._tap, "noisy line", self._sleep_until)
+        self.bus = self._bus(kind)
+
+    def _sleep_until(self, t_s: float) -> None:
+        self.now = max(self.now, t_s)
+
+    def _tap(self, data: bytes) -> None:
+        """Note where the joints are when anything is asked: an answer tells one of these."""
+        self._seen.append(self.truth())
+
+    def _emulated(self, kind: str) -> Emulated:
+        middle = (self.low + self.high) // 2
+        if self._make == "maestro":
+            specs = [HobbySpec(i, middle, min_steps=2000, max_steps=10_000) for i in IDS]
+            return MaestroLine(12, servos=tuple(specs))
+        model = "sts3215" if self._make == "feetech" else "xl330-m077"
+        servos = tuple(ServoSpec(i, model, middle) for i in IDS)
+        return StsLine(servos) if self._make == "feetech" else DynamixelLine(servos)
+
+    def _bus(self, kind: str) -> ServoBus:
+        model = {"dynamixel": "xl330-m077", "feetech": "sts3215", "maestro": "hobby"}[self._make]
+        rest = (self.low + self.high) // 2 if self._make == "maestro" else None
+        speed = SPEED_STEPS_S[self._make]
+        setups = [
+            ServoSetup(i, model, self.low, self.high, speed, f"joint_{i}", rest_steps=rest)
+            for i in IDS
+        ]
+        if self._make == "maestro":
+            params = MaestroParams(stagger_ms=0.0, crc=kind.endswith("crc"))
+            return MaestroBus(self.port, setups, params)
+        if self._make == "feetech":
+            return FeetechBus(self.port, setups, FeetechParams())
+        direct = kind.endswith("direct")
+        params = DynamixelParams(indirect_block=not direct, fast_sync_read=not direct)
+        return DynamixelBus(self.port, setups, params)
+
+    def truth(self) -> tuple[float, ...]:
+        """Give where the joints truly are."""
+        places = self.device.positions_steps()
+        return tuple(places[i] for i in IDS) if self._make == "maestro" else places
+
+    def goals(self, t_s: float) -> list[int]:
+        """Give goals that swing slower than the joints' limits and reach the ends of the range."""
+        half = 0.5 * (self.high - self.low)
+        return [
+            round(self.low + half * (1.0 + sin(2.0 * pi * 0.4 * t_s + 0.7 * i)))
+            for i in range(len(IDS))
+        ]
+
+    def start(self) -> None:
+        """Open the bus, switch torque on and lead all joints to their first goals."""
+        self.bus.open()
+        self.bus.engage()
+        self.bus.events()
+        for _ in range(200):
+            self._tick(None)
+
+    def run(self, fault: str, rate: float, cycles: int, patience_s: float = 20.0) -> Outcome:
+        """Tick with a fault of the line, then without it until all is well again."""
+        outcome = Outcome(self.kind, rate)
+        self.device.faults.command(fault)
+        try:
+            for _ in range(cycles):
+                self._tick(outcome)
+                outcome.cycles += 1
+                if outcome.ended:
+                    break
+        except DriverError as error:
+            outcome.ended = str(error)
+        before = dict(self.bus.health().errors)
+        outcome.errors = before
+        self.device.faults.command("clear")
+        outcome.recover_s = self._recover(patience_s)
+        return outcome
+
+    def _tick(self, outcome: Outcome | None) -> None:
+        before = self.truth()
+        began = self.now
+        self._seen.clear()
+        readings = self.bus.read(self.now)
+        if outcome is not None:
+            self._judge(outcome, readings)
+        self.bus.write(self.goals(self.now))
+        self.now = max(self.now, began + TICK_S)
+        after = self.truth()
+        if outcome is not None:
+            span = self.now - began
+            top = max(abs(b - a) for a, b in zip(before, after, strict=True)) / span
+            outcome.fastest = max(outcome.fastest, top / SPEED_STEPS_S[self._make])
+            outcome.said += self.bus.events()
+
+    def _judge(self, outcome: Outcome, readings: Sequence[ServoReading | None]) -> None:
+        for k, (reading, place) in enumerate(zip(readings, self.truth(), strict=True)):
+            beyond = max(self.low - place, place - self.high)
+            outcome.farthest = max(outcome.farthest, beyond)
+            outcome.outside += beyond > OUTSIDE_STEPS
+            if reading is None:
+                outcome.damaged += 1
+                continue
+            if reading.fault and not outcome.ended:
+                outcome.ended = reading.fault
+            if not reading.measured:
+                continue
+            outcome.fresh += 1
+            places = [seen[k] for seen in self._seen]
+            at = reading.position_steps
+            off = max(min(places) - at, at - max(places))
+            outcome.worst = max(outcome.worst, off)
+            outcome.wrong += off > WRONG_STEPS
+
+    def _recover(self, patience_s: float) -> float | None:
+        """Tick until every servo is fresh, near where it was sent and powered."""
+        began = self.now
+        while self.now - began < patience_s:
+            tick = self.now
+            try:
+                readings = self.bus.read(self.now)
+                self.bus.write(self.goals(began))
+            except DriverError:
+                return None
+            self.now = max(self.now, tick + TICK_S)
+            goals, truth = self.goals(began), self.truth()
+            near = all(abs(g - p) < 60 for g, p in zip(goals, truth, strict=True))
+            if near and all(r is not None and r.torque and not r.fault for r in readings):
+                return self.now - began
+        return None

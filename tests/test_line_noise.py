@@ -1,0 +1,47 @@
+"""Noise to and fro on every kind of bus; the long form is tests/attack/line_noise.py."""
+
+import pytest
+from line_noise import Noisy
+
+SMART = ("dynamixel", "dynamixel direct", "feetech")
+
+
+@pytest.mark.parametrize("kind", SMART)
+@pytest.mark.parametrize("percent", [0.2, 2.0])
+def test_noise_gives_no_wrong_value_moves_no_joint_out_and_ends_nothing(kind, percent):
+    noisy = Noisy(kind, seed=3)
+    noisy.start()
+    outcome = noisy.run(f"static {percent}", percent, 1200)
+    assert outcome.damaged > 100
+    assert outcome.fresh > 500
+    assert outcome.wrong == 0, outcome
+    assert outcome.outside == 0, outcome
+    assert outcome.ended == ""
+    assert outcome.recover_s is not None
+    assert outcome.recover_s < 2.0
+
+
+@pytest.mark.parametrize("kind", SMART)
+def test_a_line_that_says_its_last_answer_again_first_is_not_believed(kind):
+    noisy = Noisy(kind)
+    noisy.start()
+    outcome = noisy.run("repeat", 0.0, 400)
+    assert (outcome.wrong, outcome.ended, outcome.damaged) == (0, "", 0)
+
+
+@pytest.mark.parametrize("kind", SMART)
+def test_a_joint_that_was_turned_by_hand_is_believed_soon(kind):
+    noisy = Noisy(kind)
+    noisy.start()
+    noisy.bus.release()
+    for _ in range(100):  # it comes to rest
+        noisy.bus.read(noisy.now)
+        noisy.now += 0.005
+    noisy.device.faults.command("turn 3 1000")
+    seen = []
+    for _ in range(8):
+        seen.append(noisy.bus.read(noisy.now)[2])
+        noisy.now += 0.005
+    assert seen[0] is None
+    assert abs(seen[-1].position_steps - noisy.truth()[2]) <= 2
+    assert noisy.bus.health().errors["implausible"] == 2

@@ -1,0 +1,70 @@
+"""Which positions are believed, from how far a joint can have come."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.plausibility import AGREEING, DISTURBED_S, Plausibility
+
+SPEED = 4000.0
+STEP = 47_835 * 4096 // 360
+"""What damaged bytes that passed a CRC once said, in steps."""
+
+
+def known(*places):
+    plausible = Plausibility([SPEED] * len(places))
+    for slot, place in enumerate(places):
+        assert plausible.one(slot, place, 1.0)
+    return plausible
+
+
+def test_a_place_out_of_reach_is_not_believed_and_changes_nothing():
+    plausible = known(1000, 2000)
+    assert not plausible.whole((1010, STEP), 1.005)
+    assert plausible.whole((1010, 2010), 1.005)
+    assert not plausible.one(0, STEP, 1.01)
+    assert plausible.one(0, 1020, 1.015)
+
+
+def test_who_says_so_again_and_again_is_believed():
+    plausible = known(1000, 2000)
+    said = [plausible.one(1, 3500 + k, 1.0 + 0.005 * k) for k in range(1, AGREEING + 1)]
+    assert said == [False] * (AGREEING - 1) + [True]
+    assert plausible.one(1, 3500, 1.1)
+
+
+def test_values_that_disagree_with_each_other_are_never_believed():
+    plausible = known(1000)
+    assert not any(plausible.one(0, 3000 + 900 * (k % 2), 1.0 + 0.005 * k) for k in range(1, 40))
+
+
+def test_reach_grows_with_time_and_all_is_believed_after_a_port_was_gone():
+    plausible = known(1000)
+    assert not plausible.one(0, 3000, 1.1)
+    assert plausible.one(0, 3000, 1.6)
+    plausible.forget()
+    assert plausible.one(0, -40_000, 1.61)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.floats(-SPEED, SPEED), min_size=1, max_size=40), st.data())
+def test_no_motion_that_the_motor_can_make_is_refused(speeds, data):
+    plausible, at_s, place = known(2000, 2000), 1.0, 2000.0
+    for speed in speeds:
+        dt_s = data.draw(st.floats(0.001, 0.05))
+        at_s, place = at_s + dt_s, place + speed * dt_s
+        assert plausible.whole((round(place), 2000), at_s)
+
+
+def test_a_line_is_disturbed_for_a_while_after_a_damaged_answer():
+    plausible = known(1000)
+    assert not plausible.disturbed(1.0)
+    plausible.damaged(1.0)
+    assert plausible.disturbed(1.0 + DISTURBED_S)
+    assert not plausible.disturbed(1.1 + DISTURBED_S)
+
+
+def test_two_answers_right_after_one_another_agree_within_the_motor_s_way():
+    plausible = known(1000)
+    assert plausible.pair(0, 1000, 2.0, 1008, 2.0)
+    assert not plausible.pair(0, 1000, 2.0, 1009, 2.0)
+    assert plausible.pair(0, 1000, 2.0, 1011, 2.001)
