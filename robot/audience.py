@@ -23,6 +23,7 @@ from robot.page.snapshot import Snapshots
 from robot.recording.recorder import Recorder
 from robot.recording.run_info import RunInfo
 from robot.remote.live_control import FileTuning, LiveControl
+from robot.reply import OrderTaker, Ticket
 
 _SWITCH_S = 0.0003
 
@@ -259,14 +260,14 @@ class Audience:
             self._snapshots.rig = self._made.shown()
 
 
-def only_stops(order: Callable[[Order], None]) -> Callable[[Order], None]:
+def only_stops(order: OrderTaker) -> OrderTaker:
     """Give what takes stop and resume alone; of the rest, it raises ValueError."""
 
-    def take(asked: Order) -> None:
+    def take(asked: Order) -> Ticket | None:
         if not isinstance(asked, Stop | Resume):
             raise ValueError(
                 f"the buttons of {STEER!r} lead the head now; besides them only stop and resume go"
             )
-        order(asked)
+        return order(asked)
 
     return take

@@ -2,7 +2,6 @@
 
 import contextlib
 import gc
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, radians
@@ -10,19 +9,24 @@ from typing import NamedTuple, Protocol
 
 from drivers.errors import DriverError, ServoFault, SetupError
 from drivers.types import Camera
-from gaze.aversion import MODES, Aversion
+from gaze.aversion import Aversion
 from gaze.lids import Lids
 from gaze.oculomotor import Oculomotor
 from gaze.scanpath import Scanpath
 from gaze.top_down import TopDown
-from gaze.types import GazeState, Percept, Target, Vec3
+from gaze.types import GazeState, Percept, Target
 from robot.body import Body
 from robot.clock import Clock
 from robot.frames import PoseHistory
 from robot.kinematics import Kinematics
-from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune, check
+from robot.lead import Lead
+from robot.menus import Menus, refuse_absent, refuse_out_of_range, refuse_unknown
+from robot.order_queue import OrderQueue
+from robot.orders import Ask, Jog, LookAt, Order, Renew, Resume, Stop, Tune, check
+from robot.reply import Reply, Ticket
 from robot.safety.guard import Guard
 from robot.seeing.perception import Perception
+from robot.stop_latch import StopLatch
 from robot.tick import Tick as Tick
 from robot.tick import at_rest
 from robot.types import JointAngles
@@ -45,15 +49,6 @@ class LoopParams:
             "says": "longest time for parking before torque goes off",
         },
     )
-
-
-LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
-    "awake": lambda lids, t_s: lids.sleepy(0.0),
-    "sleepy": lambda lids, t_s: lids.sleepy(0.7),
-    "wink left": lambda lids, t_s: lids.wink("left", t_s),
-    "wink right": lambda lids, t_s: lids.wink("right", t_s),
-}
-"""What can be asked of the lids."""
 
 
 class LoopCount(NamedTuple):
@@ -108,42 +103,51 @@ class Robot:
         self._scanpath = scanpath
         self._aversion = aversion
         self._oculomotor = oculomotor
-        self._lids = lids
+        self._menus = Menus(aversion, lids)
         self._guard = guard
         self._settled = True
-        self._orders: deque[Order] = deque()
-        self._looked_at: Vec3 | None = None
-        self._puppet_shifts = 0
-        self._jogged: JointAngles = ()
+        self._orders = OrderQueue()
+        self._lead = Lead()
+        self._latch = StopLatch()
         self._last: JointAngles = ()
         # The models lead again: they begin where this tick finds head and eyes.
         self._takes_over = False
-        self.stopped = ""
         self.tune: Callable[[Tune, float], tuple[str, ...]] = _not_tunable
         self._told: list[str] = []
+        self._refused = ""
 
-    def order(self, order: Order) -> None:
+    @property
+    def stopped(self) -> str:
+        """Return why somebody stopped the robot, "" while it moves."""
+        return self._latch.why
+
+    def order(self, order: Order) -> Ticket:
         """Ask for something, from the next tick on; may be called from any thread.
 
+        Returns:
+            Where the reply comes, once the loop has taken the order up.
+
         Raises:
-            ValueError: it cannot be done; the message lists what there is.
+            ValueError: it cannot be done, or too many orders wait; the message says which,
+                and what there is.
+        """
+        check(order)
+        if isinstance(order, Jog):
+            refuse_out_of_range(order, self.body.names, self._guard.limits)
+        return self.order_again(order)
+
+    def order_again(self, order: Order) -> Ticket:
+        """Ask for what was accepted in a recorded run, whatever the ranges are now.
+
+        Raises:
+            ValueError: as ``order``.
         """
         check(order)
         if isinstance(order, Ask):
-            menus = self.menus()
-            if order.menu not in menus:
-                raise ValueError(
-                    f"nothing called {order.menu!r} to choose; there is {', '.join(menus)}"
-                )
-            if order.choice not in menus[order.menu]:
-                there = ", ".join(menus[order.menu])
-                raise ValueError(f"no {order.menu} {order.choice!r}; there is {there}")
+            refuse_unknown(order, self.menus())
         if isinstance(order, Jog):
-            for name, _ in order.angles_rad:
-                if name not in self.body.names:
-                    there = ", ".join(self.body.names)
-                    raise ValueError(f"this rig has no joint {name!r}; there is {there}")
-        self._orders.append(order)
+            refuse_absent(order, self.body.names)
+        return self._orders.add(order)
 
     def ask(self, menu: str, choice: str) -> None:
         """Ask for a behaviour, a mode of conversation or a wink, from the next tick on.
@@ -157,12 +161,7 @@ class Robot:
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Give what ``ask`` takes: menu -> choices, the present one first."""
-        top_down = self.attention.top_down
-        return {
-            "behaviour": _first(top_down.behaviour, top_down.behaviours),
-            "conversation": _first(self._aversion.mode, MODES),
-            "lids": tuple(LID_COMMANDS),
-        }
+        return self._menus.offered(self.attention.top_down)
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch torque on where the joints are, begin from there.
@@ -219,18 +218,17 @@ class Robot:
             self._oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
-        target = self._led(self.attention.choose(percept, pose, t_s), t_s)
+        target = self._lead.target(self.attention.choose(percept, pose, t_s), t_s)
         target = self._scanpath.wander(target, percept, t_s, self._settled, pose.p_world_head_m)
         target = self._aversion.step(target, pose.p_world_head_m, t_s)
         gaze = self._oculomotor.step(target, pose, t_s, dt_s)
         self._settled = gaze.phase != "saccade"
-        wish = self._jogged or self._kinematics.inverse(gaze)
+        wish = self._lead.pose_rad or self._kinematics.inverse(gaze)
         if self.stopped:
             verdict = at_rest(joints, wish, self.stopped, self.body.names)
         else:
             # What a person chose to look at is there whatever the camera shows.
-            led = bool(self._jogged) or self._looked_at is not None
-            age_s = 0.0 if led else percept.age_s(t_s) if percept is not None else inf
+            age_s = 0.0 if self._lead.active else percept.age_s(t_s) if percept is not None else inf
             verdict = self._guard.check(wish, joints, age_s, t_s)
             self.body.write(verdict.command_rad)
         self._last = verdict.command_rad
@@ -238,7 +236,7 @@ class Robot:
         self._told.clear()
         return Tick(
             t_s, joints, pose, detections, percept, target, gaze, wish, verdict, events, orders,
-            self.stopped,
+            self.stopped, self._lead.words,
         )  # fmt: skip
 
     def park(
@@ -263,10 +261,10 @@ class Robot:
             # A bus that is slow to answer must not make it longer.
             if t_s > end_s or (again is not None and again()):
                 return False
-            while self._orders:
-                if isinstance(order := self._orders.popleft(), Stop):
-                    self._halt(order.why)
-                    return False
+            if stops := self._orders.stops():
+                for stop in stops:
+                    stop.ticket.answer(self._obey_one(stop.order, t_s))
+                return False
             joints = self.body.read(t_s)
             # Parking goes home whatever the camera shows.
             self.body.write(self._guard.check(pose_rad, joints, 0.0, t_s).command_rad)
@@ -283,94 +281,94 @@ class Robot:
             self.camera.close()
 
     def _obey(self, t_s: float) -> tuple[Order, ...]:
-        """Put in force what was asked for."""
-        if not self._orders:
-            return ()
-        obeyed: list[Order] = []
-        while self._orders:
-            order = self._orders.popleft()
-            match order:
-                case Ask(menu, choice):
-                    self._choose(menu, choice, t_s)
-                case LookAt(p_world_m):
-                    self._looked_at = p_world_m
-                    self._puppet_shifts += 1
-                    self._jog((), t_s)
-                case Jog(angles_rad):
-                    self._jog(angles_rad, t_s)
-                case Stop(why):
-                    self._halt(why)
-                case Resume():
-                    self._resume(t_s)
-                case Tune():
-                    self._told += self.tune(order, t_s)
-            obeyed.append(order)
-        return tuple(obeyed)
+        """Put in force what was asked for, and end a lead that nobody renews."""
+        taken = self._orders.take()
+        for order, ticket in taken:
+            ticket.answer(self._obey_one(order, t_s))
+        if self._lead.lapsed(t_s):
+            self._told.append(f"{self._lead.words}: not renewed, so the gaze leads again")
+            self._let_lead(self._lead.end)
+        return tuple([order for order, _ in taken])
 
-    def _choose(self, menu: str, choice: str, t_s: float) -> None:
-        if menu == "behaviour":
-            self.attention.top_down.behave(choice)
-        elif menu == "conversation":
-            mode = next(mode for mode in MODES if mode == choice)
-            self._aversion.converse(mode, t_s)
-            self._lids.mode("rest" if mode == "none" else "conversation")
-        else:
-            LID_COMMANDS[choice](self._lids, t_s)
+    def _obey_one(self, order: Order, t_s: float) -> Reply:
+        """Put one order in force; return what became of it."""
+        match order:
+            case Ask():
+                self._menus.choose(order, self.attention.top_down, t_s)
+            case LookAt() | Jog() if self.stopped:
+                return Reply(f"stopped ({self.stopped}): resume first")
+            case LookAt():
+                return self._look(order, t_s)
+            case Jog():
+                return self._jog(order, t_s)
+            case Renew():
+                if not self._lead.renew(order, t_s):
+                    return Reply(f"{order.who or 'you'} lead nothing now")
+            case Stop():
+                self._halt(order, t_s)
+            case Resume():
+                return self._resume(order, t_s)
+            case Tune():
+                self._told += self.tune(order, t_s)
+        return Reply()
 
-    def _led(self, target: Target, t_s: float) -> Target:
-        """Put the point that a person chose in the place of what attention did."""
-        if self._looked_at is None:
-            return target
-        return Target(
-            self._looked_at, (0.0, 0.0, 0.0), t_s, "puppet", -1, 1.0, True, None,
-            target.shift + self._puppet_shifts, "somebody chose this point", None, target.pulls,
-        )  # fmt: skip
+    def _look(self, order: LookAt, t_s: float) -> Reply:
+        """Look at a point that a person chose, or freely again."""
+        self._let_lead(lambda: self._lead.look(order, t_s))
+        return Reply(asked_m=order.p_world_m, done_m=order.p_world_m)
 
-    def _jog(self, angles_rad: tuple[tuple[str, float], ...], t_s: float) -> None:
+    def _jog(self, order: Jog, t_s: float) -> Reply:
         """Hold all joints but those given; without any, let the models lead again."""
-        if not angles_rad:
-            if self._jogged:
-                self._takes_over = True
-                self._guard.go_gently()
-            self._jogged = ()
-            return
-        angles = dict(zip(self.body.names, self._jogged or self._last, strict=True))
-        angles.update(angles_rad)
-        self._jogged = tuple(angles[name] for name in self.body.names)
-        # A slider can be torn from end to end in no time.
-        self._guard.go_gently()
+        self._let_lead(lambda: self._lead.jog(order, self.body.names, self._last, t_s))
+        if order.angles_rad:
+            # A slider can be torn from end to end in no time.
+            self._guard.go_gently()
+        return Reply()
 
-    def _halt(self, why: str) -> None:
+    def _let_lead(self, change: Callable[[], None]) -> None:
+        """Change who leads; the models begin gently where they take joints over."""
+        held, words = bool(self._lead.pose_rad), self._lead.words
+        change()
+        if held and not self._lead.pose_rad:
+            self._takes_over = True
+            self._guard.go_gently()
+        if self._lead.words and not words:
+            self._told.append(f"led by {self._lead.words}")
+
+    def _halt(self, order: Stop, t_s: float) -> None:
         """Take the torque off at once."""
-        if not self.stopped:
-            self._told.append(f"stopped: {why}; torque off")
-        self.stopped = why or "stopped"
-        self._jogged, self._looked_at = (), None
+        if self._latch.stop(order, t_s):
+            by = f" by {order.who}" if order.who else ""
+            self._told.append(f"stopped{by}: {order.why}; torque off")
+        self._lead.end()
         self.body.let_go()
 
-    def _resume(self, t_s: float) -> None:
+    def _resume(self, order: Resume, t_s: float) -> Reply:
         """Put the torque on where the joints are; a servo that refuses leaves it off."""
         if not self.stopped:
-            return
+            return Reply()
+        by = f" by {order.who}" if order.who else ""
+        if refusal := self._latch.refusal(order, t_s):
+            if refusal != self._refused:  # a flood of them is one line
+                self._told.append(f"resume{by} refused: {refusal}")
+            self._refused = refusal
+            return Reply(refusal)
         try:
             goals = self.body.take_hold()
         except (SetupError, ServoFault) as error:
             self._told.append(f"still stopped: {error}")
-            return
-        self.stopped = ""
-        self._told.append("torque on again: going on slowly")
+            return Reply(self._told[-1])
+        self._latch.lift()
+        self._refused = ""
+        self._told.append(f"torque on again{by}: going on slowly")
         self._guard.reset(t_s, goals)
         self._takes_over = True
+        return Reply()
 
 
 def _not_tunable(order: Tune, t_s: float) -> tuple[str, ...]:
     """Refuse: nobody has said how."""
     return ("this robot's parameters cannot be changed while it runs",)
-
-
-def _first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Put the present choice before the others."""
-    return (present, *(name for name in names if name != present))
 
 
 def run(

@@ -14,6 +14,7 @@ class Tick(NamedTuple):
     events: what has happened on the bus and to the camera, in words
     orders: what people asked for, obeyed at the beginning of this tick
     stopped: why somebody stopped the robot, "" while it moves
+    led: who leads gaze or joints and with what, "" while nobody does
     """
 
     t_s: float
@@ -28,6 +29,7 @@ class Tick(NamedTuple):
     events: tuple[str, ...] = ()
     orders: tuple[Order, ...] = ()
     stopped: str = ""
+    led: str = ""
 
 
 def at_rest(joints: JointState, wish_rad: JointAngles, why: str, names: tuple[str, ...]) -> Verdict:

@@ -35,7 +35,8 @@ from config.load import ConfigError, Fault, shipped_names
 from config.save import Change, Saved, copy_shipped, rig_file, save
 from config.save_text import Unchangeable, written
 from config.schema import Rig, layers_of, load_rig
-from robot.orders import Order, Value
+from robot.orders import Value
+from robot.reply import OrderTaker
 from robot.retune import Retuner
 
 NO_CHARACTER = "none"
@@ -71,7 +72,7 @@ class Tuning:
     def __init__(
         self,
         retuner: Retuner,
-        order: Callable[[Order], None],
+        order: OrderTaker,
         rig: str,
         character: str | None = None,
         profile: str | None = None,

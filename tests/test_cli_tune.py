@@ -26,11 +26,14 @@ from config.load import ConfigError
 from config.save import copy_shipped
 from config.schema import load_rig
 from drivers.errors import SetupError
+from robot import stop_latch
 from robot.assemble import assemble
 from robot.choice import Choice
+from robot.cli.lead import app as lead_app
+from robot.cli.lead import read_point
 from robot.cli.quick import QUICK, is_quick
 from robot.cli.quick import main as quick_main
-from robot.cli.tune import app, read_pairs, read_point, read_value, state_lines
+from robot.cli.tune import app, read_pairs, read_value, state_lines
 from robot.loop import Tick
 from robot.loop import run as run_loop
 from robot.remote.live_control import LiveControl
@@ -45,6 +48,7 @@ PACE_S = 0.02  # real seconds a tick
 
 def serve(path: Path) -> None:
     """Run until SIGTERM; says what the rig says on standard error."""
+    stop_latch.MIN_HOLD_S = stop_latch.MIN_RESUME_GAP_S = 0.0  # time is slow here
     over: list[str] = []
     signal.signal(signal.SIGTERM, lambda *_: over.append("SIGTERM"))
     made = assemble(load_rig(str(path)), Choice(mock=True, fast=True, seed=0, scene="visitor"))
@@ -127,7 +131,7 @@ def as_before(rig: Running, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
     with RunningRig.connect(rig.process.pid) as found:
         found.revert()
-        found.resume()
+        found.resume(confirmed=True)
         found.look_freely()
 
 
@@ -317,7 +321,8 @@ def a_rig_beside() -> Iterator[subprocess.Popen[str]]:
 
 
 def test_look_and_character() -> None:
-    assert gazerig("look", "1", "-0.2", "0.3").returncode == 0
+    done = gazerig("look", "1", "-0.2", "0.3", "--stay")
+    assert done.returncode == 0 and "it looks there, until: gazerig look free" in done.stderr
     with RunningRig.connect() as rig:
         assert rig.status()["why"] == "somebody chose this point"
     assert gazerig("look", "free").returncode == 0
@@ -368,7 +373,7 @@ def test_status_says_what_the_rig_does() -> None:
     gazerig("stop", "finger")
     said = gazerig("status").stdout
     assert "STOPPED, torque off: finger; gazerig resume goes on" in said
-    assert "not saved: 1 value" in said and "said: stopped: finger" in said
+    assert "not saved: 1 value" in said and "said: stopped by gazerig stop (process" in said
     assert json.loads(gazerig("status", "--json").stdout)["stopped"] == "finger"
 
 
@@ -493,7 +498,8 @@ def test_pairs_and_points() -> None:
 
 
 def test_the_quick_way_knows_all_its_commands_and_no_other() -> None:
-    assert {c.name or c.callback.__name__ for c in app.registered_commands if c.callback} == QUICK
+    here = (*app.registered_commands, *lead_app.registered_commands)
+    assert {c.name or c.callback.__name__ for c in here if c.callback} == QUICK
     assert is_quick(["stop"], {}) and is_quick(["set", "a", "1"], {})
     for words in ([], ["run"], ["stop", "--help"], ["--debug", "stop"], ["get", "--debug"]):
         assert not is_quick(words, {})

@@ -15,7 +15,7 @@ import pytest
 from config.save import copy_shipped
 from config.schema import load_rig
 from drivers.errors import DriverError
-from robot.remote.running_rig import NoRig, RunningRig, running
+from robot.remote.running_rig import NoRig, Refused, RunningRig, running
 from robot.remote.sockets import folder, sockets
 
 RATE = "loop.rate_hz"
@@ -92,11 +92,14 @@ def test_it_is_tuned_stopped_and_goes_on(run: Run) -> None:
         assert rig.status()["why"] == "somebody chose this point"
         rig.stop("finger")
         assert rig.status()["stopped"] == "finger"
+        with pytest.raises(Refused, match="holds at least 2 s"):
+            rig.resume()
+        time.sleep(2.1)
         rig.resume()
         assert rig.status()["stopped"] == ""
         rig.save()
     assert load_rig(str(run.file)).loop.rate_hz == 150.0
-    assert run.hears("stopped: finger; torque off")
+    assert run.hears(f"stopped by process {os.getpid()}: finger; torque off")
 
 
 def test_the_file_edited_by_hand_is_taken_or_refused_whole(run: Run) -> None:

@@ -14,7 +14,19 @@ from config.schema import load_rig
 from robot.assemble import Assembly, assemble
 from robot.choice import Choice
 from robot.loop import Tick, run
-from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune, as_json, check, from_json
+from robot.orders import (
+    Ask,
+    Jog,
+    LookAt,
+    Order,
+    Renew,
+    Resume,
+    Stop,
+    Tune,
+    as_json,
+    check,
+    from_json,
+)
 from robot.session import leave
 
 YAW = JOINTS.index("neck_yaw")
@@ -63,8 +75,11 @@ ORDERS: list[Order] = [
     LookAt(None),
     Jog((("neck_yaw", 0.2), ("left_eye_pan", -0.1))),
     Jog(()),
+    Renew("a program"),
     Stop("a hand"),
+    Stop("a hand", "browser 3"),
     Resume(),
+    Resume("browser 3", confirmed=True),
     Tune((("loop.rate_hz", 100.0), ("gaze.saccade.profile", "min_jerk"), ("x", (1, 2)))),
 ]
 
@@ -83,6 +98,14 @@ def test_orders_cross_processes_as_json(order: Order) -> None:
         ({"order": "dance"}, "there is ask, look_at"),
         ({"order": "ask", "menu": "lids"}, "takes menu, choice"),
         ({"order": "ask", "menu": "lids", "choice": "sleepy", "x": 1}, "takes menu, choice"),
+        ({"order": "look_at", "p_world_m": [1e200, 0.0, 0.0]}, "none beyond .-1000 m"),
+        ({"order": "look_at", "p_world_m": [0.0, 10**400, 0.0]}, "none beyond .-1000 m"),
+        ({"order": "look_at", "p_world_m": None, "stay": 1}, "true or false"),
+        ({"order": "jog", "angles_rad": [["neck_yaw", 7.0]]}, "within .-360 deg"),
+        ({"order": "jog", "angles_rad": [["neck_yaw", 0.0]] * 99}, "one a joint"),
+        ({"order": "stop", "why": "x" * 999}, "at most 200"),
+        ({"order": "renew", "who": 3}, "text"),
+        ({"order": "resume", "confirmed": "yes"}, "true or false"),
         ({"order": "ask", "menu": 1, "choice": "sleepy"}, "names"),
         ({"order": "look_at", "p_world_m": [1.0, 2.0]}, "three finite numbers"),
         ({"order": "look_at", "p_world_m": [1.0, nan, 2.0]}, "three finite numbers"),
@@ -138,7 +161,7 @@ def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(
 
 def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running) -> None:
     running.order(Stop("test"))
-    before = running.go(0.5)[-1]
+    before = running.go(2.0)[-1]
     running.order(Resume())
     ticks = running.go(3.0)
     assert not ticks[0].stopped and all(ticks[2].joints.torque)
@@ -162,7 +185,7 @@ def test_a_run_that_ends_stopped_does_not_park(running: Running) -> None:
 
 def test_a_stop_while_parking_is_obeyed_at_once(running: Running) -> None:
     robot, made = running.made.robot, running.made
-    robot.order(Jog((("neck_yaw", radians(50.0)),)))
+    robot.order(Jog((("neck_yaw", radians(50.0)),), stay=True))
     running.go(2.0)
     began_s = made.clock.now_s()
     robot.order(LookAt(None))
@@ -184,7 +207,7 @@ def test_two_stops_are_one_and_a_resume_of_nothing_is_nothing(running: Running) 
 
 def test_the_head_looks_at_a_chosen_point_and_freely_again(running: Running) -> None:
     point = (1.2, 0.6, 0.3)
-    running.order(LookAt(point))
+    running.order(LookAt(point, stay=True))
     ticks = running.go(2.0)
     assert ticks[0].target.kind == "puppet" and ticks[-1].target.p_world_m == point
     assert ticks[-1].gaze.gaze_point_world_m == pytest.approx(point, abs=0.02)
@@ -195,7 +218,7 @@ def test_the_head_looks_at_a_chosen_point_and_freely_again(running: Running) -> 
 
 def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running) -> None:
     held = running.ticks[-1].verdict.command_rad
-    running.order(Jog((("neck_yaw", radians(25.0)),)))
+    running.order(Jog((("neck_yaw", radians(25.0)),), stay=True))
     ticks = running.go(2.0)
     end = ticks[-1].verdict.command_rad
     assert degrees(end[YAW]) == pytest.approx(25.0, abs=0.1)
@@ -212,12 +235,11 @@ def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running
     assert running.go(2.0)[-1].target.kind == "face"
 
 
-def test_a_jog_beyond_the_end_is_limited_and_says_so(running: Running) -> None:
-    running.order(Jog((("neck_yaw", pi),)))
-    tick = running.go(3.0)[-1]
-    joint = load_rig("desk").joints["neck_yaw"]
-    assert degrees(tick.verdict.command_rad[YAW]) <= joint.max_deg + 1e-6
-    assert tick.verdict.why[YAW] == "out of range"
+def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running: Running) -> None:
+    with pytest.raises(ValueError, match=r"neck_yaw 180.0 deg is outside its range, -70..70 deg"):
+        running.order(Jog((("neck_yaw", pi),)))
+    running.order(Jog((("neck_yaw", radians(70.04)),)))  # a slider's rounding
+    assert running.go(0.1)[0].led == "somebody: jog neck_yaw 70.0"
 
 
 def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
@@ -225,3 +247,127 @@ def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
         running.order(Ask("mood", "x"))
     with pytest.raises(ValueError, match="there is awake"):
         running.order(Ask("lids", "x"))
+
+
+# Who may resume, and when
+
+
+def replied(running: Running, order: Order, seconds: float = 0.005) -> str:
+    """Ask, run on, and give why it was refused."""
+    ticket = running.made.robot.order(order)
+    running.go(seconds)
+    reply = ticket.wait(0.0)
+    assert reply is not None
+    return reply.refused
+
+
+def test_a_stop_holds_two_seconds_whoever_asks(running: Running) -> None:
+    running.order(Stop("a hand", "browser 1"))
+    running.go(0.5)
+    assert "holds at least 2 s: ask again in 1.5 s" in replied(running, Resume("browser 1", True))
+    running.go(1.6)
+    assert replied(running, Resume("browser 1")) == "" and not running.made.robot.stopped
+
+
+def test_another_resumes_only_who_confirms(running: Running) -> None:
+    running.order(Stop("a hand", "browser 1"))
+    running.go(2.1)
+    assert "stopped by browser 1: another may only" in replied(running, Resume("browser 2"))
+    assert "stopped by browser 1: another may only" in replied(running, Resume())
+    assert running.made.robot.stopped
+    ticket = running.made.robot.order(Resume("browser 2", confirmed=True))
+    tick = running.go(0.005)[0]
+    assert ticket.wait(0.0) is not None and not tick.stopped
+    assert any("torque on again by browser 2" in event for event in tick.events)
+
+
+def test_a_second_stop_is_anothers_too_and_holds_anew(running: Running) -> None:
+    running.order(Stop("a hand", "browser 1"))
+    running.go(1.5)
+    running.order(Stop("mine too", "browser 2"))
+    running.go(1.0)
+    assert "at least 2 s" in replied(running, Resume("browser 1"))
+    running.go(1.1)
+    assert "browser 1 and browser 2" in replied(running, Resume("browser 1"))
+
+
+@pytest.mark.parametrize("confirmed", [False, True])
+def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool) -> None:
+    running.order(Stop("a hand", "browser 1"))
+    events: list[str] = []
+    for _ in range(700):  # 3.5 s, one a tick
+        running.order(Resume("a loop", confirmed))
+        events += [event for tick in running.go(0.005) for event in tick.events]
+    assert running.made.robot.stopped == "a hand"
+    assert len([event for event in events if "resume" in event]) < 10
+
+
+def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: Running) -> None:
+    tickets = [
+        running.made.robot.order(order)
+        for order in (LookAt((1.0, 0.2, 0.3)), Jog((("neck_yaw", 0.2),)), Resume(confirmed=True))
+    ]
+    running.order(Stop("a hand"))
+    assert running.go(0.005)[0].orders == (Stop("a hand"),)
+    replies = [ticket.wait(0.0) for ticket in tickets]
+    assert all(reply is not None and "stopped since" in reply.refused for reply in replies)
+    assert "resume first" in replied(running, LookAt((1.0, 0.2, 0.3)))
+
+
+# Who leads, and for how long
+
+
+def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None:
+    running.order(Jog((("neck_yaw", 0.3),), "a show (process 7)"))
+    ticks = running.go(1.5)
+    assert ticks[0].led == "a show (process 7): jog neck_yaw 17.2"
+    led = [tick for tick in ticks if tick.led]
+    assert led[-1].t_s - led[0].t_s == pytest.approx(1.0, abs=0.011)
+    words = [event for tick in ticks for event in tick.events]
+    assert "led by a show (process 7): jog neck_yaw 17.2" in words
+    assert "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze leads again" in words
+    gentle = radians(load_rig("desk").guard.gentle_speed_deg_s)
+    yaw = [tick.verdict.command_rad[YAW] for tick in ticks]
+    assert max(abs(b - a) for a, b in zip(yaw, yaw[1:], strict=False)) <= gentle * 0.005 * 1.01
+
+
+def test_a_lead_holds_while_it_is_renewed_by_the_one_who_leads(running: Running) -> None:
+    running.order(LookAt((1.2, 0.6, 0.3), "a show"))
+    for _ in range(5):
+        running.go(0.5)
+        assert replied(running, Renew("a show")) == ""
+    assert running.ticks[-1].led == "a show: look at 1.2 0.6 0.3"
+    for _ in range(4):
+        assert "lead nothing" in replied(running, Renew("another"))
+        running.go(0.4)
+    assert running.ticks[-1].led == "" and running.ticks[-1].target.kind == "face"
+
+
+def test_a_lead_that_is_to_stay_stays_until_it_is_let_go(running: Running) -> None:
+    running.order(LookAt((1.2, 0.6, 0.3), "a show", stay=True))
+    assert running.go(3.0)[-1].led
+    running.order(LookAt(None, "another"))
+    assert running.go(0.1)[-1].led == ""
+
+
+# Floods
+
+
+def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Running) -> None:
+    robot = running.made.robot
+    with pytest.raises(ValueError, match="too many requests"):
+        for _ in range(1000):
+            robot.order(Ask("lids", "awake"))
+    stop = robot.order(Stop("a hand"))
+    tick = running.go(0.005)[0]
+    assert tick.orders[0] == Stop("a hand") and len(tick.orders) <= 9
+    assert stop.wait(0.0) is not None and tick.stopped
+    for _ in range(1000):
+        robot.order(Stop("again"))
+    assert len(robot._orders) <= 128
+
+
+def test_one_change_of_parameters_a_tick(running: Running) -> None:
+    for speed in (400.0, 410.0, 420.0):
+        running.order(Tune((("gaze.saccade.max_speed_deg_s", speed),)))
+    assert [len(tick.orders) for tick in running.go(0.02)] == [1, 1, 1, 0]

@@ -24,7 +24,7 @@ from robot.orders import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_jso
 from robot.page.controls import LeadView
 from robot.page.ear import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
 from robot.page.feed import TuningFeed
-from robot.page.hear import PageHear
+from robot.page.hear import PAGE, PageHear
 from robot.page.jog import MEASURED, RECKONED, JogView, measured_table
 from robot.page.knob import (
     KnobControl,
@@ -325,7 +325,10 @@ def heard() -> Heard:
 def test_orders_are_obeyed(heard: Heard) -> None:
     for order in (Stop("a test"), LookAt(None), Jog((("neck_yaw", 0.1),))):
         assert heard.hear(json.loads(json.dumps(as_json(order)))) is None
-        assert heard.orders[-1] == order
+        assert heard.orders[-1] == order._replace(who=PAGE)
+    named = Stop("a test", "browser 3")
+    assert heard.hear(json.loads(json.dumps(as_json(named)))) is None
+    assert heard.orders[-1] == named
 
 
 def test_what_is_no_order_is_refused_with_the_rule(heard: Heard) -> None:
@@ -341,7 +344,7 @@ def test_what_is_no_order_is_refused_with_the_rule(heard: Heard) -> None:
 
 def test_a_click_in_the_picture_is_looked_at(heard: Heard) -> None:
     assert heard.hear({"pick": {"x": 0.5, "y": 1}}) is None
-    assert heard.orders == [LookAt((1.0, 0.5, 1.0))]
+    assert heard.orders == [LookAt((1.0, 0.5, 1.0), PAGE, stay=True)]
     words = heard.hear({"pick": {"x": 0.95, "y": 0.5}})
     assert words is not None and "no camera picture" in words
 
@@ -471,7 +474,7 @@ def test_a_slider_jogs_and_then_follows_its_joint(server: viser.ViserServer) -> 
     view.show(replace(SNAPSHOT, t_s=1.0))
     assert slider.value == pytest.approx(5.7) and mouth.told == []  # 0.1 rad, and nobody asked
     touch(server, slider, 20.0)
-    assert mouth.told == [(Jog((("neck_yaw", radians(20.0)),)), "5")]
+    assert mouth.told == [(Jog((("neck_yaw", radians(20.0)),), stay=True), "5")]
 
     def wished(t_s: float, wish_deg: float, stopped: str = "") -> float:
         wish = tuple(radians(wish_deg) if i == yaw else 0.1 for i in range(9))
@@ -518,7 +521,7 @@ def test_sliders_are_those_of_the_rig(server: viser.ViserServer) -> None:
     view.show(of_six(SNAPSHOT))
     assert view._sliders["eyes_pan"].value == pytest.approx(20.0)
     touch(server, lid, 5.0)
-    assert mouth.told == [(Jog((("left_lower_lid", radians(5.0)),)), "5")]
+    assert mouth.told == [(Jog((("left_lower_lid", radians(5.0)),), stay=True), "5")]
     view.show(SNAPSHOT)  # of another rig: nothing to follow, and nothing breaks
 
 

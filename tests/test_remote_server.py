@@ -21,6 +21,7 @@ import pytest
 
 from config.schema import load_rig
 from drivers.errors import SetupError
+from robot import stop_latch
 from robot.assemble import assemble
 from robot.choice import Choice
 from robot.clock import RealClock
@@ -177,7 +178,9 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def beat() -> Iterator[Beat]:
-    with Beat() as running_robot:
+    with pytest.MonkeyPatch.context() as patch, Beat() as running_robot:
+        patch.setattr(stop_latch, "MIN_HOLD_S", 0.0)
+        patch.setattr(stop_latch, "MIN_RESUME_GAP_S", 0.0)
         yield running_robot
 
 
@@ -287,12 +290,12 @@ def test_the_first_tick_after_set_has_it(rig: RunningRig, beat: Beat) -> None:
 
 
 def test_looking_jogging_and_asking(rig: RunningRig, beat: Beat) -> None:
-    rig.look_at(1.0, 0.2, 0.1)
+    rig.look_at(1.0, 0.2, 0.1, stay=True)
     assert rig.status()["why"] == "somebody chose this point"
     assert beat.ticks[-1].target.p_world_m == (1.0, 0.2, 0.1)
     rig.look_freely()
     assert rig.status()["why"] != "somebody chose this point"
-    rig.jog("neck_yaw", 10.0)
+    rig.jog("neck_yaw", 10.0, stay=True)
     wish = dict(zip(rig.status()["joints_deg"], beat.ticks[-1].wish_rad, strict=True))
     assert wish["neck_yaw"] == pytest.approx(radians(10.0))
     rig.jog_free()
@@ -340,6 +343,7 @@ def test_a_loop_that_hangs_is_told_to_who_stops(
             rig.stop()
     finally:
         beat.hold.clear()
+    assert beat.pulse.taken_up(20.0)
     rig.resume()
 
 

@@ -36,9 +36,9 @@ PUPPET: Asked = {
     140: (LookAt(None), Jog((("neck_yaw", 0.2), ("left_eye_pan", 0.1)))),
     200: (Jog(()),),
     240: (Stop("a finger is in it"),),
-    280: (Resume(),),
-    330: (Tune((("gaze.saccade.profile", "min_jerk"), ("joints.neck_yaw.zero_step", 2060))),),
-    360: (Tune((("gaze.attention.stale_ms", 200.0), ("gaze.idle.rest_ms", 500.0))),),
+    650: (Resume(),),
+    700: (Tune((("gaze.saccade.profile", "min_jerk"), ("joints.neck_yaw.zero_step", 2060))),),
+    730: (Tune((("gaze.attention.stale_ms", 200.0), ("gaze.idle.rest_ms", 500.0))),),
 }
 
 
@@ -225,7 +225,7 @@ def test_a_configuration_of_another_version_is_told_in_one_line(once: Once) -> N
 def test_a_run_on_the_hosts_clock_is_done_again(tmp_path: Path) -> None:
     """Times of a machine that has been up for days, and slots that are not round numbers."""
     path = tmp_path / "days.mcap"
-    ticks = recorded(path, 1.0, {100: (Stop("x"),), 150: (Resume(),)}, start_s=345678.9012345)
+    ticks = recorded(path, 3.0, {100: (Stop("x"),), 550: (Resume(),)}, start_s=345678.9012345)
     recording = RunRecording(path)
     found = rerun(recording)
     assert found.same and found.ticks == len(ticks)

@@ -419,8 +419,8 @@ def test_a_joint_outside_its_new_range_is_led_inside_slowly() -> None:
 
 
 def jog(running: Running, joint: str, deg: float, ticks: int) -> None:
-    """Send one joint somewhere by hand."""
-    running.made.robot.order(Jog(((joint, float(np.radians(deg))),)))
+    """Send one joint somewhere by hand, beyond its range as well."""
+    running.made.robot.order_again(Jog(((joint, float(np.radians(deg))),), stay=True))
     running.go(ticks)
 
 
@@ -435,7 +435,7 @@ def test_a_wider_range_waits_until_the_servos_are_set_up_anew() -> None:
     held = np.degrees(running.ticks[-1].verdict.command_rad[6])
     assert held == pytest.approx(70.0, abs=0.1)
     running.made.robot.order(Stop("test"))
-    running.go(20)
+    running.go(401)
     running.made.robot.order(Resume())
     running.go(200)
     jog(running, "neck_yaw", 80.0, 800)

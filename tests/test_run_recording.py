@@ -24,6 +24,7 @@ from drivers.errors import SetupError
 from drivers.types import BusHealth, Detections
 from gaze.scanpath import Walk
 from gaze.types import Bodies, Face, Percept
+from robot import stop_latch
 from robot.assemble import Assembly, assemble
 from robot.choice import Choice
 from robot.loop import Tick, run
@@ -125,7 +126,9 @@ def ordered(number: int, made: Assembly) -> None:
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    return record(tmp_path_factory.mktemp("runs") / "run.mcap", 1.5, ordered)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stop_latch, "MIN_HOLD_S", 0.1)  # a shorter run
+        return record(tmp_path_factory.mktemp("runs") / "run.mcap", 1.5, ordered)
 
 
 def exact(tick: Tick) -> str:
@@ -137,7 +140,7 @@ def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
     # A new field must be recorded too: add it to moment.flat, as_json and from_json.
     assert Tick._fields == (
         "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "wish_rad", "verdict",
-        "events", "orders", "stopped",
+        "events", "orders", "stopped", "led",
     )  # fmt: skip
     back = list(RunRecording(recorded.path).ticks())
     assert len(back) == len(recorded.ticks) == 299

@@ -10,10 +10,13 @@ import typer
 
 from config.load import ConfigError, read_yaml, shipped_names
 from drivers.errors import DriverError, SetupError
-from robot.cli.terminal import FAULT, clear_errors, say
-from robot.remote.running_rig import JsonValue, KnobInfo, RunningRig, running
+from robot.cli import lead as cli_lead
+from robot.cli.lead import PidOption
+from robot.cli.terminal import clear_errors, say
+from robot.remote.running_rig import JsonValue, KnobInfo, RunningRig
 
 app = typer.Typer()
+app.add_typer(cli_lead.app)
 _OLD_S = 1.0
 """A loop that has not ticked for so long does not do as it should."""
 _LAST_SAID = 5
@@ -72,12 +75,6 @@ def _menus() -> dict[str, tuple[str, ...]]:
             return rig.menus()
     except DriverError:
         return {}
-
-
-PidOption = Annotated[
-    int | None,
-    typer.Option("--pid", metavar="N", help="Of several running rigs that of process N."),
-]
 
 
 @app.command()
@@ -217,67 +214,6 @@ def status(
         _tell(state_lines(now))
 
 
-@app.command(context_settings=_NEGATIVE)
-def look(
-    where: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="X Y Z | free", help="Metres ahead, left and up of the neck; or free."
-        ),
-    ],
-    pid: PidOption = None,
-) -> None:
-    """Let the running head look at a point, or freely again."""
-    with clear_errors():
-        point = read_point(where)
-        with RunningRig.connect(pid) as rig:
-            if point is None:
-                rig.look_freely()
-            else:
-                rig.look_at(*point)
-        say("it looks freely" if point is None else "it looks there until: gazerig look free")
-
-
-@app.command()
-def stop(
-    why: Annotated[str, typer.Argument(help="Reason, for the log.")] = "gazerig stop",
-    pid: PidOption = None,
-) -> None:
-    """Torque off at once, of every rig that runs here; nothing parks, the programs go on."""
-    with clear_errors():
-        rigs = running(pid)
-        if not rigs:
-            RunningRig.connect(pid)  # says why there is none
-        failed = False
-        for rig in rigs:
-            try:
-                with rig:
-                    rig.stop(why)
-            except DriverError as error:
-                failed = True
-                say(f"{rig.pid}: NOT KNOWN TO HAVE STOPPED, press the emergency stop: {error}")
-            else:
-                say(f"{rig.pid}: torque is off; gazerig resume goes on")
-    if failed:
-        raise typer.Exit(FAULT)
-
-
-@app.command()
-def resume(
-    yes: Annotated[bool, typer.Option("--yes", help="No hand is in the mechanism.")] = False,
-    pid: PidOption = None,
-) -> None:
-    """Put the torque on again after a stop, where the joints are, and go on slowly."""
-    with clear_errors(), RunningRig.connect(pid) as rig:
-        if not rig.status()["stopped"]:
-            say("it was not stopped: nothing to resume")
-            return
-        if not yes:
-            typer.confirm("The torque goes on and the head moves. Is no hand in it?", abort=True)
-        rig.resume()
-        say("torque is on; it goes on slowly")
-
-
 def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
     """Read KEY VALUE KEY VALUE ... with values as YAML.
 
@@ -311,23 +247,6 @@ def read_value(key: str, text: str) -> Any:
     return held["value"]
 
 
-def read_point(words: Sequence[str]) -> tuple[float, float, float] | None:
-    """Read X Y Z in metres, or "free" as None.
-
-    Raises:
-        drivers.errors.SetupError: it is neither.
-    """
-    if list(words) == ["free"]:
-        return None
-    try:
-        x, y, z = map(float, words)
-    except ValueError:
-        raise SetupError(
-            f"{' '.join(words)}: give X Y Z in metres (ahead, left, up), or free"
-        ) from None
-    return x, y, z
-
-
 def state_lines(now: Mapping[str, Any]) -> list[str]:
     """Say in a few lines what ``RunningRig.status`` gives."""
     lines = [f"rig: {now.get('rig', '')}, process {now.get('pid', '')}"]
@@ -341,6 +260,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
     unsaved = now["unsaved"]
     return [
         *lines,
+        *([f"led by {now['led']}"] if now["led"] else []),
         f"looks at: {now['target']} - {now['why']} ({now['phase']})",
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         f"joints in deg: {joints}",

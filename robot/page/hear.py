@@ -6,8 +6,9 @@ from typing import Protocol, cast
 
 from drivers.errors import DriverError
 from gaze.types import Vec3
-from robot.orders import LookAt, Order, Tune, Value, from_json
+from robot.orders import LookAt, Tune, Value, from_json, signed
 from robot.remote.requests import Saved, Tuning
+from robot.reply import OrderTaker
 
 _LATER = "next start"
 """Of what a change did, people are told what it did not; the controls show the rest."""
@@ -25,6 +26,9 @@ class Confined(Protocol):
         ...
 
 
+PAGE = "the page"
+"""Who asks, where a browser does not say which one it is."""
+
 Point = Callable[[float, float], Vec3 | None]
 """Place in the picture, 0..1 from the left and from the top -> point in the world."""
 
@@ -34,7 +38,7 @@ class PageHear:
 
     def __init__(
         self,
-        order: Callable[[Order], None],
+        order: OrderTaker,
         tuning: Tuning | None = None,
         point: Point | None = None,
         steer: Callable[[str], str | None] | None = None,
@@ -93,13 +97,13 @@ class PageHear:
         if isinstance(order, Tune):
             # An order's values count as checked, and only the tuning checks them.
             raise ValueError("parameters are changed by tuning, which knows their rules")
-        self._order(order)
+        self._order(order if getattr(order, "who", PAGE) else signed(order, PAGE))
 
     def _pick(self, x: float, y: float) -> str | None:
         point = self._point(x, y) if self._point is not None else None
         if point is None:
             return "refused: there is no camera picture to look into yet"
-        self._order(LookAt(point))
+        self._order(LookAt(point, PAGE, stay=True))
         return None
 
     def _tune(self, asked: Mapping[str, object]) -> str | None:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from drivers.errors import SetupError
 from robot.bus_events import drawn_together
 from robot.loop import Tick
-from robot.orders import Ask
+from robot.orders import Ask, Renew
 from robot.page.link import pack, unpack
 from robot.page.snapshot import Said, ShownRig, Snapshots, seeing_words, verdict_words
 from robot.recording.gaze_angles import order_words
@@ -170,6 +170,8 @@ class Noticing:
             found.append(Mark(at_s, "blink", "blink"))
         self._saccades, self._blinks = tick.gaze.saccades, tick.gaze.blinks
         for order in tick.orders:
+            if isinstance(order, Renew):
+                continue
             found.append(Mark(at_s, "event", order_words(order)))
             if isinstance(order, Ask):
                 self._heed(order)

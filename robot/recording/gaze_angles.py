@@ -24,7 +24,7 @@ from gaze.angles import add, angle_between, sub, yaw_pitch
 from gaze.field_of_view import line_of_sight
 from gaze.types import Angles2, Floats, GazeState, Target, Vec3
 from robot.loop import Tick
-from robot.orders import Jog, Order, Stop
+from robot.orders import Jog, Order, Renew, Stop
 from robot.reckoned import Basis, basis_of, reckoned_joints
 
 Ints = NDArray[np.int64]
@@ -134,6 +134,7 @@ class Tracing:
         self._fixated: Target | None = None
         self._saccades = 0
         self._jogged = False
+        self._led = ""
         self._joints: tuple[str, ...] = ()
         self._reckoned: dict[str, None] = {}
 
@@ -185,11 +186,16 @@ class Tracing:
         """Keep what was said and asked for, and whether the joints are moved by hand."""
         self._messages += [(time_s, event) for event in tick.events]
         for order in tick.orders:
+            if isinstance(order, Renew):
+                continue
             self._messages.append((time_s, order_words(order)))
             if isinstance(order, Jog):
                 self._jogged = bool(order.angles_rad)
             elif isinstance(order, Stop):
                 self._jogged = False
+        if self._led and not tick.led:  # by a lapse, which no order tells
+            self._jogged = False
+        self._led = tick.led
 
     def _number(self, tick: Tick) -> int:
         """Give the number of what the eyes are on, which a new target is only once they go there.
@@ -217,7 +223,12 @@ def target_words(target: Target) -> str:
 
 def order_words(order: Order) -> str:
     """Say in words what was asked for, e.g. "asked: stop why=space bar"."""
-    given = " ".join(f"{name}={value}" for name, value in order._asdict().items())
+    usual = order._field_defaults
+    given = " ".join(
+        f"{name}={value}"
+        for name, value in order._asdict().items()
+        if name not in usual or value != usual[name]
+    )
     return f"asked: {type(order).__name__.lower()} {given}".rstrip()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from gaze.types import Bodies, Face, GazeCommand, GazeState, Percept, Pull, Target
 from robot.loop import Tick
 from robot.orders import as_json as order_as_json
-from robot.orders import from_json as order_from_json
+from robot.orders import from_recording as order_from_json
 from robot.types import JOINTS, JointAngles, JointState, Verdict
 
 Json = dict[str, Any]
@@ -92,6 +92,7 @@ def flat(tick: Tick, percept_number: int | None, dt_s: float, before: tuple[Hear
         tick.events,
         [order_as_json(order) for order in tick.orders],
         tick.stopped,
+        tick.led,
         [(_HEARD_NAMES[type(one)], _plain(one)) for one in before],
     )
 
@@ -102,7 +103,7 @@ def as_json(values: Flat) -> Json:
     if not finite:
         values = _worded(values)
     (t_s, dt_s, percept, joints, pose, target, gaze, wish, verdict, events, orders, stopped,
-     before) = values  # fmt: skip
+     led, before) = values  # fmt: skip
     data: Json = {
         "t_s": t_s,
         "dt_s": dt_s,
@@ -119,6 +120,7 @@ def as_json(values: Flat) -> Json:
         "events": events,
         "orders": orders,
         "stopped": stopped,
+        "led": led,
     }
     if before:
         data["before"] = [{"what": what, **_named(_HEARD[what], one)} for what, one in before]
@@ -158,6 +160,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
         tuple(data["events"]),
         tuple([order_from_json(order) for order in data["orders"]]),
         data["stopped"],
+        data.get("led", ""),
     )
     before = tuple([_heard(one) for one in data.get("before", ())])
     return Moment(tick, data["dt_s"], before)

@@ -178,7 +178,7 @@ class _Again:
         self._perception.percept = was.percept
         for order in was.orders:
             try:
-                self._made.robot.order(order)
+                self._made.robot.order_again(order)
             except ValueError as error:
                 self._notes.append(f"an order could not be given again: {error}")
         tick = self._made.robot.tick(was.t_s, moment.dt_s)

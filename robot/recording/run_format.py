@@ -104,6 +104,7 @@ _TICK = _says(
         events=_TEXTS,
         orders=_list(_ORDER),
         stopped=_says(_TEXT, "why somebody stopped the robot"),
+        led=_says(_TEXT, "who leads gaze or joints and with what"),
         before=_list(_object(what=_TEXT), "what the machine said beside the tick's own reading"),
     ),
     "one tick of the control loop; frames: world at the neck base, x forward, y left, z up",

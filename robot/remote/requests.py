@@ -14,14 +14,20 @@ from typing import Protocol
 from drivers.errors import DriverError
 from robot.clock import Clock
 from robot.loop import Tick
-from robot.orders import Order, Tune, Value, from_json
+from robot.orders import Order, Renew, Tune, Value, from_json, signed
 from robot.page.snapshot import target_name
 from robot.reckoned import reckoned_joints
+from robot.reply import Ticket
 
 _TAKEN_UP_S = 1.0
 """Within this the loop must have obeyed; a servo that answers late costs it some 50 ms."""
 _WORDS = 20
 """How many of the last things said are kept."""
+
+_HANGS = (
+    f"the control loop has not taken it up within {_TAKEN_UP_S:g} s: it hangs, "
+    "starts or ends; what moves is stopped by the emergency stop"
+)
 
 REQUESTS = (
     'status', 'menus', 'knobs, "prefix"', 'get, "prefix"', 'set, "changes": {key: value}',
@@ -128,7 +134,7 @@ class Tuning(Protocol):
 class Orderable(Protocol):
     """A robot that takes orders, as robot.loop.Robot does."""
 
-    def order(self, order: Order) -> None:
+    def order(self, order: Order) -> Ticket | None:
         """Ask for something from the next tick on; raises ValueError with the rule."""
         ...
 
@@ -155,10 +161,13 @@ class Pulse:
         if tick.events:
             self._said.extend(tick.events)
 
-    def taken_up(self, within_s: float = _TAKEN_UP_S) -> bool:
-        """Wait until all orders given before are obeyed; tell whether that came to pass."""
-        # The tick under way may have looked for orders already: the next one has not.
-        wanted = self._ticks + 2
+    def taken_up(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
+        """Wait until all orders given before are obeyed; tell whether that came to pass.
+
+        ticks: to wait for; the one under way may have looked for orders already, the next
+            one has not
+        """
+        wanted = self._ticks + ticks
         waits = int(within_s / 0.002)
         while self._ticks < wanted and waits > 0:
             self._never.wait(0.002)
@@ -176,6 +185,7 @@ class Pulse:
             "t_s": tick.t_s,
             "age_s": self._clock.now_s() - tick.t_s,
             "stopped": tick.stopped,
+            "led": tick.led,
             "level": tick.verdict.level,
             "reasons": list(tick.verdict.reasons),
             "target": target_name(tick.target),
@@ -216,14 +226,17 @@ class Requests:
         self._unsaved = -1, 0
         self._knobs: tuple[Iterable[Knob], list[tuple[str, object]]] = (), []
 
-    def answer(self, request: object) -> dict[str, object]:
-        """Carry out one request: {"ok": what came of it} or {"refused": every rule broken}."""
+    def answer(self, request: object, peer: str = "") -> dict[str, object]:
+        """Carry out one request: {"ok": what came of it} or {"refused": every rule broken}.
+
+        peer: who is at the other end, as "process 123", "" where nobody knows
+        """
         try:
-            return {"ok": self._done(request)}
+            return {"ok": self._done(request, peer)}
         except self._refusals as error:
             return {"refused": str(error)}
 
-    def _done(self, request: object) -> object:
+    def _done(self, request: object, peer: str) -> object:
         """Find what is meant; the patterns are the protocol."""
         tuning = self._tuning
         match request:
@@ -250,7 +263,7 @@ class Requests:
             case {"do": "character", "name": str(name), **rest} if not rest:
                 return self._in_force(tuning.character(name))
             case {"do": "order", "order": dict(order), **rest} if not rest:
-                return self._order(from_json(order))
+                return self._order(from_json(order), peer)
         raise ValueError(f"not understood; there is {'; '.join(REQUESTS)}")
 
     def _all_knobs(self) -> list[tuple[str, object]]:
@@ -276,21 +289,30 @@ class Requests:
         backup = None if saved.backup is None else str(saved.backup)
         return {"path": str(saved.path), "backup": backup, "changes": _changes(saved.changes)}
 
-    def _order(self, order: Order) -> object:
+    def _order(self, order: Order, peer: str) -> object:
         """Hand on an order; parameters go through ``set``, which knows their rules."""
         if isinstance(order, Tune):
             raise ValueError("parameters are changed by the request set, which checks them")
-        self._robot.order(order)
-        return self._in_force(())
+        who = str(getattr(order, "who", ""))
+        if peer:  # nobody can give himself out as another process, or as the page
+            order = signed(order, f"{who} ({peer})" if who else peer)
+        ticket = self._robot.order(order)
+        if ticket is None:
+            return self._in_force(())
+        reply = ticket.wait(_TAKEN_UP_S)
+        if reply is None:
+            raise ValueError(_HANGS)
+        if reply.refused:
+            raise ValueError(reply.refused)
+        if not isinstance(order, Renew):
+            self._pulse.taken_up(ticks=1)  # so that the status tells of it
+        return {"notes": [], "reply": reply.as_json()}
 
     def _in_force(self, notes: object) -> dict[str, object]:
         """Wait for the tick that obeys; pass on what a person should know."""
         words = [str(note) for note in notes] if isinstance(notes, tuple | list) else []
         if not self._pulse.taken_up():
-            raise ValueError(
-                f"the control loop has not taken it up within {_TAKEN_UP_S:g} s: it hangs, "
-                "starts or ends; what moves is stopped by the emergency stop"
-            )
+            raise ValueError(_HANGS)
         return {"notes": words}
 
 

@@ -4,14 +4,15 @@ from robot.remote.running_rig import RunningRig
 
 with RunningRig.connect() as rig:
     rig.set("gaze.lids.blinks_per_min", 12.0)
-    rig.look_at(1.0, 0.3, 0.0)
+    print(rig.look_at(1.0, 0.3, 0.0).words())
     print(rig.status()["target"])
     rig.save("/home/me/my.yaml")
 """
 
 import os
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from math import radians
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +20,9 @@ from typing import Any, NamedTuple, cast
 
 from drivers.errors import DriverError, SetupError
 from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Value, as_json, check
+from robot.remote.heartbeat import Heartbeat
 from robot.remote.sockets import ANSWER_BYTES, Garbled, Wire, dial, folder, is_private, sockets
+from robot.reply import Reply
 
 _CONNECT_S = 1.0
 _ANSWER_S = 10.0
@@ -87,20 +90,30 @@ class SavedFile(NamedTuple):
 class RunningRig:
     """A connection to one running rig; answers come when the rig has done what was asked."""
 
-    def __init__(self, wire: Wire, pid: int) -> None:
-        """Take a connection; ``connect`` makes one."""
+    def __init__(
+        self, wire: Wire, pid: int, who: str = "", dial: Callable[[], Wire] | None = None
+    ) -> None:
+        """Take a connection; ``connect`` makes one.
+
+        who: what people are told of who asks; dial: makes another connection to the same rig
+        """
         self._wire = wire
         self._lock = threading.Lock()
+        self._who = who
+        self._dial = dial
+        self._heartbeat: Heartbeat | None = None
         self.pid = pid
 
     @classmethod
-    def connect(cls, pid: int | None = None) -> "RunningRig":
+    def connect(cls, pid: int | None = None, who: str = "") -> "RunningRig":
         """Find the one rig that runs, or the one of this process.
+
+        who: what people are told of who asks, e.g. "my show"; the process is added
 
         Raises:
             NoRig: none runs, or several and ``pid`` does not say which.
         """
-        found = running(pid)
+        found = running(pid, who)
         for other in found[1:]:
             other.close()
         if len(found) == 1:
@@ -126,7 +139,8 @@ class RunningRig:
         self.close()
 
     def close(self) -> None:
-        """Hang up; the rig runs on."""
+        """Hang up; the rig runs on, and leads that were not to stay end."""
+        self._end_heartbeat()
         self._wire.close()
 
     def status(self) -> dict[str, Any]:
@@ -217,21 +231,61 @@ class RunningRig:
         """
         self._order(Ask(menu, choice))
 
-    def look_at(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Look at a point until told otherwise: metres, x ahead, y left, z up of the neck."""
-        self._order(LookAt((x_m, y_m, z_m)))
+    def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> Reply:
+        """Look at a point: metres, x ahead, y left, z up of the neck base.
+
+        stay: until somebody lets go; else for as long as this connection is open, this
+            program alive, and nobody else leads
+
+        Returns:
+            How far beside the point the gaze will rest, and the joints at their ends.
+
+        Raises:
+            Refused: it is no point, or the rig is stopped.
+        """
+        return self._lead(LookAt((x_m, y_m, z_m), self._who, stay), stay)
 
     def look_freely(self) -> None:
         """Let the head choose again what to look at."""
-        self._order(LookAt(None))
+        self._end_heartbeat()
+        self._order(LookAt(None, self._who))
 
-    def jog(self, joint: str, deg: float) -> None:
-        """Hold all joints and put one at an angle."""
-        self._order(Jog(((joint, radians(deg)),)))
+    def jog(self, joint: str, deg: float, stay: bool = False) -> Reply:
+        """Hold all joints and put one at an angle.
+
+        stay: as in ``look_at``
+
+        Raises:
+            Refused: there is no such joint, the angle is outside its range, or the rig is
+                stopped.
+        """
+        return self._lead(Jog(((joint, radians(deg)),), self._who, stay), stay)
 
     def jog_free(self) -> None:
         """Let the models lead the joints again."""
-        self._order(Jog(()))
+        self._order(Jog((), self._who))
+
+    @property
+    def leads(self) -> bool:
+        """True while this connection renews a lead that the rig still obeys."""
+        return self._heartbeat is not None and self._heartbeat.leads
+
+    def _lead(self, order: LookAt | Jog, stay: bool) -> Reply:
+        reply = self._order(order)
+        if stay or self._dial is None:
+            self._end_heartbeat()
+        elif not self.leads:
+            self._end_heartbeat()
+            try:
+                self._heartbeat = Heartbeat(self._dial, self._who)
+            except OSError:
+                raise RigGone(f"the rig (process {self.pid}) has ended or hung up") from None
+        return reply
+
+    def _end_heartbeat(self) -> None:
+        heartbeat, self._heartbeat = self._heartbeat, None
+        if heartbeat is not None:
+            heartbeat.end()
 
     def stop(self, why: str = "asked for from another program") -> None:
         """Take the torque off at once; when this returns, the loop has done it.
@@ -239,26 +293,30 @@ class RunningRig:
         Raises:
             RigGone, Refused: nobody knows whether it stopped: press the emergency stop.
         """
-        self._order(Stop(why))
+        self._order(Stop(why, self._who))
 
-    def resume(self) -> None:
-        """Put the torque on again where the joints are.
+    def resume(self, confirmed: bool = False) -> None:
+        """Put the torque on again where the joints are, and go on slowly.
+
+        confirmed: a person has said that no hand is in the mechanism; it is needed where
+            somebody else has stopped it
 
         Raises:
-            Refused: a servo does not take it; the torque stays off.
+            Refused: a servo does not take it, or a rule of stops forbids it; the torque
+                stays off.
         """
-        self._order(Resume())
-        status = self.status()
-        if status["stopped"]:
-            held = [word for word in status["said"] if word.startswith("still stopped")]
-            raise Refused(held[-1] if held else f"still stopped: {status['stopped']}")
+        self._order(Resume(self._who, confirmed))
 
-    def _order(self, order: Order) -> None:
+    def _order(self, order: Order) -> Reply:
         try:
             check(order)
         except ValueError as error:
             raise Refused(str(error)) from None
-        self._asked("order", order=as_json(order))
+        said = self._asked("order", order=as_json(order))
+        match said:
+            case {"reply": dict(reply)}:
+                return Reply.from_json(reply)
+        return Reply()
 
     def _notes(self, said: object) -> tuple[str, ...]:
         return tuple(cast(dict[str, list[str]], said)["notes"])
@@ -295,8 +353,11 @@ class RunningRig:
             raise RigGone(f"process {self.pid} gave no answer of a rig: {error}") from None
 
 
-def running(pid: int | None = None) -> list[RunningRig]:
-    """Connect to every rig of this user that runs, or to that of one process."""
+def running(pid: int | None = None, who: str = "") -> list[RunningRig]:
+    """Connect to every rig of this user that runs, or to that of one process.
+
+    who: as in RunningRig.connect
+    """
     uid = os.getuid()
     place = folder(os.environ, uid)
     if not is_private(place, uid):  # whoever put a socket there is not known
@@ -305,10 +366,15 @@ def running(pid: int | None = None) -> list[RunningRig]:
     for number, path in sockets(place).items():
         if pid is None or number == pid:
             try:
-                found.append(RunningRig(Wire(dial(path, _CONNECT_S), ANSWER_BYTES), number))
+                found.append(RunningRig(_wire(path), number, who, partial(_wire, path)))
             except OSError:  # killed: the next rig that starts removes it
                 continue
     return found
+
+
+def _wire(path: Path) -> Wire:
+    """Connect to a rig's socket; raises OSError where nobody answers."""
+    return Wire(dial(path, _CONNECT_S), ANSWER_BYTES)
 
 
 def _names(rigs: list[RunningRig]) -> str:

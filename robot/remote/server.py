@@ -79,6 +79,14 @@ class RemoteServer:
                 end, _ = listener.accept()
             except OSError:  # closed
                 return
+            try:
+                caller = remote_socket.peer(end)
+            except OSError:  # gone already
+                end.close()
+                continue
+            if caller.uid != os.getuid():  # the folder is shut to others; twice is safer
+                end.close()
+                continue
             wire = Wire(end, REQUEST_BYTES)
             with self._lock:
                 if self._listener is None:  # closed since: nobody would hang up on this one
@@ -90,19 +98,19 @@ class RemoteServer:
                     del self._wires[quietest]
                     quietest.close()
                 self._wires[wire] = None
-            self._start(self._serve, wire)
+            self._start(self._serve, wire, f"process {caller.pid}")
 
-    def _serve(self, wire: Wire) -> None:
+    def _serve(self, wire: Wire, peer: str) -> None:
         """Answer one program until it hangs up or cannot be understood any more."""
         try:
-            while self._served(wire):
+            while self._served(wire, peer):
                 pass
         finally:
             with self._lock:
                 self._wires.pop(wire, None)
             wire.close()
 
-    def _served(self, wire: Wire) -> bool:
+    def _served(self, wire: Wire, peer: str) -> bool:
         """Answer one request; tell whether another can follow."""
         try:
             request = wire.read(None, _REST_S)
@@ -114,7 +122,7 @@ class RemoteServer:
             if wire in self._wires:
                 self._wires[wire] = self._wires.pop(wire)
         try:
-            answer = self._requests.answer(request)
+            answer = self._requests.answer(request, peer)
         except Exception as error:
             # One request that meets an error of ours must not end the remote control: the
             # stop goes the same way.

@@ -9,9 +9,10 @@ import json
 import os
 import socket
 import stat
+import struct
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 from drivers.errors import SetupError
 from robot.clock import RealClock
@@ -116,6 +117,24 @@ def listen(path: Path) -> socket.socket:
         listener.close()
         raise SetupError(f"{path}: no socket there ({error.strerror}); no remote control") from None
     return listener
+
+
+class Peer(NamedTuple):
+    """Who is at the other end of a Unix socket, as the kernel knows it."""
+
+    pid: int
+    uid: int
+
+
+def peer(end: socket.socket) -> Peer:
+    """Return who connected.
+
+    Raises:
+        OSError: the connection is gone.
+    """
+    data = end.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    pid, uid, _ = struct.unpack("3i", data)
+    return Peer(pid, uid)
 
 
 def clear_dead(path: Path) -> tuple[int, ...]:

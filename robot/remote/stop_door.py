@@ -13,6 +13,7 @@ from robot.loop import Tick
 from robot.orders import Order, Resume, Stop, Value
 from robot.remote.requests import Change, Knob, Pulse, Requests, Saved
 from robot.remote.server import RemoteServer
+from robot.reply import OrderTaker, Ticket
 
 
 class StopDoor:
@@ -26,7 +27,7 @@ class StopDoor:
 
     def __init__(
         self,
-        order: Callable[[Order], None],
+        order: OrderTaker,
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
@@ -55,10 +56,10 @@ class StopDoor:
 class _OnlyStops:
     """A robot that takes stop and resume alone."""
 
-    def __init__(self, order: Callable[[Order], None]) -> None:
+    def __init__(self, order: OrderTaker) -> None:
         self._order = order
 
-    def order(self, order: Order) -> None:
+    def order(self, order: Order) -> Ticket | None:
         """Hand on a stop or the end of one.
 
         Raises:
@@ -66,7 +67,7 @@ class _OnlyStops:
         """
         if not isinstance(order, Stop | Resume):
             raise ValueError("it is being calibrated: besides stop and resume nothing goes")
-        self._order(order)
+        return self._order(order)
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Offer nothing."""
