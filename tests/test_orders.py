@@ -252,7 +252,7 @@ def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
 # Who may resume, and when
 
 
-def replied(running: Running, order: Order, seconds: float = 0.005) -> str:
+def replied(running: Running, order: Order, seconds: float = 0.006) -> str:
     """Ask, run on, and give why it was refused."""
     ticket = running.made.robot.order(order)
     running.go(seconds)
@@ -276,7 +276,7 @@ def test_another_resumes_only_who_confirms(running: Running) -> None:
     assert "stopped by browser 1: another may only" in replied(running, Resume())
     assert running.made.robot.stopped
     ticket = running.made.robot.order(Resume("browser 2", confirmed=True))
-    tick = running.go(0.005)[0]
+    tick = running.go(0.006)[0]
     assert ticket.wait(0.0) is not None and not tick.stopped
     assert any("torque on again by browser 2" in event for event in tick.events)
 
@@ -297,7 +297,7 @@ def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool) -> 
     events: list[str] = []
     for _ in range(700):  # 3.5 s, one a tick
         running.order(Resume("a loop", confirmed))
-        events += [event for tick in running.go(0.005) for event in tick.events]
+        events += [event for tick in running.go(0.006) for event in tick.events]
     assert running.made.robot.stopped == "a hand"
     assert len([event for event in events if "resume" in event]) < 10
 
@@ -308,7 +308,7 @@ def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: 
         for order in (LookAt((1.0, 0.2, 0.3)), Jog((("neck_yaw", 0.2),)), Resume(confirmed=True))
     ]
     running.order(Stop("a hand"))
-    assert running.go(0.005)[0].orders == (Stop("a hand"),)
+    assert running.go(0.006)[0].orders == (Stop("a hand"),)
     replies = [ticket.wait(0.0) for ticket in tickets]
     assert all(reply is not None and "stopped since" in reply.refused for reply in replies)
     assert "resume first" in replied(running, LookAt((1.0, 0.2, 0.3)))
@@ -359,7 +359,7 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
         for _ in range(1000):
             robot.order(Ask("lids", "awake"))
     stop = robot.order(Stop("a hand"))
-    tick = running.go(0.005)[0]
+    tick = running.go(0.006)[0]
     assert tick.orders[0] == Stop("a hand") and len(tick.orders) <= 9
     assert stop.wait(0.0) is not None and tick.stopped
     for _ in range(1000):
@@ -370,4 +370,4 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
 def test_one_change_of_parameters_a_tick(running: Running) -> None:
     for speed in (400.0, 410.0, 420.0):
         running.order(Tune((("gaze.saccade.max_speed_deg_s", speed),)))
-    assert [len(tick.orders) for tick in running.go(0.02)] == [1, 1, 1, 0]
+    assert [len(tick.orders) for tick in running.go(0.021)] == [1, 1, 1, 0]
