@@ -5,7 +5,7 @@ import gc
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, radians
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from drivers.errors import DriverError, ServoFault, SetupError
 from drivers.types import Camera
@@ -13,9 +13,8 @@ from gaze.aversion import Aversion
 from gaze.lids import Lids
 from gaze.oculomotor import Oculomotor
 from gaze.scanpath import Scanpath
-from gaze.top_down import TopDown
-from gaze.types import GazeState, Percept, Target
 from robot.body import Body
+from robot.chooser import Chooser
 from robot.clock import Clock
 from robot.frames import PoseHistory
 from robot.kinematics import Kinematics
@@ -57,23 +56,6 @@ class LoopCount(NamedTuple):
     ticks: int
     overruns: int
     stopped_by: str
-
-
-class Chooser(Protocol):
-    """Chooses what to look at, as gaze.attention.Attention does.
-
-    top_down: the behaviours there are to choose from
-    """
-
-    top_down: TopDown
-
-    def reset(self, t_s: float) -> None:
-        """Forget everything seen."""
-        ...
-
-    def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
-        """Give the target in force at ``t_s``."""
-        ...
 
 
 class Robot:
