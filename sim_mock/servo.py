@@ -27,6 +27,7 @@ from sim_mock.servo_memory import (
     in_eeprom,
 )
 from sim_mock.servo_modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
+from sim_mock.servo_motion import long_pause
 from sim_mock.servo_physics import Physics, Quirks, ServoSpec, checked
 from sim_mock.servo_protection import BITS, LOOK_MS, Protection
 from sim_mock.servo_rules import GOALS, Rules
@@ -112,6 +113,17 @@ class Servo:
         return now_ms >= self._deaf_until_ms
 
     def _move(self, until_ms: int) -> None:
+        """Move on; a long pause is passed at once, so that whoever asks then is answered."""
+        pause_at_ms, pause_ms = long_pause(self._ms, until_ms, LOOK_MS)
+        self._live_on(pause_at_ms)
+        if pause_ms:
+            self.shaft.skip(pause_ms)
+            self._ms += pause_ms
+            self._look_ms += pause_ms - LOOK_MS
+            self._look(pause_ms // LOOK_MS)
+            self._live_on(until_ms)
+
+    def _live_on(self, until_ms: int) -> None:
         """Move on, and look at heat, load and voltage every 20 ms of its own time."""
         shaft = self.shaft
         while self._ms < until_ms:
@@ -123,12 +135,12 @@ class Servo:
                 if self._calm and shaft.quiet and until_ms > self._look_ms:
                     self._look_ms += (until_ms - self._look_ms) // LOOK_MS * LOOK_MS
 
-    def _look(self) -> None:
+    def _look(self, looks: int = 1) -> None:
         """Watch over itself: latch what is wrong, restart where the voltage is gone."""
         self._look_ms += LOOK_MS
         shaft, protection = self.shaft, self.protection
         before = protection.temperature_c
-        bits = protection.look(shaft.effort, shaft.volts, self._limits)
+        bits = protection.look(shaft.effort, shaft.volts, self._limits, looks)
         self._calm = protection.temperature_c == before and protection.steady
         if bits & ~self.alert:
             self._latch(bits)

@@ -77,6 +77,22 @@ class Loop(NamedTuple):
 
 LIMP = Loop(u_most=0.0, t_most=0.0)
 
+PAUSE_MS = 10_000
+"""A time without any packet that is longer is not lived through millisecond by millisecond."""
+_BEFORE_MS, _AFTER_MS = 3_000, 1_000
+"""Of such a pause these are: whatever was begun ends, and what is asked then is in motion."""
+
+
+def long_pause(now_ms: int, until_ms: int, unit_ms: int) -> tuple[int, int]:
+    """Return from when and how long a time is passed at once; (until, 0) where it is short.
+
+    unit_ms: The time passed at once is a whole number of these.
+    """
+    if until_ms - now_ms <= PAUSE_MS:
+        return until_ms, 0
+    between_ms = until_ms - now_ms - _BEFORE_MS - _AFTER_MS
+    return now_ms + _BEFORE_MS, between_ms // unit_ms * unit_ms
+
 
 class Shaft:
     """Position and speed of one output shaft, advanced in whole milliseconds.
@@ -266,6 +282,22 @@ class Shaft:
         self.quiet = (
             v == 0.0 and rv == 0.0 and not profile.running and was == (x, u, i, joint, volts)
         )
+
+    def skip(self, ticks: int) -> None:
+        """Let a long time pass at once: the shaft goes where its profile goes, between its stops.
+
+        What is not at rest after seconds of nobody asking is led by a slow profile, turns
+        for ever, or hunts around its goal; the last stays as it is.
+        """
+        if self.quiet or ticks <= 0:
+            return
+        before = self.profile.r
+        self.profile.skip(ticks)
+        moved = self.profile.r - before
+        if self._loop.bias:  # without feedback: on at the speed it has
+            moved = self.v * ticks
+        self.x = min(max(self.x + moved, self._low), self._high)
+        self.joint = min(max(self.joint, self.x - self._play), self.x + self._play)
 
     @property
     def speed_steps_s(self) -> float:

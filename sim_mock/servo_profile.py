@@ -6,7 +6,7 @@ that holds it, one that brakes. So what it gives does not depend on how it is as
 Source: ROBOTIS e-Manual, X series, "What is the Profile".
 """
 
-from math import sqrt
+from math import ceil, copysign, sqrt
 
 STEP, RECTANGLE, TRIANGLE, TRAPEZOID = 0, 1, 2, 3
 """Profile types as bits 4-5 of Moving Status (123) name them."""
@@ -126,6 +126,23 @@ class Profile:
         self._speed(begun + ticks)
         return path
 
+    def skip(self, ticks: int) -> None:
+        """Go on by many milliseconds at once."""
+        if not self.running:
+            return
+        self._t = t = self._t + ticks
+        if t >= self._t3:
+            self.r, self.v, self.running = self.goal, 0.0, False
+        elif t >= self._t2:
+            self.r = self.goal - (self._t3 - t) * (self._t3 - t) * self._slow
+            self._speed(t)
+        elif t >= self._t1:
+            self.r = self._p1 + (t - self._t1) * self._cruise
+            self._speed(t)
+        else:
+            self.r = self._from + t * (self._start + t * self._out)
+            self._speed(t)
+
     def _speed(self, t: int) -> None:
         """Bring the speed up to a time of the plan."""
         if t < self._t1:
@@ -174,3 +191,12 @@ class SpeedProfile:
         self.r, self.v = r, v
         self.running = v != 0.0 or goal != 0.0
         return path
+
+    def skip(self, ticks: int) -> None:
+        """Go on by many milliseconds at once."""
+        left = self.goal - self.v
+        ramping = min(ticks, ceil(abs(left) / self._ramp)) if self._ramp > 0.0 else 0
+        end = self.goal if ramping < ticks else self.v + copysign(self._ramp * ramping, left)
+        self.r += 0.5 * (self.v + end) * ramping + end * (ticks - ramping)
+        self.v = end
+        self.running = end != 0.0 or self.goal != 0.0

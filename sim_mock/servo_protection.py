@@ -13,6 +13,16 @@ LOOK_S = LOOK_MS / 1000.0
 BITS = {name: bit for bit, name in HARDWARE_ERRORS.items()}
 
 
+def warmed(now_c: float, final_c: float, thermal_s: float, looks: int) -> float:
+    """Return the temperature of a motor after some looks; up to a minute as one by one."""
+    share = LOOK_S / thermal_s
+    if looks * LOOK_S > 60.0:
+        return final_c + (now_c - final_c) * (1.0 - share) ** looks
+    for _ in range(looks):
+        now_c += (final_c - now_c) * share
+    return now_c
+
+
 class Protection:
     """Temperature of the motor and how long it has been overloaded.
 
@@ -30,16 +40,19 @@ class Protection:
         """Forget the load; the heat stays."""
         self._overloaded_looks = 0
 
-    def look(self, effort: float, volts: float, limits: tuple[int, int, int]) -> int:
+    def look(
+        self, effort: float, volts: float, limits: tuple[int, int, int], looks: int = 1
+    ) -> int:
         """Go on by 20 ms at this torque and voltage (shares); gives bits of register 70.
 
         limits: registers 31, 32 and 34 (degC, 0.1 V, 0.1 V).
+        looks: go on by so many times 20 ms at once
         """
         physics = self._physics
         target = self.ambient_c + physics.stall_rise_c * effort * effort
-        self.temperature_c += (target - self.temperature_c) * (LOOK_S / physics.thermal_s)
+        self.temperature_c = warmed(self.temperature_c, target, physics.thermal_s, looks)
         too_much = abs(effort) >= physics.overload_share * volts and effort != 0.0
-        self._overloaded_looks = self._overloaded_looks + 1 if too_much else 0
+        self._overloaded_looks = self._overloaded_looks + looks if too_much else 0
         hottest, highest, lowest = limits
         tenths = volts * self._model.rated_v * 10.0
         bits = 0

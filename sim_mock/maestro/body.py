@@ -15,6 +15,8 @@ PERIODS_S = 100
 """Periods in a second; a pulse goes out in every second one."""
 RESTART_S = 0.1
 """From a dip of the supply until it hears again [A]."""
+PAUSE = 1000
+"""So many periods without being looked at are not lived through one by one."""
 SWING = 100
 """The script that a fault starts sends a channel to its other end every so many periods."""
 
@@ -114,9 +116,22 @@ class Body:
     def advance(self) -> None:
         """Let time pass up to now."""
         now = whole_periods(self.now_s())
-        while self._period < now:
-            self._period = self._next_period(now)
+        while now - self._period > PAUSE and self.swung is not None:
+            self._live_on(self._period + 2 * SWING)
+            self._skip_swings(now)
+        self._live_on(now)
+
+    def _live_on(self, until: int) -> None:
+        while self._period < until:
+            self._period = self._next_period(until)
             self._pass()
+
+    def _skip_swings(self, now: int) -> None:
+        """Let whole swings of a script go by, as each leaves all as it was."""
+        due = self._due()
+        until = now if due is None else min(now, due - 1)
+        if self.awake and until > self._period and self._at_rest(but=self.swung):
+            self._period += (until - self._period) // (2 * SWING) * (2 * SWING)
 
     def _next_period(self, now: int) -> int:
         """Give the next period in which anything happens."""
@@ -131,11 +146,12 @@ class Body:
             return None
         return self._fed + round(self.settings.timeout_s * PERIODS_S)
 
-    def _at_rest(self) -> bool:
-        """Tell whether every servo has heard its last pulse and done what it can."""
+    def _at_rest(self, but: int | None = None) -> bool:
+        """Tell whether every servo, ``but`` one, has heard its last pulse and done what it can."""
         return all(
             not channel.moving and servo.width_steps == self._pulse(channel) and servo.resting
-            for channel, servo in zip(self.channels, self.servos, strict=True)
+            for k, (channel, servo) in enumerate(zip(self.channels, self.servos, strict=True))
+            if k != but
         )
 
     def _pulse(self, channel: Channel) -> int:

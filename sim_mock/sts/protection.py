@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 from drivers.feetech.table import FeetechModel
 from sim_mock.servo_physics import Physics
+from sim_mock.servo_protection import LOOK_MS as LOOK_MS
+from sim_mock.servo_protection import LOOK_S, warmed
 from sim_mock.sts.memory import StsMemory
 from sim_mock.sts.motion import CURRENT_UNIT_A
 
-LOOK_MS = 20
-LOOK_S = LOOK_MS / 1000.0
 TIME_UNIT_S = 0.01
 
 VOLTAGE, ANGLE, HEAT, CURRENT, OVERLOAD = 1, 2, 4, 8, 32
@@ -69,20 +69,20 @@ class StsProtection:
             get("protection_time") * per_unit,
         )
 
-    def look(self, effort: float, volts: float) -> None:
-        """Go on by 20 ms at this torque and voltage (shares)."""
+    def look(self, effort: float, volts: float, looks: int = 1) -> None:
+        """Go on by 20 ms, or so many times that, at this torque and voltage (shares)."""
         physics, limits = self._physics, self._limits
         to_c = self.ambient_c + physics.stall_rise_c * effort * effort
-        self.temperature_c += (to_c - self.temperature_c) * (LOOK_S / physics.thermal_s)
+        self.temperature_c = warmed(self.temperature_c, to_c, physics.thermal_s, looks)
         self._flag(HEAT, self.temperature_c > limits.hottest)
         tenths = volts * self._model.rated_v * 10.0
         self._flag(VOLTAGE, not limits.lowest - 0.5 <= tenths <= limits.highest + 0.5)
         effort = abs(effort)
         amps = effort * self._model.stall_current_a
         heavy = effort > 0.0 and effort * 100.0 >= limits.overload * volts - 1e-9
-        self._heavy_looks = self._heavy_looks + 1 if heavy else 0
+        self._heavy_looks = self._heavy_looks + looks if heavy else 0
         strong = amps > limits.current * CURRENT_UNIT_A
-        self._strong_looks = self._strong_looks + 1 if strong else 0
+        self._strong_looks = self._strong_looks + looks if strong else 0
         if self._heavy_looks and self._heavy_looks >= limits.overload_looks:
             self.status |= OVERLOAD
         if self._strong_looks and self._strong_looks >= limits.current_looks:

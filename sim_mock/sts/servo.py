@@ -15,6 +15,7 @@ from drivers.feetech.table import (
     RETURN_DELAY_UNIT_S,
     SET_MIDDLE,
 )
+from sim_mock.servo_motion import long_pause
 from sim_mock.servo_physics import Physics, ServoSpec, checked
 from sim_mock.sts.habits import StsHabits
 from sim_mock.sts.memory import StsMemory
@@ -82,6 +83,17 @@ class StsServo:
         return now_ms >= self._deaf_until_ms
 
     def _move(self, until_ms: int) -> None:
+        """Move on; a long pause is passed at once, so that whoever asks then is answered."""
+        pause_at_ms, pause_ms = long_pause(self._ms, until_ms, LOOK_MS)
+        self._live_on(pause_at_ms)
+        if pause_ms:
+            self.shaft.skip(pause_ms)
+            self._ms += pause_ms
+            self._look_ms += pause_ms - LOOK_MS
+            self._look(pause_ms // LOOK_MS)
+            self._live_on(until_ms)
+
+    def _live_on(self, until_ms: int) -> None:
         """Move on, and look at heat, load and voltage every 20 ms of its own time."""
         shaft = self.shaft
         while self._ms < until_ms:
@@ -93,12 +105,12 @@ class StsServo:
                 if self._calm and shaft.quiet and until_ms > self._look_ms:
                     self._look_ms += (until_ms - self._look_ms) // LOOK_MS * LOOK_MS
 
-    def _look(self) -> None:
+    def _look(self, looks: int = 1) -> None:
         """Watch over itself: protect itself, restart where the voltage is gone."""
         self._look_ms += LOOK_MS
         shaft, protection = self.shaft, self.protection
         before, was = protection.temperature_c, protection.status
-        protection.look(shaft.effort, shaft.volts)
+        protection.look(shaft.effort, shaft.volts, looks)
         self._calm = protection.temperature_c == before and protection.steady
         if protection.status != was:
             self._protect()

@@ -1,0 +1,170 @@
+"""Emulators that nobody asks for an hour: the next packet is answered at once, and truly."""
+
+import pytest
+from sts_bench import Bench
+from test_maestro_board import World, acceleration, speed, target
+
+from drivers.dynamixel.table import MODELS
+from sim_mock.servo import Servo
+from sim_mock.servo_motion import PAUSE_MS, Loop, Shaft, long_pause
+from sim_mock.servo_physics import Physics, ServoSpec
+from sim_mock.servo_profile import Profile, SpeedProfile
+from sim_mock.sts.protection import StsProtection
+
+HOUR_S = 3600.0
+GOAL, GOAL_SPEED, MODE = 42, 46, 33
+
+
+@pytest.fixture
+def lived_ms(monkeypatch):
+    """Count the milliseconds that shafts live through, and the looks of protections."""
+    count = [0]
+    run, look = Shaft.run, StsProtection.look
+
+    def counted(shaft, ticks):
+        count[0] += 0 if shaft.quiet else ticks
+        run(shaft, ticks)
+
+    def looked(protection, *words):
+        count[0] += 1
+        look(protection, *words)
+
+    monkeypatch.setattr(Shaft, "run", counted)
+    monkeypatch.setattr(StsProtection, "look", looked)
+    return count
+
+
+def moved(bench):
+    bench.write(1, 48, 1000, 2)
+    bench.engage(1, 3000)
+    bench.wait(0.5)
+
+
+def slow(bench):
+    bench.write(1, GOAL_SPEED, 20, 2)  # 40 s and more for what is left
+    bench.engage(1, 3000)
+    bench.wait(0.5)
+
+
+def wheel(bench):
+    bench.write(1, MODE, 1)
+    bench.write(1, 40, 1)
+    bench.write(1, GOAL_SPEED, 700, 2)
+    bench.wait(0.5)
+
+
+def loose(bench):
+    moved(bench)
+    bench.write(1, 40, 0)
+
+
+def jammed(bench):
+    bench.engage(1, 2048)
+    bench.chain.faults.command("stick 1")
+    bench.write(1, GOAL, 2100, 2)
+    bench.wait(0.5)
+
+
+STATES = [moved, slow, wheel, loose, jammed]
+
+
+@pytest.mark.parametrize("begin", STATES)
+def test_an_hour_costs_no_more_than_seconds(begin, lived_ms):
+    bench = Bench(ServoSpec(1, "sts3215", 2048.0))
+    begin(bench)
+    lived_ms[0] = 0
+    bench.now_s += HOUR_S
+    bench.position()
+    assert lived_ms[0] < 5_000
+
+
+@pytest.mark.parametrize("begin", STATES)
+def test_a_pause_ends_where_a_life_through_it_does(begin):
+    ends = []
+    for looks in (1, 40):  # of a second each, which is no pause
+        bench = Bench(ServoSpec(1, "sts3215", 2048.0))
+        begin(bench)
+        bench.wait(40.0, looks)
+        servo = bench.chain.here(1)
+        ends.append((bench.position(), servo.torque, servo.protection.temperature_c))
+    (at, torque, warm), (truly, torque_truly, warm_truly) = ends
+    apart = abs(at - truly)
+    assert min(apart, 4096 - apart) <= (40 if begin is wheel else 2)
+    assert torque == torque_truly and warm == pytest.approx(warm_truly, abs=0.5)
+
+
+def test_a_dynamixel_that_moved_and_idled_answers_and_is_there(lived_ms):
+    servo = Servo(ServoSpec(1, "xl330-m077", 1000.0, physics=Physics(gravity_nm=0.01)), 0)
+    servo.memory.set("torque_enable", 1)
+    servo._switch(True)
+    servo.drive.aim(2000)
+    servo.advance(100, 100)
+    lived_ms[0] = 0
+    servo.advance(3_600_100, 100)
+    assert lived_ms[0] < 5_000
+    assert servo.position_steps == pytest.approx(2000, abs=20)
+    # From there on it is as it always was.
+    servo.drive.aim(1500)
+    servo.advance(3_602_000, 3_600_100)
+    assert servo.position_steps == pytest.approx(1500, abs=20)
+
+
+def test_short_times_are_lived_through_to_the_millisecond():
+    assert long_pause(7, 7 + PAUSE_MS, 20) == (7 + PAUSE_MS, 0)
+    at, skipped = long_pause(7, 8 + PAUSE_MS, 20)
+    assert at > 7 and skipped % 20 == 0 and 0 < skipped < PAUSE_MS
+
+
+@pytest.mark.parametrize("ramp", [0.0, 1e-4, 0.01])
+@pytest.mark.parametrize("skipped", [1, 500, 4000, 90_000])
+def test_profiles_go_on_at_once_as_they_do_step_by_step(ramp, skipped):
+    for make in (_led, _spun):
+        one, other = make(ramp), make(ramp)
+        one.ahead(100)
+        other.ahead(100)
+        one.skip(skipped)
+        other.ahead(skipped)
+        assert (one.r, one.v) == pytest.approx((other.r, other.v), rel=1e-6, abs=1.0)
+        assert one.running == other.running
+
+
+def _led(ramp):
+    made = Profile(0.0)
+    made.by_velocity(5000.0, 1.0, ramp)
+    return made
+
+
+def _spun(ramp):
+    made = SpeedProfile(0.0, 0.0)
+    made.aim(2.0, ramp)
+    return made
+
+
+def test_a_motor_without_feedback_turns_on():
+    made = Shaft(MODELS["xl330-m077"], Physics(), 0.0)
+    made.drive(Loop(bias=0.5))
+    made.run(3000)
+    before, v = made.x, made.v
+    made.skip(10_000)
+    assert made.x - before == pytest.approx(10_000 * v) and v > 0
+
+
+@pytest.mark.parametrize("timeout_s", [0, 100])
+def test_a_maestro_whose_script_runs_all_night_answers(timeout_s, monkeypatch):
+    world = World(12)
+    for channel in range(12):
+        world.ask(target(channel, 5000))
+        world.ask(speed(channel, 1) + acceleration(channel, 1) + target(channel, 6000))
+    world.do("script 3")
+    world.do(f"set timeout-ms {1000 * timeout_s}")
+    passed = []
+    body = type(world.board.body)
+    through = body._pass
+    monkeypatch.setattr(body, "_pass", lambda self: (passed.append(1), through(self)))
+    world.after(HOUR_S)
+    here = world.positions()
+    assert len(passed) < 12_000
+    # Speed 1 is 100 a second: all the others are there, or sent off by the timeout.
+    assert here[0] == (0 if timeout_s else 6000)
+    swung = {world.after(0.5).position(3) for _ in range(8)}
+    assert len(swung) > 1
