@@ -3,9 +3,12 @@
 Property tests draw the same examples every time; HYPOTHESIS_PROFILE=search draws others.
 """
 
+import gc
 import os
 import sys
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("steady", derandomize=True)
@@ -21,3 +24,19 @@ sys.dont_write_bytecode = False
 # only wait for each other. Read when the library loads, so before any test imports it.
 for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):
     os.environ.setdefault(threads, "1")
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Let what is imported lie: it stays, and looking it through takes a third of the time."""
+    gc.disable()
+    yield
+    gc.freeze()
+    gc.enable()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return three workers for two processors: for a third of the time tests wait."""
+    processors = os.cpu_count() or 1
+    return processors + (processors + 1) // 2
