@@ -7,6 +7,7 @@ import errno
 import os
 import select
 import time
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from dynamixel_sdk import PortHandler
@@ -81,10 +82,23 @@ class BusPort(Protocol):
 
 
 class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
-    """A real serial port by path, opened for this program alone."""
+    """A real serial port by path.
 
-    def __init__(self, port_name: str) -> None:
+    Args:
+        port_name: its path.
+        exclusive: opened for this program alone; False: beside the program that has it open.
+        on_traffic: called whenever bytes are sent or waited for, None where nobody asks.
+    """
+
+    def __init__(
+        self,
+        port_name: str,
+        exclusive: bool = True,
+        on_traffic: Callable[[], None] | None = None,
+    ) -> None:
         super().__init__(port_name)
+        self._exclusive = exclusive
+        self._on_traffic = on_traffic
         self.ser: Serial | None = None
         self._fd = -1
         self._fds: tuple[int, ...] = (-1,)
@@ -102,6 +116,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         Raises:
             drivers.errors.BusLost: the port is gone or takes nothing.
         """
+        if self._on_traffic is not None:
+            self._on_traffic()
         deadline_s = 0.0
         while True:
             try:
@@ -122,6 +138,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         Raises:
             drivers.errors.BusLost: the port is gone.
         """
+        if self._on_traffic is not None:
+            self._on_traffic()
         got = b""
         try:
             while True:
@@ -204,7 +222,9 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """
         self.closePort()
         try:
-            self.ser = Serial(self.port_name, cflag_baud, timeout=0, exclusive=True)
+            self.ser = Serial(
+                self.port_name, cflag_baud, timeout=0, exclusive=self._exclusive or None
+            )
         except (SerialException, OSError) as error:
             raise PortError(explain(self.port_name, error.errno)) from error
         except ValueError as error:  # pyserial: an adapter that does not do this rate

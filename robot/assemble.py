@@ -13,8 +13,8 @@ from drivers.camera_depth import depth_at
 from drivers.camera_poses import PoseRing
 from drivers.errors import SetupError
 from drivers.port_owner import refuse_owner
-from drivers.serial_port import BlockingPort, BusPort
 from drivers.serial_ports import serial_ports
+from drivers.types import ServoBus
 from gaze.attention import Attention
 from gaze.aversion import Aversion
 from gaze.bottom_up import BottomUp
@@ -40,7 +40,7 @@ from robot.loop import LoopParams, Robot
 from robot.page.snapshot import ShownRig
 from robot.retune import Parts, Placed, Retuner
 from robot.rig_angles import eye_limits, head_limits, lid_ends, limits, own_parts, park_rad
-from robot.rig_bus import ports_of, rig_bus
+from robot.rig_bus import guarded_rig_bus, ports_of, rig_bus
 from robot.safety.guard import Guard
 from robot.seeing.perception import Perception
 from robot.seeing.tracks import Tracker
@@ -106,9 +106,9 @@ class Assembly(NamedTuple):
 
 
 class _Wires(NamedTuple):
-    """The ports by the names of their buses, and what is emulated behind them in this process."""
+    """The bus of the rig, and what is emulated behind it in this process, by the bus's name."""
 
-    ports: Mapping[str, BusPort]
+    bus: ServoBus
     devices: Mapping[str, Device]
     digest: Callable[[], str | None]
     close: Callable[[], None]
@@ -137,7 +137,7 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
     poses = remembering(kinematics, tell=_teller(kinematics, mount, turns))
     wires = _wires(rig, choice, clock)
     try:
-        body = Body(rig_bus(rig, wires.ports), rig.joints, park_rad(rig))
+        body = Body(wires.bus, rig.joints, park_rad(rig))
         lids = Lids(rig.gaze.lids, lid_dice)
         where = _true_head(wires.devices, rig, poses)
         tracker = Tracker(rig.tracks)
@@ -261,19 +261,15 @@ def _wires(rig: Rig, choice: Choice, clock: Clock) -> _Wires:
         paths, here = ports_of(rig, choice.port), serial_ports()
         for name, path in paths.items():
             refuse_owner(path, rig.bus_named(name).kind, here)
-        return _Wires(_opened_by(paths), {}, _no_digest, _nothing)
+        return _Wires(guarded_rig_bus(rig, paths), {}, _no_digest, _nothing)
     lines = emulated_lines(rig)
     if not choice.fast:
         buses = PtyBuses()
-        return _Wires(_opened_by(buses.start(lines)), {}, _no_digest, buses.stop)
+        return _Wires(guarded_rig_bus(rig, buses.start(lines)), {}, _no_digest, buses.stop)
     sent = hashlib.sha256()
     devices = {name: build(line, clock.now_s) for name, line in lines.items()}
     ports = {name: InProcessPort(device, sent.update) for name, device in devices.items()}
-    return _Wires(ports, devices, sent.hexdigest, _nothing)
-
-
-def _opened_by(paths: Mapping[str, str]) -> dict[str, BusPort]:
-    return {name: BlockingPort(path) for name, path in paths.items()}
+    return _Wires(rig_bus(rig, ports), devices, sent.hexdigest, _nothing)
 
 
 def _no_digest() -> str | None:

@@ -8,9 +8,13 @@ from drivers.errors import SetupError
 from drivers.feetech.bus import FeetechBus
 from drivers.maestro.bus import MaestroBus
 from drivers.mixed_bus import MixedBus, Share
-from drivers.serial_port import BusPort
+from drivers.serial_port import BlockingPort, BusPort
+from drivers.servo_models import BUS_KINDS
 from drivers.types import ServoBus, ServoSetup
 from robot.body import setups
+from robot.guardian.guarded_bus import GuardedBus
+from robot.guardian.guardian import Guardian
+from robot.guardian.release_plan import ReleasePlan
 from robot.rig_angles import park_rad
 
 
@@ -56,7 +60,71 @@ def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
 
     ports: by the name of the bus
     """
-    shares = [_share(rig, name, ports[name]) for name in bus_names(rig)]
+    return _joined([_share(rig, name, ports[name]) for name in bus_names(rig)])
+
+
+def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
+    """Return the bus of a rig on serial ports, guarded where servos have no watchdog.
+
+    A program that switches torque on through it may die: a guardian process, started as the
+    bus is opened, then lets go. Nothing is opened here.
+
+    Args:
+        rig: the rig.
+        paths: of the serial ports, by the name of the bus.
+    """
+    plans = release_plans(rig, paths)
+    guarded = list(plans)
+    guardian = Guardian(tuple(plans.values())) if plans else None
+    beat = guardian.beat if guardian is not None else None
+    shares = []
+    for name in bus_names(rig):
+        share = _share(rig, name, BlockingPort(paths[name], on_traffic=beat))
+        if guardian is not None and name in plans:
+            bus = GuardedBus(share.bus, len(share.places), guardian, guarded.index(name))
+            share = share._replace(bus=bus)
+        shares.append(share)
+    return _joined(shares)
+
+
+def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
+    """Return how to let go of the servos that have no watchdog, by the name of their bus.
+
+    Args:
+        rig: the rig.
+        paths: of the serial ports, by the name of the bus.
+    """
+    return {
+        name: release_plan(rig, name, paths[name])
+        for name in bus_names(rig)
+        if not has_watchdog(rig, name)
+    }
+
+
+def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
+    """Return how to let go of the servos of one bus.
+
+    Args:
+        rig: the rig.
+        name: of the bus.
+        path: of its serial port.
+    """
+    config, board = rig.bus_named(name), rig.bus_named(name).maestro
+    (kind,) = (kind for kind in BUS_KINDS if kind == config.kind)
+    ids = tuple(rig.joints[joint].id for joint in joints_on(rig, name))
+    return ReleasePlan(
+        kind, path, config.baud, ids, board.protocol, board.device, board.crc, board.channels
+    )
+
+
+def has_watchdog(rig: Rig, name: str) -> bool:
+    """Return whether the servos of one bus stop by themselves when their program dies."""
+    config = rig.bus_named(name)
+    return config.kind == "dynamixel" and config.dynamixel.watchdog_ms > 0
+
+
+def _joined(shares: list[Share]) -> ServoBus:
+    """Return several buses as one; one stays as it is."""
     return shares[0].bus if len(shares) == 1 else MixedBus(shares)
 
 

@@ -8,11 +8,11 @@ the package index are copies of it. The protocol is small, and the port is ours 
 
 What an STS cannot do. It has no bus watchdog: when the host falls silent, a servo goes on
 to its last goal and holds it, for ever. Nothing in the servo stands in for that: whoever
-runs the bus must let go before leaving (``release``), and what bounds the force until
-somebody cuts the power is the torque limit (``strength``) and the servo's own overload
-protection, which leaves a fifth of the torque after two seconds. So goals are sent a tick
-at a time, never far ahead. Faults do not latch: their bits come and go, and so do the names
-in ``faults``.
+runs the bus must let go before leaving (``release``) or have a guardian beside it that
+does (robot.guardian), and what bounds the force until somebody cuts the power is the
+torque limit (``strength``) and the servo's own overload protection, which leaves a fifth
+of the torque after two seconds. So goals are sent a tick at a time, never far ahead.
+Faults do not latch: their bits come and go, and so do the names in ``faults``.
 """
 
 from collections.abc import Sequence

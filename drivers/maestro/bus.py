@@ -7,7 +7,8 @@ What the board cannot do, and so this bus cannot promise:
 - Where a servo is before its pulses begin is unknown. It goes to the first pulse at its
   own speed, whatever limit is armed.
 - No watchdog can be armed over the serial line: when this program dies the servos hold
-  their last goals. The board's own serial timeout does it, set with Pololu's program.
+  their last goals, unless a guardian beside it stops the pulses (robot.guardian). The board's
+  own serial timeout, set with Pololu's program, helps where the cable or the computer dies.
 - The board knows nothing of its servos' supply: servos that restart alone go unnoticed.
 """
 
@@ -20,9 +21,9 @@ from drivers.lasting_port import LastingPort
 from drivers.maestro.care import Care
 from drivers.maestro.channel import Channel, check
 from drivers.maestro.commands import MICRO
-from drivers.maestro.hold import TRIES, switch_off
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams as MaestroParams
+from drivers.maestro.release import TRIES, switch_off
 from drivers.maestro.silence import Silence
 from drivers.maestro.start import find, take_on
 from drivers.serial_port import BusPort

@@ -1,19 +1,15 @@
-"""Switching a channel's pulses on and off, so that nothing moves that need not.
+"""Switching a channel's pulses on, so that nothing moves that need not.
 
 Where a channel gives pulses already it is held there. Where it gives none nobody can know
 where its servo is, and a first pulse is not ramped: the servo goes there at its own speed.
 """
 
-from collections.abc import Sequence
 from enum import Enum
-from typing import NamedTuple
 
 from drivers.bus_journal import call
 from drivers.maestro.channel import FINE_STEPS, Channel
 from drivers.maestro.line import Line
 from drivers.maestro.params import US_STEPS
-
-TRIES = 3
 
 
 class Outcome(Enum):
@@ -62,31 +58,3 @@ def refusal(channel: Channel) -> str:
         f"{call(channel.setup)} is sent to {sent} and gets {got}: "
         "widen its range in Pololu's program, or delete the board's script"
     )
-
-
-class Released(NamedTuple):
-    """Channels that still give pulses, and those of which nothing was heard."""
-
-    holding: tuple[int, ...]
-    mute: tuple[int, ...]
-
-
-def switch_off(line: Line, channels: Sequence[int]) -> Released:
-    """Stop the pulses, and see that they are gone.
-
-    Raises:
-        drivers.errors.BusLost: the port is gone.
-    """
-    left = tuple(channels)
-    heard: set[int] = set()
-    for _ in range(TRIES):
-        # Each by its own command: one that is damaged on the way takes no other with it.
-        line.send(b"".join(line.speech.target(channel, 0) for channel in left))
-        found = line.pulses(left)
-        if found is not None:
-            heard.update(left)
-            left = tuple(channel for channel, pulse in zip(left, found, strict=True) if pulse)
-        if not left:
-            break
-    holding = tuple(channel for channel in left if channel in heard)
-    return Released(holding, tuple(channel for channel in left if channel not in heard))

@@ -7,9 +7,10 @@ from drivers.bus_journal import Journal, call
 from drivers.errors import ServoMissing
 from drivers.maestro.channel import Channel
 from drivers.maestro.commands import MOST_INPUT, name_errors
-from drivers.maestro.hold import TRIES, Outcome, refusal, take
+from drivers.maestro.hold import Outcome, refusal, take
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
+from drivers.maestro.release import TRIES
 
 
 def find(line: Line, channels: Sequence[Channel], params: MaestroParams, journal: Journal) -> None:

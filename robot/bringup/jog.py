@@ -12,7 +12,8 @@ what was really applied:
         control.stop()
 
 Between two calls nothing is sent: Dynamixel servos are held by their own bus watchdog, others
-stay at their last goal, and the next call goes on from there.
+stay at their last goal, or limp where a guardian watches them (robot.guardian, after .4 s), and
+the next call goes on from there.
 """
 
 from collections.abc import Callable, Mapping

@@ -53,7 +53,7 @@ FEETECH = ServoKind(
     nobody="is the servo supply on, and its voltage that of the servos (7.4 or 12 V)? is the "
     "first cable in, and the adaptor's jumper set to USB?",
     notes=(
-        "an STS has no bus watchdog: if the program or the cable dies it holds its last goal; "
+        "an STS has no bus watchdog: if the cable or the computer dies it holds its last goal; "
         "keep the switch of the servo supply at hand",
     ),
     version=lambda firmware: f"{firmware // 100}.{firmware % 100}",

@@ -17,7 +17,7 @@ from robot.interrupts import Interrupts
 from robot.kinematics import NECK
 from robot.power_down import PowerDown
 from robot.rig_angles import limits, park_rad
-from robot.rig_bus import rig_bus
+from robot.rig_bus import guarded_rig_bus
 from robot.safety.guard import Guard
 from sim_mock.board_scene import BoardScene
 
@@ -87,7 +87,7 @@ def moving_neck(
     elif not agrees(stopped, yes, "does the board hang, and is the head free to move?"):
         raise CameraCalibrationRefused("left out as you wished: nothing was written")
     with wires(rig, mock is not None, port) as wire:
-        body = Body(rig_bus(rig, wire.opened_by()), rig.joints, park_rad(rig))
+        body = Body(guarded_rig_bus(rig, wire.paths), rig.joints, park_rad(rig))
         guard = Guard(rig.guard, limits(rig.joints), rig.names)
         params = JogParams(speed_deg_s=_GENTLE_DEG_S)
         control = ManualControl(body, guard, RealClock(), params, stopped)

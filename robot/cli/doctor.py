@@ -11,6 +11,7 @@ from drivers.serial_port import BlockingPort
 from robot.bringup import checkup as checkup
 from robot.bringup import doctor_maestro as doctor_maestro
 from robot.bringup.checkup import Done
+from robot.bringup.doctor_guardian import examine_guardian
 from robot.bringup.findings import Finding, worst
 from robot.bringup.kinds import KINDS
 from robot.bringup.servo_report import as_plain, grouped, summed_up
@@ -18,6 +19,7 @@ from robot.cli import bench as bench
 from robot.cli.bench import JsonOption, console, progress, wipe
 from robot.cli.terminal import FAULT, RigArgument, clear_errors
 from robot.cli.wires import MockOption, PortOption, bus_label, setups_on, wires
+from robot.rig_bus import has_watchdog, release_plan
 
 app = typer.Typer()
 
@@ -61,6 +63,8 @@ def _examined(rig: Rig, lines: Mapping[str, BlockingPort], tell: Tell) -> dict[s
     findings = {}
     for bus, line in lines.items():
         findings[bus] = _examine(rig, bus, line)
+        if not has_watchdog(rig, bus):
+            findings[bus].append(examine_guardian(release_plan(rig, bus, line.port_name)))
         wipe()
         if len(lines) > 1:
             tell(f"{bus_label(rig, bus)} ({rig.bus_named(bus).kind}, {line.port_name}):")

@@ -24,7 +24,7 @@ from robot.cli.wires import MockOption, PortOption, RigOption, Wires, wires
 from robot.clock import RealClock
 from robot.power_down import PowerDown
 from robot.rig_angles import lid_ends, limits, park_rad
-from robot.rig_bus import rig_bus
+from robot.rig_bus import guarded_rig_bus
 from robot.safety.guard import Guard
 
 app = typer.Typer()
@@ -180,7 +180,7 @@ def _ask_for_fingers(rig: Rig, yes: bool) -> None:
 def _control(
     rig: Rig, wire: Wires, speed: float, stopped: Callable[[], str | None]
 ) -> ManualControl:
-    body = Body(rig_bus(rig, wire.opened_by()), rig.joints, park_rad(rig))
+    body = Body(guarded_rig_bus(rig, wire.paths), rig.joints, park_rad(rig))
     guard = Guard(rig.guard, limits(rig.joints), rig.names)
     gentle = rig.guard.gentle_speed_deg_s
     if speed > gentle:

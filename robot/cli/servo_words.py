@@ -6,8 +6,10 @@ from robot.rig_bus import bus_names
 
 _LEFT_ALONE: dict[BusKind, str] = {
     "dynamixel": "the Dynamixel servos' own watchdog stops them",
-    "feetech": "Feetech servos hold their last goal until the servo power is cut",
-    "maestro": "a Maestro goes on with its last pulses until the servo power is cut",
+    "feetech": "Feetech servos hold their last goal until the servo power is cut, or "
+    "the guardian, which tries for 10 s, reaches the port",
+    "maestro": "a Maestro goes on with its last pulses until the servo power is cut, or "
+    "the guardian, which tries for 10 s, reaches the port",
 }
 
 

@@ -1,0 +1,191 @@
+"""The program's side of its guardian: starts it, shows it signs of life, starts it again."""
+
+import os
+import select
+import subprocess
+import sys
+from pathlib import Path
+
+from drivers.errors import SetupError
+from robot.guardian import process
+from robot.guardian.heartbeat import IDLE, MAX_PLANS, RELEASED, RELEASING, Heartbeat, shared_file
+from robot.guardian.release_plan import ReleasePlan, encode
+
+READY_S = 20.0
+"""A guardian starts within 0.1 s; a machine under load may take long."""
+
+GOODBYE_S = 2.0
+CHECK_S = 0.25
+"""Time between two looks whether it is alive."""
+
+RESTART_S = 5.0
+"""Time between two starts of a guardian that does not stay alive."""
+
+
+class Guardian:
+    """One process for all ports of a rig whose servos have no watchdog of their own.
+
+    Args:
+        plans: what it lets go of, by port.
+
+    Raises:
+        ValueError: more ports than its memory has room for.
+    """
+
+    def __init__(self, plans: tuple[ReleasePlan, ...]) -> None:
+        if len(plans) > MAX_PLANS:
+            raise ValueError(f"{len(plans)} ports are too many for one guardian: {MAX_PLANS}")
+        self.plans = plans
+        self._fd = shared_file()
+        self._heartbeat = Heartbeat(self._fd)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._ready = False
+        self._users: set[int] = set()
+        self._check_s = self._restart_s = 0.0
+        self._events: list[str] = []
+        self.beat = self._heartbeat.beat
+        """Show a sign of life; for the control loop's thread alone."""
+
+    def __del__(self) -> None:
+        os.close(self._fd)
+
+    @property
+    def pid(self) -> int | None:
+        """Return the process id of the guardian, None where none runs."""
+        return None if self._process is None else self._process.pid
+
+    def join(self, plan: int) -> None:
+        """Start it where it does not run yet; returns at once.
+
+        Raises:
+            drivers.errors.SetupError: no process can be started.
+        """
+        self._users.add(plan)
+        if self._process is None:
+            try:
+                self._start()
+            except OSError as error:
+                raise SetupError(f"no guardian can be started: {error.strerror}") from error
+
+    def wait_until_ready(self) -> None:
+        """Wait until it watches, where it has just been started.
+
+        Raises:
+            drivers.errors.SetupError: it does not start.
+        """
+        if self._process is not None and self._process.stdout is not None and not self._ready:
+            stdout = self._process.stdout
+            if select.select([stdout], [], [], READY_S)[0]:
+                self._ready = bool(os.read(stdout.fileno(), 1))
+        if not self._ready:
+            raise SetupError(
+                "the guardian, which lets go of the servos should this program die, did not start: "
+                "see the lines above"
+            )
+
+    def arm(self, plan: int) -> None:
+        """Let it watch from now on, before torque comes on.
+
+        Raises:
+            drivers.errors.SetupError: it does not run, and torque must not come on without it.
+        """
+        self.wait_until_ready()
+        self._heartbeat.set_state(plan, IDLE)
+        self.beat()
+        self._heartbeat.arm(plan, True)
+
+    def disarm(self, plan: int) -> None:
+        """Tell it that the torque is off."""
+        self._heartbeat.arm(plan, False)
+
+    def releasing(self, plan: int) -> bool:
+        """Return whether it is letting go of a plan's servos at this moment."""
+        return self._heartbeat.state(plan) == RELEASING
+
+    def released(self, plan: int) -> bool:
+        """Return whether it has let go of a plan's servos, or is about to."""
+        return self._heartbeat.state(plan) != IDLE
+
+    def acknowledge(self, plan: int) -> None:
+        """Record that the loop knows of it; from now on the guardian may let go again."""
+        self._heartbeat.set_state(plan, IDLE)
+
+    def check(self, now_s: float) -> None:
+        """See now and then whether it is alive, and start it again where it is not.
+
+        Args:
+            now_s: monotonic seconds.
+        """
+        if now_s < self._check_s or self._process is None:
+            return
+        self._check_s = now_s + CHECK_S
+        code = self._process.poll()
+        if code is None or now_s < self._restart_s:
+            return
+        self._restart_s = now_s + RESTART_S
+        self._end_unfinished()
+        self._events.append(f"the guardian ended by itself ({_ending(code)}): started again")
+        try:
+            self._start()
+        except OSError as error:
+            self._events.append(f"no guardian: {error.strerror}; tried again in {RESTART_S:g} s")
+
+    def events(self) -> tuple[str, ...]:
+        """Return what has happened since the last call."""
+        if not self._events:
+            return ()
+        events = tuple(self._events)
+        self._events.clear()
+        return events
+
+    def leave(self, plan: int) -> None:
+        """Say goodbye for one port; after the last the guardian ends.
+
+        Where servos of the port are still armed, as they could not be let go of, it goes on
+        trying for some seconds by itself.
+        """
+        self._users.discard(plan)
+        if self._users or self._process is None:
+            return
+        ending, self._process = self._process, None
+        for pipe in (ending.stdin, ending.stdout):
+            if pipe is not None:
+                pipe.close()
+        if any(self._heartbeat.armed(i) for i in range(len(self.plans))):
+            return
+        try:
+            ending.wait(GOODBYE_S)
+        except subprocess.TimeoutExpired:  # nothing is armed: it has nothing left to do
+            ending.kill()
+            ending.wait()
+
+    def _start(self) -> None:
+        """Start the process; raises OSError where the system refuses."""
+        self._ready = False
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", process.__name__, str(self._fd), encode(self.plans)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            bufsize=0,
+            pass_fds=(self._fd,),
+            env=_environment(),
+            # Ctrl-C and a closed terminal are the program's.
+            start_new_session=True,
+        )
+
+    def _end_unfinished(self) -> None:
+        """Take what a guardian that died on its way was letting go of for let go of."""
+        for i in range(len(self.plans)):
+            if self.releasing(i):
+                self._heartbeat.set_state(i, RELEASED)
+
+
+def _ending(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _environment() -> dict[str, str]:
+    """Return an environment in which the guardian finds this very package."""
+    here = str(Path(__file__).resolve().parents[2])
+    known = os.environ.get("PYTHONPATH")
+    return {**os.environ, "PYTHONPATH": os.pathsep.join((here, known)) if known else here}

@@ -1,0 +1,65 @@
+"""The memory that a program and its guardian share: a counter, and one record for each port.
+
+    offset 0     uint64   beats: counted up by the control loop's thread
+    offset 8+2i  uint8    armed: the servos of plan i may be under torque   (the loop writes)
+    offset 9+2i  uint8    state: what the guardian did with plan i          (both write)
+
+Nothing is locked: every field has one writer at a time. The guardian sets ``RELEASING``
+before its first byte and ``RELEASED`` after the last; the loop alone sets ``IDLE`` again.
+"""
+
+import mmap
+import os
+
+IDLE, RELEASING, RELEASED = 0, 1, 2
+
+SIZE = 4096
+MAX_PLANS = 64
+
+
+class Heartbeat:
+    """One side's view of the shared memory.
+
+    Args:
+        fd: a file of ``SIZE`` bytes, mapped here; it may be closed afterwards.
+    """
+
+    def __init__(self, fd: int) -> None:
+        self._map = mmap.mmap(fd, SIZE)
+        view = memoryview(self._map)
+        self._beats = view[:8].cast("Q")
+        self._flags = view[8 : 8 + 2 * MAX_PLANS]
+        self._count = self._beats[0]
+
+    def beat(self) -> None:
+        """Count one sign of life; called by the loop's thread alone."""
+        self._count += 1
+        self._beats[0] = self._count
+
+    @property
+    def beats(self) -> int:
+        """Return the counter."""
+        return self._beats[0]
+
+    def arm(self, plan: int, armed: bool) -> None:
+        """Record that servos may be under torque from now on, or are not any more."""
+        self._flags[2 * plan] = armed
+
+    def armed(self, plan: int) -> bool:
+        """Return whether servos may be under torque."""
+        return self._flags[2 * plan] != 0
+
+    def state(self, plan: int) -> int:
+        """Return IDLE, RELEASING or RELEASED."""
+        return self._flags[2 * plan + 1]
+
+    def set_state(self, plan: int, state: int) -> None:
+        """Record what the guardian does, or that the loop has seen it."""
+        self._flags[2 * plan + 1] = state
+
+
+def shared_file() -> int:
+    """Return the descriptor of a new file in memory that another process can be given."""
+    fd = os.memfd_create("gazerig-heartbeat", os.MFD_CLOEXEC)
+    os.ftruncate(fd, SIZE)
+    return fd

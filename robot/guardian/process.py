@@ -1,0 +1,148 @@
+"""The guardian itself: lets go of servos that have no watchdog when their program dies or hangs.
+
+Run by robot.guardian.guardian as
+
+    python -m robot.guardian.process HEARTBEAT_FD PLANS
+
+with one end of a pipe as standard input, whose other end the program holds, and a pipe as
+standard output, on which one byte says that it is ready. It knows nothing of the program
+but the memory with its heartbeat, and opens a port only to let go.
+
+It ends when the program is gone or has closed the pipe: silently where nothing is armed
+any more, else after having let go. Signals to a whole group (Ctrl-C, a closed terminal,
+the end of a service) are for the program: they do not end it.
+"""
+
+import contextlib
+import os
+import select
+import signal
+import sys
+
+from drivers.errors import DriverError
+from drivers.serial_port import BlockingPort
+from robot.clock import RealClock
+from robot.guardian.hang_detector import HangDetector
+from robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, Heartbeat
+from robot.guardian.release_plan import ReleasePlan, decode, describe, releaser
+
+LOOK_S = 0.02
+"""Time between two looks at the heartbeat."""
+
+RETRY_S = 0.25
+"""A port that could not be opened is tried again so much later."""
+
+UNPLUGGED_S = 10.0
+"""An adaptor that was unplugged when the program died is waited for so long."""
+
+ALONE_S = 1.0
+"""From so long after the program's death another one may have taken the port: its own now."""
+
+
+class Guard:
+    """Watches one program.
+
+    Args:
+        heartbeat: the memory shared with it.
+        plans: what to let go of, one record of the memory each.
+        parent: process id of the program.
+    """
+
+    def __init__(self, heartbeat: Heartbeat, plans: tuple[ReleasePlan, ...], parent: int) -> None:
+        self._heartbeat, self._plans, self._parent = heartbeat, plans, parent
+        # All is imported now: when it is needed, the disk may be gone with the rest.
+        self._release = [releaser(plan) for plan in plans]
+        self._complained: set[int] = set()
+        self._clock = RealClock()
+        self._hang = HangDetector(heartbeat.beats, self._clock.now_s())
+        self._retry_s = 0.0
+
+    def run(self) -> None:
+        """Watch until the program is gone or says goodbye, and let go of what is armed then."""
+        while not self._gone():
+            self._watch(self._clock.now_s())
+        self._let_go_for_good()
+
+    def _gone(self) -> bool:
+        """Wait a moment; return whether the program is gone or has said goodbye."""
+        readable, _, _ = select.select([sys.stdin.fileno()], [], [], LOOK_S)
+        # A child of the program may hold its end of the pipe open, so its id is asked as well.
+        return bool(readable) or os.getppid() != self._parent
+
+    def _watch(self, now_s: float) -> None:
+        """Let go of what is armed where the loop hangs."""
+        armed = self._armed()
+        if not armed:
+            self._hang.reset()
+        if not self._hang.step(self._heartbeat.beats, now_s) or now_s < self._retry_s:
+            return
+        for i in armed:
+            if self._heartbeat.state(i) == IDLE:
+                self._let_go_of_hung(i)
+
+    def _armed(self) -> list[int]:
+        return [i for i in range(len(self._plans)) if self._heartbeat.armed(i)]
+
+    def _let_go_of_hung(self, i: int) -> None:
+        """Let go of one plan's servos beside a program that has the port open."""
+        # Before the first byte: a loop that wakes now keeps its hands off until this is over.
+        self._heartbeat.set_state(i, RELEASING)
+        why = f"no sign of life of the control loop for {self._hang.silent_s:.1f} s"
+        done = self._let_go(i, why, exclusive=False)
+        self._heartbeat.set_state(i, RELEASED if done else IDLE)
+        if not done:
+            self._retry_s = self._clock.now_s() + RETRY_S
+
+    def _let_go_for_good(self) -> None:
+        """Let go of what the program left, waiting a while for adaptors that are unplugged."""
+        began_s = self._clock.now_s()
+        left = self._armed()
+        while left:
+            since_s = self._clock.now_s() - began_s
+            left = [i for i in left if not self._let_go(i, "the program died", since_s > ALONE_S)]
+            # Only an adaptor can come back; an emulated port ends with its program.
+            left = [i for i in left if self._plans[i].port.startswith("/dev/")]
+            if since_s > UNPLUGGED_S:
+                return
+            if left:
+                self._clock.sleep_until(self._clock.now_s() + RETRY_S)
+
+    def _let_go(self, i: int, why: str, exclusive: bool) -> bool:
+        """Let go of one plan's servos; return False where the port cannot be used."""
+        plan = self._plans[i]
+        port = BlockingPort(plan.port, exclusive)
+        try:
+            mute = self._release[i](port)
+        except DriverError as error:
+            if i not in self._complained:
+                say(f"guardian: {why}; not let go yet: {error}")
+            self._complained.add(i)
+            return False
+        finally:
+            port.closePort()
+        named = ", ".join(map(str, mute))
+        unsure = f"; not confirmed by {named}: cut the servo power" if mute else ""
+        say(f"guardian: {why}: {describe(plan)}{unsure}")
+        return True
+
+
+def say(line: str) -> None:
+    """Write a line to standard error, which may have gone with the terminal."""
+    with contextlib.suppress(OSError):
+        wipe = "\r\x1b[K" if os.isatty(2) else ""
+        os.write(2, f"{wipe}{line}\n".encode())
+
+
+def main(heartbeat_fd: int, plans: str) -> None:
+    """Watch the program that started this process."""
+    parent = os.getppid()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+    guard = Guard(Heartbeat(heartbeat_fd), decode(plans), parent)
+    with contextlib.suppress(BrokenPipeError):
+        os.write(sys.stdout.fileno(), b".")
+    guard.run()
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), sys.argv[2])

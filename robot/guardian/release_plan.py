@@ -1,0 +1,68 @@
+"""What must be known to let go of the servos of one port: data that fits on a command line."""
+
+import json
+from collections.abc import Callable
+from typing import NamedTuple
+
+from drivers.maestro.params import Form, MaestroParams
+from drivers.serial_port import BusPort
+from drivers.servo_models import BusKind
+
+
+class ReleasePlan(NamedTuple):
+    """The servos of one port and how they are reached.
+
+    port: path of the serial port
+    baud: bit/s
+    ids: of the servos; channels of a Maestro
+    protocol, device, crc, channels: of a Maestro, as in drivers.maestro.params
+    """
+
+    kind: BusKind
+    port: str
+    baud: int
+    ids: tuple[int, ...]
+    protocol: Form = "compact"
+    device: int = 12
+    crc: bool = False
+    channels: int = 12
+
+
+def encode(plans: tuple[ReleasePlan, ...]) -> str:
+    """Return plans as one word of a command line."""
+    return json.dumps(plans)
+
+
+def decode(text: str) -> tuple[ReleasePlan, ...]:
+    """Return the plans that ``encode`` wrote."""
+    plans = [ReleasePlan(*fields) for fields in json.loads(text)]
+    return tuple(plan._replace(ids=tuple(plan.ids)) for plan in plans)
+
+
+def releaser(plan: ReleasePlan) -> Callable[[BusPort], tuple[int, ...]]:
+    """Return what lets go of the servos of a plan through a port of its path.
+
+    It opens the port and returns the ids that did not confirm; it raises
+    drivers.errors.PortError where the port cannot be opened, drivers.errors.BusLost where it
+    went away. All that it needs is imported here, and of the drivers no more than one.
+    """
+    if plan.kind == "feetech":
+        from drivers.feetech import release as feetech
+
+        return lambda port: feetech.disable_torque(port, plan.baud, plan.ids)
+    if plan.kind == "maestro":
+        from drivers.maestro import release as maestro
+
+        params = MaestroParams(plan.baud, plan.protocol, plan.device, plan.crc, plan.channels)
+        return lambda port: maestro.stop_pulses(port, params, plan.ids)
+    from drivers.dynamixel import release as dynamixel
+
+    return lambda port: dynamixel.disable_torque(port, plan.baud, plan.ids)
+
+
+def describe(plan: ReleasePlan) -> str:
+    """Return what letting go of a plan's servos means, e.g. "pulses off on 6 channels of PORT"."""
+    count = len(plan.ids)
+    if plan.kind == "maestro":
+        return f"pulses off on {count} channel{'s' * (count != 1)} of {plan.port}"
+    return f"torque off on {count} servo{'s' * (count != 1)} of {plan.port}"

@@ -1,0 +1,165 @@
+"""A loop in a process of its own that drives a rig's emulated servos, to be killed or stopped."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from config.rig import Rig
+from config.schema import load_rig
+from drivers.serial_port import BlockingPort
+from robot.emulated_rig import emulated_lines
+from robot.rig_bus import guarded_rig_bus, ports_of, rig_bus, rig_setups
+from sim_mock.pty_bus import PtyBuses
+
+RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker"}
+SLOW_DEG_S = 4.0
+PATIENCE_S = 30.0
+
+
+def slow(kind: str, watchdog: bool = True) -> Rig:
+    """Return a kind's shipped rig whose joints take seconds to their ends."""
+    rig = load_rig(RIGS[kind])
+    joints = {n: replace(j, max_speed_deg_s=SLOW_DEG_S) for n, j in rig.joints.items()}
+    if not watchdog:
+        dynamixel = replace(rig.bus.dynamixel, watchdog_ms=0)
+        rig = replace(rig, bus=replace(rig.bus, dynamixel=dynamixel))
+    return replace(rig, joints=joints)
+
+
+def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
+    """Drive all joints slowly to their ends, 100 ticks a second, and say what happens."""
+    rig = slow(kind, watchdog)
+    paths = ports_of(rig, path)
+    bus = (
+        guarded_rig_bus(rig, paths)
+        if guarded
+        else rig_bus(rig, {name: BlockingPort(path) for name, path in paths.items()})
+    )
+    bus.open()
+    bus.engage()
+    goals = [setup.max_steps for setup in rig_setups(rig)]
+    said = False
+    ticks = 0
+    while True:
+        for event in bus.events():
+            print(f"event {event}", flush=True)
+        readings = bus.read(time.monotonic())
+        if any(reading is not None and reading.rearmed for reading in readings):
+            goals = [
+                goal if r is None else r.position_steps
+                for r, goal in zip(readings, goals, strict=True)
+            ]
+            print("rearmed", flush=True)
+        bus.write(goals)
+        ticks += 1
+        if not said and ticks == 30:
+            said = True
+            print("moving", flush=True)
+        time.sleep(0.01)
+
+
+class Driven(NamedTuple):
+    """A loop's process and what it drives."""
+
+    loop: subprocess.Popen[str]
+    buses: PtyBuses
+    ids: frozenset[int]
+
+    def strike(self, number: int) -> float:
+        """Send the loop a signal; return when."""
+        at_s = time.monotonic()
+        os.kill(self.loop.pid, number)
+        return at_s
+
+    def line(self, beginning: str) -> str:
+        """Wait for a line that the loop prints; return it."""
+        assert self.loop.stdout is not None
+        for line in self.loop.stdout:
+            if line.startswith(beginning):
+                return line.strip()
+        raise AssertionError(f"the loop ended before it said {beginning!r}")
+
+    def guardians(self) -> list[int]:
+        """Return the process ids of the loop's guardians."""
+        found = []
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdigit():
+                try:
+                    words = (entry / "cmdline").read_bytes().split(b"\0")
+                    parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+                except OSError:
+                    continue
+                if b"robot.guardian.process" in words and parent == self.loop.pid:
+                    found.append(int(entry.name))
+        return found
+
+    def holding(self) -> list[bool]:
+        """Return which servos are under torque, or get pulses."""
+        return [bool(one.get("target", one.get("torque"))) for one in self._servos()]
+
+    def places(self) -> list[float]:
+        """Return where the servos truly are."""
+        return [one.get("place", one["position"]) for one in self._servos()]
+
+    def _servos(self) -> list[dict[str, float]]:
+        servos: list[dict[str, float]] = json.loads(self.buses.command("status", ""))["servos"]
+        return [one for one in servos if one["id"] in self.ids]
+
+    def limp_after_s(self, since_s: float, patience_s: float) -> float | None:
+        """Return the time from then until no servo is under torque; None where some stay so."""
+        while True:
+            limp = not any(self.holding())
+            took_s = time.monotonic() - since_s
+            if limp:
+                return took_s
+            if took_s > patience_s:
+                return None
+            time.sleep(0.005)
+
+    def still_after_s(self, since_s: float, patience_s: float) -> float | None:
+        """Return the time from then until the last servo stops moving; None where some go on."""
+        before, moved_s = self.places(), since_s
+        while time.monotonic() - since_s < patience_s:
+            time.sleep(0.03)
+            places = self.places()
+            if any(abs(a - b) > 0.5 for a, b in zip(places, before, strict=True)):
+                moved_s = time.monotonic()
+            before = places
+        return moved_s - since_s if patience_s - (moved_s - since_s) > 0.5 else None
+
+
+@contextmanager
+def driven(kind: str, guarded: bool = True, watchdog: bool = True) -> Iterator[Driven]:
+    """Give a rig that a loop in another process drives."""
+    with PtyBuses() as buses:
+        rig = slow(kind)
+        (path,) = buses.start(emulated_lines(rig)).values()
+        words = [kind, str(int(guarded)), str(int(watchdog)), path]
+        loop = subprocess.Popen(
+            [sys.executable, __file__, *words], stdout=subprocess.PIPE, text=True
+        )
+        # A line that never comes fails the test instead of hanging it.
+        late = threading.Timer(2.0 * PATIENCE_S, loop.kill)
+        late.start()
+        try:
+            it = Driven(loop, buses, frozenset(joint.id for joint in rig.joints.values()))
+            it.line("moving")
+            yield it
+        finally:
+            late.cancel()
+            loop.kill()
+            loop.wait()
+            assert loop.stdout is not None
+            loop.stdout.close()
+
+
+if __name__ == "__main__":
+    drive(sys.argv[1], sys.argv[2] == "1", sys.argv[3] == "1", sys.argv[4])

@@ -1,0 +1,281 @@
+"""Servos without a watchdog are let go of when the loop that drives them dies or hangs."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loop_deaths import PATIENCE_S, driven
+from mixed_rig import mixed_text
+from sts_rig import Rig as StsRig
+
+from config.schema import load_rig
+from drivers.errors import ServoFault, SetupError
+from robot.guardian.guarded_bus import RETRY_S, GuardedBus
+from robot.guardian.guardian import Guardian
+from robot.guardian.hang_detector import HANG_S, HangDetector
+from robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, SIZE, Heartbeat, shared_file
+from robot.guardian.release_plan import ReleasePlan, decode, describe, encode
+from robot.rig_bus import ports_of, release_plans
+
+PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
+
+
+# --- a loop that dies, in a process of its own
+
+
+@pytest.mark.parametrize("kind", ["feetech", "maestro"])
+def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
+    with driven(kind) as it:
+        assert all(it.holding())
+        (guardian,) = it.guardians()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            os.kill(guardian, number)  # meant for the program: the guardian stays
+        at_s = it.strike(signal.SIGSTOP)
+        took_s = it.limp_after_s(at_s, PATIENCE_S)
+        assert took_s is not None and took_s > 0.3, "not before it was sure"
+        it.strike(signal.SIGCONT)
+        it.line("rearmed")
+        assert "stood still" in it.line("event the control loop")
+        assert all(it.holding())
+        os.kill(guardian, signal.SIGKILL)
+        assert "started again" in it.line("event the guardian")
+        assert it.guardians() != [guardian]
+        assert it.limp_after_s(it.strike(signal.SIGKILL), PATIENCE_S) is not None
+
+
+def test_a_dynamixel_without_its_watchdog_is_guarded_too():
+    with driven("dynamixel", watchdog=False) as it:
+        assert all(it.holding())
+        assert it.limp_after_s(it.strike(signal.SIGKILL), PATIENCE_S) is not None
+
+
+def test_a_dynamixel_with_its_watchdog_needs_no_guardian():
+    assert not release_plans(load_rig("desk"), ports_of(load_rig("desk"), None))
+
+
+# --- which ports
+
+
+def test_ports_of_servos_without_watchdog_are_guarded(tmp_path):
+    file = tmp_path / "mixed.yaml"
+    file.write_text(mixed_text(), encoding="utf-8")
+    rig = load_rig(str(file))
+    plans = release_plans(rig, ports_of(rig, None))
+    assert {name: plan.kind for name, plan in plans.items()} == {"": "maestro", "tilt": "feetech"}
+    assert plans["tilt"].ids == (1,) and plans["tilt"].baud == rig.bus_named("tilt").baud
+    dynamixel = replace(rig.buses["neck"].dynamixel, watchdog_ms=0)
+    neck = replace(rig.buses["neck"], dynamixel=dynamixel)
+    without = replace(rig, buses={**rig.buses, "neck": neck})
+    assert set(release_plans(without, ports_of(without, None))) == {"", "neck", "tilt"}
+
+
+def test_plans_go_through_a_command_line():
+    plans = (PLAN, ReleasePlan("maestro", "/dev/a 'b\"", 9600, (0, 5), "pololu", 3, True, 24))
+    assert decode(encode(plans)) == plans
+    assert describe(plans[0]) == "torque off on 2 servos of /tmp/no such port"
+    assert describe(plans[1]) == "pulses off on 2 channels of /dev/a 'b\""
+
+
+def test_the_guardian_is_light():
+    code = (
+        "import sys; import robot.guardian.process; from robot.guardian.release_plan import *;"
+        "[releaser(ReleasePlan(k, '', 1, ())) for k in ('feetech', 'maestro', 'dynamixel')];"
+        "print([m for m in ('numpy', 'cv2', 'scipy', 'config', 'pydantic') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+# --- when a loop counts as hung
+
+
+def test_a_loop_that_is_late_is_not_hung():
+    detector = HangDetector(0, 0.0)
+    now_s = 0.0
+    for beats, late_s in enumerate((0.005, 0.1, 0.3, 0.35) * 5):
+        end_s = now_s + late_s
+        while now_s < end_s:
+            now_s += 0.02
+            assert not detector.step(beats, now_s)
+        assert not detector.step(beats + 1, now_s)
+
+
+def test_a_machine_that_stood_still_has_not_hung_its_loop():
+    detector = HangDetector(0, 0.0)
+    assert not detector.step(0, 3600.0)
+    assert not detector.step(0, 3600.02)
+    assert not detector.step(1, 3600.04)
+
+
+@given(st.lists(st.floats(0.001, 0.09), min_size=1, max_size=200))
+@settings(deadline=None, max_examples=60)
+def test_silence_adds_up_to_a_hang(looks_s):
+    detector, now_s = HangDetector(7, 0.0), 0.0
+    for look_s in looks_s:
+        now_s += look_s
+        assert detector.step(7, now_s) == (now_s >= HANG_S - 1e-9) or abs(now_s - HANG_S) < 1e-9
+
+
+# --- the program's side
+
+
+class Unattended(Guardian):
+    """A guardian without a process: the test does what it would do."""
+
+    def __init__(self):
+        super().__init__((PLAN,))
+        self.other = Heartbeat(self._fd)
+
+    def join(self, plan):
+        self._users.add(plan)
+
+    def wait_until_ready(self):
+        pass
+
+
+@pytest.fixture
+def sts():
+    rig, guardian = StsRig(), Unattended()
+    rig.inner = rig.bus
+    rig.bus = GuardedBus(rig.inner, 4, guardian, 0)
+    rig.guardian = guardian
+    rig.bus.open()
+    return rig
+
+
+def test_it_watches_from_before_torque_on_until_torque_off(sts):
+    other = sts.guardian.other
+    assert not other.armed(0)
+    refused, sts.inner.engage = sts.inner.engage, _refuse
+    with pytest.raises(ServoFault):
+        sts.bus.engage()
+    assert other.armed(0), "some servos may have had their torque already"
+    sts.inner.engage = refused
+    sts.bus.engage()
+    assert other.armed(0)
+    sts.bus.release()
+    assert not other.armed(0)
+
+
+def test_every_tick_is_a_sign_of_life(sts):
+    sts.bus.engage()
+    before = sts.guardian.other.beats
+    sts.run(0.1, [2000] * 4)
+    assert sts.guardian.other.beats == before + 20  # a read and a write each
+
+
+def test_a_loop_that_wakes_takes_hold_where_the_joints_are(sts):
+    sts.bus.engage()
+    sts.run(0.3, [2200] * 4)
+    other = sts.guardian.other
+    other.set_state(0, RELEASING)
+    count = len(sts.sent)
+    assert sts.bus.read(sts.now_s) == (None,) * 4
+    sts.bus.write([2900] * 4)
+    assert len(sts.sent) == count, "hands off while the guardian speaks"
+    for i in (1, 2, 3):  # the guardian's work
+        sts.chain.here(i).write(40, b"\0")
+    other.set_state(0, RELEASED)
+    readings = sts.tick(None)
+    assert other.state(0) == IDLE
+    assert all(r is not None and r.rearmed for r in readings)
+    assert not any(r.rearmed for r in sts.tick(None))
+    assert any("stood still" in line for line in sts.bus.events())
+    sts.run(0.5, [2250] * 4)
+    assert all(sts.get(i, 40) == 1 for i in (1, 2, 3))
+
+
+def test_servos_that_refuse_are_asked_again_and_get_no_goals(sts):
+    sts.bus.engage()
+    engage, sts.inner.engage = sts.inner.engage, _refuse
+    sts.guardian.other.set_state(0, RELEASED)
+    readings = sts.run(0.2, [2300] * 4)
+    assert not any(r.torque for r in readings if r is not None)
+    lines = sts.bus.events()
+    assert [line for line in lines if "torque stays off" in line], lines
+    sts.inner.engage = engage
+    sts.run(RETRY_S + 0.05, [2300] * 4)
+    assert any("torque on again" in line for line in sts.bus.events())
+
+
+def test_servos_that_nobody_held_stay_limp(sts):
+    sts.bus.engage()
+    sts.bus.release()
+    sts.guardian.other.set_state(0, RELEASED)
+    sts.bus.events()
+    sts.run(0.2, [2300] * 4)
+    assert not sts.bus.events() and not any(sts.get(i, 40) for i in (1, 2, 3))
+
+
+def _refuse():
+    raise ServoFault("servo 1: too hot")
+
+
+# --- the process, without any port
+
+
+def test_it_ends_silently_when_all_is_off(capfd):
+    guardian = Guardian((PLAN,))
+    guardian.join(0)
+    guardian.arm(0)
+    pid = guardian.pid
+    guardian.disarm(0)
+    guardian.leave(0)
+    guardian.leave(0)
+    assert guardian.pid is None and not os.path.exists(f"/proc/{pid}")
+    assert capfd.readouterr().err == ""
+
+
+def test_a_port_that_is_gone_is_told_once_and_not_waited_for(capfd):
+    guardian = Guardian((PLAN,))
+    guardian.join(0)
+    guardian.arm(0)
+    pid = guardian.pid
+    guardian.leave(0)  # still armed: it could not be switched off
+    os.waitpid(pid, 0)
+    told = capfd.readouterr().err
+    assert told.count("not let go yet") == 1 and "no serial port /tmp/no such port" in told
+
+
+def test_without_a_guardian_there_is_no_torque(monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    guardian = Guardian((PLAN,))
+    guardian.join(0)
+    with pytest.raises(SetupError, match="did not start"):
+        guardian.arm(0)
+    guardian.leave(0)
+
+
+def test_one_that_dies_is_started_again_and_said(monkeypatch):
+    guardian = Guardian((PLAN,))
+    guardian.join(0)
+    guardian.arm(0)
+    first = guardian.pid
+    os.kill(first, signal.SIGKILL)
+    now_s, end_s = 0.0, time.monotonic() + PATIENCE_S
+    while guardian.pid == first and time.monotonic() < end_s:
+        time.sleep(0.01)
+        now_s += 1.0
+        guardian.check(now_s)
+    assert guardian.pid != first
+    assert [line for line in guardian.events() if "signal 9" in line]
+    guardian.disarm(0)
+    guardian.leave(0)
+
+
+def test_both_sides_see_the_same_memory():
+    fd = shared_file()
+    ours, theirs = Heartbeat(fd), Heartbeat(fd)
+    assert os.fstat(fd).st_size == SIZE
+    os.close(fd)
+    ours.beat()
+    ours.arm(3, True)
+    theirs.set_state(3, RELEASING)
+    assert theirs.beats == 1 and theirs.armed(3) and not theirs.armed(2)
+    assert ours.state(3) == RELEASING and ours.state(2) == IDLE
