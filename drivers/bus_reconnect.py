@@ -25,9 +25,9 @@ class Reconnect:
         """Tell whether to try now."""
         return now_s >= self._next_s
 
-    def failed(self, now_s: float) -> None:
-        """Note an attempt in vain."""
-        self._wait_s = min(LAST_S, 2.0 * self._wait_s)
+    def failed(self, now_s: float, longest_s: float = LAST_S) -> None:
+        """Note an attempt in vain; the next one comes within ``longest_s``."""
+        self._wait_s = min(longest_s, 2.0 * self._wait_s)
         self._next_s = now_s + self._wait_s
 
     def back(self, now_s: float) -> float:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from drivers.bus_journal import Journal
-from drivers.bus_reconnect import Reconnect
+from drivers.bus_reconnect import FIRST_S, LAST_S, Reconnect
 from drivers.errors import BusLost, PortError
 from drivers.serial_port import BusPort
 
@@ -17,6 +17,9 @@ class LastingPort:
         give_up_s: it may stay away for so long.
         journal: where its going and coming is told.
         anew: called when it is open again: nobody on it may be trusted.
+
+    release_due: torque has to be taken off as soon as the port is there, before all else; set
+        and cleared by the bus
     """
 
     def __init__(
@@ -30,6 +33,7 @@ class LastingPort:
         self._port, self._baud, self._give_up_s = port, baud, give_up_s
         self._journal, self._anew = journal, anew
         self._link = Reconnect()
+        self.release_due = False
 
     @property
     def down(self) -> bool:
@@ -53,12 +57,22 @@ class LastingPort:
             if self._open():
                 self._journal.say(f"port back after {self._link.back(now_s):.1f} s")
                 return True
-            self._link.failed(now_s)
+            self._link.failed(now_s, FIRST_S if self.release_due else LAST_S)
         if gone_s >= self._give_up_s:
             raise BusLost(
                 f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
             )
         return False
+
+    def refused_release(self) -> None:
+        """Note that torque could not be taken off: it is as soon as the port is back."""
+        self.release_due = True
+
+    def released(self) -> None:
+        """Note that torque was taken off on everything that answers."""
+        if self.release_due:
+            self._journal.say("torque switched off, as was asked for while the port was gone")
+        self.release_due = False
 
     def open_once_more(self, now_s: float) -> bool:
         """Try to open the port now, whether it is due or not; tell whether it is open."""

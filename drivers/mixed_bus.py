@@ -97,13 +97,20 @@ class MixedBus:
             drivers.errors.BusLost: nobody has answered on a bus for longer than its patience.
         """
         whole: list[ServoReading | None] = [None] * self._count
+        lost: list[BusLost] = []
         for (_, bus, places), patience in zip(self._shares, self._patience, strict=True):
             if not patience.due(now_s):
                 continue
-            readings = bus.read(now_s)
+            try:
+                readings = bus.read(now_s)
+            except BusLost as error:  # the others are read all the same, and may come back
+                lost.append(error)
+                continue
             patience.note(readings, now_s)
             for place, reading in zip(places, readings, strict=True):
                 whole[place] = reading
+        if lost:
+            raise lost[0]
         return tuple(whole)
 
     def engage(self) -> tuple[int, ...]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from math import inf
 
-from drivers.errors import DriverError
+from drivers.errors import BusLost, DriverError
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from robot.joint import JointParams
 from robot.safety.motion import JointLimit
@@ -40,6 +40,7 @@ class Body:
         self.bus = bus
         self.names = in_order(joints)
         self._park_rad = dict(park_rad or {})
+        self._let_go = False
         self._set_up = tuple(joints[name] for name in self.names)
         self._take(self._set_up)
         # Before the first answer: the centre, of an age that says so.
@@ -91,8 +92,18 @@ class Body:
             raise
 
     def read(self, t_s: float) -> JointState:
-        """Read all joints; one that does not answer keeps its last value and its age."""
-        readings = self.bus.read(t_s)
+        """Read all joints; one that does not answer keeps its last value and its age.
+
+        Raises:
+            drivers.errors.BusLost: nobody has answered for too long, and torque was not let
+                go of; after that the bus may stay away for as long as it likes.
+        """
+        try:
+            readings = self.bus.read(t_s)
+        except BusLost:
+            if not self._let_go:
+                raise
+            readings = (None,) * len(self.names)
         missing: tuple[str, ...] = ()
         for i, reading in enumerate(readings):
             if reading is None:
@@ -129,8 +140,9 @@ class Body:
         """Torque off at once; the bus stays open and readings go on.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            drivers.errors.BusLost: the port is gone; the torque is taken off when it is back.
         """
+        self._let_go = True
         self.bus.release()
 
     def take_hold(self) -> JointAngles:
@@ -141,6 +153,7 @@ class Body:
             drivers.errors.BusLost: the port is gone.
         """
         goals = self.bus.engage()
+        self._let_go = False
         self._set_up = self._joints
         return self.angles(goals)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import inf, radians
 from typing import NamedTuple
 
-from drivers.errors import DriverError, ServoFault, SetupError
+from drivers.errors import DriverError
 from drivers.types import Camera
 from gaze.aversion import Aversion
 from gaze.lids import Lids
@@ -25,7 +25,7 @@ from robot.orders import Ask, Jog, LookAt, Order, Renew, Resume, Stop, Tune, che
 from robot.reply import Reply, Ticket
 from robot.safety.guard import Guard
 from robot.seeing.perception import Perception
-from robot.stop_latch import StopLatch
+from robot.stop_control import StopControl
 from robot.tick import Tick as Tick
 from robot.tick import at_rest
 from robot.types import JointAngles
@@ -90,18 +90,17 @@ class Robot:
         self._settled = True
         self._orders = OrderQueue()
         self._lead = Lead()
-        self._latch = StopLatch()
         self._last: JointAngles = ()
         # The models lead again: they begin where this tick finds head and eyes.
         self._takes_over = False
         self.tune: Callable[[Tune, float], tuple[str, ...]] = _not_tunable
         self._told: list[str] = []
-        self._refused = ""
+        self._stop = StopControl(self._told)
 
     @property
     def stopped(self) -> str:
         """Return why somebody stopped the robot, "" while it moves."""
-        return self._latch.why
+        return self._stop.why
 
     def order(self, order: Order) -> Ticket:
         """Ask for something, from the next tick on; may be called from any thread.
@@ -207,6 +206,7 @@ class Robot:
         self._settled = gaze.phase != "saccade"
         wish = self._lead.pose_rad or self._kinematics.inverse(gaze)
         if self.stopped:
+            self._stop.keep_released(self.body, joints, t_s)
             verdict = at_rest(joints, wish, self.stopped, self.body.names)
         else:
             # What a person chose to look at is there whatever the camera shows.
@@ -287,7 +287,8 @@ class Robot:
                 if not self._lead.renew(order, t_s):
                     return Reply(f"{order.who or 'you'} lead nothing now")
             case Stop():
-                self._halt(order, t_s)
+                self._lead.end()
+                self._stop.halt(order, self.body, t_s)
             case Resume():
                 return self._resume(order, t_s)
             case Tune():
@@ -317,33 +318,14 @@ class Robot:
         if self._lead.words and not words:
             self._told.append(f"led by {self._lead.words}")
 
-    def _halt(self, order: Stop, t_s: float) -> None:
-        """Take the torque off at once."""
-        if self._latch.stop(order, t_s):
-            by = f" by {order.who}" if order.who else ""
-            self._told.append(f"stopped{by}: {order.why}; torque off")
-        self._lead.end()
-        self.body.let_go()
-
     def _resume(self, order: Resume, t_s: float) -> Reply:
         """Put the torque on where the joints are; a servo that refuses leaves it off."""
         if not self.stopped:
             return Reply()
-        by = f" by {order.who}" if order.who else ""
-        if refusal := self._latch.refusal(order, t_s):
-            if refusal != self._refused:  # a flood of them is one line
-                self._told.append(f"resume{by} refused: {refusal}")
-            self._refused = refusal
-            return Reply(refusal)
-        try:
-            goals = self.body.take_hold()
-        except (SetupError, ServoFault) as error:
-            self._told.append(f"still stopped: {error}")
-            return Reply(self._told[-1])
-        self._latch.lift()
-        self._refused = ""
-        self._told.append(f"torque on again{by}: going on slowly")
-        self._guard.reset(t_s, goals)
+        resumed = self._stop.resume(order, self.body, t_s)
+        if isinstance(resumed, Reply):
+            return resumed
+        self._guard.reset(t_s, resumed)
         self._takes_over = True
         return Reply()
 

@@ -137,6 +137,8 @@ class DynamixelBus:
         self._now_s = now_s
         if self._link.down and not self._link.returned(now_s):
             return (None,) * len(self._ids)
+        if self._link.release_due and not self._caught_up():
+            return (None,) * len(self._ids)
         try:
             readings = self._read(now_s)
         except BusLost as lost:
@@ -165,6 +167,10 @@ class DynamixelBus:
         except (ServoMissing, ServoFault):
             self.release()
             raise
+        except BusLost:
+            self._link.refused_release()  # some may have their torque already
+            raise
+        self._link.release_due = False
         self._care.take_on(outside)
         return goals
 
@@ -223,18 +229,38 @@ class DynamixelBus:
         """Torque off on every servo, confirmed; never raises for a servo that does not answer.
 
         Raises:
-            drivers.errors.BusLost: the port is gone, and stays so when tried once more.
+            drivers.errors.BusLost: the port is gone, and stays so when tried once more; the
+                torque is taken off by the first read after it is back.
         """
         self._care.let_go()
         if not self._opened:
             return
         if self._link.down and not self._link.open_once_more(self._now_s):
+            self._link.refused_release()
             raise BusLost(self._cannot_release())
+        self._switch_all_off()
+
+    def _caught_up(self) -> bool:
+        """Take off the torque that was asked off while the port was gone; True if that is done."""
+        try:
+            self._switch_all_off()
+        except BusLost:
+            return False
+        return True
+
+    def _switch_all_off(self) -> None:
+        """Take the torque off, see that it is gone, and say where it is not.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
         try:
             released = switch_off(self._line, self._ids)
         except BusLost as lost:
             self._lose(lost)
+            self._link.refused_release()
             raise BusLost(self._cannot_release()) from lost
+        self._link.released()
         self._line.errors["refused"] += len(released.holding)
         for kind, ids in (("still reports torque", released.holding), ("mute", released.mute)):
             for servo_id in ids:

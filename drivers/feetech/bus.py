@@ -131,6 +131,8 @@ class FeetechBus:
         self._now_s = now_s
         if self._link.down and not self._link.returned(now_s):
             return (None,) * len(self._ids)
+        if self._link.release_due and not self._caught_up():
+            return (None,) * len(self._ids)
         try:
             readings = self._take(self._reader.read(now_s), now_s)
             self._care.tend(readings, self._roll.group, now_s)
@@ -161,6 +163,10 @@ class FeetechBus:
         except (ServoMissing, ServoFault):
             self.release()
             raise
+        except BusLost:
+            self._link.refused_release()  # some may have their torque already
+            raise
+        self._link.release_due = False
         self._care.take_on(outside)
         self._speeds = self._revival.speeds(self._ids, ())
         return goals
@@ -214,18 +220,38 @@ class FeetechBus:
         """Torque off on every servo, confirmed; never raises for a servo that does not answer.
 
         Raises:
-            drivers.errors.BusLost: the port is gone, and stays so when tried once more.
+            drivers.errors.BusLost: the port is gone, and stays so when tried once more; the
+                torque is taken off by the first read after it is back.
         """
         self._care.let_go()
         if not self._opened:
             return
         if self._link.down and not self._link.open_once_more(self._now_s):
+            self._link.refused_release()
             raise BusLost(self._cannot_release())
+        self._switch_all_off()
+
+    def _caught_up(self) -> bool:
+        """Take off the torque that was asked off while the port was gone; True if that is done."""
+        try:
+            self._switch_all_off()
+        except BusLost:
+            return False
+        return True
+
+    def _switch_all_off(self) -> None:
+        """Take the torque off, see that it is gone, and say where it is not.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
         try:
             released = switch_off(self._line, self._ids)
         except BusLost as lost:
             self._lose(lost)
+            self._link.refused_release()
             raise BusLost(self._cannot_release()) from lost
+        self._link.released()
         self._line.errors["refused"] += len(released.holding)
         for servo_id in released.holding:
             self._journal.say(f"{self._line.who(servo_id)} still reports torque: {_CUT}")

@@ -106,6 +106,8 @@ class MaestroBus:
         self._now_s = now_s
         if self._link.down and not self._link.returned(now_s):
             return (None,) * len(self._ids)
+        if self._link.release_due and not self._caught_up():
+            return (None,) * len(self._ids)
         try:
             answered = self._watch(now_s)
         except BusLost as lost:
@@ -141,6 +143,10 @@ class MaestroBus:
         except ServoMissing:
             self.release()
             raise
+        except BusLost:
+            self._link.refused_release()  # some may have their pulses already
+            raise
+        self._link.release_due = False
         self._care.take_on()
         return tuple(channel.goal_steps for channel in self._channels)
 
@@ -202,18 +208,38 @@ class MaestroBus:
         """Stop all pulses, confirmed; never raises for a board that does not answer.
 
         Raises:
-            drivers.errors.BusLost: the port is gone, and stays so when tried once more.
+            drivers.errors.BusLost: the port is gone, and stays so when tried once more; the
+                torque is taken off by the first read after it is back.
         """
         self._care.let_go()
         if not self._opened:
             return
         if self._link.down and not self._link.open_once_more(self._now_s):
+            self._link.refused_release()
             raise BusLost(self._cannot_release())
+        self._switch_all_off()
+
+    def _caught_up(self) -> bool:
+        """Take off the torque that was asked off while the port was gone; True if that is done."""
+        try:
+            self._switch_all_off()
+        except BusLost:
+            return False
+        return True
+
+    def _switch_all_off(self) -> None:
+        """Take the torque off, see that it is gone, and say where it is not.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
         try:
             released = switch_off(self._line, self._ids)
         except BusLost as lost:
             self._lose(lost)
+            self._link.refused_release()
             raise BusLost(self._cannot_release()) from lost
+        self._link.released()
         self._line.errors["refused"] += len(released.holding)
         for channel in self._channels:
             if channel.id in released.holding:

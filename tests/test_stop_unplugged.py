@@ -1,0 +1,185 @@
+"""A stop while the adapter is unplugged: remembered, and carried out when it is back."""
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bus_kinds import KINDS, Twin, in_process
+from mixed_rig import mixed_text
+
+import robot.assemble
+from config.schema import Rig, load_rig
+from drivers.errors import BusLost
+from robot.assemble import Assembly, assemble
+from robot.choice import Choice
+from robot.loop import Tick, run
+from robot.orders import Resume, Stop
+from sim_mock.device import Device
+
+RIGS = ("desk", "feetech", "maker", "mixed")
+
+
+@pytest.fixture
+def twin(request: pytest.FixtureRequest) -> Twin:
+    return Twin(request.param, in_process(request.param).wires, patient=False)
+
+
+@pytest.mark.parametrize("twin", KINDS, indirect=True)
+def test_what_could_not_be_released_is_when_the_port_is_back(twin: Twin) -> None:
+    twin.pulses_on()
+    bus = twin.bus(give_up_s=1.0)
+    bus.open()
+    bus.engage()
+    twin.run(bus, 0.1)
+    twin.command("unplug")
+    with pytest.raises(BusLost):
+        bus.release()
+    for _ in range(300):  # longer than its patience
+        twin.wait(0.01)
+        try:
+            bus.read(twin.now_s())
+        except BusLost:
+            continue
+    assert all(twin.holding())
+    twin.command("plug")
+    _read_on(twin, bus, 0.5)
+    assert not any(twin.holding())
+    assert any("torque switched off" in event for event in bus.events())
+    _read_on(twin, bus, 3.0)
+    assert not any(twin.holding())
+    bus.engage()
+    _read_on(twin, bus, 0.2)
+    assert all(twin.holding())
+    bus.release()
+    bus.close()
+
+
+@pytest.mark.parametrize("twin", KINDS, indirect=True)
+def test_torque_that_came_on_only_here_and_there_is_taken_off(twin: Twin) -> None:
+    twin.pulses_on()
+    bus = twin.bus()
+    bus.open()
+    twin.run(bus, 0.1)
+    twin.command("unplug")
+    with pytest.raises(BusLost):
+        bus.engage()
+    twin.command("plug")
+    _read_on(twin, bus, 1.0)
+    assert not any(twin.holding())
+
+
+def _read_on(twin: Twin, bus: Any, seconds: float) -> None:
+    end_s = twin.now_s() + seconds
+    while twin.now_s() < end_s:
+        twin.wait(0.01)
+        try:
+            bus.read(twin.now_s())
+        except BusLost:
+            continue
+
+
+class Machine:
+    """A whole robot before emulated buses that can be unplugged."""
+
+    def __init__(self, made: Assembly, devices: dict[str, Device]) -> None:
+        self.made, self.devices = made, devices
+        self.ticks: list[Tick] = []
+        self.ended = ""
+        made.robot.start(made.clock)
+
+    def go(self, seconds: float) -> list[Tick]:
+        began = len(self.ticks)
+        self.ended = run(
+            self.made.robot,
+            self.made.clock,
+            self.made.loop,
+            lambda s: "seconds" if s >= seconds else None,
+            self.ticks.append,
+        ).stopped_by
+        return self.ticks[began:]
+
+    def command(self, text: str) -> None:
+        for device in self.devices.values():
+            device.faults.command(text)
+
+    def holding(self) -> list[bool]:
+        """Return which servos truly hold their place."""
+        servos = [
+            one
+            for device in self.devices.values()
+            for one in json.loads(device.faults.command("status"))["servos"]
+        ]
+        return [bool(one.get("target", one.get("torque"))) for one in servos]
+
+    def said(self, words: str) -> bool:
+        return any(words in event for tick in self.ticks for event in tick.events)
+
+
+@pytest.fixture
+def machine(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Iterator[Machine]:
+    rig = _rig(request.param, tmp_path)
+    devices: dict[str, Device] = {}
+    build: Callable[..., Device] = robot.assemble.build
+
+    def kept(line: Any, now_s: Callable[[], float]) -> Device:
+        device = build(line, now_s)
+        devices[f"{len(devices)}"] = device
+        return device
+
+    monkeypatch.setattr(robot.assemble, "build", kept)
+    made = assemble(rig, Choice(mock=True, fast=True, seed=2, scene="face-to-face"))
+    machine = Machine(made, devices)
+    yield machine
+    made.close()
+
+
+def _rig(name: str, folder: Path) -> Rig:
+    if name != "mixed":
+        return load_rig(name)
+    path = folder / "mixed.yaml"
+    path.write_text(mixed_text(), encoding="utf-8")
+    return load_rig(str(path))
+
+
+@pytest.mark.parametrize("machine", RIGS, indirect=True)
+def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(machine: Machine) -> None:
+    machine.go(1.0)
+    held = machine.holding()
+    machine.command("unplug")
+    machine.made.robot.order(Stop("a hand", "the space bar"))
+    ticks = machine.go(7.0)  # longer than the bus's patience
+    assert machine.ended == "seconds" and ticks[-1].stopped == "a hand"
+    assert machine.said("the stop is remembered, torque is NOT YET off")
+    assert any(machine.holding())
+    ticket = machine.made.robot.order(Resume("the space bar"))
+    machine.go(0.1)
+    reply = ticket.wait(0.0)
+    assert reply is not None and reply.refused.startswith("still stopped: ")
+    machine.command("plug")
+    machine.go(0.5)
+    assert not any(machine.holding())
+    assert machine.said("torque switched off, as was asked for while the port was gone")
+    machine.go(4.0)
+    assert not any(machine.holding()) and machine.ticks[-1].stopped
+    machine.made.robot.order(Resume("the space bar"))
+    machine.go(2.0)
+    assert machine.holding() == held and not machine.ticks[-1].stopped
+    machine.made.robot.stop()
+    assert not any(machine.holding())
+
+
+@pytest.mark.parametrize("machine", ["desk", "feetech"], indirect=True)
+def test_torque_that_comes_on_after_a_stop_is_taken_off_again(machine: Machine) -> None:
+    machine.go(0.5)
+    machine.made.robot.order(Stop("a hand"))
+    machine.go(0.5)
+    machine.made.robot.body.bus.engage()  # somebody else on the line
+    assert all(machine.holding())
+    machine.go(1.0)
+    assert not any(machine.holding())
+    assert machine.said("still held: torque off again")
+    machine.made.robot.stop()
