@@ -91,11 +91,11 @@ MAX_ANGLE_RAD = 2.0 * pi
 MAX_WORDS = 200
 """Longest name or reason that an order may carry, in characters."""
 
-_KINDS: dict[str, type[Order]] = {
+KINDS: dict[str, type[Order]] = {
     "ask": Ask, "look_at": LookAt, "jog": Jog, "renew": Renew, "stop": Stop, "resume": Resume,
     "tune": Tune,
 }  # fmt: skip
-_NAMES = {kind: name for name, kind in _KINDS.items()}
+_NAMES = {kind: name for name, kind in KINDS.items()}
 
 
 def as_json(order: Order) -> dict[str, object]:
@@ -110,9 +110,9 @@ def from_json(data: object) -> Order:
         ValueError: it is no order; the message says what is wrong and what there is.
     """
     name = data.get("order") if isinstance(data, dict) else None
-    kind = _KINDS.get(name) if isinstance(name, str) else None
+    kind = KINDS.get(name) if isinstance(name, str) else None
     if kind is None or not isinstance(data, dict):
-        raise ValueError(f"no order; there is {', '.join(_KINDS)}")
+        raise ValueError(f"no order; there is {', '.join(KINDS)}")
     fields = {key: _frozen(value) for key, value in data.items() if key != "order"}
     needed = set(kind._fields).difference(kind._field_defaults)
     if not needed <= set(fields) <= set(kind._fields):

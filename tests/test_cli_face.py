@@ -1,6 +1,5 @@
 """calibrate face as it is typed: keys, scripts, what is written and what is not."""
 
-import json
 import os
 import pty
 import select
@@ -8,7 +7,6 @@ import signal
 import socket
 import sys
 import time
-import urllib.request
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -18,6 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from page_visitor import Visitor
 from typer.testing import CliRunner
 
 from config.save import save_rig
@@ -281,35 +280,29 @@ def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
 # --- on the page
 
 
-def ask(url: str, asked: object) -> None:
-    """Ask as the page in a browser does."""
-    headers = {"Origin": url, "Content-Type": "application/json"}
-    request = urllib.request.Request(f"{url}/rig/ask", json.dumps(asked).encode(), headers)
-    with urllib.request.urlopen(request, timeout=20.0) as answer:
-        assert answer.status == 204
-
-
 def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
     with socket.socket() as trial:
         trial.bind(("127.0.0.1", 0))
         port = trial.getsockname()[1]
     url = f"http://127.0.0.1:{port}"
     with Sitting(rig, "--page", f"127.0.0.1:{port}") as sitting:
-        sitting.reads(f"the page is at {url}")
+        sitting.reads(f"the page is at {url}/?token=")
+        sitting.reads("\n")
+        visitor = Visitor(f"{url}/?token={sitting.before.strip()}")
         sitting.reads("1/8 the tip of your nose: 0 mm")
-        ask(url, {"steer": "left"})
+        visitor.ask({"steer": "left"})
         sitting.reads("5 mm left, 0 mm up")
         sitting.types(b"w")
         sitting.reads("5 mm left, 5 mm up")
         # Nothing else leads the head meanwhile: it would leave the face that is measured.
-        ask(url, {"order": "look_at", "p_world_m": [1.0, 0.5, 0.0]})
-        ask(url, {"steer": "enter"})
+        visitor.ask({"order": "look_at", "p_world_m": [1.0, 0.5, 0.0]})
+        visitor.ask({"steer": "enter"})
         sitting.reads("2/8 your left eye")
-        ask(url, {"steer": "down"})
+        visitor.ask({"steer": "down"})
         sitting.reads("0 mm across, 5 mm down")
-        ask(url, {"steer": "enter"})
+        visitor.ask({"steer": "enter"})
         sitting.reads("3/8")
-        ask(url, {"steer": "end"})
+        visitor.ask({"steer": "end"})
         sitting.reads("stopped by you: parked, torque off")
         assert sitting.ends() == 0, sitting.said
     found = load_rig(str(rig)).face_parts_mm

@@ -4,23 +4,19 @@ Its share of what the page sends fills the buffers on the way; what counts is th
 other browsers and the stop button do not notice.
 """
 
-import json
 import socket
 import threading
 import time
-import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
-import viser
 from desk import JOINTS
+from page_visitor import LOOKING, Visitor
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Origin, Subprotocol
+from websockets.sync.client import ClientConnection
 
 from robot.orders import Stop, as_json
 from robot.page.link import Page
@@ -28,7 +24,6 @@ from robot.page.picture import encode
 from robot.types import Snapshot
 
 PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes
-VISER = Subprotocol(f"viser-v{viser.__version__}")
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 SNAPSHOT = Snapshot(
     t_s=1.0,
@@ -64,35 +59,9 @@ def wait_for(ready: Callable[[], object], what: str) -> None:
         time.sleep(0.02)
 
 
-# The page counts a browser as there when it has said where it looks from.
-LOOKING = msgspec.msgpack.encode(
-    {
-        "type": "ViewerCameraMessage",
-        "wxyz": [1.0, 0.0, 0.0, 0.0],
-        "position": [1.0, 0.0, 0.0],
-        "fov": 1.0,
-        "near": 0.1,
-        "far": 100.0,
-        "image_height": 600,
-        "image_width": 800,
-        "look_at": [0.0, 0.0, 0.0],
-        "up_direction": [0.0, 0.0, 1.0],
-    }
-)
-
-
-def browser(url: str, deaf: bool = False) -> ClientConnection:
+def browser(visitor: Visitor, deaf: bool = False) -> ClientConnection:
     """A browser without the drawing; a deaf one stops to read at the first message."""
-    there = socket.socket()
-    if deaf:
-        there.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    host, _, port = url.removeprefix("http://").partition(":")
-    there.connect((host, int(port)))
-    talk = connect(
-        f"ws://{host}:{port}/", sock=there, origin=Origin(url), subprotocols=[VISER],
-        max_size=None, compression=None, open_timeout=PATIENCE_S, ping_interval=None,
-        max_queue=1 if deaf else None, close_timeout=1.0,
-    )  # fmt: skip
+    talk = visitor.open(receive_bytes=4096 if deaf else None)
     talk.send(LOOKING)
     return talk
 
@@ -100,9 +69,9 @@ def browser(url: str, deaf: bool = False) -> ClientConnection:
 class Listener:
     """A browser that reads everything; without the drawing."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, visitor: Visitor) -> None:
         self.bytes = 0
-        self._socket = browser(url)
+        self._socket = browser(visitor)
         self._words: set[bytes] = set()
         self.awaited = b"the first target"
         self._thread = threading.Thread(target=self._read)
@@ -170,39 +139,26 @@ def rig() -> Iterator[Rig]:
         rig.close()
 
 
-def stop_state(url: str) -> object:
-    """What the stop button is told first."""
-    with urllib.request.urlopen(f"{url}/rig/state", timeout=PATIENCE_S) as stream:
-        return json.loads(stream.readline().removeprefix(b"data: "))["stopped"]
-
-
-def press_stop(url: str) -> None:
-    body = json.dumps(as_json(Stop("a test"))).encode()
-    request = urllib.request.Request(f"{url}/rig/ask", body, {"Origin": url})
-    with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
-        assert answer.status == 204
-
-
 def drained(there: ClientConnection) -> int:
     """How many bytes were kept for the deaf one when it reads at last."""
     taken = 0
-    with suppress(TimeoutError):
+    with suppress(TimeoutError, ConnectionClosed):  # sent away in the end
         while True:
             taken += len(there.recv(timeout=1.0))
     return taken
 
 
 def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(rig: Rig) -> None:
-    url = rig.open()
-    deaf, listener = browser(url, deaf=True), Listener(url)
+    visitor = Visitor(rig.open())
+    deaf, listener = browser(visitor, deaf=True), Listener(visitor)
     try:
         wait_for(lambda: listener.bytes > OWED_BYTES, "what one who reads gets")
         # Now as ever: others see the newest, a stop is heard, the button knows of it.
         rig.snapshot = replace(SNAPSHOT, target_name="the target of later", stopped="a test")
         wait_for(lambda: listener.reads(b"the target of later"), "the newest words")
-        press_stop(url)
-        wait_for(lambda: rig.heard == [as_json(Stop("a test"))], "the stop")
-        wait_for(lambda: stop_state(url) == "a test", "the button's news")
+        assert visitor.ask(as_json(Stop("a test"))) == 204
+        wait_for(lambda: [asked["why"] for asked in rig.heard] == ["a test"], "the stop")
+        wait_for(lambda: visitor.state()["stopped"] == "a test", "the button's news")
         # It was deaf indeed: what it was owed was not all kept for it.
         rig.feed_no_more()
         assert 0 < drained(deaf) < listener.bytes - 1_000_000

@@ -1,26 +1,38 @@
 """Only those come in who may: no other origin, nobody without the token, nobody by the back."""
 
 import json
+import os
 import socket
+import stat
 import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import msgspec
 import pytest
 import viser
+from page_visitor import LOOKING
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from robot.page.door import Door, compact, needs_token
-from robot.page.server import open_server
+from robot.page.asked import from_browser
+from robot.page.door import Door
+from robot.page.server import FROM_BROWSER_BYTES, browser_of, open_server
+from robot.page.stop_line import StopListener, StopSender
 
 PATIENCE_S = 20.0
 VISER = [f"viser-v{viser.__version__}"]
-SECRET = "what only the door knows"
+TOKEN = "what-only-the-terminal-shows"
 ELSEWHERE = "http://elsewhere.example"
+
+
+OPENED: list[str] = []
+"""The addresses of all doors of these tests."""
 
 
 class Opener(urllib.request.HTTPRedirectHandler):
@@ -46,44 +58,74 @@ def fetch(
 class Rig:
     """A door with a server behind it, and what was asked through it."""
 
-    def __init__(self, host: str) -> None:
-        self.asked: list[bytes] = []
+    def __init__(self, host: str, folder: Path) -> None:
+        self.asked: list[dict[str, Any]] = []
+        self.stops: list[dict[str, Any]] = []
         self.takes = True
+        self.stop_answer = ""
         with socket.socket() as trial:
             trial.bind((host, 0))
             port = trial.getsockname()[1]
-        self.server = open_server(SECRET)
-        self.door = Door(host, port, self.server.get_port(), SECRET, self.take)
+        self.server = open_server(folder / "page.sock")
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._listener = StopListener(ours, self.stop)
+        self._sender = theirs
+        self.door = Door(
+            host, port, folder / "page.sock", self.take, StopSender(theirs), TOKEN
+        )  # fmt: skip
         self.door.open()
         self.address = f"{host}:{port}"
         self.url = f"http://{self.address}"
+        self.cookie = f"{self.door._cookie}={TOKEN}"
 
     def take(self, data: bytes) -> bool:
-        self.asked.append(data)
+        self.asked.append(json.loads(data))
         return self.takes
 
-    def knock(self, **headers: str | None) -> ClientConnection:
-        """Open the page's websocket as a browser does, with other headers as given."""
-        origin = headers.pop("origin", self.url)
+    def stop(self, asked: Any) -> str:
+        self.stops.append(dict(asked))
+        return self.stop_answer
+
+    def get(self, path: str = "", **headers: str) -> tuple[int, dict[str, str], str]:
+        """Get something as a browser does that has shown the token before."""
+        return fetch(self.url + path, {"Cookie": self.cookie, **headers})
+
+    def post(self, body: bytes, **headers: str | None) -> tuple[int, dict[str, str], str]:
+        """Ask for something as the page's script does, with other headers as given."""
+        given = {"Cookie": self.cookie, "Origin": self.url, **headers}
+        words = {k: v for k, v in given.items() if v is not None}
+        return fetch(f"{self.url}/rig/ask", words, body)
+
+    def knock(self, path: str = "/", **headers: str | None) -> ClientConnection:
+        """Open a websocket as a browser does, with other headers as given."""
+        given = {"Cookie": self.cookie, **headers}
+        origin = given.pop("origin", self.url)
         return connect(
-            f"ws://{self.address}/",
+            f"ws://{self.address}{path}",
             origin=origin,
             subprotocols=VISER,
             max_size=None,
             compression=None,
             open_timeout=PATIENCE_S,
-            additional_headers={k: v for k, v in headers.items() if v is not None},
+            additional_headers={k: v for k, v in given.items() if v is not None},
         )
+
+    def close(self) -> None:
+        self.door.close()
+        self.server.stop()
+        self._listener.close()
+        self._sender.close()
 
 
 @contextmanager
 def opened(host: str) -> Iterator[Rig]:
-    rig = Rig(host)
-    try:
-        yield rig
-    finally:
-        rig.door.close()
-        rig.server.stop()
+    with TemporaryDirectory() as folder:
+        rig = Rig(host, Path(folder))
+        OPENED.append(rig.address)
+        try:
+            yield rig
+        finally:
+            rig.close()
 
 
 @pytest.fixture(scope="module")
@@ -95,24 +137,19 @@ def near() -> Iterator[Rig]:
 
 @pytest.fixture(scope="module")
 def far() -> Iterator[Rig]:
-    """A page for other machines: every address but the three names of the loopback."""
+    """A page as other machines see it: at an address that has no name of the loopback."""
     with opened("127.0.0.2") as rig:
         yield rig
-
-
-def test_who_needs_a_token() -> None:
-    assert not any(map(needs_token, ("127.0.0.1", "localhost", "::1")))
-    assert all(map(needs_token, ("0.0.0.0", "::", "192.168.1.5", "127.0.0.2", "rig.local")))
 
 
 # --- on this machine ----------------------------------------------------------------------
 
 
 def test_the_page_comes_with_its_stop_button(near: Rig) -> None:
-    status, headers, text = fetch(near.url)
+    status, headers, text = near.get()
     assert status == 200 and '<script src="/rig/stop.js"></script>' in text
     assert headers["X-Frame-Options"] == "DENY"
-    status, headers, text = fetch(f"{near.url}/rig/stop.js")
+    status, headers, text = near.get("/rig/stop.js")
     assert status == 200 and "text/javascript" in headers["Content-Type"] and "STOP" in text
 
 
@@ -126,16 +163,16 @@ def test_a_browser_gets_what_the_server_sends(near: Rig) -> None:
 def test_localhost_by_name_may_come_in(near: Rig) -> None:
     port = near.address.rpartition(":")[2]
     name = f"localhost:{port}"
-    assert fetch(near.url, {"Host": name})[0] == 200
+    assert near.get(Host=name)[0] == 200
     # The tunnel of another machine has a port of its own.
-    assert fetch(near.url, {"Host": "localhost:9999"})[0] == 200
+    assert near.get(Host="localhost:9999")[0] == 200
 
 
 @pytest.mark.parametrize("host", ["elsewhere.example", "127.0.0.1.elsewhere.example", "10.0.0.1"])
 def test_a_foreign_name_for_this_machine_is_refused(near: Rig, host: str) -> None:
-    status, _, text = fetch(near.url, {"Host": host})
+    status, _, text = near.get(Host=host)
     assert status == 403 and text.startswith("refused") and len(text.splitlines()) == 1
-    assert fetch(f"{near.url}/rig/state", {"Host": host})[0] == 403
+    assert near.get("/rig/stop.js", Host=host)[0] == 403
 
 
 @pytest.mark.parametrize("origin", [ELSEWHERE, "null", "http://127.0.0.1:1", None])
@@ -161,100 +198,191 @@ def test_rebinding_a_name_to_this_machine_gets_no_websocket(near: Rig) -> None:
 @pytest.mark.parametrize("origin", [ELSEWHERE, "null", None])
 def test_a_page_of_another_origin_cannot_ask_for_anything(near: Rig, origin: str | None) -> None:
     before = len(near.asked)
-    headers = {"Origin": origin} if origin is not None else {}
-    status, _, _ = fetch(f"{near.url}/rig/ask", headers, b'{"order": "stop", "why": "x"}')
-    assert status == 403 and len(near.asked) == before
+    status, _, _ = near.post(b'{"order": "stop", "why": "x"}', Origin=origin)
+    assert status == 403 and len(near.asked) == before and near.stops == []
 
 
-def test_what_is_asked_goes_to_the_rig_compact(near: Rig) -> None:
-    body = b'{ "order": "stop",\n "why": "a test" }'
-    status, _, _ = fetch(f"{near.url}/rig/ask", {"Origin": near.url}, body)
-    assert (status, near.asked[-1]) == (204, b'{"order":"stop","why":"a test"}')
+def test_what_is_asked_goes_to_the_rig_with_the_name_of_who_asks(near: Rig) -> None:
+    ana = {"Cookie": f"{near.cookie}; {near.door._name_cookie}=ana"}
+    bob = {"Cookie": f"{near.cookie}; {near.door._name_cookie}=bob"}
+    named = []
+    for who in (ana, bob, ana):
+        assert near.post(b'{"confirmed": true, "who": "me", "order": "resume"}', **who)[0] == 204
+        assert list(near.asked[-1]) == ["order", "confirmed", "who"]
+        named.append(near.asked[-1]["who"])
+    assert named[0] == named[2] != named[1] and named[0].startswith("browser ")
+    assert near.post(b'{"pick": {"x": 0.5, "y": 0.5}}', **bob)[0] == 204
+    assert near.asked[-1]["pick"] == {"x": 0.5, "y": 0.5, "who": named[1]}
 
 
 def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:
     near.takes = False
     try:
-        status, _, text = fetch(f"{near.url}/rig/ask", {"Origin": near.url}, b"{}")
-        assert status == 503 and "does not take" in text
+        status, _, text = near.post(b"{}")
+        assert status == 503 and "takes nothing" in text
     finally:
         near.takes = True
 
 
-@pytest.mark.parametrize("body", [b"", b"nonsense", b"[1, 2]", b'"stop"', b"\xff"])
+@pytest.mark.parametrize(
+    "body", [b"", b"nonsense", b"[1, 2]", b'"stop"', b"\xff", b"[" * 2000, b'{"a": NaN}']
+)
 def test_rubbish_is_not_handed_on(near: Rig, body: bytes) -> None:
     before = len(near.asked)
-    assert fetch(f"{near.url}/rig/ask", {"Origin": near.url}, body)[0] == 400
+    assert near.post(body)[0] == 400
     assert len(near.asked) == before
 
 
 def test_too_much_is_not_even_read(near: Rig) -> None:
     before = len(near.asked)
-    body = json.dumps({"pick": "x" * 100_000}).encode()
-    assert fetch(f"{near.url}/rig/ask", {"Origin": near.url}, body)[0] == 413
+    with pytest.raises((urllib.error.URLError, ConnectionError)) as refused:
+        answer = near.post(json.dumps({"pick": "x" * 100_000}).encode())
+        raise urllib.error.URLError(str(answer[0]))
+    assert (
+        "413" in str(refused.value)
+        or "reset" in str(refused.value).lower()
+        or "pipe" in str(refused.value)
+    )
     assert len(near.asked) == before
 
 
 def test_the_stop_button_is_told_of_every_change(near: Rig) -> None:
     near.door.tell({"stopped": ""})
-    with urllib.request.urlopen(f"{near.url}/rig/state", timeout=PATIENCE_S) as stream:
-        assert json.loads(stream.readline().removeprefix(b"data: ")) == {"stopped": ""}
+    with near.knock("/rig/line") as line:
+        first = json.loads(line.recv(timeout=PATIENCE_S))["state"]
+        assert (first["stopped"], first["you"]) == ("", "the page")
         near.door.tell({"stopped": "a test"})
-        lines = (stream.readline() for _ in range(20))
-        assert any(b"a test" in line for line in lines)
+        told = (json.loads(line.recv(timeout=PATIENCE_S)) for _ in range(20))
+        assert any(said["state"]["stopped"] == "a test" for said in told)
 
 
-# --- from other machines ------------------------------------------------------------------
+# --- stop -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("path", ["/", "/rig/state", "/rig/stop.js", "/?token=wrong", "/?token="])
-def test_without_the_token_nothing_is_seen(far: Rig, path: str) -> None:
-    status, headers, text = fetch(far.url + path)
+def stop_by_line(line: ClientConnection, why: str) -> int:
+    """Press STOP over a connection that stands; the answer's status."""
+    line.send(json.dumps({"order": "stop", "why": why}))
+    while True:
+        said = json.loads(line.recv(timeout=PATIENCE_S))
+        if "answer" in said:
+            return int(said["answer"])
+
+
+def test_a_stop_has_a_way_of_its_own_and_is_answered_by_the_rig(near: Rig) -> None:
+    near.stops.clear()
+    near.takes = False  # the way of all else is full
+    try:
+        assert near.post(b'{ "order": "stop",\n "why": "a test" }')[0] == 204
+        assert near.stops == [{"order": "stop", "why": "a test", "who": "the page"}]
+        with near.knock("/rig/line") as line:
+            assert stop_by_line(line, "by line") == 204
+        assert near.stops[-1]["why"] == "by line"
+        near.stop_answer = "refused: it has ended"
+        status, _, text = near.post(b'{"order": "stop", "why": "late"}')
+        assert (status, text) == (503, "refused: it has ended\n")
+    finally:
+        near.takes, near.stop_answer = True, ""
+
+
+def test_a_stop_that_the_rig_does_not_answer_is_said_and_the_next_one_is_sent() -> None:
+    with opened("127.0.0.1") as rig:
+        stall = [True]
+
+        def stalls(asked: Any) -> str:
+            while stall[0]:
+                time.sleep(0.02)
+            return ""
+
+        rig.stop = stalls  # type: ignore[method-assign]
+        rig._listener._take = stalls
+        status, _, text = rig.post(b'{"order": "stop", "why": "x"}')
+        assert status == 503 and "does not answer" in text
+        stall[0] = False
+        for _ in range(100):
+            if rig.post(b'{"order": "stop", "why": "x"}')[0] == 204:
+                break
+        else:
+            raise AssertionError("no stop was taken")
+
+
+# --- the token ------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["127.0.0.1", "127.0.0.2"])
+def either(request: pytest.FixtureRequest, near: Rig, far: Rig) -> Rig:
+    """The page for this machine, which has other users, and the one for others."""
+    return near if request.param == "127.0.0.1" else far
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/rig/line", "/rig/stop.js", "/?token=wrong", "/?token=", "/?token=%ff"]
+)
+def test_without_the_token_nothing_is_seen(either: Rig, path: str) -> None:
+    status, headers, text = fetch(either.url + path)
     assert status == 403 and text.startswith("refused") and len(text.splitlines()) == 1
     assert "Set-Cookie" not in headers
 
 
-def test_without_the_token_nothing_moves(far: Rig) -> None:
-    headers = {"Origin": far.url}
-    assert fetch(f"{far.url}/rig/ask", headers, b'{"order":"resume"}')[0] == 403
-    wrong = {**headers, "Cookie": f"{far.door._cookie}=wrong"}
-    assert fetch(f"{far.url}/rig/ask", wrong, b'{"order":"resume"}')[0] == 403
-    assert far.asked == []
+@pytest.mark.parametrize("cookie", [None, "wrong", "", "\xff"])
+def test_without_the_token_nothing_moves(either: Rig, cookie: str | None) -> None:
+    either.asked.clear()
+    either.stops.clear()
+    given = None if cookie is None else f"{either.door._cookie}={cookie}"
+    for body in (b'{"order":"resume"}', b'{"order":"stop","why":"x"}'):
+        assert either.post(body, Cookie=given)[0] == 403
+    for path in ("/", "/rig/line"):
+        with pytest.raises(InvalidStatus) as refused:
+            either.knock(path, Cookie=given)
+        assert refused.value.response.status_code == 403
+    assert either.asked == either.stops == []
 
 
-@pytest.mark.parametrize("cookie", [None, "wrong"])
-def test_without_the_token_there_is_no_websocket(far: Rig, cookie: str | None) -> None:
-    given = None if cookie is None else f"{far.door._cookie}={cookie}"
-    with pytest.raises(InvalidStatus) as refused:
-        far.knock(Cookie=given)
-    assert refused.value.response.status_code == 403
-
-
-def test_the_token_becomes_a_cookie_and_leaves_the_address(far: Rig) -> None:
-    status, headers, text = fetch(f"{far.url}/?look=here&token={far.door.token}")
+def test_the_token_becomes_a_cookie_and_leaves_the_address(either: Rig) -> None:
+    status, headers, text = fetch(f"{either.url}/?look=here&token={TOKEN}")
     assert (status, headers["Location"], text) == (302, "/?look=here", "")
     cookie = headers["Set-Cookie"]
     assert "HttpOnly" in cookie and "SameSite=Strict" in cookie
-    pair = cookie.partition(";")[0]
-    assert fetch(far.url, {"Cookie": pair})[0] == 200
-    with far.knock(Cookie=pair) as socket_:
+    assert either.get()[0] == 200
+    with either.knock() as socket_:
         assert socket_.recv(timeout=PATIENCE_S)
 
 
-def test_the_token_does_not_help_another_origin(far: Rig) -> None:
-    pair = f"{far.door._cookie}={far.door.token}"
+@pytest.mark.parametrize(
+    "path", ["//evil/", "/%5Cevil/", "/\\evil/", "///evil", "//evil/%2e%2e//x"]
+)
+def test_the_token_leads_to_this_page_and_nowhere_else(near: Rig, path: str) -> None:
+    with socket.create_connection(tuple(near.address.split(":"))) as there:  # type: ignore[arg-type]
+        there.sendall(
+            f"GET {path}?token={TOKEN} HTTP/1.1\r\nHost: {near.address}\r\n"
+            "Connection: close\r\n\r\n".encode()
+        )
+        answer = there.recv(4096).decode()
+    place = next(line for line in answer.splitlines() if line.startswith("Location: "))
+    assert place.startswith("Location: /") and place[11:12] not in ("/", "\\")
+
+
+def test_the_token_does_not_help_another_origin(either: Rig) -> None:
+    either.asked.clear()
     with pytest.raises(InvalidStatus):
-        far.knock(Cookie=pair, origin=ELSEWHERE)
-    headers = {"Cookie": pair, "Origin": ELSEWHERE}
-    assert fetch(f"{far.url}/rig/ask", headers, b'{"order":"resume"}')[0] == 403
-    assert far.asked == []
+        either.knock(origin=ELSEWHERE)
+    assert either.post(b'{"order":"resume"}', Origin=ELSEWHERE)[0] == 403
+    assert either.asked == []
 
 
-def test_two_doors_have_two_tokens(far: Rig) -> None:
-    with opened("127.0.0.2") as other:
-        assert other.door.token != far.door.token
-        assert fetch(f"{other.url}/?token={far.door.token}")[0] == 403
-    assert far.door.token is not None and len(far.door.token) >= 32
+@pytest.mark.parametrize(
+    "path",
+    ["/../../../../etc/passwd", "/%2e%2e/%2e%2e/%2e%2e/etc/passwd", "/..%2f..%2f..%2fetc%2fpasswd",
+     "//etc/passwd", "/assets/../../../../../../etc/passwd", "/\\..\\etc\\passwd"],
+)  # fmt: skip
+def test_no_path_leads_out_of_the_pages_own_files(near: Rig, path: str) -> None:
+    with socket.create_connection(tuple(near.address.split(":"))) as there:  # type: ignore[arg-type]
+        there.settimeout(PATIENCE_S)
+        there.sendall(
+            f"GET {path} HTTP/1.1\r\nHost: {near.address}\r\nCookie: {near.cookie}\r\n"
+            "Connection: close\r\n\r\n".encode()
+        )
+        answer = b"".join(iter(lambda: there.recv(1 << 16), b""))
+    assert b"root:" not in answer and b" 500 " not in answer.splitlines()[0]
 
 
 # --- by the back ----------------------------------------------------------------------------
@@ -277,18 +405,15 @@ def dragged(near: Rig) -> Iterator[viser.TransformControlsHandle]:
     handle.remove()
 
 
-@pytest.mark.parametrize("origin", [None, "http://127.0.0.1", ELSEWHERE])
-def test_the_server_behind_the_door_takes_nobody_else(
-    near: Rig, dragged: viser.TransformControlsHandle, origin: str | None
+def test_the_server_behind_the_door_is_reached_by_the_door_alone(
+    near: Rig, dragged: viser.TransformControlsHandle
 ) -> None:
-    url = f"ws://127.0.0.1:{near.server.get_port()}/"
-    with connect(url, origin=origin, subprotocols=VISER, max_size=None) as socket_:
-        with pytest.raises(ConnectionClosed) as closed:
-            socket_.send(DRAG)
-            socket_.recv(timeout=PATIENCE_S)
-        assert closed.value.rcvd is not None and closed.value.rcvd.code == 1008
-    assert tuple(dragged.position) == (0.0, 0.0, 0.0)
-    with near.knock() as socket_:  # by the door the same message does something
+    inside = Path(near.door._inside)
+    assert stat.S_ISSOCK(inside.stat().st_mode)
+    assert inside.parent.stat().st_mode & 0o077 == 0  # other users cannot even go there
+    ports = {line.split()[1].rpartition(":")[2] for line in listening(os.getpid())}
+    assert ports <= {f"{int(rig.rpartition(':')[2]):04X}" for rig in OPENED}
+    with near.knock() as socket_:  # by the door a message does something
         socket_.send(DRAG)
         for _ in range(200):
             if tuple(dragged.position) == (1.0, 2.0, 3.0):
@@ -297,11 +422,53 @@ def test_the_server_behind_the_door_takes_nobody_else(
         assert tuple(dragged.position) == (1.0, 2.0, 3.0)
 
 
+def listening(process: int) -> list[str]:
+    """The lines of /proc/net/tcp of the ports that a process listens at."""
+    held = set()
+    for fd in Path(f"/proc/{process}/fd").iterdir():
+        try:
+            held.add(os.readlink(fd))
+        except OSError:
+            continue
+    lines = Path("/proc/net/tcp").read_text().splitlines()[1:]
+    return [x for x in lines if x.split()[3] == "0A" and f"socket:[{x.split()[9]}]" in held]
+
+
+def test_the_server_knows_which_browser_a_client_is(near: Rig) -> None:
+    seen: list[str] = []
+    near.server.on_client_connect(
+        lambda client: seen.append(browser_of(near.server, client.client_id))
+    )
+    with near.knock(Cookie=f"{near.cookie}; {near.door._name_cookie}=ana") as socket_:
+        socket_.send(LOOKING)
+        for _ in range(400):
+            if seen:
+                break
+            time.sleep(0.05)
+    assert seen == [near.door.browsers.name("ana")]
+
+
+def test_a_message_that_is_too_long_ends_its_connection_alone(near: Rig) -> None:
+    with near.knock() as long, near.knock() as other:
+        with pytest.raises(ConnectionClosed):
+            long.send(bytes(FROM_BROWSER_BYTES + 1))
+            while True:
+                long.recv(timeout=PATIENCE_S)
+        assert other.recv(timeout=PATIENCE_S)
+    with near.knock("/rig/line") as line, pytest.raises(ConnectionClosed):
+        line.send("x" * 5000)
+        while True:
+            line.recv(timeout=PATIENCE_S)
+
+
 def test_a_browser_cannot_publish_the_page(near: Rig) -> None:
     handlers = near.server._websock_server._incoming_handlers
     assert not [kind.__name__ for kind in handlers if "ShareUrl" in kind.__name__]
 
 
-def test_compact_takes_objects_only() -> None:
-    assert compact(b'{"a": [1, 2]}') == b'{"a":[1,2]}'
-    assert compact(b"[]") is None and compact(b"{") is None
+def test_only_small_objects_are_asked_for() -> None:
+    assert from_browser(b'{"a": [1, 2]}', "me") == {"a": [1, 2]}
+    assert from_browser(b"[]", "me") is None and from_browser(b"{", "me") is None
+    assert from_browser('{"order": "stop", "why": "x", "who": "you"}', "me") == {
+        "order": "stop", "why": "x", "who": "me",
+    }  # fmt: skip

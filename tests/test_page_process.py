@@ -8,15 +8,16 @@ import subprocess
 import sys
 import threading
 import time
-import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
+from urllib.parse import urlsplit
 
 import pytest
 from desk import JOINTS
+from page_visitor import LOOKING, Visitor, said
 
 from robot.page.link import Page
 from robot.page.view import free_port as first_free_port
@@ -99,7 +100,7 @@ def page_process(parent: int) -> int | None:
         except OSError:  # it has ended meanwhile
             continue
         if b"robot.page.view" in words and state != "Z":
-            _fd, its_parent, *_ = words[words.index(b"robot.page.view") + 1 :]
+            _fd, _stop_fd, its_parent, *_ = words[words.index(b"robot.page.view") + 1 :]
             if int(its_parent) == parent:
                 return int(entry.name)
     return None
@@ -139,12 +140,10 @@ def test_more_than_the_page_can_show_is_passed_over() -> None:
 
 def test_busy_port_moves_on_and_says_so(shared: tuple[Page, str, int]) -> None:
     page, url, busy = shared
-    port = int(url.rpartition(":")[2])
-    assert port > busy
+    port = urlsplit(url).port
+    assert port is not None and port > busy
     assert page.notice() == f"port {busy} is busy, using {port}"
-    with urllib.request.urlopen(url) as answer:
-        assert answer.status == 200
-        assert b"<html" in answer.read().lower()
+    assert b"<html" in Visitor(url).get().lower()
 
 
 def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(
@@ -152,15 +151,14 @@ def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(
 ) -> None:
     page, url, _ = shared
     page.notice()
-    port = int(url.rpartition(":")[2])
+    port = urlsplit(url).port
     # The whole of 127.0.0.0/8 is this machine: a page on every address would answer here.
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection(("127.0.0.2", port))
     process = page_process(os.getpid())
     assert process is not None
     os.kill(process, signal.SIGINT)
-    with urllib.request.urlopen(url) as answer:
-        assert answer.status == 200
+    assert Visitor(url).get()
     assert page.notice() is None
     assert page_process(os.getpid()) == process
 
@@ -205,15 +203,51 @@ def test_close_ends_even_a_frozen_page(shared: tuple[Page, str, int]) -> None:
 # Pages of their own
 
 
-def test_crashed_page_is_reported_once_and_hurts_nobody() -> None:
-    with running_page() as (page, _):
-        process = page_process(os.getpid())
-        assert process is not None
-        os.kill(process, signal.SIGKILL)
+def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None:
+    with running_page() as (page, url):
+        page.offer({"lids": ("wink", "blink")})
+        first = page_process(os.getpid())
+        assert first is not None
+        os.kill(first, signal.SIGKILL)
         words = wait_for(page.notice, "the notice")
-        assert words.startswith("the page has stopped")
-        page.show(SNAPSHOT)
-        assert (page.dropped, page.url(), page.notice()) == (1, None, None)
+        assert words.startswith("the page has stopped") and "started again" in words
+        page.show(SNAPSHOT)  # hurts nobody
+        assert wait_for(page.url, "the page") == url  # the same port and token
+        assert page_process(os.getpid()) not in (None, first) and page.started == 2
+        assert wait_for(page.notice, "the second notice") == f"the page is there again, at {url}"
+        with Visitor(url).open() as talk:
+            talk.send(LOOKING)
+            while "'blink'" not in said(bytes(talk.recv(timeout=PATIENCE_S))):
+                pass
+        # Once more: no more words about it.
+        second = page_process(os.getpid())
+        assert second is not None
+        os.kill(second, signal.SIGKILL)
+        wait_for(lambda: page.started == 3, "the third page")
+        assert page.notice() is None
+
+
+def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
+    heard: list[object] = []
+    slow = threading.Event()
+
+    def hear(asked: dict[str, object]) -> str | None:
+        if asked.get("order") == "stop":
+            heard.append(asked["why"])
+        else:
+            slow.wait(PATIENCE_S)  # what is asked for takes for ever
+        return None
+
+    page = Page("127.0.0.1", free_port(), hear)
+    page.open()
+    try:
+        visitor = Visitor(wait_for(page.url, "the page's address"))
+        answers = [visitor.ask({"order": "resume", "pad": "x" * 1500}) for _ in range(60)]
+        assert 429 in answers  # and no more than the rig can be told
+        assert visitor.ask({"order": "stop", "why": "a test"}) == 204 and heard == ["a test"]
+    finally:
+        slow.set()
+        page.close()
 
 
 def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
@@ -256,7 +290,7 @@ def test_address_of_another_machine_is_refused_in_words() -> None:
     page = Page("192.0.2.1", 8080)
     page.open()
     words = wait_for(page.notice, "the notice")
-    assert "cannot open 192.0.2.1 port 8080" in words
+    assert "cannot open 192.0.2.1 port 8080" in words and page.gone
     page.close()
 
 

@@ -13,7 +13,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("run my.yaml --oak", "the real rig looks through its OAK-D"),
         ("run --mock --video party.mp4", "an emulated rig before a film"),
         ("run --mock --fast --seconds 60 --seed 7 --summary -", "figures of a simulated minute"),
-        ("run my.yaml --oak --page 0.0.0.0:8080", "the page for other machines, with a token"),
+        ("run my.yaml --oak --page 0.0.0.0:8080", "the page for other machines too"),
         ("run my.yaml --oak --record evening.mcap", "keep every tick, to replay and judge"),
     ),
     "check": (("check my.yaml", "all faults of a file at once; no servo is touched"),),

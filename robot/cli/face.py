@@ -70,7 +70,7 @@ def calibrate_face(
         typer.Option(
             metavar="HOST:PORT",
             help="Where a page with the same keys is served. Other machines reach it at "
-            "0.0.0.0:8080, and only with the token in the address that is printed at start.",
+            "0.0.0.0:8080. It opens with the token in the address that is printed at start.",
         ),
     ] = "127.0.0.1:8080",
     no_page: Annotated[

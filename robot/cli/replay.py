@@ -150,7 +150,7 @@ def _show(
     seconds: float | None,
     stopped: Callable[[], str | None],
 ) -> bool:
-    """Serve the page until told to stop; False where the page died."""
+    """Serve the page until told to stop; False where it cannot be had."""
     from robot.clock import RealClock
     from robot.page.link import Page
     from robot.recording.frames import Frames
@@ -171,25 +171,27 @@ def _show(
         )
     replaying = Replay(frames, clock)
     page = Page(*address, replaying.hear)
-    began_s, urls = clock.now_s(), [""]
+    began_s, urls, starts = clock.now_s(), [""], [0]
 
     def over(_: State) -> bool:
         if (note := page.notice()) is not None:
             say(note)
         url = page.url()
+        if page.started != starts[-1]:
+            starts.append(page.started)
+            replaying.begin_anew()
         if url is not None and url != urls[-1]:
             urls.append(url)
             say(f"{frames.duration_s:.1f} s of {file} on {url}: Ctrl-C ends")
-        died = url is None and len(urls) > 1
         past = seconds is not None and clock.now_s() - began_s >= seconds
-        return died or past or stopped() is not None
+        return page.gone or past or stopped() is not None
 
     say(page.open())
     if play:
         replaying.ask({"play": True})
     try:
         replaying.run(page, over)
-        return page.url() is not None or len(urls) == 1
+        return not page.gone
     finally:
         page.close()
         frames.close()

@@ -90,8 +90,8 @@ def run(
         str,
         typer.Option(
             metavar="HOST:PORT",
-            help="Where the live page is served. Other machines reach it at 0.0.0.0:8080, and "
-            "only with the token in the address that is printed at start.",
+            help="Where the live page is served. Other machines reach it at 0.0.0.0:8080. It "
+            "opens with the token in the address that is printed at start.",
         ),
     ] = "127.0.0.1:8080",
     no_page: Annotated[bool, typer.Option(help="Without the live page.")] = False,

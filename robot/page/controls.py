@@ -111,7 +111,7 @@ class LeadView:
         async def _(event: viser.TransformControlsEvent) -> None:
             x, y, z = map(float, event.target.position)
             if event.client_id is not None and event.phase != "start":
-                self._teller.order(LookAt((x, y, z), stay=True), str(event.client_id))
+                self._teller.order(LookAt((x, y, z)), str(event.client_id))
 
         @free.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:

@@ -1,12 +1,11 @@
 """The page's door: the only way in, at the asked address, for those who may come in.
 
-A reverse proxy before viser, which itself listens on the loopback alone and turns away
-everybody who does not come through here (``robot.page.server``). On a loopback address
-whoever is on this machine may come in, but no page of another origin: the Origin of every
-websocket and of everything that is sent must be the address of this page, and that address
-must be a name of the loopback, or a foreign name made to point here would do (DNS
-rebinding). On any other address a token is asked for as well, once, in the query of the
-first address; a cookie takes its place.
+A reverse proxy before viser, which itself listens where nobody else can reach it
+(``robot.page.server``). Whoever comes in shows a token, once, in the query of the first
+address; a cookie takes its place. That holds on this machine as well, which may have other
+users. The Origin of every websocket and of everything that is sent must be the address of
+this page, and on the loopback that address must be a name of the loopback, or a foreign name
+made to point here would do (DNS rebinding).
 
 It also serves what must work whatever viser does: the stop button, written into the page,
 and what the button talks to.
@@ -18,30 +17,46 @@ import json
 import secrets
 import threading
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import aiohttp
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
+from yarl import URL
 
-SECRET_HEADER = "X-Gazerig-Door"
-"""Says to the server behind the door that somebody has come through it."""
+from robot.page.asked import ASKED_BYTES, compact, from_browser, leads
+from robot.page.browsers import Browsers
+from robot.page.connections import Connections
+from robot.page.rate import Rate
+from robot.page.relay import TAKES_S, carry_in, carry_out, until_one_ends
+from robot.page.server import BROWSER_HEADER, FROM_BROWSER_BYTES, TO_BROWSER_BYTES
+from robot.page.stop_line import StopSender
+
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
+MOST_BROWSERS = 16
+"""Tabs that show the page at a time; more of them get the stop button alone."""
+MOST_LINES = 32
+"""Tabs whose stop button is told the state of the rig."""
 
 _SCRIPT = Path(__file__).with_name("stop.js")
 _SCRIPT_TAG = b'<script src="/rig/stop.js"></script>'
 _HEAD = b"<head>"
-_MOST_ASKED_BYTES = 65536
+_ASKED_PER_S, _ASKED_BURST = 20.0, 40.0  # clicks of all people together
+_READ_S = 5.0
 _BEAT_S = 1.0
+_RENEWED_EVERY_S = 0.25
 _OPEN_PATIENCE_S = 20.0
 _CLOSE_PATIENCE_S = 3.0
+_DAY_S = 86400
 # What a proxy must not hand on: it is about one leg of the way (RFC 9110, 7.6.1).
 _ONE_LEG = {"connection", "transfer-encoding", "content-encoding", "content-length", "keep-alive"}
 _HEADERS = {
     "X-Frame-Options": "DENY",  # nobody may lay a page of theirs over the buttons
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
 }
 _PLAIN = {"Accept-Encoding": "identity"}
 
@@ -49,28 +64,33 @@ Ask = Callable[[bytes], bool]
 """Hands a JSON object to the rig; False where the rig does not take it."""
 
 
-def needs_token(host: str) -> bool:
-    """Tell whether others than this machine can reach an address."""
-    return host not in LOOPBACK
-
-
 class Door:
     """Lets people in to the server behind it, from a thread of its own."""
 
-    def __init__(self, host: str, port: int, inside_port: int, secret: str, ask: Ask) -> None:
-        """Take the address, a free port of it, the server's loopback port and its secret.
+    def __init__(
+        self, host: str, port: int, inside: Path, ask: Ask, stop: StopSender, token: str
+    ) -> None:
+        """Prepare to listen.
 
-        ask: called in the door's thread with what is sent to the rig
+        Args:
+            host: the address; port: a free port of it
+            inside: the Unix socket of the server
+            ask: called in the door's thread with what is sent to the rig
+            stop: takes stops, beside and before all else
+            token: what whoever comes in must show
         """
         self._host = host
         self._port = port
-        self._inside = f"127.0.0.1:{inside_port}"
-        self._secret = secret
+        self._inside = str(inside)
         self._ask = ask
-        self.token = secrets.token_urlsafe(24) if needs_token(host) else None
+        self._stop = stop
+        self.token = token
+        self.browsers = Browsers(token)
         self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
-        self._state: bytes = b"{}"
+        self._state: Mapping[str, object] = {}
+        self._asked_rate = Rate(_ASKED_PER_S, _ASKED_BURST)
         self._news: set[asyncio.Event] = set()
+        self._shown = 0
         self._loop = asyncio.new_event_loop()
         self._over = asyncio.Event()
         self._opened = threading.Event()
@@ -89,11 +109,14 @@ class Door:
         if self._failed is not None:
             raise self._failed
 
+    def is_open(self) -> bool:
+        """Return whether people can come in."""
+        return self._thread.is_alive()
+
     def tell(self, state: Mapping[str, object]) -> None:
         """Show this to everybody who looks at the stop button; from any thread."""
-        data = json.dumps(state).encode()
-        if data != self._state:
-            self._state = data
+        if state != self._state:
+            self._state = dict(state)
             self._loop.call_soon_threadsafe(self._wake)
 
     def close(self) -> None:
@@ -108,24 +131,33 @@ class Door:
         self._loop.close()
 
     async def _serve(self) -> None:
-        app = web.Application(middlewares=[self._doorkeeper()], client_max_size=_MOST_ASKED_BYTES)
+        app = web.Application(middlewares=[self._doorkeeper()], client_max_size=ASKED_BYTES)
         app.router.add_get("/rig/stop.js", self._script)
-        app.router.add_get("/rig/state", self._stream)
+        app.router.add_get("/rig/line", self._line)
         app.router.add_post("/rig/ask", self._asked)
         app.router.add_get("/{path:.*}", self._pass_on)
-        runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.5)
+        runner = web.AppRunner(
+            app, access_log=None, shutdown_timeout=0.5, lingering_time=0.0, max_line_size=4096
+        )
         await runner.setup()
+        assert runner.server is not None
+        self._connections = Connections(runner.server)
         try:
-            await web.TCPSite(runner, self._host, self._port, reuse_address=True).start()
+            listener = await self._loop.create_server(
+                self._connections.accept, self._host, self._port, reuse_address=True, backlog=512
+            )
         except OSError as error:
             self._failed = error
             return
         finally:
             self._opened.set()
-        self._client = aiohttp.ClientSession(auto_decompress=True)
+        self._stop.attach(self._loop)
+        connector = aiohttp.UnixConnector(self._inside, limit=0)
+        self._client = aiohttp.ClientSession(connector=connector, auto_decompress=True)
         async with self._client:
-            await self._over.wait()
+            await until_one_ends(self._over.wait(), self._connections.watch(), self._renew())
             self._wake()
+            listener.close()
             await runner.cleanup()
 
     # --- who may come in ----------------------------------------------------------------
@@ -135,12 +167,13 @@ class Door:
 
         @web.middleware
         async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
-            why_not = self._refusal(request)
-            if why_not is not None:
-                return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
-            if "token" in request.query:
-                return self._with_cookie(request)
-            return await handler(request)
+            with self._connections.busy(request):
+                why_not = self._refusal(request)
+                if why_not is not None:
+                    return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
+                if "token" in request.query:
+                    return self._with_cookie(request)
+                return await handler(request)
 
         return admit
 
@@ -150,26 +183,42 @@ class Door:
         origin = request.headers.get("Origin")
         if origin is None and sends:
             return "refused: no Origin; only a browser with this page open may ask for anything"
-        if origin is not None and urlsplit(origin).netloc != request.host:
+        if origin is not None and _netloc(origin) != request.host:
             return "refused: a page of another origin may not look or ask"
-        if self.token is None:
-            if urlsplit(f"//{request.host}").hostname not in LOOPBACK:
-                return f"refused: on this machine the page is at http://{self._host}:{self._port}"
-            return None
+        if self._host in LOOPBACK and _hostname(request.host) not in LOOPBACK:
+            return f"refused: on this machine the page is at http://{self._host}:{self._port}"
         given = request.query.get("token") or request.cookies.get(self._cookie) or ""
-        if hmac.compare_digest(given.encode(), self.token.encode()):
+        if hmac.compare_digest(given.encode(errors="replace"), self.token.encode()):
             return None
-        return "refused: open the address with the token that the rig showed when it started"
+        return (
+            "refused: open the address with the token that the rig's terminal shows; "
+            "there is a new one each time the rig is started"
+        )
 
     def _with_cookie(self, request: web.Request) -> web.Response:
         """Take the token out of the address, so that it is not seen, kept or sent on."""
-        clean = request.url.with_query(
-            {key: value for key, value in request.query.items() if key != "token"}
-        )
-        answer = web.Response(status=302, headers={**_HEADERS, "Location": clean.raw_path_qs})
-        if self.token is not None:
-            answer.set_cookie(self._cookie, self.token, httponly=True, samesite="Strict", path="/")
+        clean = request.rel_url.without_query_params("token").raw_path_qs
+        # "//elsewhere" is the address of another machine, and so is "/\elsewhere".
+        there = "/" + clean.lstrip("/\\")
+        answer = web.Response(status=302, headers={**_HEADERS, "Location": there})
+        answer.set_cookie(self._cookie, self.token, httponly=True, samesite="Strict", path="/")
+        if self._name_cookie not in request.cookies:
+            answer.set_cookie(
+                self._name_cookie,
+                secrets.token_urlsafe(9),
+                httponly=True,
+                samesite="Strict",
+                path="/",
+                max_age=_DAY_S,
+            )
         return answer
+
+    @property
+    def _name_cookie(self) -> str:
+        return f"{self._cookie}_browser"
+
+    def _who(self, request: web.Request) -> str:
+        return self.browsers.name(request.cookies.get(self._name_cookie))
 
     # --- the stop button ------------------------------------------------------------------
 
@@ -180,44 +229,86 @@ class Door:
 
     async def _asked(self, request: web.Request) -> web.Response:
         """Hand what is asked for to the rig, and say whether it was taken."""
-        data = compact(await request.read())
-        if data is None:
-            return web.Response(status=400, text="not a JSON object\n")
-        if not self._ask(data):
-            return web.Response(status=503, text="the rig does not take it\n")
-        return web.Response(status=204)
+        async with asyncio.timeout(_READ_S):
+            body = await request.read()
+        status, words = await self._heard(body, self._who(request))
+        return web.Response(status=status, text=f"{words}\n" if words else None, headers=_HEADERS)
 
-    async def _stream(self, request: web.Request) -> web.StreamResponse:
-        """Send the state whenever it changes, and a sign of life in between."""
-        answer = web.StreamResponse(headers={**_HEADERS, "Content-Type": "text/event-stream"})
-        await answer.prepare(request)
+    async def _heard(self, body: bytes | str, who: str) -> tuple[int, str]:
+        """Hand on what a browser asks; return an HTTP status, and words of a refusal."""
+        asked = from_browser(body, who)
+        if asked is None:
+            return 400, "not a JSON object that can be asked for"
+        if asked.get("order") == "stop":
+            try:
+                words = await self._stop.send(str(asked.get("why", "")), who)
+            except OSError as error:
+                return 503, str(error)
+            return (503, words) if words else (204, "")
+        if not self._asked_rate.take(self._loop.time()):
+            return 429, "too many requests; try again"
+        if leads(asked):
+            self.browsers.led_by(who)
+        return (204, "") if self._ask(compact(asked)) else (503, "the rig takes nothing now")
+
+    async def _line(self, request: web.Request) -> web.StreamResponse:
+        """Tell the state whenever it changes, with a sign of life in between; hear stops.
+
+        A connection that stands already when STOP is pressed: a browser opens only six others.
+        """
+        if len(self._news) >= MOST_LINES:
+            return web.Response(status=503, text="too many browsers\n", headers=_HEADERS)
+        line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False)
+        await line.prepare(request)
+        self._connections.lasting(request)
+        who = self._who(request)
         news = asyncio.Event()
         self._news.add(news)
         try:
-            while not self._over.is_set():
-                news.clear()
-                await answer.write(b"data: " + self._state + b"\n\n")
-                try:
-                    await asyncio.wait_for(news.wait(), _BEAT_S)
-                except TimeoutError:
-                    continue
-        except ConnectionError:  # the browser has gone
-            return answer
+            with self.browsers.connected(who):
+                await until_one_ends(
+                    self._tell_line(line, news, who), self._hear_line(line, who), self._over.wait()
+                )
         finally:
             self._news.discard(news)
-        return answer
+        with suppress(TimeoutError, ConnectionError):
+            async with asyncio.timeout(_BEAT_S):
+                await line.close()
+        return line
+
+    async def _tell_line(self, line: web.WebSocketResponse, news: asyncio.Event, who: str) -> None:
+        while not line.closed:
+            news.clear()
+            async with asyncio.timeout(TAKES_S):
+                await line.send_str(json.dumps({"state": {**self._state, "you": who}}))
+            with suppress(TimeoutError):
+                await asyncio.wait_for(news.wait(), _BEAT_S)
+
+    async def _hear_line(self, line: web.WebSocketResponse, who: str) -> None:
+        async for message in line:
+            if message.type is not aiohttp.WSMsgType.TEXT:
+                continue
+            status, words = await self._heard(message.data, who)
+            async with asyncio.timeout(TAKES_S):
+                await line.send_str(json.dumps({"answer": status, "words": words}))
 
     def _wake(self) -> None:
         for news in self._news:
             news.set()
+
+    async def _renew(self) -> None:
+        """Let the rig know that the browser which leads is there; until cancelled."""
+        while True:
+            await asyncio.sleep(_RENEWED_EVERY_S)
+            if who := self.browsers.leading():
+                self._ask(compact({"order": "renew", "who": who}))
 
     # --- the server behind the door -------------------------------------------------------
 
     async def _pass_on(self, request: web.Request) -> web.StreamResponse:
         if "upgrade" in request.headers:
             return await self._relay(request)
-        url = f"http://{self._inside}{request.raw_path}"
-        async with self._client.get(url, headers=_PLAIN) as inside:
+        async with self._client.get(self._address("http", request), headers=_PLAIN) as inside:
             body = await inside.read()
             headers = {k: v for k, v in inside.headers.items() if k.lower() not in _ONE_LEG}
             status = inside.status
@@ -225,51 +316,54 @@ class Door:
             body = body.replace(_HEAD, _HEAD + _SCRIPT_TAG, 1)
         return web.Response(status=status, body=body, headers={**headers, **_HEADERS})
 
-    async def _relay(self, request: web.Request) -> web.WebSocketResponse:
+    async def _relay(self, request: web.Request) -> web.StreamResponse:
         """Carry a browser's websocket to the server and back, each side as slow as the other."""
+        if self._shown >= MOST_BROWSERS:
+            return web.Response(status=503, text="too many browsers\n", headers=_HEADERS)
         offered = [
             word.strip()
             for word in request.headers.get("Sec-WebSocket-Protocol", "").split(",")
             if word.strip()
         ]
-        browser = web.WebSocketResponse(protocols=offered, max_msg_size=0, compress=False)
-        async with self._client.ws_connect(
-            f"ws://{self._inside}{request.raw_path}",
-            protocols=offered,
-            headers={SECRET_HEADER: self._secret},
-            max_msg_size=0,
-            compress=0,
-        ) as inside:
-            await browser.prepare(request)
-            ways = {
-                asyncio.ensure_future(_carry(browser, inside)),
-                asyncio.ensure_future(_carry(inside, browser)),
-                asyncio.ensure_future(self._over.wait()),
-            }
-            _, still = await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-            for way in still:
-                way.cancel()
-            await asyncio.gather(*ways, return_exceptions=True)
-        await browser.close()
+        browser = web.WebSocketResponse(
+            protocols=offered, max_msg_size=FROM_BROWSER_BYTES, compress=False
+        )
+        self._shown += 1
+        try:
+            async with self._client.ws_connect(
+                self._address("ws", request),
+                protocols=offered,
+                headers={BROWSER_HEADER: self._who(request)},
+                max_msg_size=TO_BROWSER_BYTES,
+                compress=0,
+            ) as inside:
+                await browser.prepare(request)
+                self._connections.lasting(request)
+                await until_one_ends(
+                    carry_in(browser, inside), carry_out(inside, browser), self._over.wait()
+                )
+        finally:
+            self._shown -= 1
+        with suppress(TimeoutError, ConnectionError):
+            async with asyncio.timeout(_BEAT_S):
+                await browser.close()
+        if request.transport is not None:  # one who reads nothing does not read that it is over
+            request.transport.abort()
         return browser
 
-
-Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
-
-
-async def _carry(here: Socket, there: Socket) -> None:
-    """Carry messages one way; ``send`` waits where the other side takes them slowly."""
-    async for message in here:
-        if message.type is aiohttp.WSMsgType.BINARY:
-            await there.send_bytes(message.data)
-        elif message.type is aiohttp.WSMsgType.TEXT:
-            await there.send_str(message.data)
+    def _address(self, scheme: str, request: web.Request) -> URL:
+        return URL(f"{scheme}://page/{request.rel_url.raw_path_qs.lstrip('/')}", encoded=True)
 
 
-def compact(body: bytes) -> bytes | None:
-    """Give a JSON object without blanks, None where it is none."""
+def _netloc(origin: str) -> str | None:
     try:
-        data = json.loads(body)
+        return urlsplit(origin).netloc
     except ValueError:
         return None
-    return json.dumps(data, separators=(",", ":")).encode() if isinstance(data, dict) else None
+
+
+def _hostname(host: str) -> str | None:
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None

@@ -5,6 +5,7 @@ obeyed at the next tick. What may take long, such as checking a changed paramete
 heard by a second thread, and a stop never waits behind it.
 """
 
+import contextlib
 import json
 import queue
 import select
@@ -20,6 +21,8 @@ MESSAGE_BYTES = 200_000
 _URGENT = b'{"order":'
 _CHANGE = b'{"tune":{"set":'
 _OVER = b""
+_MOST_WAITING = 100
+"""Requests that wait for the slow thread; one more is refused."""
 _CHANGES_EVERY_S = 0.1
 """A change costs a few ms of processor in all, which the control loop has to share."""
 _CLOSE_PATIENCE_S = 2.0
@@ -59,18 +62,24 @@ class Ear:
     """Two threads that hear what comes over one socket."""
 
     def __init__(
-        self, link: socket.socket, take: Callable[[bytes], None], lost: Callable[[], None]
+        self,
+        link: socket.socket,
+        take: Callable[[bytes], None],
+        lost: Callable[[], None],
+        refuse: Callable[[bytes], None] | None = None,
     ) -> None:
         """Listen at once.
 
         take: called with each message, orders in one thread and the rest in another
+        refuse: called with each message that is dropped, as too many wait
         lost: called once when the other side is gone, unless this side was closed first
         """
         self._link = link
         self._take = take
         self._lost = lost
+        self._refuse = refuse
         self._over = threading.Event()
-        self._later: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._later: queue.Queue[bytes] = queue.Queue(_MOST_WAITING)
         self._threads = [
             threading.Thread(target=self._listen, name="page ear", daemon=True),
             threading.Thread(target=self._hear_later, name="page ear, slow", daemon=True),
@@ -94,15 +103,33 @@ class Ear:
             if urgent(message):
                 self._take(message)
             else:
-                self._later.put(message)
-        self._later.put(_OVER)
+                self._put_off(message)
+        self._end_later()
         if not self._over.is_set():
             self._lost()
+
+    def _put_off(self, message: bytes) -> None:
+        try:
+            self._later.put_nowait(message)
+        except queue.Full:
+            if self._refuse is not None:
+                self._refuse(message)
+
+    def _end_later(self) -> None:
+        """Let the slow thread end after what it has in hand; what waits is for nobody now."""
+        while True:
+            try:
+                self._later.put_nowait(_OVER)
+            except queue.Full:
+                with contextlib.suppress(queue.Empty):
+                    self._later.get_nowait()
+            else:
+                return
 
     def _hear_later(self) -> None:
         waiting = [self._later.get()]
         while waiting[0]:
-            while not self._later.empty():
+            while len(waiting) < _MOST_WAITING and not self._later.empty():
                 waiting.append(self._later.get())
             # A slider that is dragged sends more than can be checked: its last word counts.
             message = waiting.pop(0)

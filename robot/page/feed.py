@@ -64,6 +64,11 @@ class TuningFeed:
         self._version: int | None = None
         self._write()
 
+    def begin_anew(self) -> None:
+        """Tell all again: the page that knew it has died, and another is there."""
+        self._due.clear()
+        self._known, self._version = {}, None
+
     def step(self) -> None:
         """Send what is due, as far as the page takes it."""
         if not self._due and self._tuning.version != self._version:

@@ -81,8 +81,8 @@ class PageHear:
                 return None
             case {"tune": dict(asked)}:
                 return self._tune(asked)
-            case {"pick": {"x": int() | float() as x, "y": int() | float() as y}}:
-                return self._pick(float(x), float(y))
+            case {"pick": {"x": int() | float() as x, "y": int() | float() as y, **rest}}:
+                return self._pick(float(x), float(y), str(rest.get("who") or PAGE))
             case {"steer": str(way)} if self._steer is not None:
                 return self._steer(way)
             case {"show": {"depth": bool(on)}} if self._depth is not None:
@@ -99,11 +99,13 @@ class PageHear:
             raise ValueError("parameters are changed by tuning, which knows their rules")
         self._order(order if getattr(order, "who", PAGE) else signed(order, PAGE))
 
-    def _pick(self, x: float, y: float) -> str | None:
+    def _pick(self, x: float, y: float, who: str) -> str | None:
+        if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
+            raise ValueError("a place in the picture is 0 to 1 from the left and from the top")
         point = self._point(x, y) if self._point is not None else None
         if point is None:
             return "refused: there is no camera picture to look into yet"
-        self._order(LookAt(point, PAGE, stay=True))
+        self._order(LookAt(point, who))
         return None
 
     def _tune(self, asked: Mapping[str, object]) -> str | None:

@@ -82,7 +82,7 @@ class JogView:
 
     def _jog(self, joint: str, angle_deg: float, who: str) -> None:
         self._held[joint] = (angle_deg, self._now_s)
-        self._teller.order(Jog(((joint, radians(angle_deg)),), stay=True), who)
+        self._teller.order(Jog(((joint, radians(angle_deg)),)), who)
 
     def show(self, snapshot: Snapshot) -> None:
         """Write the measured angles; sliders that nobody holds follow them."""

@@ -10,6 +10,7 @@ that ends.
 import json
 import os
 import pickle
+import secrets
 import socket
 import subprocess
 import sys
@@ -20,8 +21,11 @@ from dataclasses import fields
 from math import nan
 from operator import attrgetter
 from pathlib import Path
+from urllib.parse import urlsplit
 
+from robot.clock import RealClock
 from robot.page.ear import MESSAGE_BYTES, TELL, Ear, told
+from robot.page.stop_line import StopListener
 from robot.types import SeenBody, SeenFace, Snapshot
 
 # The first byte of a message says what follows it. To the page: a snapshot, a picture, menus,
@@ -29,6 +33,10 @@ from robot.types import SeenBody, SeenFace, Snapshot
 SNAPSHOT, PICTURE, CHOICES, KNOBS, VALUES, WORDS, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
 # From the page: its address, words for the terminal, and TELL, what people ask of the rig.
 URL, NOTICE = b"u", b"n"
+TOKEN_VARIABLE = "GAZERIG_PAGE_TOKEN"
+"""Of the page's environment: what browsers must show."""
+CANNOT_OPEN = 3
+"""Exit code of a page that cannot have its address: it need not be tried again."""
 EVERYBODY = "*"
 """In the place of the word that says who asked."""
 
@@ -39,6 +47,10 @@ _CLOSE_PATIENCE_S = 2.0
 _LAST_WORDS_BYTES = 4096
 _MOST_WORDS = 20_000  # of one answer, in characters
 _MOST_OWED = 100  # answers to a page that takes none
+_AGAIN_AFTER_S = 0.5
+_AGAIN_LATEST_S = 30.0
+_WELL_AFTER_S = 60.0  # one that lived so long begins with a short wait again
+_TOKEN_BYTES = 16
 
 SHOWN_EVERY_S = 0.0095
 """Snapshots closer together than some 10 ms are passed over: 100 a second show a saccade of
@@ -75,7 +87,11 @@ class Page:
 
     ``show`` belongs to one thread; everything else may be called from any.
 
+    A page process that dies is started again, at the same address, after a while that grows.
+
     dropped: snapshots the page did not take; pictures_dropped: the same for pictures
+    started: how often the page has come up; who feeds it begins anew when this changes
+    gone: it has ended and is not started again
     """
 
     def __init__(self, host: str, port: int, hear: Hear | None = None) -> None:
@@ -86,9 +102,20 @@ class Page:
         self._host = host
         self._port = port
         self._hear = hear
+        self._token = secrets.token_urlsafe(_TOKEN_BYTES)
         self._socket: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._ear: Ear | None = None
+        self._stops: StopListener | None = None
+        self._choices: Mapping[str, tuple[str, ...]] = {}
+        self._over = threading.Event()
+        self._beginning = threading.Lock()
+        self._clock = RealClock()
+        self._began_s = 0.0
+        self._wait_s = _AGAIN_AFTER_S
+        self._mourned = self._welcomed = False
+        self.started = 0
+        self.gone = False
         self._errors_fd = -1
         self._url: str | None = None
         self._notices: deque[str] = deque()
@@ -100,31 +127,42 @@ class Page:
 
     def open(self) -> str:
         """Start the page and return at once, with the words to say meanwhile."""
+        self._begin()
+        return f"the page is starting on port {self._port}"
+
+    def _begin(self) -> None:
+        """Start a process, and talk to it."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        stops, their_stops = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # The page's own words are of interest only if it dies, and a pipe nobody reads fills.
         self._errors_fd = os.memfd_create("page_errors")
-        with theirs:
+        with theirs, their_stops:
+            fds = theirs.fileno(), their_stops.fileno()
             self._process = subprocess.Popen(
-                self._command(theirs.fileno()),
+                self._command(*fds),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=self._errors_fd,
-                pass_fds=(theirs.fileno(),),
-                env=_environment(),
+                pass_fds=fds,
+                env={**_environment(), TOKEN_VARIABLE: self._token},
                 start_new_session=True,  # Ctrl-C in the terminal is the rig's, not the page's
             )
-        self.join(ours)
-        return f"the page is starting on port {self._port}"
+        self._began_s = self._clock.now_s()
+        self.join(ours, stops)
 
-    def _command(self, fd: int) -> list[str]:
-        arguments = [str(fd), str(os.getpid()), self._host, str(self._port)]
+    def _command(self, fd: int, stop_fd: int) -> list[str]:
+        arguments = [str(fd), str(stop_fd), str(os.getpid()), self._host, str(self._port)]
         return [sys.executable, "-P", "-m", "robot.page.view", *arguments]
 
-    def join(self, link: socket.socket) -> None:
-        """Talk over this socket from now on; ``open`` makes one with a process behind it."""
+    def join(self, link: socket.socket, stops: socket.socket | None = None) -> None:
+        """Talk over these from now on; ``open`` makes them with a process at the other ends.
+
+        stops: for stops alone
+        """
         link.setblocking(False)
         self._socket = link
-        self._ear = Ear(link, self._take, self._lose)
+        self._ear = Ear(link, self._take, self._lose, self._refuse)
+        self._stops = StopListener(stops, self._stop) if stops is not None else None
 
     def show(self, snapshot: Snapshot) -> None:
         """Hand over a snapshot; dropped and counted where the page does not take it."""
@@ -142,6 +180,7 @@ class Page:
 
     def offer(self, choices: Mapping[str, tuple[str, ...]]) -> None:
         """Put menus on the page: name of the menu -> what can be chosen, the present first."""
+        self._choices = choices
         self.send(CHOICES + json.dumps(choices).encode())
 
     def say(self, words: str) -> None:
@@ -160,7 +199,7 @@ class Page:
         return True
 
     def url(self) -> str | None:
-        """Give the page's address once it is there and as long as it is."""
+        """Give the page's address, token included, once it is there and as long as it is."""
         return self._url
 
     def notice(self) -> str | None:
@@ -171,12 +210,30 @@ class Page:
         """Do what a message of the page is for; called by the ear."""
         kind, body = message[:1], message[1:]
         if kind == URL:
-            self._url = body.decode()
+            self._take_url(body.decode())
         elif kind == NOTICE:
             self._notices.append(body.decode())
         elif kind == TELL:
             who, data = told(message)
             self._answer(who, self._heard(data))
+
+    def _take_url(self, url: str) -> None:
+        """Note that the page is there; one that was started again is told what it must know."""
+        self._url = url
+        self._port = int(urlsplit(url).port or self._port)
+        self.started += 1
+        if self.started > 1 and self._choices:
+            self.offer(self._choices)
+        if self._mourned and not self._welcomed:
+            self._welcomed = True
+            self._notices.append(f"the page is there again, at {url}")
+
+    def _refuse(self, message: bytes) -> None:
+        self._answer(told(message)[0], "refused: too many requests at once; try again")
+
+    def _stop(self, asked: Mapping[str, object]) -> str:
+        """Hear a stop; "" where it is obeyed."""
+        return self._heard(json.dumps(asked).encode()) or ""
 
     def _heard(self, data: bytes) -> str | None:
         """Have the rig hear a request; what goes wrong with it must not make it deaf."""
@@ -199,11 +256,32 @@ class Page:
                 self._owed.popleft()
 
     def _lose(self) -> None:
-        words = self._last_words()
+        """Say that the page has died, once, and start it again where that can help."""
+        process = self._process
         self._hang_up()
-        self._notices.append(
-            f"the page has stopped ({words}); the rig runs on, start it again to see the page"
-        )
+        words = self._last_words()
+        self.gone = process is None or _code(process) == CANNOT_OPEN
+        if self._clock.now_s() - self._began_s > _WELL_AFTER_S:
+            self._wait_s, self._mourned, self._welcomed = _AGAIN_AFTER_S, False, False
+        if not self._mourned:
+            then = "start it again to see the page" if self.gone else "it is started again"
+            self._notices.append(f"the page has stopped ({words}); the rig runs on, {then}")
+        self._mourned = True
+        if self.gone:
+            return
+        threading.Thread(target=self._begin_again, name="page start", daemon=True).start()
+
+    def _begin_again(self) -> None:
+        wait_s, self._wait_s = self._wait_s, min(2.0 * self._wait_s, _AGAIN_LATEST_S)
+        self._over.wait(wait_s)
+        with self._beginning:
+            if self._over.is_set():
+                return
+            self._end_process()
+            try:
+                self._begin()
+            except OSError as error:  # no memory, no processes, no files
+                self._notices.append(f"the page cannot be started again: {error.strerror}")
 
     def _last_words(self) -> str:
         if self._errors_fd < 0:
@@ -221,14 +299,22 @@ class Page:
         link, self._socket = self._socket, None
         if link is not None:
             link.close()
+        stops, self._stops = self._stops, None
+        if stops is not None:
+            stops.close()
         self._url = None
 
     def close(self) -> None:
         """End the page; safe to call twice."""
-        ear, self._ear = self._ear, None
-        if ear is not None:
-            ear.close()
-        self._hang_up()
+        self._over.set()
+        with self._beginning:
+            ear, self._ear = self._ear, None
+            if ear is not None:
+                ear.close()
+            self._hang_up()
+            self._end_process()
+
+    def _end_process(self) -> None:
         if self._process is None:
             return
         try:
@@ -239,6 +325,14 @@ class Page:
         self._process = None
         os.close(self._errors_fd)
         self._errors_fd = -1
+
+
+def _code(process: subprocess.Popen[bytes]) -> int | None:
+    """Return the exit code of a process that has hung up, None where it hangs."""
+    try:
+        return process.wait(_CLOSE_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        return None
 
 
 def _environment() -> dict[str, str]:

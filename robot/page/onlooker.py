@@ -44,6 +44,10 @@ class InForce(NamedTuple):
     character: str
 
 
+def _nobody(words: str) -> None:
+    """Tell nobody."""
+
+
 class Onlooker:
     """One thread that looks at the newest tick."""
 
@@ -59,14 +63,14 @@ class Onlooker:
         poses: PoseHistory,
         horizontal_field_deg: Callable[[], float],
         feed: TuningFeed | None = None,
-        tell: Callable[[str], None] | None = None,
+        tell: Callable[[str], None] = _nobody,
     ) -> None:
         """Take the page, and where to write the status line (None: nowhere).
 
         snapshots: makes what the page shows
         health, in_force, residual, horizontal_field_deg: give what is so now
         feed: tells the page what can be tuned
-        tell: writes a line that stays, such as the page's address; None: into the status line
+        tell: writes a line that stays, such as the page's address
         """
         self._page = page
         self._say = say
@@ -82,6 +86,7 @@ class Onlooker:
         self.depth = False
         self._url_told = False
         self._failed: set[str] = set()
+        self._page_started = 0
         self._slot: Tick | None = None
         self._ticks = 0
         self._over = threading.Event()
@@ -147,9 +152,10 @@ class Onlooker:
     def _tell_of(self, page: Page) -> None:
         """Keep the page told of what can be tuned, and the person at the rig of the page."""
         if self._feed is not None:
+            if page.started != self._page_started and self._page_started:
+                self._feed.begin_anew()
+            self._page_started = page.started
             self._feed.step()
-        if self._tell is None:
-            return
         if not self._url_told and (url := page.url()) is not None:
             self._url_told = True
             self._tell(f"the page is at {url}")
@@ -184,15 +190,13 @@ class Onlooker:
         return (u, v)
 
     def _line(self, tick: Tick, rate_hz: float) -> str:
-        note = self._page.notice() if self._page is not None else None
-        url = self._page.url() if self._page is not None else None
         parts = [
             f"{rate_hz:5.1f} Hz",
             f"{target_name(tick.target)} - {tick.target.why}",
             verdict_words(tick.verdict),
             health_words(self._health()),
         ]
-        return " | ".join([*parts, *([note] if note else []), *([url] if url else [])])
+        return " | ".join(parts)
 
 
 class _Rate:

@@ -1,43 +1,60 @@
-"""The viser server behind the page's door: on the loopback, and for the door alone.
+"""The viser server behind the page's door: on a Unix socket that no other user can reach.
 
-A page of any site open in a browser on this machine may knock at every loopback port with
-a websocket, and viser asks nobody where they come from. Whoever does not bring the door's
-secret is sent away before a message of theirs is read or one is sent to them.
+Viser asks nobody who they are. On a port of the loopback every user of the machine, and every
+page that is open in a browser here, could talk to it past the door.
 """
 
 import contextlib
-import hmac
+import functools
+from collections.abc import Iterator
+from pathlib import Path
 
 import viser
-from viser import _messages, infra
-from websockets.exceptions import ConnectionClosed
+import websockets.asyncio.server as websocket_server
+from viser import _messages
 
-from robot.page.door import SECRET_HEADER
+BROWSER_HEADER = "X-Gazerig-Browser"
+"""Says to the server which browser a websocket is of."""
+TO_BROWSER_BYTES = 1 << 25
+"""No message to a browser is longer."""
+FROM_BROWSER_BYTES = 1 << 20
+"""No message from a browser is longer: the longest that the page's script sends has some kB."""
 
-LOOPBACK = "127.0.0.1"
 
-
-def open_server(secret: str) -> viser.ViserServer:
-    """Open a server on a free loopback port that only takes who brings this secret.
+def open_server(socket_path: Path) -> viser.ViserServer:
+    """Open a server on a new Unix socket, in a folder that is its user's alone.
 
     Raises:
-        OSError: there is no free port.
+        OSError: the socket cannot be made.
     """
-    server = viser.ViserServer(host=LOOPBACK, port=0, label="gazerig", verbose=False)
-    inner = server._websock_server
-
-    async def guard(client: infra.WebsockClientConnection) -> None:
-        connection = inner._live_connections[client.client_id]
-        given = connection.request.headers.get(SECRET_HEADER, "") if connection.request else ""
-        if hmac.compare_digest(given.encode(), secret.encode()):
-            return
-        await connection.close(1008, "come in by the door")
-        with contextlib.suppress(ConnectionClosed):
-            async for _ in connection:  # what was sent before the refusal is not for anybody
-                continue
-
-    inner.on_client_connect(guard)
+    with _on_unix_socket(socket_path):
+        server = viser.ViserServer(host="127.0.0.1", port=0, label="gazerig", verbose=False)
     # A browser must not be able to put this page on the internet.
     for publish in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
-        inner.unregister_handler(publish)
+        server._websock_server.unregister_handler(publish)
     return server
+
+
+def browser_of(server: viser.ViserServer, client_id: int) -> str:
+    """Return which browser a client of the server is, "" where that is not known."""
+    connection = server._websock_server._live_connections.get(client_id)
+    if connection is None or connection.request is None:
+        return ""
+    return connection.request.headers.get(BROWSER_HEADER, "")
+
+
+@contextlib.contextmanager
+def _on_unix_socket(path: Path) -> Iterator[None]:
+    """Let servers that are opened meanwhile listen at a path; viser knows only ports."""
+    serve = websocket_server.serve
+
+    @functools.wraps(serve)
+    def at_path(handler: object, host: str, port: int, **settings: object) -> object:
+        settings["max_size"] = FROM_BROWSER_BYTES
+        return serve(handler, unix=True, path=str(path), **settings)  # type: ignore[arg-type]
+
+    websocket_server.serve = at_path  # type: ignore[assignment, misc]
+    try:
+        yield
+    finally:
+        websocket_server.serve = serve  # type: ignore[misc]

@@ -1,25 +1,28 @@
 // The red button that is always there, whatever the rest of the page does.
 //
 // It stands outside of everything that viser draws, and talks to the rig over the page's
-// door by requests of its own. The space bar does the same, unless somebody types. A click
-// into the camera picture makes the head look there.
+// door by a connection of its own, which stands before it is needed. The space bar does the
+// same, unless somebody types. A stop is sent again until the rig has taken it. A click into
+// the camera picture makes the head look there.
 
 (() => {
   "use strict";
 
   const SILENT_AFTER_MS = 3000; // the door gives a sign of life every second
+  const AGAIN_MS = 250;
   const RED = "#c92a2a";
   const css = `
-    #rig-stop-bar { position: fixed; left: 50%; bottom: 14px; transform: translateX(-50%);
-      z-index: 2147483647; display: flex; flex-direction: column-reverse; gap: 10px;
+    #rig-stop-bar { position: fixed; left: 50%; top: 8px; transform: translateX(-50%);
+      z-index: 2147483647; display: flex; flex-direction: column; gap: 8px;
       align-items: center; width: max-content; max-width: calc(100vw - 28px);
       font: 600 15px/1.3 system-ui, sans-serif; color: #fff; pointer-events: none }
     #rig-stop-bar > * { pointer-events: auto; border-radius: 10px;
       box-shadow: 0 2px 10px rgba(0, 0, 0, .35) }
     #rig-stop-bar button { font: inherit; color: #fff; border: 0; border-radius: 10px;
       cursor: pointer; padding: 0 18px }
-    #rig-stop { background: ${RED}; min-width: 150px; min-height: 72px;
-      font-size: 26px !important; letter-spacing: 2px }
+    #rig-stop { background: ${RED}; min-width: 150px; min-height: 60px;
+      font-size: 24px !important; letter-spacing: 2px; touch-action: manipulation }
+    #rig-stop.going { background: #801515 }
     #rig-stop:active { background: #801515 }
     #rig-stop small { display: block; font: 400 11px system-ui, sans-serif; letter-spacing: 0 }
     #rig-words { background: #212529; padding: 10px 14px; display: flex; gap: 12px;
@@ -33,18 +36,24 @@
   const bar = document.createElement("div");
   bar.id = "rig-stop-bar";
   bar.innerHTML = `
-    <button id="rig-stop" type="button">STOP<small>or the space bar</small></button>
+    <button id="rig-stop" type="button"><span>STOP</span><small>or the space bar</small></button>
     <div id="rig-words" role="status" hidden></div>`;
   const stop = bar.querySelector("#rig-stop");
   const words = bar.querySelector("#rig-words");
 
-  let state = { stopped: "", silent: false };
+  const QUIET = { stopped: "", silent: false, you: "", by: "" };
+  let state = QUIET;
+  let line = null; // the connection that stands
   let heardAt = performance.now();
+  let why_lost = "";
   let confirming = false;
   let failed = "";
+  let stopping = null; // a stop that the rig has not taken yet
+  let posting = false;
 
-  async function ask(what) {
+  async function ask(what, signal) {
     const answer = await fetch("/rig/ask", {
+      signal,
       method: "POST",
       headers: { "Content-Type": "application/json" },
       body: JSON.stringify(what),
@@ -55,10 +64,33 @@
 
   function halt(by) {
     confirming = false;
-    ask({ order: "stop", why: by })
-      .then(() => { failed = ""; })
-      .catch((error) => { failed = `STOP did not reach the rig (${error.message})`; })
-      .finally(draw);
+    failed = "";
+    const first = !stopping;
+    stopping = { order: "stop", why: by };
+    draw();
+    if (first) push(1);
+  }
+
+  // Send the stop until it is taken: over the connection that stands, and by a request of its
+  // own where there is none or it does not answer.
+  function push(attempt) {
+    if (!stopping) return;
+    const standing = line && line.readyState === WebSocket.OPEN;
+    if (standing) line.send(JSON.stringify(stopping));
+    if (!posting && (!standing || attempt > 1)) {
+      posting = true;
+      ask(stopping, AbortSignal.timeout(2000))
+        .then(() => answered(204, ""))
+        .catch((error) => answered(0, error.message))
+        .finally(() => { posting = false; });
+    }
+    setTimeout(() => push(attempt + 1), AGAIN_MS);
+  }
+
+  function answered(status, why) {
+    if (status === 204) { stopping = null; failed = ""; }
+    else if (stopping) failed = `STOP has not reached the rig yet (${why}), it is sent again`;
+    draw();
   }
 
   function button(text, kind, does) {
@@ -72,7 +104,7 @@
 
   function resume() {
     confirming = false;
-    ask({ order: "resume" })
+    ask({ order: "resume", confirmed: true }) // a person said yes to the question
       .catch((error) => { failed = `resume did not reach the rig (${error.message})`; })
       .finally(draw);
   }
@@ -91,16 +123,23 @@
     return `${who} at full speed.`;
   }
 
+  // Who stopped is asked about as well where it was not here: they may have their hands in it.
+  function question() {
+    const other = state.by && state.by !== state.you;
+    return other ? `Stopped by ${state.by}. Is nobody's hand in the mechanism? ${how()}`
+      : `Fingers out? ${how()}`;
+  }
+
   // What there is to say, most urgent first: [text, alarm, buttons].
   function saying() {
     if (state.recording) return ["A recording: nothing here moves or stops a rig.", false, []];
     const lost = performance.now() - heardAt > SILENT_AFTER_MS;
     if (failed) return [`${failed}. Use the emergency stop of the rig.`, true, []];
-    if (lost) return ["No connection: STOP does nothing here. Use the emergency stop.", true, []];
+    if (lost) return [why_lost || NO_CONNECTION, true, []];
     if (state.silent) return ["The rig is silent: use its emergency stop.", true, []];
     if (!state.stopped) return ["", false, []];
     if (confirming) {
-      return [`Fingers out? ${how()}`, false, [
+      return [question(), false, [
         button("Yes, resume", "yes", resume),
         button("No", "no", () => sure(false)),
       ]];
@@ -110,9 +149,15 @@
     ]];
   }
 
+  const NO_CONNECTION = "No connection: STOP does nothing here. Use the emergency stop.";
+  const NOT_IN = "This page is of an earlier run, and STOP does nothing here: open the address "
+    + "that the rig's terminal shows.";
   let drawn = "";
   function draw() {
     stop.hidden = Boolean(state.recording);
+    stop.classList.toggle("going", Boolean(stopping));
+    const label = stopping ? "stopping…" : "STOP";
+    if (stop.firstChild.textContent !== label) stop.firstChild.textContent = label;
     const [text, alarm, buttons] = saying();
     const now = [text, alarm, ...buttons.map((b) => b.textContent)].join("|");
     if (now === drawn) return; // a button that is being pressed stays where it is
@@ -125,17 +170,26 @@
   }
 
   function listen() {
-    const events = new EventSource("/rig/state");
-    events.onmessage = (event) => {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    const mine = new WebSocket(`${scheme}://${location.host}/rig/line`);
+    line = mine;
+    mine.onmessage = (event) => {
+      const said = JSON.parse(event.data);
+      if (said.answer) return answered(said.answer, said.words);
       heardAt = performance.now();
+      why_lost = "";
       const before = state.stopped;
-      state = { stopped: "", silent: false, ...JSON.parse(event.data) };
+      state = { ...QUIET, ...said.state };
       if (state.stopped !== before) { confirming = false; failed = ""; }
       draw();
     };
-    events.onerror = () => {
-      if (events.readyState !== EventSource.CLOSED) return; // it tries again by itself
-      setTimeout(listen, 1000);
+    mine.onclose = () => {
+      line = null;
+      setTimeout(listen, 500);
+      // A connection that is refused does not say why.
+      fetch("/rig/stop.js", { cache: "no-store", signal: AbortSignal.timeout(2000) })
+        .then((answer) => { why_lost = answer.status === 403 ? NOT_IN : ""; })
+        .catch(() => { why_lost = ""; });
     };
   }
 

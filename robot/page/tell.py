@@ -2,24 +2,43 @@
 
 import json
 import socket
-from collections.abc import Mapping
+import threading
+from collections.abc import Callable, Mapping
 
-from robot.orders import Order, as_json
+from robot.clock import Clock, RealClock
+from robot.orders import Jog, LookAt, Order, as_json
 from robot.page.ear import MESSAGE_BYTES, telling
+from robot.page.rate import Rate
 
 DOOR = "door"
 """Who asks where it is the stop button or a click in the picture."""
 
 
-class Teller:
-    """Sends requests over the page's socket; from any thread."""
+_PER_S, _BURST = 100.0, 200.0
+"""Requests of all browsers together; each drags one thing, at some 20 changes a second."""
 
-    def __init__(self, feed: socket.socket) -> None:
-        """Take the socket to the rig."""
+
+class Teller:
+    """Sends requests over the page's socket; from any thread.
+
+    name: returns what the browser of a client of the page is called; leads: is told of one
+    that leads the head now
+    """
+
+    def __init__(self, feed: socket.socket, clock: Clock | None = None) -> None:
+        """Take the socket to the rig; clock: what limits requests by the second."""
         self._feed = feed
+        self._clock = clock if clock is not None else RealClock()
+        self._rate = Rate(_PER_S, _BURST)
+        self._lock = threading.Lock()
+        self.name: Callable[[str], str] = _unnamed
+        self.leads: Callable[[str], object] = _unnamed
 
     def order(self, order: Order, who: str) -> bool:
         """Give an order; False where the rig does not take it now."""
+        if isinstance(order, LookAt | Jog):
+            self.leads(self.name(who))
+            order = order._replace(who=self.name(who))
         return self.ask(as_json(order), who)
 
     def ask(self, data: Mapping[str, object], who: str) -> bool:
@@ -29,11 +48,17 @@ class Teller:
     def hand_on(self, data: bytes, who: str = DOOR) -> bool:
         """Hand on a compact JSON object."""
         message = telling(who, data)
-        if len(message) > MESSAGE_BYTES:
-            return False
+        with self._lock:
+            if len(message) > MESSAGE_BYTES or not self._rate.take(self._clock.now_s()):
+                return False
         try:
             # A rig that takes nothing must not hold up the others who ask.
             self._feed.send(message, socket.MSG_DONTWAIT)
         except OSError:  # full, or gone: then the page ends by itself
             return False
         return True
+
+
+def _unnamed(client: str) -> str:
+    """Return no name: nobody has said which browser a client is."""
+    return ""

@@ -1,6 +1,7 @@
 """The page's own process: take the newest snapshot off the socket and draw it.
 
-Started by ``robot.page.link.Page`` as ``python -m robot.page.view FD PARENT HOST PORT``. It
+Started by ``robot.page.link.Page`` as ``python -m robot.page.view FD STOP_FD PARENT HOST PORT``,
+with the token in its environment, which other users cannot read as they can its arguments. It
 ends when the other side of the socket closes. Nothing is fetched from anywhere: the
 page's script comes from the viser package and all shapes are made here. Browsers come in
 by ``robot.page.door``; what people do there goes to the rig over the same socket.
@@ -9,14 +10,16 @@ by ``robot.page.door``; what people do there goes to the rig over the same socke
 import errno
 import json
 import os
-import secrets
 import select
+import shutil
 import signal
 import socket
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from math import atan
+from pathlib import Path
 from typing import NamedTuple
 
 import viser
@@ -27,6 +30,7 @@ from robot.page.ear import MESSAGE_BYTES
 from robot.page.head import FLOOR_M, HeadView
 from robot.page.layers import LayersView
 from robot.page.link import (
+    CANNOT_OPEN,
     CHOICES,
     EVERYBODY,
     KNOBS,
@@ -34,6 +38,7 @@ from robot.page.link import (
     PICTURE,
     REPLAY,
     SNAPSHOT,
+    TOKEN_VARIABLE,
     URL,
     VALUES,
     WORDS,
@@ -42,7 +47,8 @@ from robot.page.link import (
 from robot.page.panel import PanelView
 from robot.page.people import PeopleView
 from robot.page.replay import ReplayView
-from robot.page.server import open_server
+from robot.page.server import browser_of, open_server
+from robot.page.stop_line import StopSender
 from robot.page.tell import Teller
 from robot.types import Snapshot
 
@@ -287,31 +293,50 @@ class Served(NamedTuple):
     words: str | None
 
 
-def serve(host: str, port: int, teller: Teller) -> Served:
+def serve(
+    host: str, port: int, token: str, folder: Path, teller: Teller, stop: StopSender
+) -> Served:
     """Open the page's server, and its door on the first free port.
+
+    Args:
+        host, port: the address; a busy port moves on to the next
+        token: what browsers must show
+        folder: that only this user can enter, for the server's socket
+        teller: hands on what is asked for; stop: hands on stops
 
     Raises:
         OSError: see ``free_port``.
     """
     open_port = free_port(host, port)
-    secret = secrets.token_urlsafe(24)
-    server = open_server(secret)
-    door = Door(host, open_port, server.get_port(), secret, teller.hand_on)
+    server = open_server(folder / "page.sock")
+    door = Door(host, open_port, folder / "page.sock", teller.hand_on, stop, token)
+    teller.name = lambda client: _browser(server, client)
+    teller.leads = door.browsers.led_by
     door.open()
     words = []
     if port not in (0, open_port):  # 0 asks for any port
         words.append(f"port {port} is busy, using {open_port}")
     name = socket.gethostname() if host in _EVERYWHERE else host
     url = f"http://[{name}]:{open_port}" if ":" in name else f"http://{name}:{open_port}"
-    if door.token is not None:
-        words.append(f"the page opens only at {url}/?token={door.token} (shown this once)")
-    return Served(server, door, url, "; ".join(words) or None)
+    return Served(server, door, f"{url}/?token={token}", "; ".join(words) or None)
 
 
-def watch(feed: socket.socket, view: View, parent: int) -> None:
-    """Draw what comes until the other side is gone."""
+def _browser(server: viser.ViserServer, client: str) -> str:
+    """Return what the browser of a client is called; client: its number, and maybe more."""
+    number = client.partition(":")[0]
+    return browser_of(server, int(number)) if number.isdecimal() else ""
+
+
+def watch(feed: socket.socket, view: View, parent: int, door: Door) -> None:
+    """Draw what comes until the other side is gone.
+
+    Raises:
+        RuntimeError: nobody can come in any more; a page that is started anew may help.
+    """
     pause = threading.Event()
     while True:
+        if not door.is_open():
+            raise RuntimeError("the page's door has closed by itself")
         readable, _, _ = select.select([feed], [], [], _SILENT_AFTER_S)
         if readable:
             news = drain(feed)
@@ -330,21 +355,40 @@ def main(arguments: list[str]) -> int:
     """Run the page; give the process's exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICENESS)
-    fd, parent, host, port = arguments
+    fd, stop_fd, parent, host, port = arguments
+    token = os.environ.pop(TOKEN_VARIABLE)
     # Not closed by hand: its end tells the other side to read this process's last words,
     # and those of an exception are written only after a ``with`` has been left.
     feed = socket.socket(fileno=int(fd))
-    teller = Teller(feed)
+    teller, stop = Teller(feed), StopSender(socket.socket(fileno=int(stop_fd)))
+    folder = Path(tempfile.mkdtemp(prefix="gazerig-page-"))
     try:
-        served = serve(host, int(port), teller)
+        return _show(feed, teller, stop, (host, int(port)), token, folder, int(parent))
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _show(
+    feed: socket.socket,
+    teller: Teller,
+    stop: StopSender,
+    address: tuple[str, int],
+    token: str,
+    folder: Path,
+    parent: int,
+) -> int:
+    """Serve the page until the rig is gone; give the process's exit code."""
+    try:
+        served = serve(*address, token, folder, teller, stop)
     except OSError as error:
+        host, port = address
         sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
-        return 1
+        return CANNOT_OPEN
     if served.words is not None:
         feed.send(NOTICE + served.words.encode())
     view = View(served.server, teller, served.door.tell)
     feed.send(URL + served.url.encode())
-    watch(feed, view, int(parent))
+    watch(feed, view, parent, served.door)
     served.door.close()
     served.server.stop()
     return 0

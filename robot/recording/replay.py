@@ -129,6 +129,10 @@ class Replay:
         leapt = state.at_s != told.at_s and not state.playing
         return leapt or now_s - self._told_s >= (_SLIDE_S if state.playing else _BEAT_S)
 
+    def begin_anew(self) -> None:
+        """Introduce the recording again: the page that knew it has died, and another is there."""
+        self._introduced = False
+
     def _tell(self, screen: Screen, state: State, now_s: float) -> None:
         more = {} if self._introduced else introduction(self._frames)
         message = REPLAY + json.dumps({**state._asdict(), **more}).encode()

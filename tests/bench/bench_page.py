@@ -5,21 +5,19 @@
 A simulated rig in real time, its servos behind a pseudo-terminal, with the page off and with
 0, 1 and 5 browsers that take all that comes. Printed a run: how far ticks are off their slots,
 skipped slots, and the processor time of the rig's and of the page's process, in per cent of
-one core. Then, with one browser, seconds in which nobody tunes, the door is knocked at as
-often as by a slider, a slider of the tuning is dragged, another program sets a value ten times
+one core. Then, with one browser, seconds in which nobody tunes, the door is knocked at ten
+times a second, a parameter is changed ten times a second, another program sets a value ten times
 a second, or it reads all of them as often, in turn. Then the time until the page can be opened,
 until a browser has its first picture, and from a slider that is moved (and from a stop) to the
 goals on the bus.
 """
 
-import json
 import os
 import signal
 import subprocess
 import sys
 import threading
 import time
-import urllib.request
 from contextlib import ExitStack
 from math import radians
 from pathlib import Path
@@ -27,11 +25,9 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-import viser
 import zstandard
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 from websockets.sync.connection import Connection
-from websockets.typing import Origin, Subprotocol
 
 from config.load import ConfigError
 from config.schema import load_rig
@@ -42,7 +38,10 @@ from robot.loop import LoopCount, Tick, run
 from robot.recording.run_info import RunInfo
 from robot.tuning import Tuning
 
-VISER = [Subprotocol(f"viser-v{viser.__version__}")]
+TESTS = Path(__file__).parents[1]
+sys.path.insert(0, str(TESTS))
+from page_visitor import Visitor  # noqa: E402
+
 TRIES = 30
 CAMERA = msgspec.msgpack.encode(
     {
@@ -62,13 +61,7 @@ CAMERA = msgspec.msgpack.encode(
 
 def browser(url: str) -> ClientConnection:
     """Connect as a browser does, with a camera, so that the page is drawn for it."""
-    there = connect(
-        url.replace("http", "ws"),
-        origin=Origin(url),
-        subprotocols=VISER,
-        max_size=None,
-        compression=None,
-    )
+    there = Visitor(url).open()
     there.send(CAMERA)
     return there
 
@@ -178,20 +171,22 @@ def watched(url: str, n: int) -> "subprocess.Popen[bytes]":
 
 HANDS = {
     "no request": """
-import contextlib, time, urllib.error, urllib.request
+import sys, time
+sys.path.insert(0, {tests!r})
+from page_visitor import Visitor
+visitor = Visitor({url!r})
 while True:
-    time.sleep(1 / 60)
-    asked = urllib.request.Request("{url}/rig/ask", b"no JSON", {{"Origin": "{url}"}})
-    with contextlib.suppress(urllib.error.HTTPError):
-        urllib.request.urlopen(asked).close()
+    time.sleep(1 / 10)
+    visitor.ask("no object")
 """,
     "drag": """
-import itertools, json, time, urllib.request
+import itertools, sys, time
+sys.path.insert(0, {tests!r})
+from page_visitor import Visitor
+visitor = Visitor({url!r})
 for n in itertools.count():
-    time.sleep(1 / 60)
-    body = json.dumps({{"tune": {{"set": {{"gaze.head.align": 0.5 + 0.001 * (n % 100)}}}}}})
-    asked = urllib.request.Request("{url}/rig/ask", body.encode(), {{"Origin": "{url}"}})
-    urllib.request.urlopen(asked).close()
+    time.sleep(1 / 10)
+    visitor.ask({{"tune": {{"set": {{"gaze.head.align": 0.5 + 0.001 * (n % 100)}}}}}})
 """,
     "remote set": """
 import itertools, time
@@ -218,7 +213,7 @@ What the door turns away never reaches the rig: it is what the sending itself co
 
 def tuned(how: str, url: str) -> "subprocess.Popen[bytes]":
     """Somebody who tunes until killed."""
-    code = HANDS[how].format(url=url, pid=os.getpid())
+    code = HANDS[how].format(url=url, pid=os.getpid(), tests=str(TESTS))
     return subprocess.Popen([sys.executable, "-c", code])
 
 
@@ -274,8 +269,7 @@ def show(name: str, run: Run) -> None:
 def first_picture(url: str) -> tuple[float, float]:
     """Seconds until a browser has the page's script, and until it has a picture and traces."""
     start_s = time.monotonic()
-    with urllib.request.urlopen(url) as answer:
-        answer.read()
+    Visitor(url).get()
     script_s = time.monotonic() - start_s
     with browser(url) as there:
         while True:
@@ -318,14 +312,12 @@ def slider_ms(bench: Bench, url: str) -> np.ndarray:
 
 def stop_ms(bench: Bench, url: str) -> np.ndarray:
     """From a stop at the door to the tick that has taken the torque off."""
-    took = []
+    took, visitor = [], Visitor(url)
     for _ in range(TRIES):
         for order in ({"order": "stop", "why": "bench"}, {"order": "resume"}):
             before = len(bench.obeyed)
-            body = json.dumps(order).encode()
-            request = urllib.request.Request(f"{url}/rig/ask", body, {"Origin": url})
             start_s = time.monotonic()
-            urllib.request.urlopen(request).close()
+            visitor.ask(order)
             while len(bench.obeyed) == before:
                 time.sleep(0.0005)
             if order["order"] == "stop":

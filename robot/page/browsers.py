@@ -1,0 +1,47 @@
+"""Who is at the page: a name for each browser, and whether the one that leads is still there."""
+
+import hashlib
+import hmac
+import threading
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_DIGITS = 4
+
+
+class Browsers:
+    """Names browsers by the cookie that each was given; from any thread."""
+
+    def __init__(self, token: str) -> None:
+        self._key = token.encode()
+        self._lock = threading.Lock()
+        self._open: Counter[str] = Counter()
+        self._leads = ""
+
+    def name(self, cookie: str | None) -> str:
+        """Return what a browser is called, the same as long as it keeps its cookie."""
+        if not cookie:
+            return "the page"
+        digest = hmac.new(self._key, cookie.encode(errors="replace"), hashlib.sha256)
+        return f"browser {digest.hexdigest()[:_DIGITS]}"
+
+    @contextmanager
+    def connected(self, name: str) -> Iterator[None]:
+        """Count a browser as there."""
+        with self._lock:
+            self._open[name] += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._open[name] -= 1
+
+    def led_by(self, name: str) -> None:
+        """Note who led the head last."""
+        self._leads = name
+
+    def leading(self) -> str:
+        """Return who led last if that browser is still there, else ""."""
+        with self._lock:
+            return self._leads if self._leads and self._open[self._leads] > 0 else ""

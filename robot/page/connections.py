@@ -1,0 +1,93 @@
+"""Connections to the page: how many there may be, and how long one may be silent.
+
+A browser needs a handful. Whoever opens hundreds and sends nothing, or sends a byte a second,
+must not keep others from pressing STOP, so that the one who has been idle longest goes when
+another comes.
+"""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from aiohttp import web
+from aiohttp.web_protocol import RequestHandler
+
+MOST = 96
+"""Connections at a time, of all browsers together."""
+IDLE_S = 15.0
+"""For so long a connection may be open without asking for anything."""
+BUSY_S = 20.0
+"""For so long one request may take, unless it is a websocket."""
+_LOOK_EVERY_S = 1.0
+
+
+class _State:
+    """Since when a connection is as it is."""
+
+    def __init__(self, since_s: float) -> None:
+        self.since_s = since_s
+        self.busy = self.lasting = False
+
+
+class Connections:
+    """Makes the handlers of connections and ends those that should not go on."""
+
+    def __init__(self, server: web.Server) -> None:
+        self._server = server
+        self._states: dict[RequestHandler, _State] = {}
+
+    def accept(self) -> RequestHandler:
+        """Return the handler of a new connection; the idlest goes where there are too many."""
+        self._forget_gone()
+        if len(self._states) >= MOST:
+            idlest = min(self._states, key=self._rank)
+            self._end(idlest)
+        handler: RequestHandler = self._server()
+        self._states[handler] = _State(asyncio.get_running_loop().time())
+        return handler
+
+    @contextmanager
+    def busy(self, request: web.BaseRequest) -> Iterator[None]:
+        """Note that a request is being answered."""
+        state = self._states.get(request.protocol)
+        if state is None:
+            yield
+            return
+        loop = asyncio.get_running_loop()
+        state.busy, state.since_s = True, loop.time()
+        try:
+            yield
+        finally:
+            state.busy, state.since_s = False, loop.time()
+
+    def lasting(self, request: web.BaseRequest) -> None:
+        """Note that a request is a websocket, which lasts as long as the browser likes."""
+        if (state := self._states.get(request.protocol)) is not None:
+            state.lasting = True
+
+    async def watch(self) -> None:
+        """End connections that are silent, or busy, for too long; until cancelled."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await asyncio.sleep(_LOOK_EVERY_S)
+            self._forget_gone()
+            now_s = loop.time()
+            for handler, state in tuple(self._states.items()):
+                longest_s = BUSY_S if state.busy else IDLE_S
+                if not state.lasting and now_s - state.since_s > longest_s:
+                    self._end(handler)
+
+    def _rank(self, handler: RequestHandler) -> tuple[bool, bool, float]:
+        state = self._states[handler]
+        return state.lasting, state.busy, state.since_s
+
+    def _end(self, handler: RequestHandler) -> None:
+        del self._states[handler]
+        if handler.transport is not None:
+            handler.transport.abort()
+
+    def _forget_gone(self) -> None:
+        """Forget connections that have ended; one that begins has no transport for a moment."""
+        known = set(self._server.connections)
+        for handler in [h for h in self._states if h not in known]:
+            del self._states[handler]

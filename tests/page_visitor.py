@@ -1,0 +1,111 @@
+"""A browser without the drawing: comes in with the token, asks, and listens."""
+
+import json
+import socket
+import urllib.error
+import urllib.request
+from typing import Any
+from urllib.parse import urlsplit
+
+import msgspec
+import viser
+import zstandard
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin, Subprotocol
+
+PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes
+VISER = Subprotocol(f"viser-v{viser.__version__}")
+
+# The page counts a browser as there when it has said where it looks from.
+LOOKING = msgspec.msgpack.encode(
+    {
+        "type": "ViewerCameraMessage",
+        "wxyz": [1.0, 0.0, 0.0, 0.0],
+        "position": [1.0, 0.0, 0.0],
+        "fov": 1.0,
+        "near": 0.1,
+        "far": 100.0,
+        "image_height": 600,
+        "image_width": 800,
+        "look_at": [0.0, 0.0, 0.0],
+        "up_direction": [0.0, 0.0, 1.0],
+    }
+)
+
+
+def said(data: bytes) -> str:
+    """What viser sent, as text: sizes, then packed messages."""
+    size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
+    plain = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
+    return str(msgspec.msgpack.decode(plain))
+
+
+class _Stay(urllib.request.HTTPRedirectHandler):
+    """Follows no redirect."""
+
+    def redirect_request(self, *_: object) -> None:
+        return None
+
+
+class Visitor:
+    """Who has opened the address that the terminal shows.
+
+    url: of the page, without the token; headers: what a browser sends with every request
+    """
+
+    def __init__(self, address: str) -> None:
+        parts = urlsplit(address)
+        self.url = f"{parts.scheme}://{parts.netloc}"
+        opener = urllib.request.build_opener(_Stay())
+        try:
+            with opener.open(address, timeout=PATIENCE_S) as answer:
+                raise AssertionError(f"let in without a cookie: {answer.status}")
+        except urllib.error.HTTPError as answer:
+            assert answer.code == 302, answer.code
+            cookies = answer.headers.get_all("Set-Cookie") or []
+        pairs = "; ".join(cookie.partition(";")[0] for cookie in cookies)
+        self.headers = {"Cookie": pairs, "Origin": self.url}
+
+    def get(self, path: str = "/") -> bytes:
+        """What is at a path."""
+        request = urllib.request.Request(self.url + path, headers=self.headers)
+        with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
+            body: bytes = answer.read()
+            return body
+
+    def ask(self, asked: object) -> int:
+        """Ask for something as the page's script does; the status of the answer."""
+        body = json.dumps(asked).encode()
+        request = urllib.request.Request(f"{self.url}/rig/ask", body, self.headers)
+        try:
+            with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
+                return int(answer.status)
+        except urllib.error.HTTPError as error:
+            return error.code
+
+    def open(self, path: str = "/", receive_bytes: int | None = None) -> ClientConnection:
+        """Open a websocket: "/" is the page's own, "/rig/line" that of the stop button."""
+        there = socket.socket()
+        if receive_bytes is not None:
+            there.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
+        parts = urlsplit(self.url)
+        there.connect((parts.hostname, parts.port))
+        return connect(
+            f"ws://{parts.netloc}{path}",
+            sock=there,
+            origin=Origin(self.url),
+            subprotocols=[VISER] if path == "/" else None,
+            additional_headers={"Cookie": self.headers["Cookie"]},
+            max_size=None,
+            compression=None,
+            open_timeout=PATIENCE_S,
+            ping_interval=None,
+            max_queue=1 if receive_bytes is not None else None,
+            close_timeout=1.0,
+        )
+
+    def state(self) -> dict[str, Any]:
+        """What the stop button is told first."""
+        with self.open("/rig/line") as line:
+            state: dict[str, Any] = json.loads(line.recv(timeout=PATIENCE_S))["state"]
+            return state
