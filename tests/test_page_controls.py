@@ -344,7 +344,7 @@ def test_what_is_no_order_is_refused_with_the_rule(heard: Heard) -> None:
 
 def test_a_click_in_the_picture_is_looked_at(heard: Heard) -> None:
     assert heard.hear({"pick": {"x": 0.5, "y": 1}}) is None
-    assert heard.orders == [LookAt((1.0, 0.5, 1.0), PAGE, stay=True)]
+    assert heard.orders == [LookAt((1.0, 0.5, 1.0), PAGE)]
     words = heard.hear({"pick": {"x": 0.95, "y": 0.5}})
     assert words is not None and "no camera picture" in words
 
@@ -474,7 +474,7 @@ def test_a_slider_jogs_and_then_follows_its_joint(server: viser.ViserServer) -> 
     view.show(replace(SNAPSHOT, t_s=1.0))
     assert slider.value == pytest.approx(5.7) and mouth.told == []  # 0.1 rad, and nobody asked
     touch(server, slider, 20.0)
-    assert mouth.told == [(Jog((("neck_yaw", radians(20.0)),), stay=True), "5")]
+    assert mouth.told == [(Jog((("neck_yaw", radians(20.0)),)), "5")]
 
     def wished(t_s: float, wish_deg: float, stopped: str = "") -> float:
         wish = tuple(radians(wish_deg) if i == yaw else 0.1 for i in range(9))
@@ -521,7 +521,7 @@ def test_sliders_are_those_of_the_rig(server: viser.ViserServer) -> None:
     view.show(of_six(SNAPSHOT))
     assert view._sliders["eyes_pan"].value == pytest.approx(20.0)
     touch(server, lid, 5.0)
-    assert mouth.told == [(Jog((("left_lower_lid", radians(5.0)),), stay=True), "5")]
+    assert mouth.told == [(Jog((("left_lower_lid", radians(5.0)),)), "5")]
     view.show(SNAPSHOT)  # of another rig: nothing to follow, and nothing breaks
 
 

@@ -273,10 +273,10 @@ def test_a_stop_has_a_way_of_its_own_and_is_answered_by_the_rig(near: Rig) -> No
     near.takes = False  # the way of all else is full
     try:
         assert near.post(b'{ "order": "stop",\n "why": "a test" }')[0] == 204
-        assert near.stops == [{"order": "stop", "why": "a test", "who": "the page"}]
+        assert near.stops == [{"order": "stop", "why": "a test (the page)", "who": "the page"}]
         with near.knock("/rig/line") as line:
             assert stop_by_line(line, "by line") == 204
-        assert near.stops[-1]["why"] == "by line"
+        assert near.stops[-1]["why"] == "by line (the page)"
         near.stop_answer = "refused: it has ended"
         status, _, text = near.post(b'{"order": "stop", "why": "late"}')
         assert (status, text) == (503, "refused: it has ended\n")

@@ -157,6 +157,7 @@ class LeadView:
             "behaviour": snapshot.behaviour,
             "conversation": snapshot.conversation,
             "character": snapshot.character or self._character,
+            "led by": snapshot.led,
         }
         now = ", ".join(f"{name} <b>{escape(word)}</b>" for name, word in said.items() if word)
         if now != self._now:

@@ -241,7 +241,7 @@ class Door:
             return 400, "not a JSON object that can be asked for"
         if asked.get("order") == "stop":
             try:
-                words = await self._stop.send(str(asked.get("why", "")), who)
+                words = await self._stop.send(f"{asked.get('why', '')!s:.100} ({who})", who)
             except OSError as error:
                 return 503, str(error)
             return (503, words) if words else (204, "")

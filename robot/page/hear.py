@@ -6,10 +6,13 @@ from typing import Protocol, cast
 
 from drivers.errors import DriverError
 from gaze.types import Vec3
-from robot.orders import LookAt, Tune, Value, from_json, signed
+from robot.clock import RealClock
+from robot.orders import Jog, LookAt, Order, Resume, Tune, Value, from_json, signed
 from robot.remote.requests import Saved, Tuning
 from robot.reply import OrderTaker
 
+_REPLY_S = 1.0
+_SAID_EVERY_S = 3.0
 _LATER = "next start"
 """Of what a change did, people are told what it did not; the controls show the rest."""
 
@@ -66,6 +69,8 @@ class PageHear:
         )  # fmt: skip
         self._saved = saved
         self._confined = confined
+        self._clock = RealClock()
+        self._limited_s = -_SAID_EVERY_S
 
     def __call__(self, data: Mapping[str, object]) -> str | None:
         """Do what is asked; None where nothing needs to be said, else words or a refusal."""
@@ -77,8 +82,7 @@ class PageHear:
     def _do(self, data: Mapping[str, object]) -> str | None:
         match data:
             case {"order": _}:
-                self._obey(data)
-                return None
+                return self._obey(data)
             case {"tune": dict(asked)}:
                 return self._tune(asked)
             case {"pick": {"x": int() | float() as x, "y": int() | float() as y, **rest}}:
@@ -92,12 +96,31 @@ class PageHear:
                 return self._replay(asked)
         raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} cannot be asked for here")
 
-    def _obey(self, data: Mapping[str, object]) -> None:
+    def _obey(self, data: Mapping[str, object]) -> str | None:
         order = from_json(dict(data))
         if isinstance(order, Tune):
             # An order's values count as checked, and only the tuning checks them.
             raise ValueError("parameters are changed by tuning, which knows their rules")
-        self._order(order if getattr(order, "who", PAGE) else signed(order, PAGE))
+        return self._ordered(order if getattr(order, "who", PAGE) else signed(order, PAGE))
+
+    def _ordered(self, order: Order) -> str | None:
+        """Give an order, and return what it cannot do, None where it does all or nobody waits."""
+        ticket = self._order(order)
+        if ticket is None or not isinstance(order, LookAt | Jog | Resume):
+            return None
+        reply = ticket.wait(_REPLY_S)
+        if reply is None:
+            return "the control loop has not taken it up: it hangs, starts or ends"
+        if reply.refused:
+            return f"refused: {reply.refused}"
+        if not reply.limited:
+            return None
+        # Of somebody who drags a target out of reach one word is enough for a while.
+        now_s = self._clock.now_s()
+        if now_s - self._limited_s < _SAID_EVERY_S:
+            return None
+        self._limited_s = now_s
+        return reply.words()
 
     def _pick(self, x: float, y: float, who: str) -> str | None:
         if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
@@ -105,8 +128,7 @@ class PageHear:
         point = self._point(x, y) if self._point is not None else None
         if point is None:
             return "refused: there is no camera picture to look into yet"
-        self._order(LookAt(point, who))
-        return None
+        return self._ordered(LookAt(point, who))
 
     def _tune(self, asked: Mapping[str, object]) -> str | None:
         tuning = self._tuning

@@ -193,6 +193,7 @@ class Onlooker:
         parts = [
             f"{rate_hz:5.1f} Hz",
             f"{target_name(tick.target)} - {tick.target.why}",
+            *([f"led by {tick.led}"] if tick.led else []),
             verdict_words(tick.verdict),
             health_words(self._health()),
         ]

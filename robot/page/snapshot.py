@@ -184,6 +184,7 @@ def snapshot(
         target_id=target.id,
         target_part=target.part,
         stopped=tick.stopped,
+        led=tick.led,
         picture_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         ghost=_ghost(tick, rig) if rig is not None else None,
         camera=_camera(tick, rig) if rig is not None else None,

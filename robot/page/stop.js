@@ -41,7 +41,7 @@
   const stop = bar.querySelector("#rig-stop");
   const words = bar.querySelector("#rig-words");
 
-  const QUIET = { stopped: "", silent: false, you: "", by: "" };
+  const QUIET = { stopped: "", silent: false, you: "" };
   let state = QUIET;
   let line = null; // the connection that stands
   let heardAt = performance.now();
@@ -125,8 +125,8 @@
 
   // Who stopped is asked about as well where it was not here: they may have their hands in it.
   function question() {
-    const other = state.by && state.by !== state.you;
-    return other ? `Stopped by ${state.by}. Is nobody's hand in the mechanism? ${how()}`
+    const other = !state.stopped.includes(`(${state.you})`);
+    return other ? `Not stopped here: ${state.stopped}. Is nobody's hand in the mechanism? ${how()}`
       : `Fingers out? ${how()}`;
   }
 
