@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from config.bounds import shapes_of
-from config.load import ConfigError, Fault, read_yaml, shipped
+from config.load import ConfigError, Document, Fault, read_yaml, shipped
 from config.save_text import Unchangeable, Value, edited, written
 from config.schema import Rig, load_rig
+from drivers.file_input import read_limited
 
 Check = Callable[[str], Any]
 """Loads a file by its path and gives what it holds; raises config.load.ConfigError."""
@@ -74,7 +75,12 @@ def rig_file(name_or_path: Path | str) -> Path:
 
 
 def save(
-    path: Path | str, changes: Mapping[str, Value], now: datetime, check: Check, into: type
+    path: Path | str,
+    changes: Mapping[str, Value],
+    now: datetime,
+    check: Check,
+    into: type,
+    base: bytes | None = None,
 ) -> Saved:
     """Write values at dotted key paths into a YAML file and keep the old file beside it.
 
@@ -85,6 +91,7 @@ def save(
     now: goes into the backup's name, ``rig.yaml.bak-20260131-235959``
     check: loads a file by path, as ``config.schema.load_rig`` does
     into: the Params dataclass of the file, whose fields explain added keys
+    base: text to write the values into, in the place of a file that has faults or is gone
 
     Raises:
         config.load.ConfigError: the file is shipped, unreadable or not writable, a value
@@ -92,15 +99,16 @@ def save(
     """
     target = Path(os.path.realpath(path))
     _refuse_shipped(target)
-    before, text, found = _proposal(target, changes, into)
-    if not found:
+    before, text, found = _proposal(target, changes, into, base)
+    if text == before:
         return Saved(target, None, ())
     with _errors_named(target), _beside(target, text) as fresh:
         _check_new(target, fresh, changes, check)
-        if target.read_bytes() != before:
+        if _held(target) != before:
             raise _fault(target, "was changed by somebody else meanwhile; try again")
-        backup = _backup(target, before, now)
-        shutil.copymode(target, fresh)
+        backup = _backup(target, before, now) if before is not None else None
+        if before is not None:
+            shutil.copymode(target, fresh)
         os.replace(fresh, target)
     return Saved(target, backup, found)
 
@@ -128,12 +136,17 @@ def copy_shipped(name: str, to: Path | str, kind: str = "rigs") -> Path:
 
 
 def _proposal(
-    target: Path, changes: Mapping[str, Value], into: type
-) -> tuple[bytes, bytes, tuple[Change, ...]]:
-    """Give the file as it is, as it would be, and the difference."""
-    before = read_yaml(target, tuple(shapes_of(into)))  # refuses what is no YAML, with the line
-    raw = target.read_bytes()
-    mark = b"\xef\xbb\xbf" if raw.startswith(b"\xef\xbb\xbf") else b""
+    target: Path, changes: Mapping[str, Value], into: type, base: bytes | None = None
+) -> tuple[bytes | None, bytes, tuple[Change, ...]]:
+    """Give the file as it is, None where there is none, as it would be, and the difference."""
+    known = tuple(shapes_of(into))
+    if base is None:
+        before = read_yaml(target, known)  # refuses what is no YAML, with the line
+        base = target.read_bytes()
+        raw: bytes | None = base
+    else:
+        raw, before = _held(target), _document(base)
+    mark = b"\xef\xbb\xbf" if base.startswith(b"\xef\xbb\xbf") else b""
     try:
         text = edited(before.text, changes, into)
         _refuse_side_effects(before.data, text, changes)
@@ -145,9 +158,27 @@ def _proposal(
         for key, value in changes.items()
         if old[key] is _ABSENT or written(old[key]) != written(value)
     )
-    return raw, mark + text.encode() if found else raw, found
+    return raw, mark + text.encode() if found else base, found
 
 
+def _held(target: Path) -> bytes | None:
+    """Return what a file holds, None where there is none."""
+    with _errors_named(target):
+        try:
+            return read_limited(target, _LARGEST)
+        except FileNotFoundError:
+            return None
+
+
+def _document(text: bytes) -> Document:
+    """Read a text as a file of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "new.yaml"
+        file.write_bytes(text)
+        return read_yaml(file)
+
+
+_LARGEST = 100_000_000  # bytes of a file that is kept as a backup
 _ABSENT: Any = object()
 _ANY_WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
@@ -167,10 +198,7 @@ def _refuse_side_effects(before: dict[str, Any], text: str, changes: Mapping[str
 
     An anchor lends its value to other places, which must not change unseen.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "new.yaml"
-        file.write_bytes(text.encode())
-        after = read_yaml(file).data
+    after = _document(text.encode()).data
     kept, found = _leaves(before), _leaves(after)
     for key in sorted({*kept, *found}):
         wished = key in changes or any(c.startswith(f"{key}.") for c in changes)
@@ -234,7 +262,9 @@ def _beside(target: Path, text: bytes) -> Iterator[Path]:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        if not (os.access(target, os.W_OK) and target.stat().st_mode & _ANY_WRITE):
+        if target.exists() and not (
+            os.access(target, os.W_OK) and target.stat().st_mode & _ANY_WRITE
+        ):
             raise PermissionError(None, "it is read-only; chmod u+w gives the right to write")
         yield Path(name)
     finally:

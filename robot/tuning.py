@@ -8,12 +8,11 @@ Everything may be called from any thread. Changes reach the running parts as one
 checked as a whole beforehand.
 """
 
+import contextlib
 import os
-import shutil
 import threading
 from collections.abc import Callable, Mapping
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,9 +31,10 @@ from config.knobs import (
 )
 from config.knobs import knobs as knobs_of
 from config.load import ConfigError, Fault, shipped_names
-from config.save import Change, Saved, copy_shipped, rig_file, save
+from config.rig_files import Layers, RigFiles, read_all, save_copy, save_over
+from config.save import Change, Saved, rig_file
 from config.save_text import Unchangeable, written
-from config.schema import Rig, layers_of, load_rig
+from config.schema import Rig, load_rig
 from robot.orders import Value
 from robot.reply import OrderTaker
 from robot.retune import Retuner
@@ -48,7 +48,7 @@ class _State(NamedTuple):
 
     saved: what the files make, with the options; rig: in force
     name: of the rig as it was asked for, a shipped name or a path
-    files: in use, the rig's first
+    files: in use, with what they held when they were last read without a fault
     was, values: of ``saved`` and of ``rig``, by key
     """
 
@@ -56,7 +56,7 @@ class _State(NamedTuple):
     rig: Rig
     name: str
     character: str | None
-    files: tuple[Path, ...]
+    files: RigFiles
     was: Mapping[str, Value]
     values: Mapping[str, Value]
     version: int
@@ -94,7 +94,7 @@ class Tuning:
         self._changing = threading.Lock()
         self._defaults = _defaults(retuner.rig)
         # What the command line says otherwise stays in force whatever the files say.
-        read, files = read_all(rig, character, profile)
+        read, files = read_all(Layers(rig, character, profile))
         whole, found = retuner.rig, values(retuner.rig)
         self._options = differences(read, whole)
         self._state = _State(whole, whole, rig, character, files, found, found, 0)
@@ -125,7 +125,7 @@ class Tuning:
 
     def files(self) -> tuple[Path, ...]:
         """Give the files in use: the rig's, and those laid over it."""
-        return self._state.files
+        return self._state.files.paths
 
     def knobs(self) -> tuple[Knob, ...]:
         """Give all parameters in the order of the file."""
@@ -175,28 +175,31 @@ class Tuning:
             return self._put(self._state, self._state.saved)
 
     def save(self, path: Path | str | None = None) -> Saved:
-        """Write what is unsaved into the rig's file, or into a copy of it at a new path.
+        """Write what is in force into the rig's file, or into a copy of it at a new path.
 
-        From then on the copy is this rig's file.
+        From then on the copy is this rig's file. A file that was spoilt by hand meanwhile is
+        kept as a backup.
 
         Raises:
             config.load.ConfigError: the rig is a shipped one and no path is given, the path
                 exists or cannot be written, or another layer overrides a value.
         """
         with self._changing:
+            if self._state.files.changed():
+                # An edit that nobody has heard of yet counts; one with faults does not.
+                with contextlib.suppress(ConfigError):
+                    self._reload()
             state = self._state
             wanted = flattened(state.rig, differences(state.saved, state.rig))
             _refuse_lists(wanted)
+            layers, good = self._layers(state), state.files.own
             target = rig_file(state.name)
             if path is not None and os.path.realpath(path) != os.path.realpath(target):
-                done = self._elsewhere(
-                    save_copy, state.name, str(path), wanted, self._now(), *self._layers(state)
-                )
+                done = self._elsewhere(save_copy, layers, good, str(path), wanted, self._now())
                 state = state._replace(name=str(path))
             else:
-                done = self._elsewhere(
-                    save_over, str(target), wanted, self._now(), *self._layers(state)
-                )
+                layers = layers._replace(name=str(target))
+                done = self._elsewhere(save_over, layers, good, wanted, self._now())
             saved: Saved
             saved, files = done
             self._state = state._replace(
@@ -233,21 +236,24 @@ class Tuning:
             config.load.ConfigError: with every fault; what was in force stays.
         """
         with self._changing:
-            before, state = self._state, self._read(self._state)
-            edited = differences(before.saved, state.saved)
-            kept = {
-                key: value
-                for key, value in differences(before.saved, before.rig).items()
-                if not any(_overlap(key, other) for other in edited)
-            }
-            return self._put(state, changed(state.saved, kept))
+            return self._reload()
 
-    def _layers(self, state: _State) -> tuple[str | None, str | None]:
-        return state.character, self._profile
+    def _reload(self) -> tuple[str, ...]:
+        before, state = self._state, self._read(self._state)
+        edited = differences(before.saved, state.saved)
+        kept = {
+            key: value
+            for key, value in differences(before.saved, before.rig).items()
+            if not any(_overlap(key, other) for other in edited)
+        }
+        return self._put(state, changed(state.saved, kept))
+
+    def _layers(self, state: _State) -> Layers:
+        return Layers(state.name, state.character, self._profile)
 
     def _read(self, state: _State) -> _State:
         """Read the files, with the options over them; what is in force stays."""
-        rig, files = self._elsewhere(read_all, state.name, *self._layers(state))
+        rig, files = self._elsewhere(read_all, self._layers(state))
         saved = changed(rig, self._options)
         return state._replace(saved=saved, was=values(saved), files=files)
 
@@ -265,74 +271,6 @@ class Tuning:
             version=before.version + 1,
         )
         return tuple(_told(key, value) for key, value in found.items())
-
-
-def read_all(name: str, character: str | None, profile: str | None) -> tuple[Rig, tuple[Path, ...]]:
-    """Read a rig, and give the files that it is made of.
-
-    Raises:
-        config.load.ConfigError: see config.schema.load_rig.
-    """
-    return load_rig(name, character, profile), tuple(layers_of(name, character, profile))
-
-
-def save_over(
-    path: str,
-    wanted: Mapping[str, Any],
-    now: datetime,
-    character: str | None,
-    profile: str | None,
-) -> tuple[Saved, tuple[Path, ...]]:
-    """Write values into a rig's file; each must hold with character and profile laid over it.
-
-    Gives what was written, and the files that the rig is made of now.
-
-    Raises:
-        config.load.ConfigError: see config.save.save.
-    """
-    check = partial(load_rig, character=character, profile=profile)
-    saved = save(Path(path), wanted, now, check, Rig)
-    return saved, tuple(layers_of(path, character, profile))
-
-
-def save_copy(
-    name: str,
-    to: str,
-    wanted: Mapping[str, Any],
-    now: datetime,
-    character: str | None,
-    profile: str | None,
-) -> tuple[Saved, tuple[Path, ...]]:
-    """Write values into a new copy of a rig's file, which is not there if that fails.
-
-    Gives what ``save_over`` gives.
-
-    Raises:
-        config.load.ConfigError: see config.save.save; or ``to`` exists or is no YAML file.
-    """
-    if not to.endswith((".yaml", ".yml")):
-        raise ConfigError([Fault(to, None, "", "", "a rig's file ends in .yaml; name it so")])
-    if name in shipped_names("rigs"):
-        copy_shipped(name, to)
-    else:
-        _copy(rig_file(name), Path(to))
-    try:
-        return save_over(to, wanted, now, character, profile)
-    except ConfigError:
-        os.unlink(to)
-        raise
-
-
-def _copy(source: Path, to: Path) -> None:
-    try:
-        with source.open("rb") as old, to.open("xb") as new:
-            shutil.copyfileobj(old, new)
-    except FileExistsError:
-        rule = "is there already and is not overwritten; choose another name"
-        raise ConfigError([Fault(str(to), None, "", "", rule)]) from None
-    except OSError as error:
-        rule = f"cannot be written: {error.strerror}; check it and its folder"
-        raise ConfigError([Fault(str(to), None, "", "", rule)]) from error
 
 
 def _defaults(rig: Rig) -> Rig:

@@ -98,6 +98,72 @@ def test_save_keeps_comments_and_a_backup_and_reload_finds_nothing_new(mine: Pat
     assert bench.tuning.reload(mine) == () and bench.tuning.version == version
 
 
+SPOILT = ["loop:\n  rate_hz: fast\n", "name: [\n", "", "\x00\xff", "root:*:19000:\n", None]
+
+
+@pytest.mark.parametrize("text", SPOILT)
+@pytest.mark.parametrize("changes", [{"gaze.lids.close_ms": 90.0}, {}])
+def test_a_file_spoilt_by_hand_is_kept_and_what_is_in_force_is_saved(
+    mine: Path, text: str | None, changes: dict[str, Any]
+) -> None:
+    bench = Bench(str(mine))
+    bench.tuning.set(changes)
+    before = mine.read_text(encoding="utf-8")
+    if text is None:
+        mine.unlink()
+    else:
+        mine.write_text(text, encoding="utf-8")
+        with pytest.raises(ConfigError):
+            bench.tuning.reload(mine)
+    saved = bench.tuning.save()
+    assert load_rig(str(mine)) == bench.made.retuner.rig and bench.tuning.unsaved() == ()
+    assert len(saved.changes) == len(changes)
+    if text is not None:
+        assert saved.backup is not None and saved.backup.read_text(encoding="utf-8") == text
+    if not changes:
+        assert mine.read_text(encoding="utf-8") == before
+    # From then on it is as ever.
+    bench.tuning.set({"gaze.lids.close_ms": 95.0})
+    bench.tuning.save()
+    assert load_rig(str(mine)).gaze.lids.close_ms == 95.0
+
+
+def test_a_spoilt_file_is_not_copied(mine: Path, tmp_path: Path) -> None:
+    bench = Bench(str(mine))
+    bench.tuning.set({"gaze.lids.close_ms": 90.0})
+    mine.write_text("name: 5\n", encoding="utf-8")
+    bench.tuning.save(tmp_path / "copy.yaml")
+    assert load_rig(str(tmp_path / "copy.yaml")) == bench.made.retuner.rig
+    assert mine.read_text(encoding="utf-8") == "name: 5\n"
+
+
+def test_a_good_edit_that_nobody_has_heard_of_is_in_force_when_saved(mine: Path) -> None:
+    bench = Bench(str(mine))
+    bench.tuning.set({"gaze.lids.close_ms": 90.0})
+    text = mine.read_text(encoding="utf-8")
+    mine.write_text(text.replace("rate_hz: 200.0", "rate_hz: 100.0"), encoding="utf-8")
+    bench.tuning.save()
+    rig = load_rig(str(mine))
+    assert (rig.loop.rate_hz, rig.gaze.lids.close_ms) == (100.0, 90.0)
+    assert rig == bench.made.retuner.rig
+
+
+def test_a_copy_that_fails_names_a_file_that_is_there(mine: Path, tmp_path: Path) -> None:
+    bench = Bench(str(mine), character="sleepy")
+    key = next(c for c in _differing(bench))
+    bench.tuning.set({key: bench.tuning.values()[key] * 1.01})  # type: ignore[operator]
+    with pytest.raises(ConfigError) as refused:
+        bench.tuning.save(tmp_path / "copy.yaml")
+    assert refused.value.faults[0].file == str(mine) and not (tmp_path / "copy.yaml").exists()
+
+
+def _differing(bench: Bench) -> list[str]:
+    """Return the numbers that the character lays over the rig."""
+    plain = values(load_rig(str(bench.tuning.path)))
+    now = bench.tuning.values()
+    return [k for k, v in now.items() if isinstance(v, float) and v and v != plain[k]]
+
+
 def test_a_shipped_rig_asks_for_a_path_and_goes_on_from_it(tmp_path: Path) -> None:
     bench = Bench("desk")
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
@@ -229,8 +295,8 @@ def test_a_dragged_slider_reads_no_file_and_makes_no_knob_anew(
     def read(*words: object) -> None:
         raise AssertionError(f"read: {words}")
 
-    monkeypatch.setattr("robot.tuning.layers_of", read)
-    monkeypatch.setattr("robot.tuning.load_rig", read)
+    monkeypatch.setattr("config.rig_files.layers_of", read)
+    monkeypatch.setattr("config.rig_files.load_rig", read)
     for step in range(3):
         bench.tuning.set({"gaze.lids.close_ms": 90.0 + step})
         assert bench.tuning.files() == files and bench.tuning.knobs() is knobs

@@ -146,6 +146,9 @@ def save(
     with clear_errors(), RunningRig.connect(pid) as rig:
         saved = rig.save(path)
     _tell(f"{change.key}: {change.old} -> {change.new}" for change in saved.changes)
+    if not saved.changes and saved.backup is not None:
+        say(f"{saved.path} had faults: what is in force is in it; as it was: {saved.backup}")
+        return
     if not saved.changes:
         say(f"{saved.path} says all of it already: nothing to save")
         return

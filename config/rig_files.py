@@ -1,0 +1,137 @@
+"""The files that a running rig is made of: read together, and written so that they stay good.
+
+What is written starts from the text that was last read without a fault: a rig's file that
+somebody has spoilt by hand meanwhile is kept beside it, and is never the base of what is saved.
+"""
+
+import os
+from collections.abc import Mapping
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from config.load import ConfigError, Fault, shipped_names
+from config.save import Saved, copy_shipped, rig_file, save
+from config.schema import Rig, layers_of, load_rig
+from drivers.file_input import read_limited
+
+_LARGEST = 1_000_000  # bytes, as config.entries reads
+
+
+class Layers(NamedTuple):
+    """What a rig was asked for by, each a shipped name or a path."""
+
+    name: str
+    character: str | None
+    profile: str | None
+
+
+class RigFiles(NamedTuple):
+    """The files of a rig, its own first, and what they held when they were read."""
+
+    paths: tuple[Path, ...]
+    texts: tuple[bytes, ...]
+
+    @property
+    def own(self) -> bytes:
+        """The text of the rig's own file."""
+        return self.texts[0] if self.texts else b""
+
+    def changed(self) -> bool:
+        """Whether any of them holds something else now, or cannot be read."""
+        try:
+            return tuple(read_limited(path, _LARGEST) for path in self.paths) != self.texts
+        except OSError:
+            return True
+
+
+def read_all(layers: Layers) -> tuple[Rig, RigFiles]:
+    """Read a rig, and return it with the files that it is made of.
+
+    Raises:
+        config.load.ConfigError: see config.schema.load_rig.
+    """
+    paths = tuple(layers_of(*layers))
+    texts = _texts(paths)
+    return load_rig(*layers), RigFiles(paths, texts)
+
+
+def save_over(
+    layers: Layers, good: bytes, wanted: Mapping[str, Any], now: datetime
+) -> tuple[Saved, RigFiles]:
+    """Write values into a rig's file; each must hold with character and profile laid over it.
+
+    Args:
+        layers: The rig's file, and what is laid over it.
+        good: The file's text as it was last read without a fault; written in the place of one
+            that has faults now.
+        wanted: Values by dotted key.
+        now: Goes into the backup's name.
+
+    Returns:
+        What was written, and the files that the rig is made of now.
+
+    Raises:
+        config.load.ConfigError: see config.save.save.
+    """
+    check = partial(load_rig, character=layers.character, profile=layers.profile)
+    saved = save(Path(layers.name), wanted, now, check, Rig, None if _is_good(layers) else good)
+    paths = tuple(layers_of(*layers))
+    return saved, RigFiles(paths, _texts(paths))
+
+
+def save_copy(
+    layers: Layers, good: bytes, to: str, wanted: Mapping[str, Any], now: datetime
+) -> tuple[Saved, RigFiles]:
+    """Write values into a new copy of a rig's file, which is not there if that fails.
+
+    Returns:
+        What ``save_over`` gives.
+
+    Raises:
+        config.load.ConfigError: see config.save.save; or ``to`` exists or is no YAML file.
+    """
+    if not to.endswith((".yaml", ".yml")):
+        raise ConfigError([Fault(to, None, "", "", "a rig's file ends in .yaml; name it so")])
+    if layers.name in shipped_names("rigs"):
+        copy_shipped(layers.name, to)
+    else:
+        _copy(good, Path(to))
+    try:
+        return save_over(layers._replace(name=to), good, wanted, now)
+    except ConfigError as error:
+        os.unlink(to)
+        source = str(rig_file(layers.name))
+        raise ConfigError(
+            f if f.file != to else Fault(source, f.line, f.key, f.value, f"{f.rule}; no {to} made")
+            for f in error.faults
+        ) from None
+
+
+def _is_good(layers: Layers) -> bool:
+    """Whether a rig's file, as it is now, can be loaded."""
+    try:
+        load_rig(*layers)
+    except ConfigError:
+        return False
+    return True
+
+
+def _texts(paths: tuple[Path, ...]) -> tuple[bytes, ...]:
+    try:
+        return tuple(read_limited(path, _LARGEST) for path in paths)
+    except OSError:
+        return ()  # what is wrong is said when it is loaded
+
+
+def _copy(text: bytes, to: Path) -> None:
+    try:
+        with to.open("xb") as new:
+            new.write(text)
+    except FileExistsError:
+        rule = "is there already and is not overwritten; choose another name"
+        raise ConfigError([Fault(str(to), None, "", "", rule)]) from None
+    except OSError as error:
+        rule = f"cannot be written: {error.strerror}; check it and its folder"
+        raise ConfigError([Fault(str(to), None, "", "", rule)]) from error
