@@ -16,7 +16,9 @@ from sts_rig import Rig as StsRig
 
 from config.schema import load_rig
 from drivers.errors import ServoFault, SetupError
+from robot.bringup.one_feetech import OneFeetech
 from robot.guardian.guarded_bus import RETRY_S, GuardedBus
+from robot.guardian.guarded_servo import GuardedServo
 from robot.guardian.guardian import Guardian
 from robot.guardian.hang_detector import HANG_S, HangDetector
 from robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, SIZE, Heartbeat, shared_file
@@ -57,6 +59,22 @@ def test_a_dynamixel_without_its_watchdog_is_guarded_too():
 
 def test_a_dynamixel_with_its_watchdog_needs_no_guardian():
     assert not release_plans(load_rig("desk"), ports_of(load_rig("desk"), None))
+
+
+def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
+    rig, guardian = StsRig(), Unattended()
+    rig.port.setBaudRate(1_000_000)
+    servo = GuardedServo(OneFeetech("eye", 1, "sts3215", rig.port), guardian)
+    servo.check()
+    assert not guardian.other.armed(0)
+    servo.hold(0.2, 100.0)
+    assert guardian.other.armed(0) and servo.holds()
+    servo.send(2010)
+    guardian.other.set_state(0, RELEASING)
+    with pytest.raises(ServoFault, match="stood still"):
+        servo.send(2020)
+    servo.leave()
+    assert not guardian.other.armed(0) and not servo.holds()
 
 
 # --- which ports

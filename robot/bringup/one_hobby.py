@@ -1,7 +1,7 @@
 """One hobby servo on a Maestro by itself, moved slowly by a person who looks at it.
 
 Nobody measures it: its place is the pulse that it gets, as far as nothing holds it back.
-Its pulses go on when this program is killed: the board knows no watchdog.
+The board knows no watchdog: a guardian stops its pulses when this program is killed.
 """
 
 from collections.abc import Callable
@@ -10,9 +10,11 @@ from drivers.errors import BusLost
 from drivers.maestro.bus import MaestroBus
 from drivers.maestro.params import US_STEPS, MaestroParams
 from drivers.serial_port import BusPort
-from drivers.types import ServoReading, ServoSetup
+from drivers.types import ServoBus, ServoReading, ServoSetup
 from robot.bringup.single_joint import Stopped
 from robot.clock import Clock
+from robot.guardian.guarded_bus import GuardedBus
+from robot.guardian.guardian import Guardian
 from robot.joint import JointParams
 
 PERIOD_S = 0.03
@@ -36,6 +38,7 @@ class OneHobby:
         clock: the host's.
         stopped: asked all the time; tells why to stop, None while there is no reason.
         pulses_us: it is never sent outside.
+        guardian: has one plan, that of this servo; None: nobody stops its pulses.
     """
 
     def __init__(
@@ -47,6 +50,7 @@ class OneHobby:
         clock: Clock,
         stopped: Callable[[], str | None],
         pulses_us: tuple[float, float],
+        guardian: Guardian | None = None,
     ) -> None:
         self.name, self.joint = name, joint
         self.who = f"{name} (channel {joint.id})"
@@ -54,7 +58,8 @@ class OneHobby:
         low, high = (round(end * US_STEPS) for end in pulses_us)
         speed = SPEED_US_S * US_STEPS
         self._setup = ServoSetup(joint.id, joint.model, low, high, speed, name)
-        self._bus = MaestroBus(port, [self._setup], params)
+        bus = MaestroBus(port, [self._setup], params)
+        self._bus: ServoBus = bus if guardian is None else GuardedBus(bus, 1, guardian, 0)
         self._goal = self._pulse = 0
         self._said: list[str] = []
 

@@ -110,8 +110,8 @@ class HobbyPlacer:
         began_us = hobby.begin(at_us)
         self._tell_events()
         person.tell(
-            f"{hobby.who}: held at {began_us:g} us; if this program is killed the board goes on "
-            "with the last pulse: cut the servo power"
+            f"{hobby.who}: held at {began_us:g} us; should this program die, its guardian stops "
+            "the pulses; should the computer die, cut the servo power"
         )
 
     def mark(self, where: str) -> float:

@@ -2,7 +2,7 @@
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Annotated
 
 import typer
@@ -31,9 +31,12 @@ def usb_id(path: str) -> str:
 
 
 @contextlib.contextmanager
-def to_open(path: str) -> Iterator[BlockingPort]:
-    """Give a port that is not opened yet, closed again at the end."""
-    line = BlockingPort(path)
+def to_open(path: str, on_traffic: Callable[[], None] | None = None) -> Iterator[BlockingPort]:
+    """Give a port that is not opened yet, closed again at the end.
+
+    on_traffic: called whenever bytes are sent or waited for
+    """
+    line = BlockingPort(path, on_traffic=on_traffic)
     try:
         yield line
     finally:

@@ -24,9 +24,11 @@ from robot.cli.steering import SteeringPerson
 from robot.cli.terminal import say
 from robot.cli.wires import Wires
 from robot.clock import RealClock
+from robot.guardian.guarded_servo import GuardedServo
+from robot.guardian.guardian import Guardian
 from robot.interrupts import Interrupts
 from robot.power_down import PowerDown
-from robot.rig_bus import bus_names, joints_on
+from robot.rig_bus import bus_names, joints_on, release_plan
 
 Made = Calibration | Places
 
@@ -129,13 +131,27 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: How) -> None:
 def _one(bench: Bench, name: str, bus: str) -> Made:
     if not bench.rig.joints[name].facts.measured:
         return _hobby(bench, name, bus)
-    with opened(bench.rig, bench.wire, bus) as port:
+    guardian = _guardian(bench, name, bus)
+    with opened(bench.rig, bench.wire, bus, guardian) as port:
         joint = bench.rig.joints[name]
         servo = _servo(name, joint.id, joint.model, port)
+        if guardian is not None:
+            servo = GuardedServo(servo, guardian)
         single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
         bench.person.hand = _hand(bench.wire, bus, joint.id)
         with _let_go_after(single.who, single.let_go, bench.stopped):
             return _smart(bench, single)
+
+
+def _guardian(bench: Bench, name: str, bus: str) -> Guardian | None:
+    """Return what lets go of one joint's servo, None where its own watchdog does.
+
+    A single Dynamixel's watchdog is armed whatever the rig says of it.
+    """
+    if bench.rig.bus_named(bus).kind == "dynamixel":
+        return None
+    plan = release_plan(bench.rig, bus, bench.wire.paths[bus])
+    return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
 
 
 def _servo(name: str, servo_id: int, model: str, port: BlockingPort) -> OneServo:
@@ -180,9 +196,13 @@ def _set_middle(single: SingleJoint, person: SteeringPerson) -> None:
 
 def _hobby(bench: Bench, name: str, bus: str) -> Made:
     config = bench.rig.bus_named(bus)
-    port = BlockingPort(bench.wire.paths[bus])
+    guardian = _guardian(bench, name, bus)
+    beat = guardian.beat if guardian is not None else None
+    port = BlockingPort(bench.wire.paths[bus], on_traffic=beat)
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
-    hobby = OneHobby(name, joint, port, config.maestro, RealClock(), bench.stopped, how.pulses_us)
+    hobby = OneHobby(
+        name, joint, port, config.maestro, RealClock(), bench.stopped, how.pulses_us, guardian
+    )
     person.hand = None
     with _let_go_after(hobby.who, hobby.let_go, bench.stopped):
         return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)

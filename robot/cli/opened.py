@@ -8,17 +8,22 @@ from drivers.errors import PortError
 from drivers.serial_port import BlockingPort
 from robot.cli.bench import to_open
 from robot.cli.wires import Wires
+from robot.guardian.guardian import Guardian
 
 
 @contextlib.contextmanager
-def opened(rig: Rig, wire: Wires, bus: str) -> Iterator[BlockingPort]:
+def opened(
+    rig: Rig, wire: Wires, bus: str, guardian: Guardian | None = None
+) -> Iterator[BlockingPort]:
     """Open the port of the bus of this name at its speed; nothing is sent.
+
+    guardian: is shown a sign of life with all that is sent
 
     Raises:
         drivers.errors.PortError: it is absent, busy, not permitted, or has no such speed.
     """
     config = rig.bus_named(bus)
-    with to_open(wire.paths[bus]) as port:
+    with to_open(wire.paths[bus], guardian.beat if guardian is not None else None) as port:
         if not port.setBaudRate(config.baud):
             raise PortError(f"{port.port_name} cannot run at {config.baud} bit/s: choose another")
         yield port
