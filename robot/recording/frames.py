@@ -13,13 +13,13 @@ from dataclasses import replace
 
 from drivers.errors import SetupError
 from robot.bus_events import drawn_together
-from robot.loop import Tick
 from robot.orders import Ask, Renew
 from robot.page.link import pack, unpack
 from robot.page.snapshot import Said, ShownRig, Snapshots, seeing_words, verdict_words
 from robot.recording.gaze_angles import order_words
 from robot.recording.player import Mark
 from robot.seeing.head_turn_residual import ResidualFigures
+from robot.tick import Tick
 from robot.types import SeenEvent, Trail
 
 SNAPSHOT_EVERY_S = 0.02

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from gaze.angles import add, angle_between, sub, yaw_pitch
 from gaze.field_of_view import line_of_sight
 from gaze.types import Angles2, Floats, GazeState, Target, Vec3
-from robot.loop import Tick
 from robot.orders import Jog, Order, Renew, Stop
 from robot.reckoned import Basis, basis_of, reckoned_joints
+from robot.tick import Tick
 
 Ints = NDArray[np.int64]
 

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gaze.types import Bodies, Face, GazeCommand, GazeState, Percept, Pull, Target
-from robot.loop import Tick
 from robot.orders import as_json as order_as_json
 from robot.orders import from_recording as order_from_json
+from robot.tick import Tick
 from robot.types import JOINTS, JointAngles, JointState, Verdict
 
 Json = dict[str, Any]

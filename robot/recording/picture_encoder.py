@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from math import inf
 
 from drivers.types import Picture
-from robot.loop import Tick
 from robot.page.picture import encode
+from robot.tick import Tick
 
 
 class PictureEncoder:

@@ -19,10 +19,10 @@ from zstandard import ZstdError
 
 from drivers.errors import SetupError
 from gaze.types import Percept
-from robot.loop import Tick
 from robot.recording import run_format as fmt
 from robot.recording.moment import Moment, from_json, percept_from_json
 from robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
+from robot.tick import Tick
 
 _MAGIC = b"\x89MCAP0\r\n"
 _CAMERA = "gazerig-camera-"

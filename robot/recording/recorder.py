@@ -14,13 +14,13 @@ from drivers.errors import SetupError
 from drivers.types import BusHealth
 from gaze.types import Percept
 from robot.body import Body
-from robot.loop import Tick
 from robot.recording import writer_process as writer
 from robot.recording.body_tap import BodyTap
 from robot.recording.moment import Heard, Measured, flat, flat_percept
 from robot.recording.picture_encoder import PictureEncoder
 from robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
 from robot.recording.writer_link import WriterLink
+from robot.tick import Tick
 
 _HEALTH_S = 1.0
 _SEND_S = 0.05

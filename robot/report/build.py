@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from drivers.errors import SetupError
-from robot.loop import Tick
 from robot.report import (
     blinks,
     eye_head,
@@ -26,6 +25,7 @@ from robot.report.gathered import Gathered, Gathering
 from robot.report.measured import Finding, Measured, judged
 from robot.report.page import Picture, report_page
 from robot.report.written import write_all
+from robot.tick import Tick
 
 Progress = Callable[[str, float], None]
 """Told what is being done and the share of it that is done, 0..1."""

@@ -17,7 +17,6 @@ import numpy as np
 from scipy import stats
 
 from gaze.types import Floats
-from robot.loop import Tick
 from robot.report.about import About
 from robot.report.bands import BY_KEY
 from robot.report.build import Progress, drawn, measured, read
@@ -27,6 +26,7 @@ from robot.report.gathered import Gathered
 from robot.report.measured import Measured, figure, judged
 from robot.report.measured import drawn as resampled
 from robot.report.written import write_all
+from robot.tick import Tick
 
 LEVEL = 0.05
 _DRAWS = 2000

@@ -13,13 +13,13 @@ from gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, 
 from gaze.field_of_view import line_of_sight
 from gaze.types import Face, Floats, Vec3
 from robot.face_gaze import on_face
-from robot.loop import Tick
 from robot.orders import Ask
 from robot.reckoned import reckoned_joints
 from robot.report.blink_finder import BlinkFinder
 from robot.report.gaze_events import NEAR_FACE_M, Blink, Fixation, GazeEvents, Saccade, beside_m
 from robot.report.run_joints import LOWER, UPPER, RunJoints, joints_of, openings
 from robot.summary import cyclopean
+from robot.tick import Tick
 
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""

@@ -11,12 +11,12 @@ from typing import NamedTuple, TypeVar
 
 from gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
 from gaze.types import PARTS, Face, Vec3
-from robot.loop import Tick
 from robot.report.blink_finder import Blink as Blink
 from robot.report.blink_finder import BlinkFinder
 from robot.report.run_joints import UPPER, openings
 from robot.report.saccade_finder import Jump, SaccadeFinder
 from robot.summary import cyclopean
+from robot.tick import Tick
 from robot.types import JOINTS
 
 NEAR_PART_M = 0.03
