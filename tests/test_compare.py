@@ -121,7 +121,8 @@ def test_two_recordings_on_the_command_line(soft: Path, hard: Path, tmp_path: Pa
     page = unescape(out.read_text(encoding="utf-8"))
     assert "soft" in page and "hard" in page
     assert page.count("data:image/png;base64,") == len(build.DRAWINGS) > 10
-    rows = {row["key"]: row for row in json.loads(out.with_suffix(".json").read_text("utf-8"))}
+    measures = json.loads((tmp_path / "both_measures.json").read_text(encoding="utf-8"))
+    rows = {row["key"]: row for row in measures}
     assert rows["peak_small"]["word"] == "more than chance"
     assert rows["peak_small"]["verdicts"] == ["pass", "outside"]
     assert rows["vergence"]["word"] == "may be chance"

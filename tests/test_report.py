@@ -235,7 +235,7 @@ def test_an_empty_run_and_a_bad_place_are_told_in_one_line(
     with pytest.raises(SetupError, match="0 ticks are nothing to report on"):
         build.read([], About("empty"), lambda words, share: None)
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(SetupError, match="give another file"):
+    with pytest.raises(SetupError, match="name another file"):
         report_of(EMPTY, About("x"), tmp_path / "file" / "r.html", lambda words, share: None)
 
 
