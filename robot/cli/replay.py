@@ -101,20 +101,18 @@ def _export(
     from robot.recording.export_csv import csv_files, write_csv
     from robot.recording.gaze_angles import trace_of
     from robot.recording.gaze_labels import labels_of, stretches_of
-    from robot.recording.read import RunRecording
+    from robot.recording.read import RunRecording, used
 
     recording = RunRecording(file)
     stem = out or file.with_suffix("")
     if not bids:
         refuse_existing(*csv_files(stem), force=force)
     _warn(recording.note)
-    with _progress("reading", recording.duration_s) as read:
-        try:
+    with used(file):
+        with _progress("reading", recording.duration_s) as read:
             trace = trace_of(_told(recording.ticks(), read))
-        except ValueError as error:
-            raise SetupError(f"{file}: {error}") from None
-    labels = labels_of(trace)
-    stretches = stretches_of(trace, labels)
+        labels = labels_of(trace)
+        stretches = stretches_of(trace, labels)
     if bids:
         info = recording.info
         about = About(
@@ -155,12 +153,12 @@ def _show(
     from robot.page.link import Page
     from robot.recording.frames import Frames
     from robot.recording.player import State
-    from robot.recording.read import RunRecording
+    from robot.recording.read import RunRecording, used
     from robot.recording.replay import Replay
 
     recording, clock = RunRecording(file), RealClock()
     _warn(recording.note)
-    with _progress("reading", recording.duration_s) as read:
+    with used(file), _progress("reading", recording.duration_s) as read:
         frames = Frames(
             recording.ticks(),
             recording.pictures(),
@@ -229,11 +227,11 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
 
     Only joints as recorded can come out the same; nothing else was then to change.
     """
-    from robot.recording.read import RunRecording
+    from robot.recording.read import RunRecording, used
     from robot.recording.rerun import rerun
 
     recording = RunRecording(file)
-    with _progress("running again", recording.duration_s) as read:
+    with used(file), _progress("running again", recording.duration_s) as read:
         told, start_s = 0, 0.0
 
         def note(tick: Tick) -> None:

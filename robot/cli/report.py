@@ -102,7 +102,7 @@ def compare(
 ) -> None:
     """Put two runs side by side and say what differs by more than chance."""
     with clear_errors():
-        from robot.recording.read import RunRecording
+        from robot.recording.read import RunRecording, used
         from robot.report.compare import LEVEL
         from robot.report.compare import compare as comparing
         from robot.report.written import numbers_file
@@ -112,7 +112,7 @@ def compare(
         recordings = RunRecording(first), RunRecording(second)
         names = _names(first, second)
         abouts = _about(recordings[0], names[0]), _about(recordings[1], names[1])
-        with _progress() as tell:
+        with used(Path(f"{first} or {second}")), _progress() as tell:
             ticks = recordings[0].ticks(), recordings[1].ticks()
             made = comparing(ticks, abouts, target, tell, force)
         if made.warning:
@@ -130,12 +130,13 @@ def compare(
 
 def _recorded(file: Path, name: str, tell: _Tell) -> "tuple[About, Gathered]":
     """Read a recorded run."""
-    from robot.recording.read import RunRecording
+    from robot.recording.read import RunRecording, used
     from robot.report.build import read
 
     recording = RunRecording(file)
     about = _about(recording, name)
-    return about, read(recording.ticks(), about, tell)
+    with used(file):
+        return about, read(recording.ticks(), about, tell)
 
 
 def _simulated(

@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
+from math import isfinite
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -13,13 +14,13 @@ import orjson
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Header, Metadata
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Channel, Chunk, DataEnd, Header, Metadata
 from zstandard import ZstdError
 
-from drivers.errors import SetupError
+from drivers.errors import DriverError, SetupError
 from gaze.types import Percept
 from robot.recording import run_format as fmt
+from robot.recording.chunk_reader import LARGEST_BYTES, unpacked
 from robot.recording.moment import Moment, from_json, percept_from_json
 from robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
 from robot.tick import Tick
@@ -28,12 +29,17 @@ _MAGIC = b"\x89MCAP0\r\n"
 _CAMERA = "gazerig-camera-"
 _RUN = PROFILE.rstrip("0123456789")
 _HEAD = 9  # bytes of a record before its content: kind and length
-_LARGEST = 1 << 30  # bytes of a record; more is damage
+_LARGEST = LARGEST_BYTES + 1000  # bytes of a record; more is damage
+_CRC_PIECE = 1 << 20
+_LONGEST_GAP_S = 3600.0  # between two ticks; more is damage
 _FIXED = 22  # bytes of a message before its data: channel, sequence, two times
 _PERCEPTS_KEPT = 8  # a tick goes by the newest, or by the one before
-_DAMAGE = (
+_KINDS = frozenset(value for name, value in vars(Opcode).items() if name.isupper())
+DAMAGE = (
     McapError, KeyError, TypeError, ValueError, IndexError, struct.error, zlib.error, ZstdError,
+    AttributeError, ArithmeticError, RecursionError, MemoryError,
 )  # fmt: skip
+"""What a file leads to that holds something else than a run."""
 
 
 class BadRecording(SetupError):
@@ -72,12 +78,19 @@ class RunRecording:
         with _opened(self.path) as file:
             for kind, offset, length in self._records(file):
                 if kind == Opcode.HEADER:
-                    self._judge(Header.read(_content(file, offset, length)).profile)
+                    with _damage(self.path):
+                        profile = Header.read(_content(file, offset, length)).profile
+                    self._judge(profile)
                 elif kind == Opcode.CHUNK:
-                    first_ns, last_ns = struct.unpack("<QQ", _bytes(file, offset, 16))
+                    with _damage(self.path):
+                        first_ns, last_ns = struct.unpack("<QQ", _bytes(file, offset, 16))
                     self._chunks.append(_Place(offset, length, first_ns, last_ns))
                 elif kind == Opcode.METADATA:
-                    found = self._meet(Metadata.read(_content(file, offset, length))) or found
+                    with _damage(self.path):
+                        record = Metadata.read(_content(file, offset, length))
+                    found = self._meet(record) or found
+                elif kind == Opcode.DATA_END:
+                    self._check_sum(file, offset, length)
                 elif kind == Opcode.FOOTER:
                     self.whole = True
         if found is None:
@@ -115,6 +128,7 @@ class RunRecording:
             BadRecording: the file is damaged.
         """
         percepts: dict[int, Percept] = {}
+        before_s: float | None = None
         for topic, data in self._messages({fmt.TICK, fmt.PERCEPT}):
             with _damage(self.path):
                 message = orjson.loads(data)
@@ -125,6 +139,8 @@ class RunRecording:
                         del percepts[next(iter(percepts))]
                     continue
                 moment = from_json(message, percepts)
+                _refuse_leap(before_s, moment.tick.t_s)
+                before_s = moment.tick.t_s
             yield moment
 
     def pictures(self) -> Iterator[tuple[float, bytes]]:
@@ -157,8 +173,7 @@ class RunRecording:
             for place in self._chunks:
                 with _damage(self.path):
                     chunk = Chunk.read(_content(file, place.offset, place.length))
-                    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-                    records = memoryview(stream.read(length))
+                    records = memoryview(unpacked(chunk))
                     found = list(_wanted(records, topics, wanted))
                 yield from found
 
@@ -188,21 +203,45 @@ class RunRecording:
             "gazerig run --record"
         )
 
+    def _check_sum(self, file: BinaryIO, offset: int, length: int) -> None:
+        """Refuse a file of which any byte before its end is another one than was written."""
+        with _damage(self.path):
+            wanted = DataEnd.read(_content(file, offset, length)).data_section_crc
+        if not wanted:  # of a version that wrote none
+            return
+        file.seek(0)
+        left, found = offset - _HEAD, 0
+        while left > 0 and (piece := file.read(min(left, _CRC_PIECE))):
+            found, left = zlib.crc32(piece, found), left - len(piece)
+        if found != wanted:
+            raise BadRecording(f"{self.path} is damaged (wrong check sum): copy it anew")
+
     def _records(self, file: BinaryIO) -> Iterator[tuple[int, int, int]]:
         """Walk over the records that are whole: kind, offset and length of each."""
-        end = self.path.stat().st_size
+        end = file.seek(0, 2)
+        # Whoever wrote these bytes had written all that comes before.
+        closed = end > 2 * len(_MAGIC) and _bytes(file, end - len(_MAGIC), len(_MAGIC)) == _MAGIC
         offset = len(_MAGIC)
         while offset + _HEAD <= end:
             head = _bytes(file, offset, _HEAD)
             kind, length = head[0], int.from_bytes(head[1:], "little")
-            if length > _LARGEST:
+            cut = offset + _HEAD + length > end
+            if length > _LARGEST or kind not in _KINDS or (cut and closed):
                 raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it anew")
-            if offset + _HEAD + length > end:
+            if cut:
                 return
             yield kind, offset + _HEAD, length
             if kind == Opcode.FOOTER:
                 return
             offset += _HEAD + length
+        if closed:
+            raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it anew")
+
+
+def _refuse_leap(before_s: float | None, t_s: float) -> None:
+    """Refuse times that no run has: exports fill gaps, and would fill years."""
+    if not isfinite(t_s) or (before_s is not None and not 0.0 <= t_s - before_s < _LONGEST_GAP_S):
+        raise ValueError(f"a tick at {t_s} s after {before_s} s")
 
 
 def _wanted(
@@ -224,13 +263,31 @@ def _wanted(
 
 
 @contextmanager
+def used(path: Path) -> Iterator[None]:
+    """Say in one line that what a recording holds cannot be what a run gave.
+
+    To be put around what is made of it, as a file may be well-formed and still hold nonsense.
+
+    Raises:
+        BadRecording: something that follows from damage, or from the hand of somebody.
+    """
+    try:
+        yield
+    except DriverError:
+        raise
+    except DAMAGE as error:
+        what = f"{type(error).__name__}: {' '.join(str(error).split())[:80]}"
+        raise BadRecording(f"{path} holds what no run gives ({what}): record anew") from error
+
+
+@contextmanager
 def _damage(path: Path) -> Iterator[None]:
     """Turn what a damaged file leads to into one line."""
     try:
         yield
     except BadRecording:
         raise
-    except _DAMAGE as error:
+    except DAMAGE as error:
         what = " ".join(str(error).split())[:80]
         raise BadRecording(f"{path} is damaged ({what}): copy it anew") from None
 

@@ -92,9 +92,32 @@ def info_of(text: Mapping[str, str]) -> RunInfo:
         ValueError: something is missing or no JSON.
     """
     try:
-        return RunInfo(**_read(text, {f.name for f in fields(RunInfo)}))
+        info = RunInfo(**_read(text, {f.name for f in fields(RunInfo)}))
     except TypeError as error:
         raise ValueError(str(error)) from None
+    _refuse_nonsense(info)
+    return info
+
+
+def _refuse_nonsense(info: RunInfo) -> None:
+    """Refuse what no run is started with; files are made with these numbers and names."""
+    words = (info.rig, info.profile, info.config_yaml, info.walk_yaml, info.eyes)
+    maybe = (info.character, info.scene)
+    if not all(isinstance(word, str) for word in words + tuple(m for m in maybe if m is not None)):
+        raise ValueError("a name of the run is no text")
+    if not (_within(info.rate_hz, 1.0, 10_000.0) and _within(info.pictures_hz, 0.0, 1000.0)):
+        raise ValueError(f"a control rate of {info.rate_hz} Hz")
+    if type(info.seed) is not int or info.seed < 0:
+        raise ValueError(f"the seed {info.seed}")
+    if type(info.mock) is not bool or type(info.fast) is not bool:
+        raise ValueError("neither real nor emulated")
+    if not isinstance(info.versions, dict):
+        raise ValueError("no versions")
+    started_ns(info)
+
+
+def _within(value: object, low: float, high: float) -> bool:
+    return type(value) in (int, float) and low <= value <= high  # type: ignore[operator]
 
 
 def end_of(text: Mapping[str, str]) -> RunEnd:
@@ -103,7 +126,12 @@ def end_of(text: Mapping[str, str]) -> RunEnd:
     Raises:
         ValueError: something is no JSON.
     """
-    return RunEnd(**_read(text, {f.name for f in fields(RunEnd)}))
+    end = RunEnd(**_read(text, {f.name for f in fields(RunEnd)}))
+    if not isinstance(end.stopped_by, str) or not isinstance(end.tx_sha256, str):
+        raise ValueError("an end that is no text")
+    if type(end.lost) is not int or not (end.ran_s is None or _within(end.ran_s, 0.0, 1e9)):
+        raise ValueError("an end that is no number")
+    return end
 
 
 def _read(text: Mapping[str, str], names: set[str]) -> dict[str, Any]:

@@ -46,6 +46,7 @@ class RunWriter:
             self._file,  # type: ignore[arg-type]  # of a file, it uses write, tell and flush
             chunk_size=_CHUNK_BYTES,
             compression=CompressionType.ZSTD,
+            enable_data_crcs=True,
         )
         self._channels: dict[str, int] = {}
         self._counts: dict[str, int] = {}
@@ -120,6 +121,9 @@ class RunWriter:
             act(*arguments)
         except OSError as error:
             self.failed = error.strerror or str(error)
+            self._file.cut()
+        except (TypeError, ValueError) as error:
+            self.failed = f"it cannot be written down: {error}"
             self._file.cut()
 
 

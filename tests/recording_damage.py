@@ -1,0 +1,233 @@
+"""Recordings as disks, cables and hostile hands leave them, and what the program says of each."""
+
+import io
+import random
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Chunk
+
+from config.schema import load_rig
+from config.text import rig_text, walk_text
+from drivers.errors import DriverError
+from robot.assemble import assemble
+from robot.choice import Choice
+from robot.cli.report import _recorded
+from robot.loop import run
+from robot.recording.frames import Frames
+from robot.recording.gaze_angles import trace_of
+from robot.recording.read import RunRecording, used
+from robot.recording.recorder import Recorder
+from robot.recording.rerun import rerun
+from robot.recording.run_info import RunInfo
+
+HEAD = 9
+
+
+def recorded(path: Path, seconds: float = 0.5) -> bytes:
+    """Record a short run as ``gazerig run --fast --record`` does; return the file's bytes."""
+    made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=5, scene="visitor"))
+    rig = made.retuner.rig
+    info = RunInfo(
+        rig="desk", profile=rig.profile, config_yaml=rig_text(rig),
+        walk_yaml=walk_text(rig.gaze.scanpath.walk), seed=5, rate_hz=made.loop.rate_hz,
+        started_utc="2026-01-31T23:59:59+00:00", scene="visitor", mock=True, fast=True,
+    )  # fmt: skip
+    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
+    made.robot.body = recorder.tapped(made.robot.body)
+    recorder.open()
+    made.robot.start(made.clock)
+    stop = recorder.timed(lambda s: "seconds" if s >= seconds else None)
+    try:
+        run(made.robot, made.clock, made.loop, stop, recorder.note)
+        made.robot.stop()
+    finally:
+        made.close()
+        recorder.close("seconds", made.sent_digest())
+    return path.read_bytes()
+
+
+def records(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Give kind, offset and length of every record."""
+    at = 8
+    while at + HEAD <= len(data) - 8:
+        kind, length = data[at], int.from_bytes(data[at + 1 : at + HEAD], "little")
+        yield kind, at, length
+        at += HEAD + length
+
+
+# -- damage ----------------------------------------------------------------------------
+
+
+def flipped(data: bytes, rng: random.Random) -> bytes:
+    """Flip 1 to 8 bits anywhere."""
+    out = bytearray(data)
+    for _ in range(rng.choice((1, 1, 1, 2, 8))):
+        out[rng.randrange(len(out))] ^= 1 << rng.randrange(8)
+    return bytes(out)
+
+
+def flipped_head(data: bytes, rng: random.Random) -> bytes:
+    """Flip a bit where records begin: kinds, lengths, sizes, times."""
+    _, at, _ = rng.choice(list(records(data)))
+    out = bytearray(data)
+    out[min(at + rng.randrange(HEAD + 40), len(out) - 1)] ^= 1 << rng.randrange(8)
+    return bytes(out)
+
+
+def cut(data: bytes, rng: random.Random) -> bytes:
+    """End the file early."""
+    return data[: rng.randrange(len(data))]
+
+
+def overwritten(data: bytes, rng: random.Random) -> bytes:
+    """Put zeros, ones or noise over a stretch, as a bad sector does."""
+    at, size = rng.randrange(len(data)), rng.choice((1, 16, 512, 4096))
+    fill = rng.choice((b"\0" * size, b"\xff" * size, rng.randbytes(size)))
+    return data[:at] + fill[: len(data) - at] + data[at + size :]
+
+
+def shuffled(data: bytes, rng: random.Random) -> bytes:
+    """Take out, double or move a stretch."""
+    a, b = sorted(rng.randrange(len(data)) for _ in range(2))
+    b = min(b, a + 5000)
+    return rng.choice((data[:a] + data[b:], data[:b] + data[a:b] + data[b:], data[b:] + data[:b]))
+
+
+def hostile_chunk(data: bytes, rng: random.Random) -> bytes:
+    """Write a chunk's sizes as nobody should, with a right check sum or none."""
+    chunks = [(at, length) for kind, at, length in records(data) if kind == Opcode.CHUNK]
+    at, length = rng.choice(chunks)
+    made = Chunk.read(ReadDataStream(io.BytesIO(data[at + HEAD : at + HEAD + length])))
+    inside = bytearray(zstandard.decompress(made.data, made.uncompressed_size))
+    size = rng.choice((0, 1, len(inside) - 1, len(inside) + 1, 1 << 30, (1 << 64) - 1, None))
+    if size is None or rng.random() < 0.7:  # wrong inside, right outside
+        for _ in range(rng.choice((1, 3, 30))):
+            inside[rng.randrange(len(inside))] = rng.randrange(256)
+        size = len(inside)
+    packed = zstandard.compress(bytes(inside))
+    body = struct.pack("<QQQII", 0, rng.choice((0, 1, 1 << 63)), size,
+                       rng.choice((0, zlib.crc32(inside))), 4) + b"zstd"  # fmt: skip
+    body += struct.pack("<Q", len(packed)) + packed
+    return _unsummed(
+        data[: at + 1] + struct.pack("<Q", len(body)) + body + data[at + HEAD + length :]
+    )
+
+
+_BOMBS: dict[int, bytes] = {}
+
+
+def with_bomb(data: bytes, size: int, honest: bool) -> bytes:
+    """Put a chunk of ``size`` zero bytes in place of the first; honest: it says its size."""
+    if size not in _BOMBS:
+        packer = zstandard.ZstdCompressor(level=1).compressobj()
+        piece = bytes(1 << 20)
+        parts = [packer.compress(piece) for _ in range(size >> 20)]
+        _BOMBS[size] = b"".join([*parts, packer.flush()])
+    packed = _BOMBS[size]
+    at, length = next((at, n) for kind, at, n in records(data) if kind == Opcode.CHUNK)
+    body = struct.pack("<QQQII", 0, 1, size if honest else 1 << 20, 0, 4) + b"zstd"
+    body += struct.pack("<Q", len(packed)) + packed
+    return _unsummed(
+        data[: at + 1] + struct.pack("<Q", len(body)) + body + data[at + HEAD + length :]
+    )
+
+
+def _replaced(data: bytes, at: int, length: int, body: bytes) -> bytes:
+    """Put another content into the record at a place."""
+    head = data[at : at + 1] + struct.pack("<Q", len(body))
+    return data[:at] + head + body + data[at + HEAD + length :]
+
+
+def _unsummed(data: bytes) -> bytes:
+    """Take the check sum of the whole out, as a hostile hand would."""
+    out = bytearray(data)
+    for kind, at, _ in records(data):
+        if kind == Opcode.DATA_END:
+            out[at + HEAD : at + HEAD + 4] = bytes(4)
+    return bytes(out)
+
+
+DAMAGES: tuple[Callable[[bytes, random.Random], bytes], ...] = (
+    flipped, flipped, flipped, flipped_head, cut, overwritten, shuffled, hostile_chunk,
+)  # fmt: skip
+
+
+# -- what is made of it ----------------------------------------------------------------
+
+
+def _exported(file: Path) -> object:
+    with used(file):
+        return trace_of(RunRecording(file).ticks()).time_s.tolist()
+
+
+def _shown(file: Path) -> object:
+    with used(file):
+        found = RunRecording(file)
+        frames = Frames(found.ticks(), found.pictures(), found.info.rate_hz)
+    try:
+        return len(frames)
+    finally:
+        frames.close()
+
+
+def _again(file: Path) -> object:
+    with used(file):
+        done = rerun(RunRecording(file))
+    return done.ticks, done.same
+
+
+def _reported(file: Path) -> object:
+    return len(_recorded(file, "x", lambda words, share: None)[1].rows)
+
+
+USES: dict[str, Callable[[Path], object]] = {
+    "export": _exported, "replay": _shown, "rerun": _again, "report": _reported,
+}  # fmt: skip
+
+
+@dataclass
+class Tally:
+    """What came of many damaged files."""
+
+    refused: int = 0
+    right: int = 0
+    partly: int = 0
+    wrong: list[str] = field(default_factory=list)
+
+
+def judge(data: bytes, folder: Path, count: int, seed: int, uses: tuple[str, ...]) -> Tally:
+    """Damage a recording in ``count`` ways and use each; every one must be refused or right.
+
+    Right is the whole run, or, where the file says that it is not whole, its beginning.
+    """
+    whole, file, tally = folder / "whole.mcap", folder / "damaged.mcap", Tally()
+    whole.write_bytes(data)
+    truth = {name: USES[name](whole) for name in uses}
+    for number in range(count):
+        rng = random.Random(f"{seed} {number}")
+        damage, name = rng.choice(DAMAGES), uses[number % len(uses)]
+        file.write_bytes(damage(data, rng))
+        what = f"{damage.__name__} {seed} {number} {name}"
+        try:
+            made = USES[name](file)
+        except DriverError as error:
+            tally.refused += 1
+            if "\n" in str(error) or not str(error):
+                tally.wrong.append(f"{what}: not one line: {error}")
+        except Exception as error:  # noqa: BLE001 S112
+            tally.wrong.append(f"{what}: {type(error).__name__}: {error}")
+        else:
+            if made == truth[name]:
+                tally.right += 1
+            elif RunRecording(file).note or damage is hostile_chunk:
+                tally.partly += 1  # a killed run, or values that somebody chose
+            else:
+                tally.wrong.append(f"{what}: another result and no word")
+    return tally

@@ -1,0 +1,71 @@
+"""Damaged and hostile recordings: one line each, or the right result; never another."""
+
+import resource
+from pathlib import Path
+
+import pytest
+from command_line import typed
+from mcap.opcode import Opcode
+from recording_damage import USES, judge, recorded, records, with_bomb
+
+from drivers.errors import DriverError
+from robot.recording.read import BadRecording, RunRecording
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return recorded(tmp_path_factory.mktemp("run") / "run.mcap", 0.3)
+
+
+def test_every_damage_is_refused_or_changes_nothing(run: bytes, tmp_path: Path) -> None:
+    tally = judge(run, tmp_path, 100, 1, tuple(USES))
+    assert tally.wrong == []
+    assert tally.refused > 50 and tally.right > 3
+
+
+@pytest.mark.parametrize("honest", [True, False])
+def test_a_bomb_is_refused_before_it_is_unpacked(run: bytes, tmp_path: Path, honest: bool) -> None:
+    file = tmp_path / "bomb.mcap"
+    file.write_bytes(with_bomb(run, 300 << 20, honest))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(DriverError, match="a chunk of"):
+        USES["export"](file)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 150_000  # kB
+
+
+def test_one_wrong_bit_anywhere_before_the_end_is_known(run: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    end = next(at for kind, at, _ in records(run) if kind == Opcode.DATA_END)
+    for at in range(8, end, end // 200):
+        damaged = bytearray(run)
+        damaged[at] ^= 4
+        file.write_bytes(damaged)
+        with pytest.raises(BadRecording):
+            list(RunRecording(file).ticks())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("replay", "{}", "--seconds", "1"),
+        ("replay", "{}", "--rerun"),
+        ("export", "{}", "--csv"),
+        ("export", "{}", "--bids"),
+        ("report", "{}"),
+        ("compare", "{}", "{}"),
+    ],
+    ids=" ".join,
+)
+def test_commands_say_one_line_and_fail(
+    words: tuple[str, ...], run: bytes, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "run.mcap"
+    damaged = bytearray(run)
+    damaged[len(run) // 2] ^= 1
+    for content in (bytes(damaged), run[: len(run) // 50], b"", b"\x89MCAP0\r\n" * 2):
+        file.write_bytes(content)
+        assert typed(*(word.replace("{}", str(file)) for word in words)) == 2
+        said = capfd.readouterr()
+        assert len(said.err.splitlines()) == 1 and str(file) in said.err and not said.out
+        assert "unexpected" not in said.err
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
