@@ -35,6 +35,24 @@ class CameraCareParams:
             "0 ends it at once",
         },
     )
+    silent_s: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.1,
+            "high": 60.0,
+            "unit": "s",
+            "says": "a camera counts as lost after so long without a new picture (or 5 periods)",
+        },
+    )
+    restart_s: float = field(
+        default=3.0,
+        metadata={
+            "low": 0.1,
+            "high": 600.0,
+            "unit": "s",
+            "says": "after so long its process is ended and started again (or after 15 periods)",
+        },
+    )
 
 
 @dataclass(frozen=True)

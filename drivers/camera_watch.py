@@ -9,6 +9,9 @@ from drivers.errors import CameraError
 from drivers.picture_source import PictureSource, Shot
 from drivers.types import Detections, FaceDetector
 
+LOST, BACK = "camera lost", "camera back"
+"""How lines begin that tell of a source that is tried again, and of its return."""
+
 
 class CameraWatch:
     """A source of pictures with what finds things in them.
@@ -104,14 +107,14 @@ class CameraWatch:
                 wait_s = min(2.0 * wait_s, self._care.longest_retry_ms / 1e3)
                 continue
             if shot is not None and lost_s is not None:
-                self._tell(f"camera back after {self._now_s() - lost_s:.1f} s")
+                self._tell(f"{BACK} after {self._now_s() - lost_s:.1f} s")
             return shot
 
     def _lose(self, error: CameraError) -> float:
         """Tell of the loss, count on from the last picture, and give when it was."""
         self._counted = self._number
         if self._care.give_up_s > 0.0:
-            self._tell(f"camera lost ({error}): trying it again")
+            self._tell(f"{LOST} ({error}): trying it again")
         return self._now_s()
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from config.schema import Rig
 from drivers.camera_poses import PoseRing
-from drivers.camera_process import CameraParts, CameraProcess
+from drivers.camera_process import CameraProcess
 from drivers.camera_replay import CameraReplay
+from drivers.camera_worker import CameraParts
 from drivers.errors import SetupError
 from drivers.face_detector import face_detector
 from drivers.motion_detector import MotionDetector, turned_between

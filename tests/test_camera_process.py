@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from drivers.camera_params import CameraCareParams
-from drivers.camera_process import CameraParts, CameraProcess
+from drivers.camera_process import CameraProcess
 from drivers.camera_replay import CameraReplay
+from drivers.camera_silence import FIRST_PICTURE_S, PictureSilence
 from drivers.camera_slots import SlotReader, SlotWriter
+from drivers.camera_worker import CameraParts
 from drivers.errors import CameraError, ModelFileError
 from drivers.face_detector import face_detector
 from drivers.face_params import FaceDetectorParams
@@ -96,21 +98,99 @@ def test_detector_that_cannot_be_made_says_so_at_once(recording):
         CameraProcess(parts, time.monotonic).open()
 
 
-def test_killed_process_is_noticed(recording):
-    camera = process(partial(CameraReplay, recording))
+QUICK = CameraCareParams(retry_ms=1.0, longest_retry_ms=20.0, silent_s=60.0, restart_s=60.0)
+
+
+def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
+    camera = process(partial(CameraReplay, recording), QUICK)
+    camera.open()
+    wait_for(lambda: camera.latest(0.0) is not None)
+    assert camera.retune(DETECTOR, None)
+    first, before = camera._process.pid, camera.latest(0.0)
+    os.kill(first, signal.SIGKILL)
+    assert camera.latest(0.0) is not None, "the last picture stays, and its age tells"
+    wait_for(lambda: camera.latest(0.0).captured_s > before.captured_s + 0.2)
+    after = camera.latest(0.0)
+    assert after.number > before.number and after.picture is not None
+    assert camera._process.pid != first
+    lost, back = camera.events()
+    assert lost.startswith("camera lost (the process that looks at pictures has ended)")
+    assert back.startswith("camera back after")
+    os.kill(camera._process.pid, signal.SIGKILL)  # so soon again
+    wait_for(lambda: camera.latest(0.0).number > after.number + 50)
+    (again,) = camera.events()
+    assert "without a word" in again
+    camera.close()
+
+
+def test_a_process_that_hangs_is_told_of_and_started_again(recording):
+    care = CameraCareParams(silent_s=1.0, restart_s=2.0)
+    camera = process(partial(CameraReplay, recording), care)
+    camera.open()
+    wait_for(lambda: camera.pictures > 20)
+    first = camera._process.pid
+    os.kill(first, signal.SIGSTOP)
+    before = camera.latest(0.0)
+    wait_for(lambda: camera.latest(0.0).number > before.number + 20)
+    told = camera.events()
+    assert "camera lost (no new picture): waiting for it" in told
+    assert any("starting the camera's process again" in line for line in told)
+    assert camera._process.pid != first
+    camera.close()
+
+
+def test_where_no_loss_is_borne_a_killed_process_ends_the_run(recording):
+    camera = process(partial(CameraReplay, recording), CameraCareParams(give_up_s=0.0))
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
     os.kill(camera._process.pid, signal.SIGKILL)
-
-    def noticed() -> bool:
-        try:
-            camera.latest(0.0)
-        except CameraError as error:
-            return "has ended" in str(error)
-        return False
-
-    wait_for(noticed)
+    wait_for(lambda: camera._failure)
+    with pytest.raises(CameraError, match="has ended"):
+        camera.latest(0.0)
     camera.close()
+
+
+class Fussy:
+    """A detector that chokes on a picture."""
+
+    def find(self, picture):
+        if picture[0, 0, 0] >= 100:
+            raise ZeroDivisionError("what a picture")
+        return ()
+
+
+def test_an_exception_in_the_process_is_named_and_it_is_started_again(recording):
+    parts = CameraParts(partial(CameraReplay, recording), Fussy)
+    camera = CameraProcess(parts, time.monotonic, QUICK)
+    camera.open()
+    wait_for(lambda: camera._starts > 1 and camera.pictures > 11)
+    told = camera.events()
+    assert "ZeroDivisionError" in told[0] and told[0].startswith("camera lost")
+    assert camera.latest(0.0) is not None
+    camera.close()
+
+
+def test_closing_does_not_wait_for_a_process_that_starts_again(recording):
+    camera = process(partial(CameraReplay, recording), QUICK)
+    camera.open()
+    os.kill(camera._process.pid, signal.SIGKILL)
+    wait_for(lambda: camera._starts > 1)
+    camera.close()
+    assert not [t for t in threading.enumerate() if t.name == "camera"]
+
+
+def test_silence_is_judged_by_what_is_usual():
+    care = CameraCareParams(silent_s=1.0, restart_s=3.0)
+    for period_s, lost_s, hung_s in ((0.03, 1.0, 3.0), (0.5, 2.5, 7.5), (2.0, 10.0, 30.0)):
+        silence, now_s = PictureSilence(care, 0.0), 0.0
+        assert not silence.verdict(FIRST_PICTURE_S - 0.01)
+        assert silence.verdict(FIRST_PICTURE_S + 0.01) == "hung"
+        for _ in range(10):
+            now_s += period_s
+            silence.record_picture(now_s)
+        assert silence.verdict(now_s + lost_s - 0.01) == ""
+        assert silence.verdict(now_s + lost_s + 0.01) == "lost"
+        assert silence.verdict(now_s + hung_s + 0.01) == "hung"
 
 
 def test_camera_lost_for_good_ends_with_its_reason(tmp_path):

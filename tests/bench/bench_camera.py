@@ -19,9 +19,10 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 
-from drivers.camera_process import CameraParts, CameraProcess
+from drivers.camera_process import CameraProcess
 from drivers.camera_recorder import CameraRecorder
 from drivers.camera_thread import CameraThread
+from drivers.camera_worker import CameraParts
 from drivers.face_detector import face_detector
 from drivers.face_params import FaceDetectorParams
 from drivers.motion_params import MotionParams
