@@ -109,7 +109,7 @@ class _Film:
         elif times.rate_hz == stated[0]:
             # The number of pictures stated is often the length times the rate: where the
             # rate is wrong, so is that.
-            _check_complete(path, self._capture)
+            _check_complete(path, self._capture, len(first_s))
         self.times = times
         self._rewind()
         self._number, self._index = 0, 0  # last picture reached, and its place in this showing
@@ -171,10 +171,13 @@ def _times_s(capture: cv2.VideoCapture, most: int) -> list[float]:
     return found
 
 
-def _check_complete(path: Path, capture: cv2.VideoCapture) -> None:
-    """Refuse a film that ends long before the end it states."""
+def _check_complete(path: Path, capture: cv2.VideoCapture, seen: int) -> None:
+    """Refuse a film that ends long before the end it states.
+
+    seen: so many pictures have been read already
+    """
     stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-    if stated <= 0:  # a stream without a table of contents
+    if stated <= seen:  # all there, or a stream without a table of contents
         return
     capture.set(cv2.CAP_PROP_POS_FRAMES, stated - 1)
     reached = stated if capture.grab() else int(capture.get(cv2.CAP_PROP_POS_FRAMES))

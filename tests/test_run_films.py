@@ -49,3 +49,29 @@ def test_a_film_of_two_talking_people(network: str, tmp_path: Path) -> None:
     assert run["pictures"] >= 90
     assert run["faces_seen"] >= 0.95 * run["pictures"]
     assert run["target_share"]["face"] > 0.8
+
+
+def write_stills(path: Path, sizes: list[tuple[int, int]]) -> Path:
+    """Write a stream of JPEG pictures of these widths and heights."""
+    pictures = [np.full((height, width, 3), 90, np.uint8) for width, height in sizes]
+    path.write_bytes(b"".join(cv2.imencode(".jpg", p)[1].tobytes() for p in pictures))
+    return path
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [[(1, 1)], [(640, 1)], [(1, 480)], [(64, 48)], [(64, 48)] * 5 + [(128, 96)] * 5],
+    ids=["one pixel", "a row", "a column", "one picture", "another size"],
+)
+def test_odd_films_are_looked_at(tmp_path: Path, sizes: list[tuple[int, int]]) -> None:
+    film = write_stills(tmp_path / "odd.mjpeg", sizes)
+    seen = figures("--video", str(film), "--seconds", "0.5")
+    assert seen["stopped_by"] == "seconds" and seen["pictures"] >= 2
+
+
+def test_a_film_of_one_picture_is_not_cut_short(tmp_path: Path) -> None:
+    path = tmp_path / "one.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 25.0, (64, 48))
+    writer.write(np.full((48, 64, 3), 90, np.uint8))
+    writer.release()
+    assert figures("--video", str(path), "--seconds", "0.5")["pictures"] >= 2
