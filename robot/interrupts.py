@@ -20,12 +20,21 @@ SAME_REQUEST_S = 0.3
 class Interrupts:
     """Requests to end this program, noted while the block lasts.
 
+    Args:
+        now_s: gives the time; the host's where nothing is said.
+        also: gives another reason to end, None while there is none.
+
     The first is only noted: whoever works asks for it by calling this object. A second one
     raises KeyboardInterrupt, because the work may hang, except where ``held_off`` says
     otherwise. SIGHUP is never a second one: it comes several times from one closed terminal.
     """
 
-    def __init__(self, now_s: Callable[[], float] | None = None) -> None:
+    def __init__(
+        self,
+        now_s: Callable[[], float] | None = None,
+        also: Callable[[], str | None] | None = None,
+    ) -> None:
+        self._also = also
         self._now_s = now_s if now_s is not None else RealClock().now_s
         self._first: str | None = None
         self._last_s = 0.0
@@ -73,7 +82,9 @@ class Interrupts:
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)
 
     def __call__(self) -> str | None:
-        """Return the name of the first signal, None before any."""
+        """Return the name of the first signal or the other reason to end, None before any."""
+        if self._first is None and self._also is not None:
+            self._first = self._also()
         return self._first
 
     @property

@@ -8,12 +8,15 @@ import contextlib
 import errno
 import os
 import select
+import stat
 import threading
 from collections import deque
 
 _MOST = 500
 """So many lines wait; more are dropped."""
 _RETRY_S = 0.2
+_LOOK_S = 0.5
+UNREAD = "standard error, which nobody reads any more"
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """A disk may have room again."""
 
@@ -31,6 +34,7 @@ class LineWriter:
         self._status: str | None = None
         self._busy = False
         self._gone = False
+        self._unread: str | None = None
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
         self.dropped = 0
@@ -52,6 +56,10 @@ class LineWriter:
             if not self._gone:
                 self._status = text
                 self._wake()
+
+    def unread(self) -> str | None:
+        """Return that its reader is gone, None while it may be there."""
+        return self._unread
 
     def flush(self, patience_s: float) -> bool:
         """Wait until everything is written, no longer than this; return whether it is."""
@@ -76,13 +84,30 @@ class LineWriter:
             with self._changed:
                 self._busy = False
                 self._changed.notify_all()
-                self._changed.wait_for(lambda: self._lines or self._status is not None)
+                if not self._changed.wait_for(self._due, _LOOK_S):
+                    if self._reader_gone():
+                        self._unread = self._unread or UNREAD
+                    continue
                 if self._lines:
                     text = self._lines.popleft()
                 else:
                     text, self._status = self._status or "", None
                 self._busy = True
             self._write(text.encode(errors="replace"))
+
+    def _due(self) -> bool:
+        return bool(self._lines) or self._status is not None
+
+    def _reader_gone(self) -> bool:
+        """Tell whether a pipe has lost its reader, which else only the next line would find."""
+        try:
+            if not stat.S_ISFIFO(os.fstat(self._fd).st_mode):
+                return False
+            poll = select.poll()
+            poll.register(self._fd, 0)
+            return any(events & select.POLLERR for _, events in poll.poll(0))
+        except OSError:
+            return False
 
     def _write(self, data: bytes) -> None:
         while data:
@@ -101,6 +126,9 @@ class LineWriter:
             self.dropped += 1
             if error.errno not in _FULL:
                 self._gone = True
+                # A terminal that is gone comes with SIGHUP, for those who want to know.
+                if error.errno == errno.EPIPE:
+                    self._unread = UNREAD
                 self.dropped += len(self._lines)
                 self._lines.clear()
                 self._status = None

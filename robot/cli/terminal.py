@@ -33,6 +33,7 @@ DEBUG_LOGGER = "gazerig"
 _STDERR = 2
 _FLUSH_S = 1.0
 """The last lines have so long to be written."""
+_UNREAD = "standard output: nobody reads it any more"
 _writer = LineWriter(_STDERR)
 atexit.register(_writer.flush, _FLUSH_S)
 
@@ -106,6 +107,9 @@ def run_app(app: Callable[[list[str]], object], words: list[str], again: str) ->
         code = end.code
         if code == INTERRUPTED:
             say("interrupted")
+        elif isinstance(end.__context__, BrokenPipeError):  # typer exits without a word
+            say(_UNREAD)
+            _drop_stdout()
     except KeyboardInterrupt:
         say("interrupted")
         code = INTERRUPTED
@@ -113,7 +117,7 @@ def run_app(app: Callable[[list[str]], object], words: list[str], again: str) ->
         if not isinstance(error, BrokenPipeError):
             say(f"standard output: {error.strerror or error}")
         else:
-            say("standard output: nobody reads it any more")
+            say(_UNREAD)
         code = FAULT
         _drop_stdout()
     except Exception as error:
@@ -147,7 +151,7 @@ def _thread_failed(args: threading.ExceptHookArgs) -> None:
 
 def signals() -> Interrupts:
     """Return a block in which Ctrl-C and other requests to end are only noted, by name."""
-    return Interrupts()
+    return Interrupts(also=_writer.unread)
 
 
 def say(line: str) -> None:

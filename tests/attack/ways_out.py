@@ -1,0 +1,345 @@
+"""Every way out of every command that switches torque on: how many servos stay on?
+
+    PYTHONPATH=. python tests/attack/ways_out.py [--rig desk] [--command run] [--way SIGHUP]
+
+Servos are emulated on a pseudo-terminal, and asked there what they really do. A row is one
+command on one rig that was ended one way: servos left on, how far the joints are from their
+parking pose, seconds until the program was gone, its exit code and how many lines told of the
+end. A command that takes longer than 20 s to end counts as hanging and is killed.
+"""
+
+import argparse
+import contextlib
+import fcntl
+import json
+import os
+import pty
+import re
+import resource
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import termios
+import time
+from collections.abc import Callable, Iterator
+from itertools import product
+from math import degrees
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from config.schema import Rig, load_rig
+from robot.emulated_rig import emulated_lines
+from robot.rig_angles import park_rad
+from sim_mock.pty_bus import PtyBuses
+
+ROOT = Path(__file__).parents[2]
+RIGS = {"desk": "dynamixel", "feetech": "feetech", "maker": "maestro"}
+LONGEST_S = 20.0
+# Broken on purpose, from outside: what a plug-in, a small machine or a bug of ours would do.
+BROKEN = {
+    "observer raises": "import robot.summary as m\n"
+    "def note(self, tick):\n    raise RuntimeError('plug-in')\nm.Summary.note = note\n",
+    "MemoryError in the loop": "import robot.loop as m\ntick, n = m.Robot.tick, []\n"
+    "def note(self, *words):\n    n.append(0)\n    if len(n) > 200:\n        raise MemoryError\n"
+    "    return tick(self, *words)\nm.Robot.tick = note\n",
+}
+START = "import sys; sys.argv[0] = 'gazerig'; from robot.cli.quick import main; main()"
+
+
+def commands(rig: str) -> dict[str, list[str]]:
+    """Give what is typed, by name; each holds the torque on until it is ended."""
+    joint = "eyes_pan" if rig == "maker" else "left_eye_pan"
+    by = [] if rig == "maker" else ["--by", "motion"]
+    return {
+        "run": ["run", rig, "--scene", "visitor", "--no-page"],
+        "jog": ["jog", joint, "8", "--hold", "--yes", "--rig", rig],
+        "look-at": ["look-at", "1", "0.1", "0.3", "--seconds", "60", "--yes", "--rig", rig],
+        "home": ["home", rig, "--hold", "--yes"],
+        "calibrate": ["calibrate", rig, "--dry-run", "--joint", joint, *by, "--yes"],
+        "calibrate face": ["calibrate", "face", rig, "--scene", "sits-still", "--no-page",
+                           "--out", "/tmp/ways_out_face.yaml"],
+        "monitor": ["monitor", rig, "--json"],
+    }  # fmt: skip
+
+
+class Bench(NamedTuple):
+    """A rig whose servos are emulated."""
+
+    name: str
+    rig: Rig
+    buses: PtyBuses
+    port: str
+
+    def servos(self) -> list[dict[str, Any]]:
+        """Give the servos as they are."""
+        found: list[dict[str, Any]] = json.loads(self.buses.command("status"))["servos"]
+        ids = {joint.id for joint in self.rig.joints.values()}
+        return [servo for servo in found if servo["id"] in ids]
+
+    def on(self) -> int:
+        """Count the servos with torque, or with pulses."""
+        return sum(bool(servo.get("torque", servo.get("target"))) for servo in self.servos())
+
+    def off_park_deg(self) -> float:
+        """Give how far the worst joint is from its parking pose."""
+        at = {servo["id"]: servo.get("place", servo["position"]) for servo in self.servos()}
+        park = park_rad(self.rig)
+        return max(
+            abs(degrees(j.made().angle_rad(at[j.id]) - park.get(name, 0.0)))
+            for name, j in self.rig.joints.items()
+        )
+
+
+@contextlib.contextmanager
+def bench(name: str) -> Iterator[Bench]:
+    rig = load_rig(name)
+    with PtyBuses() as buses:
+        (path,) = buses.start(emulated_lines(rig)).values()
+        yield Bench(name, rig, buses, path)
+
+
+class Started(NamedTuple):
+    """A command at work.
+
+    errors: where its standard error can be read, -1 nowhere; master: of its terminal, or -1
+    """
+
+    process: "subprocess.Popen[bytes]"
+    errors: int
+    master: int
+
+    @property
+    def pid(self) -> int:
+        return self.process.pid
+
+
+def typed(words: list[str], breaks: str = "") -> list[str]:
+    return [sys.executable, "-c", breaks + START, *words]
+
+
+def started(words: list[str], way: str) -> Started:
+    """Start a command the way that its end needs."""
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "100"}
+    command = typed(words, BROKEN.get(way, ""))
+    pipe = subprocess.PIPE
+    if way == "| head -1":
+        line = '"$@" 2>&1 </dev/null | head -1; exit ${PIPESTATUS[0]}'
+        shell = ["bash", "-c", line, "-", *command]
+        process = subprocess.Popen(shell, stdout=pipe, env=env, start_new_session=True)
+        return Started(process, -1, -1)
+    if way.startswith("tty"):
+        master, slave = pty.openpty()
+
+        def own() -> None:
+            os.setsid()
+            fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+        process = subprocess.Popen(
+            command, stdin=slave, stdout=slave, stderr=slave, env=env, preexec_fn=own
+        )
+        os.close(slave)
+        return Started(process, -1, master)
+    if way == "stderr and stdout closed":
+        command = ["bash", "-c", 'exec "$@" >&- 2>&-', "-", *command]
+    errors: int = pipe
+    if way == "stderr on a full disk":
+        errors = os.open("/dev/full", os.O_WRONLY)
+
+    def small_files() -> None:
+        os.setsid()
+        if way == "recorder's disk full":
+            resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+
+    process = subprocess.Popen(
+        command, stdin=pipe, stdout=pipe, stderr=errors, env=env, preexec_fn=small_files
+    )
+    assert process.stderr is not None or errors != pipe
+    got = process.stderr.fileno() if process.stderr is not None else -1
+    if way == "full pipe that nobody reads":
+        fcntl.fcntl(got, fcntl.F_SETPIPE_SZ, 4096)
+        full = os.open(f"/proc/self/fd/{got}", os.O_WRONLY | os.O_NONBLOCK)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                os.write(full, b"." * 4096)
+        os.close(full)
+    return Started(process, got, -1)
+
+
+def wait_until(true: Callable[[], bool], within_s: float = 60.0) -> bool:
+    end_s = time.monotonic() + within_s
+    while time.monotonic() < end_s:
+        if true():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def send(*numbers: signal.Signals, gap_s: float = 0.7) -> Callable[[Started], None]:
+    def end(run: Started) -> None:
+        for i, number in enumerate(numbers):
+            if i:
+                time.sleep(gap_s)
+            if run.process.poll() is None:
+                run.process.send_signal(number)
+
+    return end
+
+
+def close_tty(run: Started) -> None:
+    os.close(run.master)
+
+
+def stop_tty(run: Started) -> None:
+    """Ctrl-S, a while of lines that nobody takes, then a request to end."""
+    slave = os.open(f"/proc/{run.pid}/fd/2", os.O_RDWR | os.O_NOCTTY)
+    termios.tcflow(slave, termios.TCOOFF)
+    time.sleep(2.0)
+    run.process.send_signal(signal.SIGTERM)
+    os.close(slave)
+
+
+def kill_page(run: Started) -> None:
+    for child in children(run.pid):
+        if b"robot.page.view" in Path(f"/proc/{child}/cmdline").read_bytes():
+            os.kill(child, signal.SIGKILL)
+    time.sleep(1.0)
+    run.process.send_signal(signal.SIGTERM)
+
+
+def children(pid: int) -> list[int]:
+    return [int(c) for c in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def nothing(run: Started) -> None:
+    """It ends by itself."""
+
+
+def later(run: Started) -> None:
+    time.sleep(1.5)
+    if run.process.poll() is None:
+        run.process.send_signal(signal.SIGTERM)
+
+
+def broken_pipe(run: Started) -> None:
+    """The reader of standard error goes away; then a request to end."""
+    assert run.process.stderr is not None
+    run.process.stderr.close()
+    later(run)
+
+
+WAYS: dict[str, Callable[[Started], None]] = {
+    "SIGHUP": send(signal.SIGHUP),
+    "SIGQUIT": send(signal.SIGQUIT),
+    "SIGTERM": send(signal.SIGTERM),
+    "SIGINT": send(signal.SIGINT),
+    "2x SIGINT while parking": send(signal.SIGINT, signal.SIGINT),
+    "6x SIGINT": send(*[signal.SIGINT] * 6, gap_s=0.1),
+    "tty closed": close_tty,
+    "tty stopped (Ctrl-S)": stop_tty,
+    "| head -1": nothing,
+    "stderr broken": broken_pipe,
+    "stderr and stdout closed": later,
+    "stderr on a full disk": later,
+    "full pipe that nobody reads": later,
+    "observer raises": later,
+    "MemoryError in the loop": nothing,
+    "page killed": kill_page,
+    "recorder's disk full": later,
+}
+ONLY_RUN = {"observer raises", "MemoryError in the loop", "page killed", "recorder's disk full"}
+
+
+class Row(NamedTuple):
+    """What became of it."""
+
+    on: int
+    of: int
+    off_park_deg: float
+    seconds: float
+    code: int | None
+    lines: int
+    said: str
+
+
+def attack(at: Bench, name: str, way: str) -> Row:
+    """Start a command, wait for the torque, end it one way, look at the servos."""
+    words = [*commands(at.name)[name], "--port", at.port]
+    folder = tempfile.TemporaryDirectory()
+    if way == "page killed":
+        words.remove("--no-page")
+    if way == "recorder's disk full":
+        words += ["--record", f"{folder.name}/full.mcap", "--force"]
+    run = started(words, way)
+    if name == "calibrate" and at.name == "maker" and run.process.stdin is not None:
+        with contextlib.suppress(OSError):
+            run.process.stdin.write(b"1500\n+40\n")
+            run.process.stdin.flush()
+    needs = 0 if name == "monitor" else 1
+    up = wait_until(lambda: at.on() >= needs or run.process.poll() is not None)
+    time.sleep(1.2 if up else 0.0)
+    if way == "recorder's disk full":
+        time.sleep(3.0)
+    began_s = time.monotonic()
+    WAYS[way](run)
+    said = b""
+    took_s = LONGEST_S
+    while time.monotonic() - began_s < LONGEST_S:
+        if run.process.poll() is not None:
+            took_s = time.monotonic() - began_s
+            break
+        if way not in ("full pipe that nobody reads", "stderr broken") and run.errors >= 0:
+            if select.select([run.errors], [], [], 0.05)[0]:
+                said += os.read(run.errors, 65536)
+        else:
+            time.sleep(0.02)
+    code = run.process.poll()
+    left, off = at.on(), at.off_park_deg()
+    if code is None:
+        os.killpg(run.pid, signal.SIGKILL)
+        run.process.wait()
+    if run.errors >= 0 and way != "stderr broken":
+        os.set_blocking(run.errors, False)
+        with contextlib.suppress(BlockingIOError, OSError):
+            while more := os.read(run.errors, 65536):
+                said += more
+    if run.master >= 0:
+        with contextlib.suppress(OSError):
+            os.close(run.master)
+    for pipe in (run.process.stdin, run.process.stdout, run.process.stderr):
+        with contextlib.suppress(OSError):
+            if pipe is not None:
+                pipe.close()
+    folder.cleanup()
+    lines = [line for line in said.decode(errors="replace").splitlines() if line.strip(". ")]
+    last = lines[-1] if lines else ""
+    of = len(at.rig.joints)
+    return Row(left, of, off, took_s, code, len(lines), re.sub(r"\x1b\[K|\r", "", last)[:70])
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--rig", action="append", choices=RIGS)
+    parser.add_argument("--command", action="append")
+    parser.add_argument("--way", action="append", choices=WAYS)
+    asked = parser.parse_args()
+    print("| rig | command | way out | left on | off park | s | code | last line |")
+    print("|--|--|--|--|--|--|--|--|")
+    left = hung = cases = 0
+    for name in asked.rig or RIGS:
+        for command, way in product(asked.command or commands(name), asked.way or WAYS):
+            if way in ONLY_RUN and command != "run":
+                continue
+            with bench(name) as at:
+                row = attack(at, command, way)
+            cases, left, hung = cases + 1, left + row.on, hung + (row.code is None)
+            what = (RIGS[name], command, way, f"{row.on} of {row.of}")
+            how = (f"{row.off_park_deg:.1f} deg", f"{row.seconds:.1f}", row.code, row.said)
+            print("|", *[f"{cell} |" for cell in (*what, *how)], flush=True)
+    print(f"\n{cases} ways out: {left} servos left on, {hung} hung")
+    return 1 if left or hung else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

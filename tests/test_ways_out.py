@@ -1,0 +1,384 @@
+"""Whatever ends a command that switched torque on: the head parks and the torque goes off."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from attack.ways_out import START, attack, bench
+
+import robot.assemble
+from config.schema import load_rig
+from drivers.errors import BusLost, SetupError
+from robot import session
+from robot.assemble import Assembly, assemble
+from robot.cli.line_writer import LineWriter
+from robot.cli.run import had_faults
+from robot.interrupts import SAME_REQUEST_S, Interrupts
+from robot.loop import Robot
+from robot.power_down import PowerDown
+from robot.summary import Summary
+from sim_mock.device import Device
+from sim_mock.emulated import build
+
+# --- the door by itself
+
+
+class Head:
+    """Something that can be parked and switched off."""
+
+    def __init__(self) -> None:
+        self.did: list[str] = []
+        self.said: list[str] = []
+        self.while_parking: Callable[[], None] = lambda: None
+        self.while_off: Callable[[], None] = lambda: None
+
+    def park(self, again: Callable[[], bool]) -> str:
+        self.did.append("park")
+        self.while_parking()
+        return "not parked (interrupted)" if again() else "parked"
+
+    def off(self) -> None:
+        self.while_off()
+        self.did.append("off")
+
+    def way_out(self, interrupts: Interrupts | None = None) -> PowerDown:
+        return PowerDown(
+            self.park, self.off, self.said.append, interrupts or Interrupts(), left=": cut it"
+        )
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError(), RuntimeError("x"), KeyboardInterrupt(), SystemExit(3), BusLost("gone")]
+)
+def test_whatever_ends_the_work_the_head_parks_and_torque_goes_off(error: BaseException) -> None:
+    head = Head()
+    with pytest.raises(type(error)), head.way_out() as leaving:
+        leaving.switch_on(lambda: None)
+        raise error
+    assert head.did == ["park", "off"] and len(head.said) == 1
+    assert "parked, torque off" in head.said[0]
+
+
+@pytest.mark.parametrize("error", [MemoryError(), KeyboardInterrupt(), BusLost("gone")])
+def test_parking_that_fails_does_not_keep_the_torque_on(error: BaseException) -> None:
+    head = Head()
+
+    def fail() -> None:
+        raise error
+
+    head.while_parking = fail
+    with head.way_out() as leaving:
+        leaving.switch_on(lambda: None)
+    assert head.did == ["park", "off"] and head.said[0].startswith("not parked (")
+
+
+def test_torque_that_cannot_be_switched_off_is_said_with_what_to_do() -> None:
+    head = Head()
+
+    def fail() -> None:
+        raise BusLost("no port")
+
+    head.while_off = fail
+    with head.way_out() as leaving:
+        leaving.switch_on(lambda: None)
+    assert head.said == ["parked, torque-off could not be sent (no port): cut it"]
+
+
+def test_nobody_to_tell_changes_nothing() -> None:
+    head = Head()
+
+    def deaf(line: str) -> None:
+        raise BrokenPipeError
+
+    with PowerDown(head.park, head.off, deaf, Interrupts()) as leaving:
+        leaving.switch_on(lambda: None)
+    assert head.did == ["park", "off"]
+
+
+def test_a_start_that_is_refused_needs_no_end_and_one_that_breaks_off_does() -> None:
+    def refused() -> None:
+        raise SetupError("no servo")
+
+    def broken() -> None:
+        raise MemoryError
+
+    for start, did in ((refused, []), (broken, ["off"])):
+        head = Head()
+        with pytest.raises((SetupError, MemoryError)), head.way_out() as leaving:
+            leaving.switch_on(start)
+        assert head.did == did and head.said == []
+
+
+class Seconds:
+    """A clock that is set."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def ask(clock: Seconds, number: signal.Signals = signal.SIGINT, after_s: float = 1.0) -> None:
+    clock.now += after_s
+    signal.raise_signal(number)
+
+
+def test_a_second_request_skips_parking_and_none_reaches_the_torque_off() -> None:
+    head, clock = Head(), Seconds()
+    head.while_parking = lambda: ask(clock)
+    head.while_off = lambda: [ask(clock) for _ in range(5)] and None
+    with Interrupts(clock) as interrupts, head.way_out(interrupts) as leaving:
+        leaving.switch_on(lambda: None)
+        ask(clock)
+        leaving.cause = interrupts() or ""
+    assert head.did == ["park", "off"]
+    assert head.said == ["stopped by SIGINT: not parked (interrupted), torque off"]
+
+
+def test_parking_that_hangs_is_broken_off_by_one_more() -> None:
+    head, clock = Head(), Seconds()
+
+    def hang() -> None:
+        for _ in range(3):
+            ask(clock)
+        raise AssertionError("nobody broke it off")
+
+    head.while_parking = hang
+    with Interrupts(clock) as interrupts, head.way_out(interrupts) as leaving:
+        leaving.switch_on(lambda: None)
+        ask(clock)
+    assert head.did == ["park", "off"] and "not parked (interrupted)" in head.said[0]
+
+
+def test_signals_of_one_closed_terminal_are_one_request() -> None:
+    clock = Seconds()
+    with Interrupts(clock) as interrupts:
+        ask(clock, signal.SIGHUP)
+        ask(clock, signal.SIGHUP)
+        assert interrupts() == "SIGHUP" and interrupts.requests == 1
+    with Interrupts(clock) as interrupts:
+        ask(clock, signal.SIGTERM)
+        ask(clock, signal.SIGTERM, 0.5 * SAME_REQUEST_S)
+        assert interrupts.requests == 1
+        with pytest.raises(KeyboardInterrupt):
+            ask(clock, signal.SIGTERM)
+
+
+def test_handlers_are_put_back_and_nohup_is_heeded() -> None:
+    numbers = (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTTOU)
+    before = [signal.getsignal(number) for number in numbers]
+    with Interrupts() as interrupts, interrupts:
+        assert [signal.getsignal(number) for number in numbers] != before
+    assert [signal.getsignal(number) for number in numbers] == before
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Interrupts():
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+# --- lines for people
+
+
+def _wait_until(true: Callable[[], bool]) -> bool:
+    end_s = time.monotonic() + 20.0
+    while not true() and time.monotonic() < end_s:
+        time.sleep(0.02)
+    return true()
+
+
+def test_a_pipe_that_nobody_reads_keeps_nobody_waiting() -> None:
+    reads, writes = os.pipe()
+    writer = LineWriter(writes, most=50)
+    for number in range(2000):
+        writer.line(f"{number} " + "x" * 1000 + "\n")
+        writer.status("a status\n")
+    assert writer.dropped > 1000 and not writer.flush(0.05)
+    got = b""
+    while b"49 x" not in got:  # what was kept comes in order once somebody reads
+        got += os.read(reads, 65536)
+    assert got.startswith(b"0 x") and writer.unread() is None
+
+
+def test_a_reader_that_is_gone_is_told_apart_from_a_full_disk() -> None:
+    reads, writes = os.pipe()
+    os.close(reads)
+    writer = LineWriter(writes)
+    writer.line("a\n")
+    assert writer.flush(20.0) and "nobody reads" in (writer.unread() or "") and writer.dropped == 1
+    quiet_reads, quiet_writes = os.pipe()
+    quiet = LineWriter(quiet_writes)
+    quiet.line("a\n")
+    assert quiet.flush(20.0) and quiet.unread() is None
+    os.close(quiet_reads)
+    assert _wait_until(lambda: quiet.unread() is not None)  # without another line
+    full = LineWriter(os.open("/dev/full", os.O_WRONLY))
+    full.line("a\n")
+    assert full.flush(20.0) and full.unread() is None and full.dropped == 1
+
+
+def test_a_thread_that_is_gone_ends_the_work() -> None:
+    gone: list[str] = []
+    with Interrupts(also=lambda: gone[0] if gone else None) as interrupts:
+        assert interrupts() is None
+        gone.append("nobody reads")
+        assert interrupts() == "nobody reads"
+
+
+# --- runs in simulated time, on emulated servos that are asked afterwards
+
+
+@pytest.fixture
+def devices(monkeypatch: pytest.MonkeyPatch) -> list[Device]:
+    """Give the devices behind the runs of this test."""
+    made: list[Device] = []
+
+    def built(*words: Any) -> Device:
+        made.append(build(*words))
+        return made[-1]
+
+    monkeypatch.setattr(robot.assemble, "build", built)
+    return made
+
+
+def on(device: Device) -> int:
+    """Count the servos that have torque or pulses."""
+    servos: list[dict[str, Any]] = json.loads(device.faults.command("status"))["servos"]
+    return sum(bool(servo.get("torque", servo.get("target"))) for servo in servos)
+
+
+def ran(
+    rig: str,
+    said: list[str],
+    seconds: float = 1.5,
+    before: Callable[[Assembly], None] | None = None,
+) -> dict[str, Any]:
+    wanted = session.Wanted(mock=True, fast=True, seconds=seconds)
+    made = assemble(load_rig(rig), wanted.choice())
+    if before is not None:
+        before(made)
+    return session.run(made, wanted, lambda: None, said.append, lambda line: None)
+
+
+@pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
+def test_no_memory_in_the_loop_leaves_by_the_door(
+    rig: str, devices: list[Device], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tick, ticks = Robot.tick, []
+
+    def short_of_memory(self: Robot, *words: float) -> object:
+        ticks.append(on(devices[0]))
+        if len(ticks) > 100:
+            raise MemoryError
+        return tick(self, *words)
+
+    monkeypatch.setattr(Robot, "tick", short_of_memory)
+    said: list[str] = []
+    with pytest.raises(MemoryError):
+        ran(rig, said)
+    assert ticks[-1] == len(load_rig(rig).joints) and on(devices[0]) == 0
+    assert said[-1] == "stopped by fault: unexpected MemoryError: parked, torque off"
+
+
+def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
+    devices: list[Device], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(self: Summary, tick: object) -> None:
+        raise RuntimeError("plug-in")
+
+    monkeypatch.setattr(Summary, "note", broken)
+    said: list[str] = []
+    figures = ran("desk", said, 1.0)
+    assert figures["stopped_by"] == "seconds" and figures["ticks"] >= 199 and on(devices[0]) == 0
+    assert [line for line in said if "plug-in" in line] == [
+        "the summary failed (RuntimeError: plug-in); the rig runs on without"
+    ]
+
+
+def test_nobody_to_say_anything_to_ends_nothing(devices: list[Device]) -> None:
+    def deaf(line: str) -> None:
+        raise BrokenPipeError
+
+    wanted = session.Wanted(mock=True, fast=True, seconds=0.5)
+    figures = session.run(
+        assemble(load_rig("desk"), wanted.choice()), wanted, lambda: None, deaf, deaf
+    )
+    assert figures["stopped_by"] == "seconds" and on(devices[0]) == 0
+
+
+# --- joints that faults hold
+
+
+def test_a_joint_that_does_not_move_is_said_counted_and_in_the_exit_code(
+    devices: list[Device],
+) -> None:
+    said: list[str] = []
+
+    def jam(made: Assembly) -> None:
+        devices[0].faults.command("stick 7")
+
+    figures = ran("desk", said, 6.0, jam)
+    about = [line for line in said if "neck_yaw: not moving" in line]
+    assert about and about[0].endswith("not moving: held") and len(about) <= 4
+    count = figures["joint_faults"]["neck_yaw"]["not moving"]
+    assert count["times"] >= 1 and count["seconds"] > 1.0
+    last: list[str] = []
+    assert had_faults(figures, last.append)
+    assert "neck_yaw not moving" in last[0]
+
+
+def test_a_run_without_faults_has_none(devices: list[Device]) -> None:
+    said: list[str] = []
+    figures = ran("desk", said, 3.0)
+    assert figures["joint_faults"] == {} and not had_faults(figures, said.append)
+
+
+# --- programs of their own
+
+
+@pytest.mark.parametrize(
+    ("rig", "command", "way"),
+    [
+        ("desk", "run", "SIGHUP"),
+        ("feetech", "jog", "tty closed"),
+        ("maker", "home", "full pipe that nobody reads"),
+        ("desk", "run", "| head -1"),
+    ],
+)
+def test_no_servo_stays_on(rig: str, command: str, way: str) -> None:
+    with bench(rig) as at:
+        row = attack(at, command, way)
+    assert row.code is not None and row.on == 0, row
+    assert row.off_park_deg < 6.0 or command == "home", row
+
+
+def test_ctrl_c_in_the_first_second_is_one_line() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-X", "importtime", "-c", START, "check"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stderr is not None
+    # In the middle of the imports.
+    assert any("config.load" in line or "typer" in line for line in process.stderr)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130 and "Traceback" not in err
+    assert [line for line in err.splitlines() if "import time" not in line] == ["interrupted"]
+
+
+def test_a_reader_that_is_gone_is_one_line_for_a_quick_command() -> None:
+    reads, writes = os.pipe()
+    os.close(reads)
+    done = subprocess.run(
+        [sys.executable, "-c", START, "get", "--help"],
+        stdout=writes, stderr=subprocess.PIPE, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    os.close(writes)
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done.stderr
