@@ -212,6 +212,18 @@ class Head:
         yaw, pitch, roll = head_rad
         return (min(max(yaw, yaw_low), yaw_high), min(max(pitch, pitch_low), pitch_high), roll)
 
+    @property
+    def range_rad(self) -> tuple[Angles2, Angles2]:
+        """Return the neck's ((yaw low, high), (pitch low, high))."""
+        return self._neck
+
+    def destination_rad(self, target: Target, facing_rad: Angles2) -> Angles2:
+        """Return the yaw and pitch to which the head turns for a point, its own centre.
+
+        facing_rad: neck angles that would point the face straight at it
+        """
+        return self._reaching(facing_rad, facing_rad, self._stops_short(target, facing_rad))
+
     def leads_s(self, target: Target, eccentricity_rad: float) -> float:
         """Give how long the eyes wait because the head goes first."""
         first = target.top_down and eccentricity_rad >= self.trigger_rad

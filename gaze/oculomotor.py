@@ -25,12 +25,14 @@ from gaze.types import (
     GazeCommand,
     GazeState,
     HeadGeometry,
+    Limited,
     Mat3,
     Phase,
     Target,
     Vec3,
 )
 
+_AT_END = "at the end of its range"
 _MOVING_M_S = 0.05
 """A target slower than this is fixated, not pursued."""
 
@@ -115,6 +117,21 @@ class _Seen(NamedTuple):
     centre: Vec3
 
 
+class Reach(NamedTuple):
+    """Where head and eyes come to rest for a point, and where they would have to be for it.
+
+    facing_rad, head_rad: (yaw, pitch, roll) that face it, and where the head stops
+    asked_eyes_rad, eyes_rad: left and right (yaw, pitch) from there, and as far as they go
+    too_near: the point is nearer than the eyes converge on
+    """
+
+    facing_rad: Angles3
+    head_rad: Angles3
+    asked_eyes_rad: tuple[Angles2, Angles2]
+    eyes_rad: tuple[Angles2, Angles2]
+    too_near: bool
+
+
 class Oculomotor:
     """Composes saccades, following, head and lids."""
 
@@ -195,10 +212,48 @@ class Oculomotor:
         self._move_gaze(seen, p_head, t_s, dt_s)
         centre = facing if seen.centre is seen.point else self._geometry.facing(seen.centre)
         head = self._head.step(target, centre, facing, aside_rad, t_s - self._rule.onset_s, t_s)
-        left, right = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
-        left, right = _clip(left, self._eye_limits[0]), _clip(right, self._eye_limits[1])
+        wanted = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
+        left, right = self._in_range(wanted)
+        limited = () if wanted == (left, right) else self._limited(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
-        return self._command(self._swayed(head, t_s), left, right, lids, seen)
+        return self._command(self._swayed(head, t_s), left, right, lids, seen, limited)
+
+    def reach(self, target: Target) -> Reach:
+        """Return where head and eyes come to rest for a point that stands still."""
+        facing = self._geometry.facing(target.p_world_m)
+        head = (*self._head.destination_rad(target, facing), 0.0)
+        R_world_head, p_head = self._geometry.head_pose(head)
+        exact = self._geometry.eyes_on(target.p_world_m, R_world_head, p_head)
+        point = self._clear(target.p_world_m, p_head)
+        left, right = self._in_range(self._geometry.eyes_on(point, R_world_head, p_head))
+        return Reach((*facing, 0.0), head, exact, (left, right), point != target.p_world_m)
+
+    @property
+    def ranges_rad(self) -> tuple[tuple[Angles2, Angles2], ...]:
+        """Return ((yaw low, high), (pitch low, high)) of left eye, right eye and head."""
+        return (*self._eye_limits, self._head.range_rad)
+
+    def _in_range(self, eyes: tuple[Angles2, Angles2]) -> tuple[Angles2, Angles2]:
+        """Keep both eyes inside their ranges."""
+        return _clip(eyes[0], self._eye_limits[0]), _clip(eyes[1], self._eye_limits[1])
+
+    def _limited(
+        self, wanted: tuple[Angles2, Angles2], head: Angles3, facing: Angles2
+    ) -> tuple[Limited, ...]:
+        """Name what keeps the eyes from the gaze point: their own ranges, and the neck's."""
+        eyes = self._in_range(wanted)
+        rows = (("left eye", wanted[0], eyes[0]), ("right eye", wanted[1], eyes[1]))
+        found = [
+            Limited(f"{name} {axis}", asked[i], done[i], _AT_END)
+            for name, asked, done in rows
+            for i, axis in enumerate(("yaw", "pitch"))
+            if asked[i] != done[i]
+        ]
+        for i, axis in enumerate(("yaw", "pitch")):
+            low, high = self._head.range_rad[i]
+            if not low < head[i] < high and not low <= facing[i] <= high:
+                found.append(Limited(f"head {axis}", facing[i], head[i], _AT_END))
+        return tuple(found)
 
     def _command(
         self,
@@ -207,6 +262,7 @@ class Oculomotor:
         right: Angles2,
         lids: Openings,
         seen: _Seen,
+        limited: tuple[Limited, ...],
     ) -> GazeCommand:
         moving = norm(seen.velocity) > _MOVING_M_S
         phase: Phase = "saccade" if self._flight else "pursue" if moving else "fixate"
@@ -224,6 +280,7 @@ class Oculomotor:
             self._lids.blinks,
             lids.lower_left,
             lids.lower_right,
+            limited,
         )
 
     def _swayed(self, head: Angles3, t_s: float) -> Angles3:

@@ -179,6 +179,18 @@ class GazeState(NamedTuple):
     lower_right: float = 1.0
 
 
+class Limited(NamedTuple):
+    """An angle that a model's range cut off on the way to the target, in radians.
+
+    axis: "left eye yaw", "right eye pitch", "head yaw", "head pitch"
+    """
+
+    axis: str
+    asked_rad: float
+    done_rad: float
+    reason: str
+
+
 class GazeCommand(NamedTuple):
     """What the models wish for this tick.
 
@@ -188,6 +200,7 @@ class GazeCommand(NamedTuple):
     gaze_point_world_m: where both eyes are meant to point now
     saccades, fixations, blinks: counts since the reset
     lower_left, lower_right: opening of the lower lids, 0 shut .. 1 open
+    limited:  what keeps the eyes from the gaze point, empty while nothing does
     """
 
     head_rad: Angles3
@@ -203,6 +216,7 @@ class GazeCommand(NamedTuple):
     blinks: int
     lower_left: float = 1.0
     lower_right: float = 1.0
+    limited: tuple[Limited, ...] = ()
 
 
 class HeadGeometry(Protocol):

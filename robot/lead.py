@@ -84,11 +84,18 @@ class Lead:
 
     def target(self, target: Target, t_s: float) -> Target:
         """Return the point that a person chose in the place of what attention did."""
-        if self.point is None:
+        puppet = self.puppet(t_s)
+        if puppet is None:
             return target
+        return puppet._replace(shift=target.shift + self._shifts, pulls=target.pulls)
+
+    def puppet(self, t_s: float) -> Target | None:
+        """Return the point that a person chose, None where nobody did."""
+        if self.point is None:
+            return None
         return Target(
             self.point, (0.0, 0.0, 0.0), t_s, "puppet", -1, 1.0, True, None,
-            target.shift + self._shifts, "somebody chose this point", None, target.pulls,
+            self._shifts, "somebody chose this point",
         )  # fmt: skip
 
     def _take(self, order: LookAt | Jog, t_s: float) -> None:

@@ -22,6 +22,7 @@ from robot.lead import Lead
 from robot.menus import Menus, refuse_absent, refuse_out_of_range, refuse_unknown
 from robot.order_queue import OrderQueue
 from robot.orders import Ask, Jog, LookAt, Order, Renew, Resume, Stop, Tune, check
+from robot.reach import jog_reply, look_reply
 from robot.reply import Reply, Ticket
 from robot.safety.guard import Guard
 from robot.seeing.perception import Perception
@@ -298,7 +299,10 @@ class Robot:
     def _look(self, order: LookAt, t_s: float) -> Reply:
         """Look at a point that a person chose, or freely again."""
         self._let_lead(lambda: self._lead.look(order, t_s))
-        return Reply(asked_m=order.p_world_m, done_m=order.p_world_m)
+        target = self._lead.puppet(t_s)
+        if target is None:
+            return Reply()
+        return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
 
     def _jog(self, order: Jog, t_s: float) -> Reply:
         """Hold all joints but those given; without any, let the models lead again."""
@@ -306,7 +310,7 @@ class Robot:
         if order.angles_rad:
             # A slider can be torn from end to end in no time.
             self._guard.go_gently()
-        return Reply()
+        return jog_reply(order, self.body.names, self._guard.limits)
 
     def _let_lead(self, change: Callable[[], None]) -> None:
         """Change who leads; the models begin gently where they take joints over."""

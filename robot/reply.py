@@ -28,6 +28,8 @@ class JointReply(NamedTuple):
 
     def words(self) -> str:
         """Return one phrase for people."""
+        if self.low_rad == self.high_rad:
+            return f"{self.joint}: {self.reason}"
         if not self.reason:
             return f"{self.joint} to {degrees(self.done_rad):.1f} deg"
         return (
@@ -43,7 +45,7 @@ class Reply(NamedTuple):
     asked_m: the point to look at; done_m: the point as far away that the eyes will rest on;
         None for other orders
     joints: those that cannot do what was asked; of a jog, all that were asked for
-    error_deg: angle between the point and the line of sight once head and eyes are there, of
+    error_rad: angle between the point and the line of sight once head and eyes are there, of
         the worse eye, or of their mean where one linkage turns both
     """
 
@@ -51,7 +53,12 @@ class Reply(NamedTuple):
     asked_m: Vec3 | None = None
     done_m: Vec3 | None = None
     joints: tuple[JointReply, ...] = ()
-    error_deg: float = 0.0
+    error_rad: float = 0.0
+
+    @property
+    def error_deg(self) -> float:
+        """Return ``error_rad`` in degrees."""
+        return degrees(self.error_rad)
 
     @property
     def limited(self) -> tuple[JointReply, ...]:
@@ -109,7 +116,7 @@ class Reply(NamedTuple):
             for one in data["joints"]
         )
         asked, done = (_point(data[key]) for key in ("asked_m", "done_m"))
-        return cls(data["refused"], asked, done, joints, data["error_deg"])
+        return cls(data["refused"], asked, done, joints, radians(data["error_deg"]))
 
 
 def _point(data: Any) -> Vec3 | None:

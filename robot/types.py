@@ -265,7 +265,7 @@ class Snapshot:
     target_kind, target_id, target_part: the target as in gaze.types.Target
     character, conversation: those in force, "" where nobody says
     stopped: why somebody stopped the robot, "" while it moves
-    led: who leads gaze or joints and with what, "" while nobody does
+    led: who leads gaze or joints and how well the head can follow, "" while nobody does
     picture_age_s: None before the first picture
     ghost: where the wish would have head and eyes; camera: where the camera is
     field_deg: what an eye can see, towards temple, nose, above and below

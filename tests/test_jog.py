@@ -113,7 +113,7 @@ def test_no_goal_is_faster_than_asked_nor_outside_the_range(
 ) -> None:
     bench = Bench(params=JogParams(speed_deg_s=speed))
     bench.control.start()
-    moved = bench.control.jog(joint, angle)
+    moved = bench.control.pose({joint: angle})
     i, params = JOINTS.index(joint), RIG.joints[joint]
     low, high = radians(params.min_deg), radians(params.max_deg)
     sent = [(s.t_s, s.verdict.command_rad[i]) for s in bench.steps]
@@ -134,7 +134,9 @@ def test_the_way_takes_long_enough_for_speed_and_acceleration(
 
 
 def test_out_of_range_is_held_back_at_the_limit_and_says_so(bench: Bench) -> None:
-    moved = bench.control.jog("left_eye_pan", 50.0)
+    with pytest.raises(SetupError, match="50.0 deg is outside its range, -35..35 deg"):
+        bench.control.jog("left_eye_pan", 50.0)
+    moved = bench.control.pose({"left_eye_pan": 50.0})
     part = moved.of("left_eye_pan")
     assert not moved.arrived and moved.ended == "held back"
     assert part.wished == pytest.approx(50.0) and part.permitted == pytest.approx(35.0)

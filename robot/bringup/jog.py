@@ -16,7 +16,7 @@ stay at their last goal, or limp where a guardian watches them (robot.guardian, 
 the next call goes on from there.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import degrees, isfinite, radians, sqrt
 
@@ -25,9 +25,12 @@ from gaze.quintic import Quintic
 from robot.body import Body
 from robot.bringup.applied import Moved, Notes, Step, outcome, standing
 from robot.clock import Clock
+from robot.menus import refuse_out_of_range
 from robot.observers import left_out
+from robot.orders import Jog
 from robot.power_down import Again
 from robot.safety.guard import Guard
+from robot.safety.motion import JointLimit
 from robot.types import JointAngles, JointState
 
 _PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
@@ -134,9 +137,11 @@ class ManualControl:
         """Move one joint slowly; the others hold where they are.
 
         Raises:
-            drivers.errors.SetupError: there is no such joint, or the angle is no number.
+            drivers.errors.SetupError: there is no such joint, or the angle is no number or
+                outside the joint's range.
             drivers.errors.DriverError: the bus is gone.
         """
+        refuse_beyond(joint, angle_deg, self.body.names, self._guard.limits)
         return self.pose({joint: angle_deg})
 
     def pose(self, angles_deg: Mapping[str, float]) -> Moved:
@@ -285,3 +290,18 @@ def refuse_unknown(angles_deg: Mapping[str, float], joints: tuple[str, ...]) -> 
             raise SetupError(f"no joint {name!r}; there is {', '.join(joints)}")
         if not isfinite(angle):
             raise SetupError(f"{name}: {angle} is not an angle in degrees")
+
+
+def refuse_beyond(
+    joint: str, angle_deg: float, joints: tuple[str, ...], limits: Sequence[JointLimit]
+) -> None:
+    """Refuse an angle outside a joint's range, before anything moves.
+
+    Raises:
+        drivers.errors.SetupError: with the range.
+    """
+    refuse_unknown({joint: angle_deg}, joints)
+    try:
+        refuse_out_of_range(Jog(((joint, radians(angle_deg)),)), joints, limits)
+    except ValueError as error:
+        raise SetupError(str(error)) from None

@@ -5,12 +5,13 @@ from math import degrees, isfinite
 from typing import NamedTuple
 
 from drivers.errors import SetupError
-from gaze.angles import add, angle_between, norm, sub
+from gaze.angles import angle_between, norm, sub
 from gaze.field_of_view import line_of_sight
 from gaze.oculomotor import Oculomotor
 from gaze.types import GazeState, Target, Vec3
 from robot.bringup.applied import Moved, Step
 from robot.bringup.jog import ManualControl
+from robot.gaze_error import gaze_error
 from robot.joint import JointParams
 from robot.kinematics import Kinematics
 from robot.types import JointAngles, JointState
@@ -94,19 +95,16 @@ def judged(p_world_m: Vec3, pose: GazeState, moved: Moved, converges: bool = Tru
     to_left = sub(p_world_m, pose.p_world_eye_left_m)
     to_right = sub(p_world_m, pose.p_world_eye_right_m)
     yaw, pitch, roll = pose.head_rad
-    error_left, error_right = angle_between(left, to_left), angle_between(right, to_right)
-    error = max(error_left, error_right)
-    if not converges:
-        error = angle_between(add(left, right), add(to_left, to_right))
+    error = gaze_error(p_world_m, pose, converges)
     return LookedAt(
-        degrees(error_left),
-        degrees(error_right),
+        degrees(error.left),
+        degrees(error.right),
         degrees(angle_between(left, right)),
         degrees(angle_between(to_left, to_right)),
         (degrees(yaw), degrees(pitch), degrees(roll)),
         norm(sub(p_world_m, pose.p_world_head_m)),
         moved,
-        degrees(error),
+        degrees(error.whole),
         converges,
     )
 

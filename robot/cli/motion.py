@@ -13,7 +13,7 @@ from config.schema import Rig, load_rig
 from drivers.errors import SetupError
 from robot.body import Body
 from robot.bringup.applied import PASSING, Moved, Step
-from robot.bringup.jog import JogParams, ManualControl, parked, refuse_unknown
+from robot.bringup.jog import JogParams, ManualControl, parked, refuse_beyond
 from robot.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
 from robot.bus_events import drawn_together
 from robot.cli import calibrations as cli_calibrations
@@ -64,7 +64,7 @@ def jog(
     """Move one joint slowly while the others hold: gazerig jog neck_yaw 20."""
     with clear_errors():
         loaded = load_rig(rig)
-        refuse_unknown({joint: deg}, loaded.names)
+        refuse_beyond(joint, deg, loaded.names, limits(loaded.joints))
     with _commanded(loaded, _Way(mock, port, yes), speed, hold, not no_park) as control:
         moved = control.jog(joint, deg)
         _report(moved, (joint,))

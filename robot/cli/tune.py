@@ -263,7 +263,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
     unsaved = now["unsaved"]
     return [
         *lines,
-        *([f"led by {now['led']}"] if now["led"] else []),
+        *([f"led by {now['lead']}"] if now["lead"] else []),
         f"looks at: {now['target']} - {now['why']} ({now['phase']})",
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         f"joints in deg: {joints}",

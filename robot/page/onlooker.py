@@ -24,6 +24,7 @@ from robot.page.snapshot import (
     Said,
     Snapshots,
     health_words,
+    lead_words,
     seeing_words,
     target_name,
     verdict_words,
@@ -193,7 +194,7 @@ class Onlooker:
         parts = [
             f"{rate_hz:5.1f} Hz",
             f"{target_name(tick.target)} - {tick.target.why}",
-            *([f"led by {tick.led}"] if tick.led else []),
+            *([f"led by {lead_words(tick)}"] if tick.led else []),
             verdict_words(tick.verdict),
             health_words(self._health()),
         ]

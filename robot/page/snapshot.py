@@ -2,6 +2,7 @@
 
 from collections import Counter, deque
 from dataclasses import replace
+from math import degrees
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from gaze.angles import norm, sub
 from gaze.field_of_view import FieldOfViewParams, line_of_sight
 from gaze.types import PART_NAMES, GazeState, Target, Vec3
 from robot.frames import CameraMount
+from robot.gaze_error import gaze_error
 from robot.kinematics import Kinematics
 from robot.loop import Tick
 from robot.page.loop_timing import LoopTiming
@@ -184,7 +186,7 @@ def snapshot(
         target_id=target.id,
         target_part=target.part,
         stopped=tick.stopped,
-        led=tick.led,
+        led=lead_words(tick),
         picture_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         ghost=_ghost(tick, rig) if rig is not None else None,
         camera=_camera(tick, rig) if rig is not None else None,
@@ -336,6 +338,24 @@ def target_name(target: Target) -> str:
     """Give a target's name for people, e.g. "face 3: left eye"."""
     name = target.kind if target.id < 0 else f"{target.kind} {target.id}"
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
+
+
+def lead_words(tick: Tick) -> str:
+    """Say who leads and how far beside the point the eyes look, "" while nobody leads.
+
+    e.g. "gazerig look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
+    """
+    if not tick.led:
+        return ""
+    words, limited = tick.led, tick.gaze.limited
+    if tick.target.kind != "puppet" or not limited or ": jog " in tick.led:
+        return words
+    error = degrees(gaze_error(tick.target.p_world_m, tick.pose).whole)
+    ends = (
+        f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
+        for one in limited
+    )
+    return f"{words}; {error:.0f} deg beside it: {', '.join(ends)}"
 
 
 def verdict_words(verdict: Verdict) -> str:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gaze.types import Bodies, Face, GazeCommand, GazeState, Percept, Pull, Target
+from gaze.types import Bodies, Face, GazeCommand, GazeState, Limited, Percept, Pull, Target
 from robot.orders import as_json as order_as_json
 from robot.orders import from_recording as order_from_json
 from robot.tick import Tick
@@ -114,7 +114,10 @@ def as_json(values: Flat) -> Json:
             **_named(Target, target),
             "pulls": [_named(Pull, pull) for pull in target[-1]],
         },
-        "gaze": _named(GazeCommand, gaze),
+        "gaze": {
+            **_named(GazeCommand, gaze),
+            "limited": [_named(Limited, one) for one in gaze[-1]],
+        },
         "wish_rad": wish,
         "verdict": _named(Verdict, verdict),
         "events": events,
@@ -154,7 +157,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
         None,
         percepts[number] if number is not None else None,
         _made(Target, target),
-        _made(GazeCommand, data["gaze"]),
+        _made(GazeCommand, {**data["gaze"], "limited": _limited(data["gaze"])}),
         wish,
         _made(Verdict, verdict),
         tuple(data["events"]),
@@ -233,6 +236,11 @@ def _made(kind: Any, data: Json) -> Any:
     """Make a named tuple of JSON; a field that this version does not know is left out."""
     known = kind._fields
     return kind(**{k: _tupled(v) if type(v) is list else v for k, v in data.items() if k in known})
+
+
+def _limited(gaze: Json) -> list[Limited]:
+    """Read what kept the eyes from their point; recordings of before do not tell."""
+    return [Limited(**one) for one in gaze.get("limited", ())]
 
 
 def _tupled(value: Any) -> Any:

@@ -230,7 +230,7 @@ class _Decided(NamedTuple):
 
 
 def _decided(tick: Tick) -> _Decided:
-    gaze = tick.gaze
+    gaze = tick.gaze._replace(limited=())  # told since later versions
     if _LOWER_LIDS.isdisjoint(tick.verdict.joints):  # what is asked of absent lids moves nothing
         gaze = gaze._replace(lower_left=1.0, lower_right=1.0)
     # The reason's words may be put better one day; what they stand for is in the pulls.

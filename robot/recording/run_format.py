@@ -78,6 +78,7 @@ _GAZE_COMMAND = _object(
     head_rad=_NUMBERS, eye_left_rad=_NUMBERS, eye_right_rad=_NUMBERS, lid_left=_NUMBER,
     lid_right=_NUMBER, phase=_TEXT, blink=_YES, gaze_point_world_m=_NUMBERS, saccades=_WHOLE,
     fixations=_WHOLE, blinks=_WHOLE, lower_left=_NUMBER, lower_right=_NUMBER,
+    limited=_list(_object(axis=_TEXT, asked_rad=_NUMBER, done_rad=_NUMBER, reason=_TEXT)),
 )  # fmt: skip
 _VERDICT = _object(
     command_rad=_NUMBERS, level=_TEXT, reasons=_TEXTS,

@@ -15,7 +15,7 @@ from drivers.errors import DriverError
 from robot.clock import Clock
 from robot.loop import Tick
 from robot.orders import Order, Renew, Tune, Value, from_json, signed
-from robot.page.snapshot import target_name
+from robot.page.snapshot import lead_words, target_name
 from robot.reckoned import reckoned_joints
 from robot.reply import Ticket
 
@@ -186,6 +186,16 @@ class Pulse:
             "age_s": self._clock.now_s() - tick.t_s,
             "stopped": tick.stopped,
             "led": tick.led,
+            "lead": lead_words(tick),
+            "limited": [
+                {
+                    "axis": one.axis,
+                    "asked_deg": round(degrees(one.asked_rad), 2),
+                    "done_deg": round(degrees(one.done_rad), 2),
+                    "reason": one.reason,
+                }
+                for one in tick.gaze.limited
+            ],
             "level": tick.verdict.level,
             "reasons": list(tick.verdict.reasons),
             "target": target_name(tick.target),

@@ -1,0 +1,123 @@
+"""What is told of a point or a jog before the head has moved is what comes of it."""
+
+from functools import cache
+from math import degrees, radians
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from config.schema import Rig, load_rig
+from gaze.angles import norm, sub
+from gaze.types import Target, Vec3
+from robot.assemble import assemble, gaze_parts
+from robot.choice import Choice
+from robot.gaze_error import gaze_error
+from robot.loop import run
+from robot.orders import Jog, LookAt
+from robot.reach import look_reply
+from robot.reply import Reply
+from robot.rig_angles import limits
+from robot.types import JointAngles, JointState
+
+RIGS = ("desk", "feetech", "maker")
+DT_S = 0.01
+
+
+@cache
+def loaded(name: str) -> Rig:
+    return load_rig(name)
+
+
+def target_at(point: Vec3) -> Target:
+    return Target(point, (0.0, 0.0, 0.0), 0.0, "puppet", -1, 1.0, True, None, 1, "a test")
+
+
+def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[Reply, float]:
+    """Give the reply, and the gaze error in deg of ideal joints that followed for a while."""
+    rig = loaded(name)
+    kinematics, oculomotor = gaze_parts(rig, 0)
+    spans = limits(rig.joints)
+    reply = look_reply(target_at(point), oculomotor, kinematics, spans)
+    q: JointAngles = tuple(min(max(0.0, one.low_rad), one.high_rad) for one in spans)
+    for tick in range(int(seconds / DT_S)):
+        t_s = tick * DT_S
+        state = JointState(q, (0.0,) * len(q), (t_s,) * len(q), ())
+        gaze = oculomotor.step(
+            target_at(point)._replace(at_s=t_s), kinematics.forward(state), t_s, DT_S
+        )
+        wish = kinematics.inverse(gaze)
+        q = tuple(
+            min(max(angle, one.low_rad), one.high_rad)
+            for angle, one in zip(wish, spans, strict=True)
+        )
+    pose = kinematics.forward(JointState(q, (0.0,) * len(q), (0.0,) * len(q), ()))
+    return reply, degrees(gaze_error(point, pose, not kinematics.one_pan).whole)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.sampled_from(RIGS),
+    st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.5)),
+)
+def test_the_error_told_is_the_error_that_comes(name: str, point: Vec3) -> None:
+    middle = gaze_parts(loaded(name), 0)[0].head_pose((0.0, 0.0, 0.0))[1]
+    if norm(sub(point, middle)) < 0.3 or (point[0] < 0.0 and abs(point[1]) < 0.05):
+        return  # inside the head; or right behind it, where either side is as near
+    reply, error_deg = foretold_and_true(name, point)
+    assert reply.error_deg == pytest.approx(error_deg, abs=2.0)
+    assert reply.asked_m == point and reply.done_m is not None
+    if reply.error_deg > 1.0:
+        assert reply.limited, "an error has its reason"
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_a_point_in_reach_is_met_and_nothing_is_said_to_be_limited(name: str) -> None:
+    reply, error_deg = foretold_and_true(name, (1.5, 0.1, 0.2))
+    assert reply.error_deg < 0.6 and error_deg < 1.0 and not reply.joints
+    assert reply.words() == "it looks there"
+
+
+def test_behind_the_head_the_ends_are_named() -> None:
+    reply, _ = foretold_and_true("desk", (-1.0, 0.0, 0.3), 0.1)
+    assert 60.0 < reply.error_deg < 90.0
+    assert {"neck_yaw", "left_eye_pan", "right_eye_pan"} <= {one.joint for one in reply.limited}
+    (yaw,) = [one for one in reply.joints if one.joint == "neck_yaw"]
+    assert abs(yaw.asked_rad) > 3.0 and abs(yaw.done_rad) == pytest.approx(radians(70.0))
+    assert "deg beside it: " in reply.words() and "neck_yaw stays at" in reply.words()
+    assert Reply.from_json(reply.as_json()).words() == reply.words()
+
+
+def test_a_rig_without_a_neck_says_so() -> None:
+    reply, _ = foretold_and_true("maker", (1.0, 2.0, 0.0), 0.1)
+    assert "neck_yaw: this rig has none" in reply.words() and reply.error_deg > 20.0
+
+
+def test_the_running_robot_replies_so_and_keeps_saying_it() -> None:
+    made = assemble(loaded("desk"), Choice(mock=True, fast=True, seed=3, scene="face-to-face"))
+    robot, ticks = made.robot, []
+
+    def go(seconds: float) -> None:
+        run(robot, made.clock, made.loop, lambda s: "s" if s >= seconds else None, ticks.append)
+
+    robot.start(made.clock)
+    try:
+        point = (0.3, 2.0, 0.2)
+        look = robot.order(LookAt(point, stay=True))
+        far = robot.order(LookAt((-1.0, -0.5, 0.3), stay=True))
+        go(8.0)
+        near, reply = look.wait(0.0), far.wait(0.0)
+        assert near is not None and near.error_deg < 1.0 and not near.joints
+        assert reply is not None
+        error = gaze_error((-1.0, -0.5, 0.3), ticks[-1].pose).whole
+        assert reply.error_deg == pytest.approx(degrees(error), abs=3.0)
+        axes = {one.axis for one in ticks[-1].gaze.limited}
+        assert {"left eye yaw", "right eye yaw", "head yaw"} <= axes
+        jog = robot.order(Jog((("neck_yaw", 0.2), ("left_eye_pan", 0.1))))
+        go(0.1)
+        held = jog.wait(0.0)
+        assert held is not None and not held.limited
+        assert [round(one.done_rad, 3) for one in held.joints] == [0.2, 0.1]
+    finally:
+        robot.stop()
+        made.close()
