@@ -36,8 +36,8 @@ class ServoReading(NamedTuple):
     load: share of the stall torque that it gives, signed, -1..1
     temperature_c, voltage_v: None before the first reading
     rearmed: True in the first reading after the torque came on anew with the present
-        position as goal (a restarted servo, a port that was unplugged): whoever plans
-        goals begins there
+        position as goal (a restarted servo, a port that was unplugged), and in every reading
+        of a servo on its slow way into its limits: whoever plans goals begins there
     measured: False where the servo tells nothing and position and velocity are its goal
         moved by the speed it is known to have
     """
@@ -82,6 +82,8 @@ class ServoSetup(NamedTuple):
         begin: its place before torque went off; None where it is not needed
     own_speed_steps_s: how fast such a servo itself moves, from its data sheet; None: as fast
         as max_speed_steps_s
+    entry_speed_steps_s: how fast it is led into its limits from outside; None: 30 deg/s of
+        its own shaft
     """
 
     id: int
@@ -96,6 +98,7 @@ class ServoSetup(NamedTuple):
     max_accel_steps_s2: float | None = None
     rest_steps: int | None = None
     own_speed_steps_s: float | None = None
+    entry_speed_steps_s: float | None = None
 
 
 class ServoBus(Protocol):

@@ -137,7 +137,7 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
     poses = remembering(kinematics, tell=_teller(kinematics, mount, turns))
     wires = _wires(rig, choice, clock)
     try:
-        body = Body(wires.bus, rig.joints, park_rad(rig))
+        body = _body(rig, wires)
         lids = Lids(rig.gaze.lids, lid_dice)
         where = _true_head(wires.devices, rig, poses)
         tracker = Tracker(rig.tracks)
@@ -145,7 +145,7 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
         decides = _deciders(rig, idle_dice)
         parts = Parts(
             body=body,
-            guard=Guard(rig.guard, limits(rig.joints), body.names, body.reach),
+            guard=_guard(rig, body),
             kinematics=kinematics,
             camera=scene_camera(rig, choice, scene, mount, where, camera_dice)
             if scene is not None
@@ -181,6 +181,15 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
     placed = Placed(lambda rig: _camera_params(rig, choice, kinematics)[0], camera_params.mount)
     retuner = robot.tune = Retuner(parts, rig, placed)
     return Assembly(robot, clock, mount, poses, scene, wires.digest, wires.close, notes, retuner)
+
+
+def _body(rig: Rig, wires: _Wires) -> Body:
+    gentle_deg_s = rig.guard.gentle_speed_deg_s
+    return Body(wires.bus, rig.joints, park_rad(rig), gentle_deg_s)
+
+
+def _guard(rig: Rig, body: Body) -> Guard:
+    return Guard(rig.guard, limits(rig.joints), body.names, body.reach, 1.0 / rig.loop.rate_hz)
 
 
 def _robot(parts: Parts, poses: PoseHistory) -> Robot:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import inf
 
 from drivers.errors import BusLost, DriverError
+from drivers.slow_entry import ENTRY_DEG_S
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from robot.joint import JointParams
 from robot.safety.motion import JointLimit
@@ -11,14 +12,19 @@ from robot.types import JointAngles, JointState, in_order
 
 
 def setups(
-    joints: Mapping[str, JointParams], park_rad: Mapping[str, float]
+    joints: Mapping[str, JointParams],
+    park_rad: Mapping[str, float],
+    gentle_deg_s: float = ENTRY_DEG_S,
 ) -> tuple[ServoSetup, ...]:
     """Give what a bus must know of all servos.
 
     park_rad: parking pose of joints, 0 where not given: where servos that do not tell their
         place are taken to be
+    gentle_deg_s: joints are led into their ranges no faster
     """
-    return tuple(joints[name].setup(name, park_rad.get(name, 0.0)) for name in in_order(joints))
+    return tuple(
+        joints[name].setup(name, park_rad.get(name, 0.0), gentle_deg_s) for name in in_order(joints)
+    )
 
 
 class Body:
@@ -32,6 +38,7 @@ class Body:
         bus: ServoBus,
         joints: Mapping[str, JointParams],
         park_rad: Mapping[str, float] | None = None,
+        gentle_deg_s: float = ENTRY_DEG_S,
     ) -> None:
         """Take the bus, made with ``setups`` of the same joints, and the joints.
 
@@ -41,6 +48,7 @@ class Body:
         self.names = in_order(joints)
         self._park_rad = dict(park_rad or {})
         self._let_go = False
+        self._gentle_deg_s = gentle_deg_s
         self._set_up = tuple(joints[name] for name in self.names)
         self._take(self._set_up)
         # Before the first answer: the centre, of an age that says so.
@@ -56,15 +64,17 @@ class Body:
         self._to_rad = tuple(linkage.angle_rad for linkage in self._linkages)
         self._to_rate = tuple(linkage.rate_rad for linkage in self._linkages)
 
-    def retune(self, joints: Mapping[str, JointParams]) -> dict[int, tuple[float, float]]:
+    def retune(
+        self, joints: Mapping[str, JointParams], gentle_deg_s: float
+    ) -> dict[int, tuple[float, float]]:
         """Count angles otherwise from now on; the servos are set up anew when torque comes on.
 
         Gives, for each joint whose angles are other ones now, (factor, offset in radians):
         what was x is factor x + offset.
         """
-        before = self._joints
+        before, self._gentle_deg_s = self._joints, gentle_deg_s
         self._take(tuple(joints[name] for name in self.names))
-        self.bus.retune(setups(joints, self._park_rad))
+        self.bus.retune(setups(joints, self._park_rad, self._gentle_deg_s))
         return {
             i: (
                 now.angle_rad(old.steps(1.0)) - now.angle_rad(old.steps(0.0)),

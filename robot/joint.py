@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from math import ceil, floor, pi, radians
 
 from drivers.servo_models import SERVOS, ServoFacts
+from drivers.slow_entry import ENTRY_DEG_S
 from drivers.types import ServoSetup
 from robot.linkage import Curve, Linkage, Straight
 from robot.safety.motion import JointLimit
@@ -199,11 +200,14 @@ class JointParams:
             facts.highest_v,
         )
 
-    def setup(self, name: str = "", rest_rad: float | None = None) -> ServoSetup:
+    def setup(
+        self, name: str = "", rest_rad: float | None = None, gentle_deg_s: float = ENTRY_DEG_S
+    ) -> ServoSetup:
         """Give what the bus must know: the range rounded inwards, speed and acceleration there.
 
         rest_rad: where the joint is taken to be when the torque comes on, for a servo that
             does not tell its place: the parking pose
+        gentle_deg_s: it is led into its range no faster
         """
         linkage, facts = self.made(), self.facts
         ends = sorted(linkage.steps(radians(end)) for end in (self.min_deg, self.max_deg))
@@ -221,4 +225,5 @@ class JointParams:
             radians(self.max_accel_deg_s2) * linkage.steepest,
             None if rest_rad is None or facts.measured else round(linkage.steps(rest_rad)),
             None if own is None else own * facts.steps_per_turn / 360.0,
+            radians(min(ENTRY_DEG_S, gentle_deg_s)) * linkage.steepest,
         )

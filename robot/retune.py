@@ -180,6 +180,8 @@ class Retuner:
         said = self._put_joints(old, new)
         if bends or new.ranges != old.ranges:
             parts.guard.go_gently()  # wishes are elsewhere all at once
+        if new.loop.rate_hz != old.loop.rate_hz:
+            parts.guard.pace(1.0 / new.loop.rate_hz)
         if new.tracks != old.tracks:
             parts.tracker.retune(new.tracks)
         placed, was_placed = self._placed.camera(new), self._placed.camera(old)
@@ -199,9 +201,10 @@ class Retuner:
         if (new.joints, new.guard) == (old.joints, old.guard):
             return ()
         parts, joints, before = self.parts, self._lasting(new), self._lasting(old)
-        others = joints != before
+        gentle_deg_s = new.guard.gentle_speed_deg_s
+        others = (joints, gentle_deg_s) != (before, old.guard.gentle_speed_deg_s)
         if others:
-            for i, (factor, offset_rad) in parts.body.retune(joints).items():
+            for i, (factor, offset_rad) in parts.body.retune(joints, gentle_deg_s).items():
                 parts.guard.recount(i, factor, offset_rad)
         if new.guard != old.guard or limits(joints) != limits(before):
             parts.guard.retune(new.guard, limits(joints))

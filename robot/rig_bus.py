@@ -52,7 +52,7 @@ def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
 
 def rig_setups(rig: Rig) -> tuple[ServoSetup, ...]:
     """Give what buses must know of a rig's servos, in the order of its joints."""
-    return setups(rig.joints, park_rad(rig))
+    return setups(rig.joints, park_rad(rig), rig.guard.gentle_speed_deg_s)
 
 
 def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:

@@ -15,9 +15,9 @@ buses:
 """
 NECK_JOINTS = """
   neck_yaw: {id: 7, model: xc330-m288, bus: neck, min_deg: -60.0, max_deg: 60.0,
-    max_speed_deg_s: 200.0, max_accel_deg_s2: 2000.0}
+    max_speed_deg_s: 200.0, max_accel_deg_s2: 2000.0, gains: [2000, 0, 14000]}
   neck_pitch: {id: 1, model: sts3215, bus: tilt, min_deg: -25.0, max_deg: 25.0,
-    max_speed_deg_s: 150.0, max_accel_deg_s2: 1500.0}
+    max_speed_deg_s: 150.0, max_accel_deg_s2: 1500.0, gains: [32, 0, 64]}
 """
 
 

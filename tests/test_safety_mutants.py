@@ -21,7 +21,7 @@ from robot.safety.collisions import CollisionParams
 from robot.types import JointState
 
 ROOM = Path(__file__).parents[1] / "robot" / "safety"
-PARTS = ("motion", "stuck", "health", "collisions", "guard")
+PARTS = ("motion", "stuck", "health", "collisions", "late_ticks", "guard")
 DT = 0.005
 YAW, PITCH, LID = 6, 7, 4
 JOINT = YAW
@@ -159,6 +159,26 @@ def stopped_loop(m: ModuleType) -> None:
     for t_s in (10.0, 9.0, nan, inf):
         verdict = bench.guard.check((0.8,) * 9, state, 0.0, t_s)
         assert verdict.reasons == ("all: time stands still",) and verdict.level == "hold"
+
+
+def late(m: ModuleType) -> None:
+    """A joint at full speed, ticks that do not come: it goes on from its goal, softly."""
+    limit = m.JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
+    soft = radians(500.0)
+    params = m.GuardParams(late_ms=50.0, late_accel_deg_s2=500.0)
+    for missed in (2, 10, 400):
+        guard = m.Guard(params, (limit,) * 9, JOINTS, period_s=DT)
+        guard.reset(0.0, (LOW,) * 9)
+        guard._gentle = [False] * 9
+        t_s, before, speed = 0.0, LOW, 0.0
+        for k in range(16):
+            t_s += DT if k != 8 else missed * DT
+            joints = JointState((before,) * 9, (0.0,) * 9, (t_s,) * 9, ())
+            now = guard.check((HIGH,) * 9, joints, 0.0, t_s).command_rad[0]
+            if k >= 8:
+                braked = max(0.0, speed - ACCEL * (missed - 1) * DT) if k == 8 else speed
+                assert (now - before) / DT <= braked + soft * DT + 1e-9
+            before, speed = now, (now - before) / DT
 
 
 def not_finite(m: ModuleType) -> None:
@@ -413,6 +433,7 @@ CHECKS: tuple[Callable[[ModuleType], None], ...] = (
     acceleration,
     no_overshoot,
     stopped_loop,
+    late,
     not_finite,
     stale_joints,
     stale_picture,
@@ -433,7 +454,7 @@ CHECKS: tuple[Callable[[ModuleType], None], ...] = (
     slow_joint,
 )
 
-MOTION, STUCK, HEALTH, COLLISIONS, GUARD = PARTS
+MOTION, STUCK, HEALTH, COLLISIONS, LATE, GUARD = PARTS
 Mutation = tuple[str, str, str, Callable[[ModuleType], None]]
 MUTATIONS: tuple[Mutation, ...] = (
     # position, and the way to brake before its end
@@ -477,7 +498,12 @@ MUTATIONS: tuple[Mutation, ...] = (
         no_overshoot,
     ),
     # time
-    (GUARD, "dt_s = min(since_s, _LONGEST_TICK_S)", "dt_s = since_s", stopped_loop),
+    (LATE, "return self.period_s, since_s", "return since_s, since_s", stopped_loop),
+    (LATE, "return self.period_s, since_s", "return since_s, since_s", late),
+    (LATE, "self._soft_until_s = t_s + soft_s", "pass", late),
+    (GUARD, "            self._motion.left_alone(missed_s)", "            pass", late),
+    (GUARD, "soft = min(soft, self._late_accel)", "pass", late),
+    (MOTION, "- limit.accel_rad_s2 * for_s", "", late),
     (GUARD, "since_s > 0.0 and isfinite(since_s)", "isfinite(since_s)", stopped_loop),
     (GUARD, "since_s > 0.0 and isfinite(since_s)", "since_s > 0.0", stopped_loop),
     # numbers and ages

@@ -13,6 +13,7 @@ from drivers.dynamixel.setup import speed_units
 from drivers.dynamixel.table import REGISTERS, WATCHDOG_UNIT_S
 from drivers.dynamixel.torque import TRIPPED, heal_tripped
 from drivers.dynamixel.views import Sample
+from drivers.slow_entry import SlowEntry
 from drivers.types import ServoReading, ServoSetup
 
 CHECK_S = 1.0
@@ -51,7 +52,7 @@ class Care:
         self._readings = readings
         self._covered = covered
         self.engaged = False
-        self._entering: set[int] = set()
+        self._entry = SlowEntry(setups)
         self._unnamed: set[int] = set()
         self._suspects: set[int] = set()
         self._rearmed: set[int] = set()
@@ -62,7 +63,7 @@ class Care:
     def take_on(self, entering: Collection[int]) -> None:
         """Begin to look after servos under torque; some of them are outside their limits."""
         self.engaged = True
-        self._entering = set(entering)
+        self._entry.begin(entering)
         self._line.starving_s, self._line.tries = self._watchdog * WATCHDOG_UNIT_S or inf, 1
         self._readings.expect_torque(True)
         self._readings.places.forget()
@@ -70,7 +71,7 @@ class Care:
     def let_go(self) -> None:
         """Leave servos without torque alone."""
         self.engaged = False
-        self._entering.clear()
+        self._entry.clear()
         self._suspects.clear()
         self._rearmed.clear()
         self._line.starving_s, self._line.starved, self._line.tries = inf, False, TRIES
@@ -128,8 +129,8 @@ class Care:
         """
         if now_s >= self._due_s:
             self._do_due(readings, group, now_s)
-        if self._entering:
-            self._mind_entry(readings)
+        if self._entry:
+            self._mind_entry(readings, now_s)
         if self._rearmed:
             self._mark_rearmed(readings)
 
@@ -177,9 +178,7 @@ class Care:
             readings[slot] = self._readings.held(slot, position, at_s, self.engaged)
             if self.engaged:
                 self._rearmed.add(servo_id)
-                setup = self._setups[servo_id]
-                if not setup.min_steps <= position <= setup.max_steps:
-                    self._entering.add(servo_id)
+                self._entry.add_outside(servo_id, position)
 
     def _mark_rearmed(self, readings: list[ServoReading | None]) -> None:
         for i, servo_id in enumerate(self._ids):
@@ -199,16 +198,13 @@ class Care:
             for servo_id, torque in self._line.ask(tuple(latched), "torque_enable").items():
                 self._readings.torque(self._ids.index(servo_id), torque)
 
-    def _mind_entry(self, readings: Sequence[ServoReading | None]) -> None:
-        """Give back its speed to every joint that has come inside its limits."""
-        for servo_id, reading in zip(self._ids, readings, strict=True):
-            if servo_id not in self._entering or reading is None:
-                continue
-            setup = self._setups[servo_id]
-            if setup.min_steps <= reading.position_steps <= setup.max_steps:
-                self._entering.discard(servo_id)
-                speed = speed_units(setup.max_speed_steps_s)
-                self._line.write_all((servo_id,), "profile_velocity", (speed,))
+    def _mind_entry(self, readings: list[ServoReading | None], now_s: float) -> None:
+        """Give back its speed, confirmed, to every joint that has come inside its limits."""
+        for servo_id in self._entry.arrived(self._ids, readings, now_s):
+            speed = speed_units(self._setups[servo_id].max_speed_steps_s)
+            self._line.write_all((servo_id,), "profile_velocity", (speed,))
+            if self._line.ask((servo_id,), "profile_velocity").get(servo_id) == speed:
+                self._entry.end(servo_id)
 
     # --- asking in turn
 

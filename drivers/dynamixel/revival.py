@@ -13,10 +13,8 @@ from drivers.dynamixel.setup import Fitting, speed_units
 from drivers.dynamixel.table import MODELS, STEPS_PER_TURN
 from drivers.dynamixel.torque import find_latched, insist, positions, switch_off, switch_on
 from drivers.errors import ServoFault, ServoMissing
+from drivers.slow_entry import entry_speed_steps_s
 from drivers.types import ServoSetup
-
-ENTRY_STEPS_S = 30.0 / 360.0 * STEPS_PER_TURN
-"""Speed at which a joint found outside its limits is brought inside."""
 
 
 class Revival:
@@ -128,9 +126,13 @@ class Revival:
 
     def entry_speeds(self, ids: Sequence[int], outside: Collection[int]) -> list[int]:
         """Give Profile Velocities, slow for those outside their limits."""
-        slow = speed_units(ENTRY_STEPS_S)
-        speeds = [speed_units(self._setups[i].max_speed_steps_s) for i in ids]
-        return [min(slow, v) if i in outside else v for i, v in zip(ids, speeds, strict=True)]
+        setups = [self._setups[i] for i in ids]
+        return [
+            speed_units(
+                entry_speed_steps_s(s, STEPS_PER_TURN) if s.id in outside else s.max_speed_steps_s
+            )
+            for s in setups
+        ]
 
     def clip(self, servo_id: int, steps: int) -> int:
         """Keep a goal inside a servo's limits."""

@@ -322,7 +322,7 @@ class FeetechBus:
         """
         entering, speeds = self._care.entering, self._speeds
         if entering:
-            speeds = self._revival.speeds(self._ids, entering)
+            speeds = self._revival.speeds(self._ids, entering.ids)
         withheld = self._care.withheld(self._now_s)
         if not withheld:
             self._line.send(self._goals.packet(goals, speeds))

@@ -1,6 +1,6 @@
 """Looking after STS servos between the exchanges: faults that come and go, torque, restarts."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from math import inf
 
 from drivers.bus_line import TRIES
@@ -10,6 +10,7 @@ from drivers.feetech.readings import Readings
 from drivers.feetech.revival import FAR_SIDE, Revival
 from drivers.feetech.table import REGISTERS, TORQUE_FULL, acceleration_units, name_errors
 from drivers.feetech.views import ARMED, Sample
+from drivers.slow_entry import SlowEntry
 from drivers.types import ServoReading, ServoSetup
 
 AGAIN_S = 0.25
@@ -51,7 +52,7 @@ class Care:
         self._health = health
         self._readings = readings
         self.engaged = False
-        self.entering: set[int] = set()
+        self.entering = SlowEntry(setups)
         self._suspects: set[int] = set()
         self._rearmed: set[int] = set()
         self._limp: set[int] = set()
@@ -65,7 +66,7 @@ class Care:
     def take_on(self, entering: Collection[int]) -> None:
         """Begin to look after servos under torque; some of them are outside their limits."""
         self.engaged = True
-        self.entering = set(entering)
+        self.entering.begin(entering)
         self._suspects.clear()
         self._limp.clear()
         self._doubted.clear()
@@ -80,7 +81,8 @@ class Care:
     def let_go(self) -> None:
         """Leave servos without torque alone."""
         self.engaged = False
-        for one in (self.entering, self._suspects, self._rearmed, self._limp, self._doubted):
+        self.entering.clear()
+        for one in (self._suspects, self._rearmed, self._limp, self._doubted):
             one.clear()
         self._line.tries = TRIES
         self._readings.expect_torque(False)
@@ -243,7 +245,8 @@ class Care:
         if self._suspects and now_s >= self._revive_at_s:
             self._revive(readings, group, now_s)
         if self.entering:
-            self._mind_entry(readings)
+            for servo_id in self.entering.arrived(self._ids, readings, now_s):
+                self.entering.end(servo_id)
         if self._rearmed:
             self._mark_rearmed(readings)
 
@@ -269,9 +272,7 @@ class Care:
             self._limp.discard(servo_id)
             if self.engaged:
                 self._rearmed.add(servo_id)
-                setup = self._setups[servo_id]
-                if not setup.min_steps <= position <= setup.max_steps:
-                    self.entering.add(servo_id)
+                self.entering.add_outside(servo_id, position)
 
     def _mark_rearmed(self, readings: list[ServoReading | None]) -> None:
         for i, servo_id in enumerate(self._ids):
@@ -279,12 +280,3 @@ class Care:
             if servo_id in self._rearmed and reading is not None:
                 self._rearmed.discard(servo_id)
                 readings[i] = reading._replace(rearmed=True)
-
-    def _mind_entry(self, readings: Sequence[ServoReading | None]) -> None:
-        """Give back its speed to every joint that has come inside its limits."""
-        for servo_id, reading in zip(self._ids, readings, strict=True):
-            if servo_id not in self.entering or reading is None:
-                continue
-            setup = self._setups[servo_id]
-            if setup.min_steps <= reading.position_steps <= setup.max_steps:
-                self.entering.discard(servo_id)

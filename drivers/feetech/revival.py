@@ -14,11 +14,8 @@ from drivers.feetech.setup import Fitting
 from drivers.feetech.table import MODELS, STEPS_PER_TURN, acceleration_units, speed_units
 from drivers.feetech.torque import insist, positions, switch_off, switch_on
 from drivers.feetech.turn import lost
+from drivers.slow_entry import entry_speed_steps_s
 from drivers.types import ServoSetup
-
-ENTRY_STEPS_S = 30.0 / 360.0 * STEPS_PER_TURN
-"""Speed at which a joint found outside its limits is brought inside."""
-
 
 FAR_SIDE = "stands beyond its encoder's zero: turn it into its range by hand"
 
@@ -180,9 +177,13 @@ class Revival:
 
     def speeds(self, ids: Sequence[int], outside: Collection[int]) -> list[int]:
         """Give Goal Speeds, slow for those outside their limits."""
-        slow = speed_units(ENTRY_STEPS_S)
-        speeds = [speed_units(self._setups[i].max_speed_steps_s) for i in ids]
-        return [min(slow, v) if i in outside else v for i, v in zip(ids, speeds, strict=True)]
+        setups = [self._setups[i] for i in ids]
+        return [
+            speed_units(
+                entry_speed_steps_s(s, STEPS_PER_TURN) if s.id in outside else s.max_speed_steps_s
+            )
+            for s in setups
+        ]
 
     def clip(self, servo_id: int, steps: int) -> int:
         """Keep a goal inside a servo's limits."""

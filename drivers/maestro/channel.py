@@ -6,10 +6,8 @@ from math import inf
 from drivers.maestro.commands import HIGHEST, LOWEST, Speech
 from drivers.maestro.params import HOBBY
 from drivers.maestro.ramp import SPEED_STEPS_S, Ramp, accel_units, speed_units
+from drivers.slow_entry import entry_speed_steps_s
 from drivers.types import ServoReading, ServoSetup
-
-ENTRY_STEPS_S = 30.0 / 360.0 * HOBBY["hobby"].steps_per_turn
-"""Speed at which a joint found outside its limits is brought inside."""
 
 RECENT_S = 0.1
 """The board may be so far behind the last goals: its own period is 20 ms, and lines are slow."""
@@ -71,7 +69,7 @@ class Channel:
         """Give the commands that arm its speed and acceleration."""
         speed = self.setup.max_speed_steps_s
         if self.entering:
-            speed = min(speed, ENTRY_STEPS_S)
+            speed = entry_speed_steps_s(self.setup, HOBBY["hobby"].steps_per_turn)
         self.ramp.speed_units = speed_units(speed)
         self.ramp.accel_units = accel_units(self.setup.max_accel_steps_s2)
         return speech.speed(self.id, self.ramp.speed_units) + speech.acceleration(
@@ -211,7 +209,7 @@ class Channel:
             bool(self.fault),
             self.on,
             self.fault,
-            rearmed=anew,
+            rearmed=anew or self.entering,
             measured=False,
         )
 

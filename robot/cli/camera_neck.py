@@ -88,8 +88,9 @@ def moving_neck(
         raise CameraCalibrationRefused("left out as you wished: nothing was written")
     with wires(rig, mock is not None, port) as wire:
         body = Body(guarded_rig_bus(rig, wire.paths), rig.joints, park_rad(rig))
-        guard = Guard(rig.guard, limits(rig.joints), rig.names)
         params = JogParams(speed_deg_s=_GENTLE_DEG_S)
+        period_s = 1.0 / params.rate_hz
+        guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=period_s)
         control = ManualControl(body, guard, RealClock(), params, stopped)
         with PowerDown(
             lambda again: parked(control, rig.park_deg, again),

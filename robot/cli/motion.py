@@ -181,7 +181,8 @@ def _control(
     rig: Rig, wire: Wires, speed: float, stopped: Callable[[], str | None]
 ) -> ManualControl:
     body = Body(guarded_rig_bus(rig, wire.paths), rig.joints, park_rad(rig))
-    guard = Guard(rig.guard, limits(rig.joints), rig.names)
+    period_s = 1.0 / JogParams().rate_hz
+    guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=period_s)
     gentle = rig.guard.gentle_speed_deg_s
     if speed > gentle:
         say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")

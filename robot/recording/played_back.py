@@ -45,9 +45,11 @@ class PlayedBody(Body):
         self._said.clear()
         self._newest = None
 
-    def retune(self, joints: Mapping[str, JointParams]) -> dict[int, tuple[float, float]]:
+    def retune(
+        self, joints: Mapping[str, JointParams], gentle_deg_s: float
+    ) -> dict[int, tuple[float, float]]:
         """Count angles otherwise from now on."""
-        return self._body.retune(joints)
+        return self._body.retune(joints, gentle_deg_s)
 
     def reach(self) -> tuple[JointLimit, ...]:
         """Give the ranges and speeds that servos keep to as they were set up."""

@@ -13,13 +13,12 @@ from typing import Literal, NamedTuple
 from robot.safety.collisions import Collisions
 from robot.safety.guard_params import GuardParams as GuardParams
 from robot.safety.health import Health
+from robot.safety.late_ticks import LateTicks
 from robot.safety.motion import JointLimit as JointLimit
 from robot.safety.motion import Motion
 from robot.safety.stuck import Stuck
 from robot.types import JointAngles, JointState, Level, Verdict
 
-# A loop that was stopped for seconds goes on from where it was, not where it would be by now.
-_LONGEST_TICK_S = 0.1
 _NEAR_RAD = radians(1.0)
 _ROUNDING_RAD = 1e-9
 _LEVELS: tuple[Level, ...] = ("ok", "limited", "hold", "limp")
@@ -48,17 +47,21 @@ class Guard:
         limits: tuple[JointLimit, ...],
         joints: tuple[str, ...],
         reach: Callable[[], tuple[JointLimit, ...]] | None = None,
+        period_s: float = 0.1,
     ) -> None:
         """Take one limit a joint, and the joints' names.
 
         reach: gives the ranges and speeds that the servos themselves keep to, which hold
             beside limits that are changed; None: all
+        period_s: nominal time between ticks; one much later is not made up for
 
         Raises:
             ValueError: a collision leaves no pose inside the limits.
         """
         self._take(params)
         self._wanted, self._reach = limits, reach
+        self._late = LateTicks(period_s)
+        self._soft = False
         self._names = joints
         self._neck = tuple(name.startswith("neck") for name in joints)
         self._motion = Motion(self._within_reach())
@@ -76,6 +79,11 @@ class Guard:
         self._params = params
         self._gentle_speed = radians(params.gentle_speed_deg_s)
         self._gentle_accel = radians(params.gentle_accel_deg_s2)
+        self._late_accel = radians(params.late_accel_deg_s2)
+
+    def pace(self, period_s: float) -> None:
+        """Expect ticks at another rate from now on."""
+        self._late.period_s = period_s
 
     def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
         """Take other limits without a jump; what has been counted and found stays.
@@ -206,7 +214,10 @@ class Guard:
         self._t_s = t_s
         if self._waiting or self._outside:
             self._change()
-        dt_s = min(since_s, _LONGEST_TICK_S)
+        dt_s, missed_s = self._late.split(since_s, t_s, self._params.late_ms / 1e3)
+        if missed_s > 0.0:
+            self._motion.left_alone(missed_s)
+        self._soft = self._late.soft(t_s)
         self._health.step(joints, dt_s)
         if self._collisions:
             self._collisions.look(self._motion, wish_rad, joints.position_rad, self._held)
@@ -256,7 +267,8 @@ class Guard:
     def _all_well(self, joints: JointState) -> bool:
         """Tell whether nothing but limits, ages and distances need be looked at."""
         return not (
-            not self._health.fine
+            self._soft
+            or not self._health.fine
             or True in self._gentle
             or True in self._held
             or self._collisions.exits
@@ -270,7 +282,8 @@ class Guard:
     def _well(self, i: int, joints: JointState) -> bool:
         """Tell the same of one joint."""
         return not (
-            self._gentle[i]
+            self._soft
+            or self._gentle[i]
             or self._held[i]
             or self._health.share[i] < 1.0
             or self._health.held[i]
@@ -394,13 +407,15 @@ class Guard:
         began = motion.command[i]
         target = min(max(wish, motion.low[i]), motion.high[i])
         top, soft = share * limit.speed_rad_s, share * limit.accel_rad_s2
+        if self._soft:
+            soft = min(soft, self._late_accel)
         if self._gentle[i]:
             lead = self._stuck.lead_rad
             pull = min(max(wish, position - lead), position + lead) if self._retrying[i] else wish
             motion.seek(i, pull, dt_s, min(top, self._gentle_speed), min(soft, self._gentle_accel))
             if abs(target - motion.command[i]) < _NEAR_RAD and self._t_s >= self._gentle_until_s[i]:
                 self._gentle[i] = self._retrying[i] = False
-        elif share < 1.0 or not motion.follow(i, wish, dt_s):
+        elif self._soft or share < 1.0 or not motion.follow(i, wish, dt_s):
             motion.chase(i, wish, dt_s, top, soft)
         if abs(wish - target) > _ROUNDING_RAD:
             outside = not limit.low_rad <= wish <= limit.high_rad
@@ -409,5 +424,7 @@ class Guard:
             return "starting slowly"
         if abs(target - motion.command[i]) <= _ROUNDING_RAD:
             return ""
+        if self._soft:
+            return "after a late tick"
         fast = abs(target - began) > limit.speed_rad_s * dt_s
         return self._health.why[i] or ("too fast" if fast else "too hard")

@@ -56,6 +56,24 @@ class GuardParams:
             "says": "acceleration after torque-on and while parking",
         },
     )
+    late_ms: float = field(
+        default=50.0,
+        metadata={
+            "low": 0.0,
+            "high": 5000.0,
+            "unit": "ms",
+            "says": "joints gather speed softly for so long after a tick that missed its slot",
+        },
+    )
+    late_accel_deg_s2: float = field(
+        default=15000.0,
+        metadata={
+            "low": 10.0,
+            "high": 200000.0,
+            "unit": "deg/s2",
+            "says": "most acceleration while they do; servos brake when no goals come",
+        },
+    )
     health: HealthParams = field(
         default_factory=HealthParams, metadata={"says": "what the servos bear"}
     )

@@ -5,7 +5,7 @@ later sequence of braking steps, a joint that keeps this can always stop in time
 the length of the ticks to come.
 """
 
-from math import inf, sqrt
+from math import copysign, inf, sqrt
 from typing import NamedTuple
 
 _ROUNDING_RAD = 1e-9
@@ -48,6 +48,13 @@ class Motion:
         """Begin anew from an angle, at rest."""
         self.command[i] = self._wished[i] = angle_rad
         self.speed[i] = 0.0
+
+    def left_alone(self, for_s: float) -> None:
+        """Note that servos got no goals for a time, in which they braked to their last ones."""
+        for i, limit in enumerate(self.limits):
+            left = abs(self.speed[i]) - limit.accel_rad_s2 * for_s
+            self.speed[i] = copysign(left, self.speed[i]) if left > 0.0 else 0.0
+            self._wished[i] = self.command[i]
 
     def recount(self, i: int, factor: float, offset_rad: float) -> None:
         """Count a joint's angles otherwise: what was x is factor x + offset from now on."""

@@ -1,0 +1,102 @@
+"""Servos that stand outside their limits and are led inside slowly.
+
+A goal outside is never sent, so such a servo gets the nearest end and a low speed of its own.
+It has arrived when it is at that end, or stands still short of it under its load. Until then
+plans must not run on, or the servo leaps after them as soon as its full speed comes back: each of
+its readings is marked ``rearmed``, which makes plans begin where it is.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from drivers.types import ServoReading, ServoSetup
+
+ENTRY_DEG_S = 30.0
+"""Speed at a joint that is brought inside its limits."""
+
+NEAR_STEPS = 6
+"""Friction stops a servo so near its goal."""
+
+STILL_STEPS, STILL_S = 2, 0.3
+"""A servo that moves no farther in such a time stands still."""
+
+
+class _Place(NamedTuple):
+    """Where a servo was, and since when it has not gone farther."""
+
+    steps: int
+    since_s: float
+
+
+class SlowEntry:
+    """Knows which servos are on their slow way into their limits.
+
+    Args:
+        setups: the servos by id.
+    """
+
+    def __init__(self, setups: Mapping[int, ServoSetup]) -> None:
+        self._setups = setups
+        self._places: dict[int, _Place | None] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._places)
+
+    def __contains__(self, servo_id: object) -> bool:
+        return servo_id in self._places
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Return those on their way."""
+        return tuple(self._places)
+
+    def begin(self, ids: Iterable[int]) -> None:
+        """Lead these inside, and no others any more."""
+        self._places = dict.fromkeys(ids)
+
+    def add_outside(self, servo_id: int, steps: int) -> None:
+        """Lead one inside if it stands outside."""
+        if self._outside(servo_id, steps):
+            self._places[servo_id] = None
+
+    def clear(self) -> None:
+        """Forget all of them."""
+        self._places.clear()
+
+    def arrived(
+        self, ids: Sequence[int], readings: list[ServoReading | None], now_s: float
+    ) -> tuple[int, ...]:
+        """Mark the readings of those on their way, and return those that have arrived."""
+        there = []
+        for slot, servo_id in enumerate(ids):
+            reading = readings[slot]
+            if servo_id not in self._places or reading is None:
+                continue
+            readings[slot] = reading._replace(rearmed=True)
+            if self._is_there(servo_id, reading.position_steps, now_s):
+                there.append(servo_id)
+        return tuple(there)
+
+    def end(self, servo_id: int) -> None:
+        """Let one go at its full speed again."""
+        self._places.pop(servo_id, None)
+
+    def _is_there(self, servo_id: int, steps: int, now_s: float) -> bool:
+        if not self._outside(servo_id, steps, NEAR_STEPS):
+            return True
+        before = self._places[servo_id]
+        if before is None or abs(steps - before.steps) > STILL_STEPS:
+            self._places[servo_id] = _Place(steps, now_s)
+            return False
+        return now_s - before.since_s >= STILL_S
+
+    def _outside(self, servo_id: int, steps: int, room_steps: int = 0) -> bool:
+        setup = self._setups[servo_id]
+        return not setup.min_steps - room_steps <= steps <= setup.max_steps + room_steps
+
+
+def entry_speed_steps_s(setup: ServoSetup, steps_per_turn: float) -> float:
+    """Return the speed of a servo that is led inside: never above its own top speed."""
+    wanted = setup.entry_speed_steps_s
+    slow = ENTRY_DEG_S / 360.0 * steps_per_turn if wanted is None else wanted
+    return min(slow, setup.max_speed_steps_s)

@@ -1,0 +1,308 @@
+"""Emulated rigs in simulated time, judged every millisecond on their own true shafts.
+
+What a servo tells is rounded, late and may be wrong; here the emulator itself is asked. Speed is
+the way in 5 ms, acceleration the change of the mean speed from 10 ms to the next 10: a motor's own
+current loop, and the millisecond at which a goal arrives, are below that and no news of a joint.
+Hobby servos hear a pulse every 20 ms and are emulated in steps of 10: there it is 20 and 20 ms.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import robot.assemble
+from config.schema import Rig
+from robot.assemble import Assembly, assemble
+from robot.body import Body
+from robot.choice import Choice
+from robot.clock import SimulatedClock
+from robot.emulated_rig import emulated_lines, place_of
+from robot.rig_angles import limits, park_rad
+from robot.rig_bus import rig_bus
+from robot.safety.guard import Guard
+from robot.types import JointAngles
+from sim_mock.device import Device
+from sim_mock.emulated import build
+from sim_mock.ports import InProcessPort
+
+MS_S = 0.001
+SPEED_MS, ACCEL_MS = 5, 10
+PULSE_MS = 20
+GROUPS = {"eye": "eyes", "lid": "lids", "neck": "neck"}
+STOP_DEG = 4.0
+"""Emulated mechanical stops lie so far beyond a joint's range (robot/emulated_rig.py)."""
+
+
+def group_of(joint: str) -> str:
+    """Return the group of a joint: eyes, lids or neck."""
+    return next(group for part, group in GROUPS.items() if part in joint)
+
+
+class Shafts(SimulatedClock):
+    """A simulated clock that looks at every true joint in each millisecond that passes.
+
+    Args:
+        rig: the joints.
+
+    Attributes:
+        angles_rad: one row a millisecond since the last ``clear``, in the order of the joints.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        super().__init__()
+        self.rig = rig
+        self.devices: dict[str, Device] = {}
+        self.angles_rad: list[tuple[float, ...]] = []
+        self.looking = True
+        self._joints = [
+            (rig.joints[name].made(), rig.joints[name].bus, place_of(rig, name))
+            for name in rig.names
+        ]
+
+    def build(self, lines: dict[str, object]) -> dict[str, InProcessPort]:
+        """Build the emulated lines on this clock."""
+        self.devices = {name: build(line, self.now_s) for name, line in lines.items()}
+        return {name: InProcessPort(device) for name, device in self.devices.items()}
+
+    def truth(self) -> JointAngles:
+        """Return where the joints truly are now."""
+        steps = {name: device.positions_steps() for name, device in self.devices.items()}
+        return tuple([made.angle_rad(steps[bus][place]) for made, bus, place in self._joints])
+
+    def sleep_until(self, t_s: float) -> None:
+        """Let time pass, a millisecond after the other."""
+        if self.looking and self.devices:
+            while self._now_s + MS_S < t_s - 1e-9:
+                self._now_s = round(self._now_s / MS_S + 1.0) * MS_S
+                self.angles_rad.append(self.truth())
+            super().sleep_until(t_s)
+            self.angles_rad.append(self.truth())
+        else:
+            super().sleep_until(t_s)
+
+    def clear(self) -> None:
+        """Forget what was seen but for what the next windows of time need."""
+        del self.angles_rad[: -2 * PULSE_MS]
+
+
+class Worst(NamedTuple):
+    """What a joint did at worst: degrees, seconds.
+
+    beyond_deg: beyond its range; speed_deg_s, accel_deg_s2: over 5 and 10 ms
+    stops: times that a mechanical stop was touched
+    """
+
+    beyond_deg: float
+    speed_deg_s: float
+    accel_deg_s2: float
+    stops: int
+
+    def joined(self, other: "Worst") -> "Worst":
+        """Return the worst of both."""
+        return Worst(*map(max, self[:3], other[:3]), self.stops + other.stops)
+
+
+class Judge:
+    """Gathers what true joints did at worst.
+
+    Args:
+        rig: the joints and their limits.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        joint_limits = np.array([limit[:4] for limit in limits(rig.joints)])
+        self.low, self.high, self.top, self.most = np.degrees(joint_limits.T)
+        self.pulsed = np.array([rig.bus_of(name).kind == "maestro" for name in rig.names])
+        self.worst = {name: Worst(-180.0, 0.0, 0.0, 0) for name in rig.names}
+
+    def take(self, shafts: Shafts) -> None:
+        """Judge what was seen since the last time, and forget it."""
+        seen: NDArray[np.float64] = np.degrees(np.array(shafts.angles_rad))
+        shafts.clear()
+        if len(seen) <= 2 * PULSE_MS:
+            return
+        speed = np.where(self.pulsed, fastest(seen, PULSE_MS), fastest(seen, SPEED_MS))
+        accel = np.where(self.pulsed, hardest(seen, PULSE_MS), hardest(seen, ACCEL_MS))
+        beyond = np.maximum(seen - self.high, self.low - seen)
+        touched = beyond >= STOP_DEG - 0.01
+        hits = np.count_nonzero(touched[1:] & ~touched[:-1], axis=0)
+        for i, name in enumerate(self.rig.names):
+            now = Worst(
+                float(beyond[:, i].max()),
+                float(speed[i]),
+                float(accel[i]),
+                int(hits[i]),
+            )
+            self.worst[name] = self.worst[name].joined(now)
+
+    def by_group(self) -> dict[str, tuple[float, float, float, int]]:
+        """Return beyond_deg, speed / limit, accel / limit and stops, by groups of joints."""
+        found: dict[str, tuple[float, float, float, int]] = {}
+        for i, name in enumerate(self.rig.names):
+            one, before = self.worst[name], found.get(group_of(name), (-180.0, 0.0, 0.0, 0))
+            now = (one.beyond_deg, one.speed_deg_s / self.top[i], one.accel_deg_s2 / self.most[i])
+            found[group_of(name)] = (*map(max, before[:3], now), before[3] + one.stops)  # type: ignore[assignment]
+        return found
+
+
+def fastest(angles: NDArray[np.float64], over_ms: int) -> NDArray[np.float64]:
+    """Return the highest speed of each column over so many rows, one a millisecond."""
+    return np.abs(angles[over_ms:] - angles[:-over_ms]).max(axis=0) / (over_ms * MS_S)
+
+
+def hardest(angles: NDArray[np.float64], over_ms: int) -> NDArray[np.float64]:
+    """Return the highest change of the mean speed of so many rows to the next so many."""
+    way = angles[2 * over_ms :] - 2.0 * angles[over_ms:-over_ms] + angles[: -2 * over_ms]
+    return np.abs(way).max(axis=0) / (over_ms * MS_S) ** 2
+
+
+@contextmanager
+def looked_at(rig: Rig, choice: Choice) -> Iterator[tuple[Assembly, Shafts]]:
+    """Assemble a rig whose true shafts are looked at."""
+    shafts = Shafts(rig)
+    was = robot.assemble.SimulatedClock, robot.assemble.build
+
+    def built(line: object, now_s: Callable[[], float]) -> Device:
+        device = build(line, now_s)  # type: ignore[arg-type]
+        name = next(n for n in lines if n not in shafts.devices and lines[n] == line)
+        shafts.devices[name] = device
+        return device
+
+    lines = emulated_lines(rig)
+    robot.assemble.SimulatedClock, robot.assemble.build = (lambda: shafts), built  # type: ignore
+    try:
+        made = assemble(rig, choice)
+    finally:
+        robot.assemble.SimulatedClock, robot.assemble.build = was  # type: ignore[misc]
+    try:
+        yield made, shafts
+    finally:
+        made.close()
+
+
+Late = Callable[[int], int]
+"""Gives, for a tick, how many slots after it are missed."""
+
+
+def on_time(tick: int) -> int:
+    """Miss no slot."""
+    return 0
+
+
+def sometimes_late(seed: int, share: float, longest_slots: int) -> Late:
+    """Return a pattern of missed slots: mostly a few, now and then up to the longest."""
+    rng = np.random.default_rng(seed)
+
+    def late(tick: int) -> int:
+        if rng.random() >= share:
+            return 0
+        return int(np.ceil(longest_slots ** rng.random()))
+
+    return late
+
+
+def run(
+    made: Assembly,
+    shafts: Shafts,
+    judge: Judge,
+    seconds: float,
+    late: Late = on_time,
+    before_tick: Callable[[Assembly, float], None] = lambda made, t_s: None,
+) -> int:
+    """Start a robot and run it; returns the number of ticks."""
+    made.robot.start(shafts)
+    period, t_s = 1.0 / made.loop.rate_hz, shafts.now_s()
+    began_s, slot, ticks = t_s, 0, 0
+    while t_s < began_s + seconds:
+        slot += 1 + late(ticks)
+        last_s = t_s
+        shafts.sleep_until(began_s + slot * period)
+        t_s = shafts.now_s()
+        before_tick(made, t_s)
+        made.robot.tick(t_s, t_s - last_s)
+        ticks += 1
+        if len(shafts.angles_rad) > 4000:
+            judge.take(shafts)
+    judge.take(shafts)
+    return ticks
+
+
+class Bench:
+    """A rig's guard and bus without gaze: wishes in, true shafts out.
+
+    Args:
+        rig: what is emulated.
+        where_rad: where joints truly stand at first, by name.
+    """
+
+    def __init__(self, rig: Rig, where_rad: dict[str, float] | None = None) -> None:
+        self.rig = rig
+        self.shafts = Shafts(rig)
+        ports = self.shafts.build(dict(emulated_lines(rig)))
+        self.names = rig.names
+        for name, angle in (where_rad or {}).items():
+            self.turn(name, angle)
+        self.body = Body(
+            rig_bus(rig, ports), rig.joints, park_rad(rig), rig.guard.gentle_speed_deg_s
+        )
+        self.guard = Guard(
+            rig.guard, limits(rig.joints), self.names, self.body.reach, 1.0 / rig.loop.rate_hz
+        )
+        self.period_s = 1.0 / rig.loop.rate_hz
+        self.slot = 0
+
+    def turn(self, name: str, angle_rad: float) -> None:
+        """Turn a limp joint by hand, as far as its stop."""
+        joint = self.rig.joints[name]
+        device, place = self.shafts.devices[joint.bus], place_of(self.rig, name)
+        steps = joint.steps(angle_rad) - device.positions_steps()[place]
+        if hasattr(device, "body"):
+            device.body.servos[place].turn(steps)
+        else:
+            device.servos[place].drive.turn(steps)  # type: ignore[attr-defined]
+
+    def start(self) -> None:
+        """Torque on where the joints are."""
+        goals = self.body.start()
+        self.guard.reset(self.shafts.now_s(), goals)
+        self._began_s = self.shafts.now_s()
+
+    def tick(self, wish_rad: JointAngles, missed_slots: int = 0) -> JointAngles:
+        """Run one tick after some missed slots; return what was sent."""
+        self.slot += 1 + missed_slots
+        self.shafts.sleep_until(self._began_s + self.slot * self.period_s)
+        t_s = self.shafts.now_s()
+        joints = self.body.read(t_s)
+        self.verdict = self.guard.check(wish_rad, joints, 0.0, t_s)
+        self.body.write(self.verdict.command_rad)
+        return self.verdict.command_rad
+
+    def stop(self) -> None:
+        """Torque off."""
+        self.body.let_go()
+
+    def resume(self) -> None:
+        """Torque on again where the joints are."""
+        goals = self.body.take_hold()
+        self._began_s, self.slot = self.shafts.now_s(), 0
+        self.guard.reset(self._began_s, goals)
+
+
+def restless(rig: Rig, seed: int, holds_s: float = 0.6) -> Callable[[float], JointAngles]:
+    """Return wishes that jump, each joint by itself, up to 5 deg outside its range."""
+    rng, over = np.random.default_rng(seed), np.radians(5.0)
+    ranges = [(limit.low_rad - over, limit.high_rad + over) for limit in limits(rig.joints)]
+    until_s, wished = [-1.0] * len(ranges), [0.0] * len(ranges)
+
+    def wish(t_s: float) -> JointAngles:
+        for i, (low, high) in enumerate(ranges):
+            if t_s >= until_s[i]:
+                until_s[i] = t_s + float(rng.uniform(0.05, holds_s))
+                wished[i] = float(rng.uniform(low, high))
+        return tuple(wished)
+
+    return wish
