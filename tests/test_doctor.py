@@ -400,7 +400,7 @@ def test_findings_in_words():
     assert together(["/dev/ttyUSB0", "j1 (servo 1)"]) == "/dev/ttyUSB0, j1 (servo 1)"
     fixable = Finding("warn", "w", "x", fixes=(Fix(1, "return_delay_time", 0, 250),))
     assert summed_up([finding, fixable], "desk", False) == (
-        "desk: 2 warn; gazerig doctor desk --fix mends 1 of them"
+        "desk: 2 warn; gazerig doctor --fix mends 1 of them"
     )
     assert "--fix" not in summed_up([fixable], "desk", True)
 

@@ -106,7 +106,7 @@ WISHES = (
     Wish("startup_configuration", 0, "warn", _startup),
     Wish(
         "homing_offset", 0, "warn", _homing, False,
-        "set it to 0 with Dynamixel Wizard 2.0, then gazerig calibrate this joint: its zero moves",
+        "set it to 0 with Dynamixel Wizard 2.0, then calibrate its zero anew: gazerig calibrate",
     ),
 )  # fmt: skip
 

@@ -55,5 +55,5 @@ def summed_up(findings: Sequence[Finding], rig: str, fixed: bool) -> str:
     counts = [(level, sum(f.level == level for f in findings)) for level in reversed(LEVELS)]
     words = ", ".join(f"{count} {level}" for level, count in counts if count)
     fixable = sum(bool(finding.fixes) for finding in findings)
-    offer = f"; gazerig doctor {rig} --fix mends {fixable} of them" if fixable and not fixed else ""
+    offer = f"; gazerig doctor --fix mends {fixable} of them" if fixable and not fixed else ""
     return f"{rig}: {words}{offer}"

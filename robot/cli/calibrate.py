@@ -69,7 +69,7 @@ def calibrate_joints(
 
     Hobby servos tell no place: you steer them by eye, and say the angles of some places.
     """
-    with clear_errors(), signals() as stopped:
+    with clear_errors(rig, port, mock), signals() as stopped:
         loaded = load_rig(rig)
         names = _names(loaded, joint)
         if dry_run and (clear_offset or set_middle):

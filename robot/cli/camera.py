@@ -101,7 +101,7 @@ def calibrate_camera(
     port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
 ) -> None:
     """Measure the lens and where the camera sits, with the printed board."""
-    with clear_errors(), signals() as stopped:
+    with clear_errors(rig, port, mock), signals() as stopped:
         loaded = load_rig(rig)
         board = CharucoBoard(_board(columns, rows, square, ruler))
         if loaded.camera.mount != "head" and what is not What.lens:

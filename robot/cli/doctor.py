@@ -17,6 +17,7 @@ from robot.bringup.kinds import KINDS
 from robot.bringup.servo_report import as_plain, grouped, summed_up
 from robot.cli import bench as bench
 from robot.cli.bench import JsonOption, console, progress, wipe
+from robot.cli.suggestions import completed
 from robot.cli.terminal import FAULT, RigArgument, clear_errors
 from robot.cli.wires import MockOption, PortOption, bus_label, setups_on, wires
 from robot.rig_bus import has_watchdog, release_plan
@@ -39,7 +40,7 @@ def doctor(
     as_json: JsonOption = False,
 ) -> None:
     """Examine every port and servo against the rig's YAML; every finding has its cure."""
-    with clear_errors():
+    with clear_errors(rig, port, mock):
         model = load_rig(rig)
         tell: Tell = (lambda _: None) if as_json else _tell
         with wires(model, mock, port) as wired:
@@ -51,6 +52,7 @@ def doctor(
                 findings = _examined(model, lines, tell)
         if as_json:
             rows = [as_plain(one, bus) for bus, some in findings.items() for one in some]
+            rows = [row | {"cure": completed(str(row["cure"]))} for row in rows]
             print(json.dumps(rows))
         whole = [one for some in findings.values() for one in some]
         tell(summed_up(whole, rig, fix))
@@ -87,13 +89,13 @@ def _examine(rig: Rig, bus: str, line: BlockingPort) -> list[Finding]:
 
 def _tell(line: str) -> None:
     """Print a line of the doctor's; all of it goes the same way, so that its order stays."""
-    level, space, rest = line.partition(" ")
+    level, space, rest = completed(line).partition(" ")
     out = console()
     if level in STYLES:
         out.print(f"[{STYLES[level]}]{level:5}[/]", end=space)
         out.print(rest, markup=False)
     else:
-        out.print(line, markup=False)
+        out.print(completed(line), markup=False)
 
 
 def _fix(

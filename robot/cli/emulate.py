@@ -109,7 +109,7 @@ def emulate(
 
     Type `help` for the commands; Ctrl-C ends it.
     """
-    with clear_errors():
+    with clear_errors(rig):
         if sum(one is not None for one in (servos, maestro, rig)) != 1:
             raise SetupError(f"name the servos: --servos {EXAMPLE}, or --maestro 12, or --rig NAME")
         _see_what_fits(maestro is not None, firmware, device, crc)

@@ -80,7 +80,7 @@ def calibrate_face(
     port: PortOption = None,
 ) -> None:
     """Steer the gaze over your face to each of its parts, and write down where they are."""
-    with clear_errors(), signals() as stopped:
+    with clear_errors(rig, port, mock), signals() as stopped:
         loaded = load_rig(rig)
         refuse_unwritable(rig, out)
         lines = Lines(answers)

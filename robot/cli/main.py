@@ -85,7 +85,7 @@ def fit_scanpath(
 @app.command()
 def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and nothing else: all faults at once, no servo is touched."""
-    with clear_errors():
+    with clear_errors(rig):
         found: Rig = load_rig(rig)
         say(f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}")
 

@@ -47,7 +47,7 @@ def monitor(
     port: PortOption = None,
 ) -> None:
     """Watch all servos; reads alone: nothing is written, torque stays as it is."""
-    with clear_errors(), signals() as stopped:
+    with clear_errors(rig, port, mock), signals() as stopped:
         found, clock = load_rig(rig), RealClock()
         with wires(found, mock, port) as wire, _looks(found, wire) as looks:
             joints = {name: found.joints[name] for name in found.names}

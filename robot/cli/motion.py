@@ -62,7 +62,7 @@ def jog(
     port: PortOption = None,
 ) -> None:
     """Move one joint slowly while the others hold: gazerig jog neck_yaw 20."""
-    with clear_errors():
+    with clear_errors(rig, port, mock):
         loaded = load_rig(rig)
         refuse_beyond(joint, deg, loaded.names, limits(loaded.joints))
     with _commanded(loaded, _Way(mock, port, yes), speed, hold, not no_park) as control:
@@ -82,7 +82,7 @@ def home(
     port: PortOption = None,
 ) -> None:
     """Move slowly to the centre: all joints to 0 deg, lids open; then torque off."""
-    with clear_errors():
+    with clear_errors(rig, port, mock):
         loaded = load_rig(rig)
     centre = dict.fromkeys(loaded.names, 0.0)
     centre.update({name: degrees(wide) for name, (_, wide) in lid_ends(loaded).items()})
@@ -108,7 +108,7 @@ def look_at_command(
     port: PortOption = None,
 ) -> None:
     """Turn eyes and head to a point and tell how well they meet it: gazerig look-at 1 0.2 0.3."""
-    with clear_errors():
+    with clear_errors(rig, port, mock):
         refuse_not_finite((x, y, z))
         loaded = load_rig(rig)
         # Imports vision as well, so only this command does, and before the torque is on: in

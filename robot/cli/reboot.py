@@ -32,7 +32,7 @@ def reboot(
     yes: YesOption = False,
 ) -> None:
     """Restart servos, which clears latched errors; their torque is off afterwards."""
-    with clear_errors():
+    with clear_errors(rig, port, mock):
         model = load_rig(rig)
         wanted: dict[str, list[int]] = {}
         for text in servos:

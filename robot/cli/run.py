@@ -116,7 +116,7 @@ def run(
     ] = None,
 ) -> None:
     """Run the head: gazerig run --mock, then open the page it names."""
-    with clear_errors():
+    with clear_errors(rig, port, mock):
         # Vision and emulator are heavy; `check` and `--help` do without them.
         from robot import session
         from robot.assemble import assemble

@@ -22,6 +22,7 @@ from robot.bringup.scan_report import board_plain, board_words, remarks, servo_p
 from robot.bringup.searching import RATES, Looked, found_of, known_kinds, plan, search
 from robot.cli import bench as bench
 from robot.cli.bench import JsonOption, console
+from robot.cli.suggestions import completed
 from robot.cli.terminal import FAULT, clear_errors, say
 from robot.cli.wires import MockOption, wires
 
@@ -50,7 +51,7 @@ def scan(
 
     Moves and changes nothing; only a Maestro's list of errors is cleared by asking for it.
     """
-    with clear_errors():
+    with clear_errors(rig, port, mock):
         rates, kinds = parse_bauds(bauds), _parse_kind(kind or "all")
         found_ports = bench.ports_here()
         if not as_json:
@@ -190,4 +191,4 @@ def _show(rounds: Sequence[Looked], where: str, wished: Sequence[BusKind], as_js
         for line in board_words(one):
             out.print(f"{where}: {line}", markup=False)
     for line in remarks(rounds, where, wished):
-        out.print(line, markup=False)
+        out.print(completed(line), markup=False)

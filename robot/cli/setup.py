@@ -36,7 +36,7 @@ def setup(
     yes: YesOption = False,
 ) -> None:
     """Give each servo its id and baud rate, one connected at a time; try a Maestro's channels."""
-    with clear_errors():
+    with clear_errors(rig, port, mock):
         model = load_rig(rig)
         wanted = _known_joints(joint or list(model.names), model.names)
         left: list[str] = []
@@ -50,7 +50,7 @@ def setup(
                 left += _chain(model, rig, bus, mine, port, mock, yes)
         if left:
             say(f"skipped: {', '.join(left)}")
-        say(f"done: {len(wanted) - len(left)} of {len(wanted)}. Next: gazerig doctor {rig}")
+        say(f"done: {len(wanted) - len(left)} of {len(wanted)}. Next: gazerig doctor")
 
 
 def _known_joints(names: list[str], known: tuple[str, ...]) -> tuple[str, ...]:

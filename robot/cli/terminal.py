@@ -18,6 +18,7 @@ import typer
 from config.load import ConfigError, shipped_names
 from drivers.errors import DriverError, SetupError
 from robot.cli.line_writer import LineWriter
+from robot.cli.suggestions import completed, speaking_of
 from robot.interrupts import Interrupts
 
 BAD_INPUT = 2
@@ -60,8 +61,19 @@ ForceOption = Annotated[
 
 
 @contextlib.contextmanager
-def clear_errors() -> Iterator[None]:
-    """Turn what a person can mend into its message and exit code 2."""
+def clear_errors(
+    rig: str | None = None, port: str | None = None, mock: bool = False
+) -> Iterator[None]:
+    """Turn what a person can mend into its message and exit code 2.
+
+    rig, port, mock: as the command was given them, for the commands that messages suggest
+    """
+    with speaking_of(rig, port, mock), _errors_said():
+        yield
+
+
+@contextlib.contextmanager
+def _errors_said() -> Iterator[None]:
     try:
         yield
     except (ConfigError, SetupError) as error:
@@ -156,7 +168,7 @@ def signals() -> Interrupts:
 
 def say(line: str) -> None:
     """Write a line for people; the status line before it is wiped. Never waits, never raises."""
-    _write(f"{line}\n", wiped=True)
+    _write(f"{completed(line)}\n", wiped=True)
 
 
 def status(line: str) -> None:
