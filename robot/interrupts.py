@@ -13,6 +13,9 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _BACKGROUND = (signal.SIGTTIN, signal.SIGTTOU)
 """Would stop a program in the background for a look at its terminal, with the torque on."""
 
+_NEVER = 1 << 30
+"""So many requests to end never come."""
+
 SAME_REQUEST_S = 0.3
 """Signals closer together are one request: a shell and the kernel each send their own."""
 
@@ -92,13 +95,17 @@ class Interrupts:
         """Return how often this program was asked to end."""
         return self._more + (self._first is not None)
 
+    def never_raise(self) -> None:
+        """Only note from now on: whoever works here asks often enough."""
+        self.patience = _NEVER
+
     def refuse(self) -> None:
         """End here what was asked to end before there was anything to park.
 
         Raises:
             KeyboardInterrupt: it was.
         """
-        if self._first is not None:
+        if self() is not None:
             raise KeyboardInterrupt
 
     def _note(self, number: int, frame: FrameType | None) -> None:

@@ -22,9 +22,6 @@ T = TypeVar("T")
 Again = Callable[[], bool]
 """Tells whether somebody asked again for the end: the rest of parking is skipped then."""
 
-_NEVER = 1 << 30
-"""So many requests to end never come."""
-
 
 class PowerDown:
     """Switches on what it also switches off.
@@ -93,7 +90,7 @@ class PowerDown:
         if self._on:
             self.leave()
         elif self._starting:  # what broke off the start may have left something on
-            self._interrupts.patience = _NEVER
+            self._interrupts.never_raise()
             with contextlib.suppress(BaseException):
                 self._torque_off()
             self._interrupts.patience = max(1, self._interrupts.requests)
@@ -110,7 +107,7 @@ class PowerDown:
                 how = f"{self._park(lambda: interrupts.requests > asked)}, "
         except BaseException as error:
             how = f"not parked ({_words(error)}), "
-        interrupts.patience = _NEVER
+        interrupts.never_raise()
         failed = True
         try:
             self._torque_off()

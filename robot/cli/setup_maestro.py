@@ -20,9 +20,9 @@ from drivers.port_owner import POLOLU
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
 from robot.bringup.maestro_settings import clipped, instructions
-from robot.bringup.maestro_sweep import FINE_STEPS, walk
+from robot.bringup.maestro_sweep import FINE_STEPS, Place, walk
 from robot.cli import bench as bench
-from robot.cli.terminal import say
+from robot.cli.terminal import say, signals
 from robot.clock import RealClock
 from robot.joint import JointParams
 
@@ -129,9 +129,28 @@ def _ranges(board: Line, setups: Sequence[ServoSetup], yes: bool) -> None:
 def _range(board: Line, setup: ServoSetup) -> list[str]:
     """Lead a channel from end to end of its joint's range; gives what cuts it."""
     places = (_rest(setup), setup.min_steps, setup.max_steps, _rest(setup))
-    gone = walk(board, setup, places, RealClock().sleep_until, QUICK_STEPS_S)
+    gone = _walked(board, setup, places, QUICK_STEPS_S)
     wrong = [one for one in gone if abs(one.asked - one.got) > FINE_STEPS]
     return list(dict.fromkeys(clipped(setup, one.asked, one.got) for one in wrong))
+
+
+def _walked(
+    board: Line, setup: ServoSetup, places: Sequence[int], *speed_steps_s: float
+) -> tuple[Place, ...]:
+    """Lead a channel over places; whoever asks for the end meanwhile gets it with pulses off.
+
+    Raises:
+        KeyboardInterrupt: somebody asked for the end.
+    """
+    clock = RealClock()
+    with signals() as stopped:
+        stopped.never_raise()
+
+        def sleep_until(t_s: float) -> None:
+            stopped.refuse()
+            clock.sleep_until(t_s)
+
+        return walk(board, setup, places, sleep_until, *speed_steps_s)
 
 
 def _rest(setup: ServoSetup) -> int:
@@ -152,7 +171,7 @@ def _channel(board: Line, setup: ServoSetup, joint: JointParams, yes: bool) -> b
         if not yes and not typer.confirm(f"   move it? {at}", default=False, err=True):
             return False
         try:
-            gone = walk(board, setup, (rest, low, high, rest), RealClock().sleep_until)
+            gone = _walked(board, setup, (rest, low, high, rest))
         except ServoFault:
             raise
         except DriverError as error:
