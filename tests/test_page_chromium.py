@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
+from config.confined import Confined
 from config.load import ConfigError, shipped
 from config.schema import load_rig
 from gaze.types import Vec3
@@ -27,7 +28,7 @@ from robot.assemble import assemble
 from robot.audience import Audience, Told, Wished
 from robot.choice import Choice
 from robot.loop import LoopCount, Tick
-from robot.orders import Ask, LookAt
+from robot.orders import Ask, LookAt, Renew, Stop
 from robot.page.view import _HALF_WIDTH as HALF_WIDTH
 from robot.page.view import VIEWS
 from robot.recording.run_info import RunInfo
@@ -71,6 +72,7 @@ class Rig:
         # Not fast: the page is for real time, of which these ticks are a slow imitation.
         self.audience = Audience(made, wished, told, False, self.said.append, self.said.append)
         self.newest: Tick | None = None
+        self.pace_s = PACE_S
         self.orders: list[object] = []
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._tick_on)
@@ -87,11 +89,11 @@ class Rig:
 
     def _tick_on(self) -> None:
         clock = self.made.clock
-        while not self._over.wait(PACE_S):
+        while not self._over.wait(self.pace_s):
             clock.sleep_until(clock.now_s() + TICK_S)
             tick = self.robot.tick(clock.now_s(), TICK_S)
             self.newest = tick
-            self.orders += tick.orders
+            self.orders += [o for o in tick.orders if not isinstance(o, Renew)]
             self.audience.note(tick)
 
     def wish_deg(self) -> float:
@@ -229,10 +231,15 @@ def at_the_rig(tab: Any) -> Iterator[tuple[Rig, Person]]:
         yield rig, person
 
 
-def resumed(rig: Rig, person: Person) -> None:
+def resumed(rig: Rig, person: Person, question: str = "Fingers out?") -> None:
+    assert rig.newest is not None
+    held_s = rig.newest.t_s + 2.1
+    rig.pace_s = 0.001
+    wait_for(lambda: rig.newest.t_s > held_s, "the time that a stop holds at least")
+    rig.pace_s = PACE_S
     person.click(saying("Resume …"))
     assert rig.robot.stopped  # not without being asked again
-    wait_for(lambda: person.reads("Fingers out?"), "the question")
+    wait_for(lambda: person.reads(question), "the question")
     person.click(saying("Yes, resume"))
     wait_for(lambda: not rig.robot.stopped, "the rig going on")
     wait_for(lambda: not person.reads("Torque is off"), "the page going on")
@@ -243,7 +250,7 @@ def test_stop_takes_the_torque_off_until_it_is_asked_back(
 ) -> None:
     rig, person = at_the_rig
     person.click(STOP)
-    wait_for(lambda: rig.robot.stopped == "somebody pressed STOP on the page", "the stop")
+    wait_for(lambda: "somebody pressed STOP on the page (browser " in rig.robot.stopped, "the stop")
     wait_for(lambda: rig.newest.verdict.level == "limp", "torque off")
     wait_for(lambda: person.reads("Torque is off", "Resume"), "the words")
     resumed(rig, person)
@@ -265,7 +272,7 @@ def test_the_space_bar_stops_but_not_while_somebody_types(
     # On a button in focus a space would press it; here it stops, and nothing else.
     person.run(f"{beside('find', 'input')}.blur(); {saying('joints')}.focus()")
     person.space()
-    wait_for(lambda: rig.robot.stopped == "somebody pressed the space bar", "the stop")
+    wait_for(lambda: "somebody pressed the space bar (" in rig.robot.stopped, "the stop")
     wait_for(lambda: len(rig.orders) > before, "the tick that obeyed")
     assert len(rig.orders) == before + 1
     resumed(rig, person)
@@ -293,14 +300,14 @@ def test_a_slider_moves_the_wish_of_its_joint(at_the_rig: tuple[Rig, Person]) ->
     person.click(beside("neck yaw", ".mantine-Slider-track"), 0.8)
     wait_for(lambda: abs(rig.wish_deg() - 42.0) < 6.0, "the wish")  # 0.8 of -70..70
     person.click(saying("let go: look freely"))
-    wait_for(lambda: rig.orders[-1] == LookAt(None), "the rig being let go")
+    wait_for(lambda: rig.orders[-1]._replace(who="") == LookAt(None), "the rig being let go")
 
 
 def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     person.click(saying("lead"))
     person.click(saying("guard"))
-    wait_for(lambda: rig.orders[-1] == Ask("behaviour", "guard"), "the behaviour")
+    wait_for(lambda: rig.orders[-1:] == [Ask("behaviour", "guard")], "the behaviour")
     picture = "[...document.querySelectorAll('img')].find(i => i.naturalWidth > 100 && "
     picture += "i.parentElement.previousElementSibling?.textContent === 'camera')"
     person.click(picture, 0.2)
@@ -315,7 +322,7 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     person.click(saying("lead"))
     person.run("window.drawScene = true")
     there = (0.7, 0.1, 0.3)
-    rig.robot.order(LookAt(there))
+    rig.robot.order(LookAt(there, stay=True))
     wait_for(lambda: rig.newest.target.p_world_m == there, "the head being led")
     wait_for(lambda: person.reads("somebody chose this point"), "the page knowing of it")
     person.click(beside("drag a target", "input"))
@@ -391,6 +398,7 @@ def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
     person.click(saying("tuning"))
     wait_for(lambda: person.reads("not saved"), "the mark")
     file = tmp_path / "tuned at midnight.yaml"
+    rig.audience._page._hear._confined = Confined(tmp_path)  # as if the rig's file lay there
     person.click(beside("save as", "input"))
     person.type(str(file))
     person.press("\r", "Enter", 13)
@@ -408,6 +416,62 @@ def test_a_character_is_laid_over_the_rig(at_the_rig: tuple[Rig, Person]) -> Non
     person.click(saying("shy"))
     wait_for(lambda: rig.tuning.character_name == "shy", "the character")
     wait_for(lambda: person.reads("character shy"), "the page saying so")
+
+
+def test_who_did_not_stop_is_asked_about_other_hands(at_the_rig: tuple[Rig, Person]) -> None:
+    rig, person = at_the_rig
+    rig.robot.order(Stop("somebody tripped", "ana"))
+    wait_for(lambda: person.reads("Torque is off: somebody tripped"), "the words")
+    resumed(rig, person, "Is nobody's hand in the mechanism?")
+
+
+def test_on_a_phone_stop_is_at_the_top_and_nothing_covers_it(
+    at_the_rig: tuple[Rig, Person],
+) -> None:
+    rig, person = at_the_rig
+    phone = {"width": 360, "height": 640, "deviceScaleFactor": 1, "mobile": True}
+    person.tab._ask("Emulation.setDeviceMetricsOverride", **phone)  # type: ignore[attr-defined]
+    try:
+        wait_for(lambda: person.run("innerWidth") == 360, "the phone")
+        test_stop_stays_in_sight_when_the_panels_are_shut(at_the_rig)
+        assert person.run("document.querySelector('#rig-stop').getBoundingClientRect().top") < 40
+        person.click(STOP)
+        wait_for(lambda: rig.robot.stopped, "the stop")
+        resumed(rig, person)
+    finally:
+        desk = {"width": 1100, "height": 760, "deviceScaleFactor": 1, "mobile": False}
+        person.tab._ask("Emulation.setDeviceMetricsOverride", **desk)  # type: ignore[attr-defined]
+
+
+def test_names_are_words_and_never_run(at_the_rig: tuple[Rig, Person]) -> None:
+    rig, person = at_the_rig
+    evil = "<img src=x onerror='window.evil=1'><script>window.evil=1</script>"
+    shown = [rig.robot.order(Stop(evil, evil))]
+    wait_for(lambda: person.reads("STOPPED: <img src=x"), "the words as they are")
+    assert shown and person.run("window.evil === undefined") is True
+    assert person.run("document.querySelectorAll('img[src=x]').length") == 0
+    resumed(rig, person, "Is nobody's hand in the mechanism?")
+
+
+def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> None:
+    rig, person = at_the_rig
+    hear, lost = rig.audience._page._hear, []
+
+    def deaf_at_first(asked: dict[str, object]) -> str | None:
+        if asked.get("order") == "stop" and len(lost) < 3:
+            lost.append(asked)
+            return "refused: not now"
+        return hear(asked)
+
+    rig.audience._page._hear = deaf_at_first
+    try:
+        person.click(STOP)
+        wait_for(lambda: rig.robot.stopped, "the stop")
+        wait_for(lambda: person.reads("Torque is off") and person.reads("STOP"), "the words")
+        assert len(lost) == 3
+    finally:
+        rig.audience._page._hear = hear
+    resumed(rig, person)
 
 
 # The last: the browser leaves the rig of the others.
