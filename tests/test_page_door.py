@@ -1,5 +1,6 @@
 """Only those come in who may: no other origin, nobody without the token, nobody by the back."""
 
+import asyncio
 import json
 import os
 import socket
@@ -8,7 +9,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -21,7 +22,10 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from robot.page.asked import from_browser
-from robot.page.door import Door
+from robot.page.browsers import Places
+from robot.page.connections import MOST as MOST_CONNECTIONS
+from robot.page.door import MOST_LINES, Door
+from robot.page.rate import Rate
 from robot.page.server import FROM_BROWSER_BYTES, browser_of, open_server
 from robot.page.stop_line import StopListener, StopSender
 
@@ -103,7 +107,7 @@ class Rig:
         return connect(
             f"ws://{self.address}{path}",
             origin=origin,
-            subprotocols=VISER,
+            subprotocols=VISER if path == "/" else None,
             max_size=None,
             compression=None,
             open_timeout=PATIENCE_S,
@@ -383,6 +387,59 @@ def test_no_path_leads_out_of_the_pages_own_files(near: Rig, path: str) -> None:
         )
         answer = b"".join(iter(lambda: there.recv(1 << 16), b""))
     assert b"root:" not in answer and b" 500 " not in answer.splitlines()[0]
+
+
+# --- limits -----------------------------------------------------------------------------------
+
+
+def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
+    """200 of somebody's lines, 200 silent connections: another's line and STOP stay."""
+    with near.knock("/rig/line", Cookie=f"{near.cookie}; {near.door._name_cookie}=ana") as ana:
+        greedy = [
+            near.knock("/rig/line", Cookie=f"{near.cookie}; {near.door._name_cookie}=bob")
+            for _ in range(MOST_LINES + 3)
+        ]
+        host, port = near.address.split(":")
+        silent = [socket.create_connection((host, int(port))) for _ in range(200)]
+        near.stops.clear()
+        assert stop_by_line(ana, "by line") == 204
+        assert near.post(b'{"order": "stop", "why": "by a request"}')[0] == 204
+        assert len(near.stops) == 2
+        for gone in greedy[:3]:
+            with pytest.raises(ConnectionClosed):
+                while True:
+                    gone.recv(timeout=PATIENCE_S)
+        silent[0].settimeout(PATIENCE_S)  # the idlest has gone
+        with suppress(ConnectionError):
+            assert silent[0].recv(1) == b""
+        for _ in range(400):
+            if near.door._connections.count <= MOST_CONNECTIONS:
+                break
+            time.sleep(0.05)
+        assert near.door._connections.count <= MOST_CONNECTIONS
+        for one in silent:
+            one.close()
+        for line in greedy:
+            line.close()
+
+
+def test_a_place_is_left_by_the_browser_with_the_most() -> None:
+    async def crowd() -> list[str]:
+        places, left = Places(3), []
+        with ExitStack() as stack:
+            for name in ("a", "b", "b", "c", "d"):
+                leave = stack.enter_context(places.take(name))
+                left.append((name, leave))
+            return [name for name, leave in left if leave.is_set()]
+
+    assert asyncio.run(crowd()) == ["a", "b"] or asyncio.run(crowd()) == ["b", "a"]
+
+
+def test_a_rate_lets_a_burst_pass_and_then_so_many_a_second() -> None:
+    rate = Rate(10.0, 5.0)
+    assert [rate.take(0.0) for _ in range(7)] == [True] * 5 + [False] * 2
+    assert sum(rate.take(0.001 * n) for n in range(1000)) == pytest.approx(10, abs=1)
+    assert rate.take(1e6) and rate.wait_s(1e6) == 0.0
 
 
 # --- by the back ----------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 """Who is at the page: a name for each browser, and whether the one that leads is still there."""
 
+import asyncio
 import hashlib
 import hmac
 import threading
@@ -45,3 +46,29 @@ class Browsers:
         """Return who led last if that browser is still there, else ""."""
         with self._lock:
             return self._leads if self._leads and self._open[self._leads] > 0 else ""
+
+
+class Places:
+    """So many open tabs; of one more, the browser with the most tabs loses its oldest.
+
+    Belongs to one event loop.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._taken: dict[asyncio.Event, str] = {}  # the oldest first
+
+    @contextmanager
+    def take(self, name: str) -> Iterator[asyncio.Event]:
+        """Take a place; the event is set when it has to be left."""
+        leave = asyncio.Event()
+        self._taken[leave] = name
+        if len(self._taken) > self._most:
+            greedy = Counter(self._taken.values()).most_common(1)[0][0]
+            oldest = next(event for event, who in self._taken.items() if who == greedy)
+            del self._taken[oldest]
+            oldest.set()
+        try:
+            yield leave
+        finally:
+            self._taken.pop(leave, None)

@@ -19,6 +19,8 @@ IDLE_S = 15.0
 BUSY_S = 20.0
 """For so long one request may take, unless it is a websocket."""
 _LOOK_EVERY_S = 1.0
+_TRIM_AFTER_S = 0.02
+_BEGINS_WITHIN_S = 5.0
 
 
 class _State:
@@ -26,7 +28,7 @@ class _State:
 
     def __init__(self, since_s: float) -> None:
         self.since_s = since_s
-        self.busy = self.lasting = False
+        self.begun = self.busy = self.lasting = False
 
 
 class Connections:
@@ -35,16 +37,33 @@ class Connections:
     def __init__(self, server: web.Server) -> None:
         self._server = server
         self._states: dict[RequestHandler, _State] = {}
+        self._trimming = False
 
     def accept(self) -> RequestHandler:
         """Return the handler of a new connection; the idlest goes where there are too many."""
-        self._forget_gone()
-        if len(self._states) >= MOST:
-            idlest = min(self._states, key=self._rank)
-            self._end(idlest)
         handler: RequestHandler = self._server()
         self._states[handler] = _State(asyncio.get_running_loop().time())
+        self._trim_soon()
         return handler
+
+    def _trim_soon(self) -> None:
+        """End the idlest where there are too many, when those of this moment have begun."""
+        if len(self._states) > MOST and not self._trimming:
+            self._trimming = True
+            asyncio.get_running_loop().call_later(_TRIM_AFTER_S, self._trim)
+
+    @property
+    def count(self) -> int:
+        """Return how many there are."""
+        return len(self._server.connections)
+
+    def _trim(self) -> None:
+        self._trimming = False
+        self._forget_gone()
+        begun = sorted((h for h, s in self._states.items() if s.begun), key=self._rank)
+        for handler in begun[: max(0, len(begun) - MOST)]:
+            self._end(handler)
+        self._trim_soon()
 
     @contextmanager
     def busy(self, request: web.BaseRequest) -> Iterator[None]:
@@ -54,7 +73,7 @@ class Connections:
             yield
             return
         loop = asyncio.get_running_loop()
-        state.busy, state.since_s = True, loop.time()
+        state.begun, state.busy, state.since_s = True, True, loop.time()
         try:
             yield
         finally:
@@ -87,7 +106,11 @@ class Connections:
             handler.transport.abort()
 
     def _forget_gone(self) -> None:
-        """Forget connections that have ended; one that begins has no transport for a moment."""
+        """Forget connections that have ended; one that begins is not known for a moment."""
         known = set(self._server.connections)
-        for handler in [h for h in self._states if h not in known]:
-            del self._states[handler]
+        now_s = asyncio.get_running_loop().time()
+        for handler, state in tuple(self._states.items()):
+            if handler in known:
+                state.begun = True
+            elif state.begun or now_s - state.since_s > _BEGINS_WITHIN_S:
+                del self._states[handler]

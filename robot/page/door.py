@@ -27,7 +27,7 @@ from aiohttp.typedefs import Handler, Middleware
 from yarl import URL
 
 from robot.page.asked import ASKED_BYTES, compact, from_browser, leads
-from robot.page.browsers import Browsers
+from robot.page.browsers import Browsers, Places
 from robot.page.connections import Connections
 from robot.page.rate import Rate
 from robot.page.relay import TAKES_S, carry_in, carry_out, until_one_ends
@@ -35,8 +35,8 @@ from robot.page.server import BROWSER_HEADER, FROM_BROWSER_BYTES, TO_BROWSER_BYT
 from robot.page.stop_line import StopSender
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
-MOST_BROWSERS = 16
-"""Tabs that show the page at a time; more of them get the stop button alone."""
+MOST_TABS = 16
+"""Tabs that show the page at a time."""
 MOST_LINES = 32
 """Tabs whose stop button is told the state of the rig."""
 
@@ -90,7 +90,7 @@ class Door:
         self._state: Mapping[str, object] = {}
         self._asked_rate = Rate(_ASKED_PER_S, _ASKED_BURST)
         self._news: set[asyncio.Event] = set()
-        self._shown = 0
+        self._lines, self._tabs = Places(MOST_LINES), Places(MOST_TABS)
         self._loop = asyncio.new_event_loop()
         self._over = asyncio.Event()
         self._opened = threading.Event()
@@ -256,8 +256,6 @@ class Door:
 
         A connection that stands already when STOP is pressed: a browser opens only six others.
         """
-        if len(self._news) >= MOST_LINES:
-            return web.Response(status=503, text="too many browsers\n", headers=_HEADERS)
         line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False)
         await line.prepare(request)
         self._connections.lasting(request)
@@ -265,9 +263,12 @@ class Door:
         news = asyncio.Event()
         self._news.add(news)
         try:
-            with self.browsers.connected(who):
+            with self.browsers.connected(who), self._lines.take(who) as leave:
                 await until_one_ends(
-                    self._tell_line(line, news, who), self._hear_line(line, who), self._over.wait()
+                    self._tell_line(line, news, who),
+                    self._hear_line(line, who),
+                    self._over.wait(),
+                    leave.wait(),
                 )
         finally:
             self._news.discard(news)
@@ -318,8 +319,6 @@ class Door:
 
     async def _relay(self, request: web.Request) -> web.StreamResponse:
         """Carry a browser's websocket to the server and back, each side as slow as the other."""
-        if self._shown >= MOST_BROWSERS:
-            return web.Response(status=503, text="too many browsers\n", headers=_HEADERS)
         offered = [
             word.strip()
             for word in request.headers.get("Sec-WebSocket-Protocol", "").split(",")
@@ -328,22 +327,23 @@ class Door:
         browser = web.WebSocketResponse(
             protocols=offered, max_msg_size=FROM_BROWSER_BYTES, compress=False
         )
-        self._shown += 1
-        try:
+        who = self._who(request)
+        with self._tabs.take(who) as leave:
             async with self._client.ws_connect(
                 self._address("ws", request),
                 protocols=offered,
-                headers={BROWSER_HEADER: self._who(request)},
+                headers={BROWSER_HEADER: who},
                 max_msg_size=TO_BROWSER_BYTES,
                 compress=0,
             ) as inside:
                 await browser.prepare(request)
                 self._connections.lasting(request)
                 await until_one_ends(
-                    carry_in(browser, inside), carry_out(inside, browser), self._over.wait()
+                    carry_in(browser, inside),
+                    carry_out(inside, browser),
+                    self._over.wait(),
+                    leave.wait(),
                 )
-        finally:
-            self._shown -= 1
         with suppress(TimeoutError, ConnectionError):
             async with asyncio.timeout(_BEAT_S):
                 await browser.close()

@@ -46,6 +46,7 @@ from robot.page.link import (
 )
 from robot.page.panel import PanelView
 from robot.page.people import PeopleView
+from robot.page.process_limits import limit_process
 from robot.page.replay import ReplayView
 from robot.page.server import browser_of, open_server
 from robot.page.stop_line import StopSender
@@ -56,7 +57,6 @@ _FRAME_S = 0.04
 _SILENT_AFTER_S = 1.0
 _PORTS_TRIED = 100
 _PORTS = 65536
-_NICENESS = 5  # the control loop comes first where both want the same core
 _EVERYWHERE = ("0.0.0.0", "::")
 
 _HALF_WIDTH = 0.84  # tangent of half the horizontal field of view: 80 deg
@@ -354,7 +354,7 @@ def watch(feed: socket.socket, view: View, parent: int, door: Door) -> None:
 def main(arguments: list[str]) -> int:
     """Run the page; give the process's exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(_NICENESS)
+    limit_process()
     fd, stop_fd, parent, host, port = arguments
     token = os.environ.pop(TOKEN_VARIABLE)
     # Not closed by hand: its end tells the other side to read this process's last words,

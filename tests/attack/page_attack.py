@@ -24,6 +24,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from page_visitor import LOOKING, Visitor
+from websockets.sync.client import ClientConnection
 
 from robot.remote.running_rig import RunningRig
 
@@ -50,6 +51,16 @@ def post(visitor: Visitor, body: bytes, token: bool = True) -> None:
                     there.sendall(head + body)
                     if not there.recv(1 << 16):
                         break
+
+    _in_threads(one)
+
+
+def work_alone(visitor: Visitor) -> None:
+    """No attack: what it takes of the processor alone."""
+
+    def one() -> None:
+        while True:
+            pass
 
     _in_threads(one)
 
@@ -150,8 +161,8 @@ def garbage(visitor: Visitor) -> None:
 ATTACKS: dict[str, Callable[[Visitor], None]] = {
     attack.__name__: attack
     for attack in (
-        big_posts, stranger_posts, orders, parameters, stops, silent, slow, deaf, lines, huge,
-        messages, garbage,
+        work_alone, big_posts, stranger_posts, orders, parameters, stops, silent, slow, deaf,
+        lines, huge, messages, garbage,
     )
 }  # fmt: skip
 
@@ -253,10 +264,9 @@ def megabytes(pid: int | None) -> float:
     return 0.0
 
 
-def press(visitor: Visitor) -> tuple[list[float], int]:
+def press(visitor: Visitor, standing: ClientConnection) -> tuple[list[float], int]:
     """Press STOP over a connection that stands, and over new ones; times in ms, and failures."""
     took, failed = [], 0
-    standing = visitor.open("/rig/line")
     for number in range(PRESSES):
         began = time.monotonic()
         try:
@@ -274,13 +284,13 @@ def press(visitor: Visitor) -> tuple[list[float], int]:
         else:
             failed += 1
         time.sleep(0.05)
-    standing.close()
     return took, failed
 
 
 def attacked(rig: Rig, name: str, seconds: float, quiet_hz: float) -> float:
     """Attack, and print one line; return the rate of the loop."""
     visitor = Visitor(rig.address)
+    standing = visitor.open("/rig/line")
     attacker = None
     if name != "nothing":
         command = [sys.executable, __file__, "--attack", name, rig.address]
@@ -299,7 +309,8 @@ def attacked(rig: Rig, name: str, seconds: float, quiet_hz: float) -> float:
     scales.start()
     try:
         hz = rate_hz(rig, seconds)
-        took, failed = press(visitor)
+        took, failed = press(visitor, standing)
+        standing.close()
         obeyed = bool(rig.remote.status()["stopped"])
     finally:
         over.set()
