@@ -90,7 +90,7 @@ def test_scan_of_every_bus_of_a_rig(mixed):
 
 def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
     with PtyBus() as bus:
-        path = bus.start_device(MaestroLine())
+        path = bus.start_device(MaestroLine(crc=True))
         board = SerialPort(path, "Pololu Mini Maestro", "1ffb:008a", None)
         monkeypatch.setattr(bench, "serial_ports", lambda host: (board,))
         monkeypatch.setattr("robot.cli.wires.serial_ports", lambda: (board,))
@@ -181,7 +181,7 @@ def test_setup_of_a_maestro_moves_one_channel_after_another_with_a_yes():
         "setup", "maker", "--mock", "--joint", "eyes_pan", "--joint", "left_upper_lid",
         answers=answers,
     )  # fmt: skip
-    assert code == 0 and "channel  0: Min 1088, Max 1936    eyes_pan" in err
+    assert code == 0 and "channel  0: Min 1088, Max 1936, Speed" in err
     assert "nothing of this can be set over the serial line" in err
     assert "all 2 channels reach both ends" in err
     assert "it goes to 1500 us at once" in err and "did the eyes pan move" in err
@@ -218,7 +218,7 @@ def test_setup_of_a_maestro_that_does_not_answer():
 
 def test_setup_of_a_board_that_is_too_small(monkeypatch):
     with PtyBus() as bus:
-        path = bus.start_device(MaestroLine(6))
+        path = bus.start_device(MaestroLine(6, crc=True))
         board = SerialPort(path, "Pololu Micro Maestro", "1ffb:0089", None)
         monkeypatch.setattr(bench, "serial_ports", lambda host: (board,))
         code, _, err = gazerig("setup", "maker", "--port", path, "--yes", "--joint", "eyes_pan")
@@ -261,7 +261,7 @@ def test_reboot_of_a_maestro_says_what_there_is_instead():
     with served("maker") as (port, _, command):
         line = BlockingPort(port)
         line.setBaudRate(115_200)
-        line.write(bytes.fromhex("84 00 70 2E"))
+        line.write(bytes.fromhex("84 00 70 2E 2B"))
         line.closePort()
         words = ("reboot", "eyes_pan", "--rig", "maker", "--port", port)
         code, _, err = gazerig(*words, answers="n\n")

@@ -1,5 +1,7 @@
 """Findings about a Maestro and its channels, what is mended, and what is only said."""
 
+from xml.etree.ElementTree import fromstring
+
 import pytest
 
 from drivers.errors import ServoMissing
@@ -10,7 +12,14 @@ from robot.bringup.checkup import mend
 from robot.bringup.doctor_maestro import mend as mend_board
 from robot.bringup.doctor_maestro import visit
 from robot.bringup.findings import worst
-from robot.bringup.maestro_settings import clipped, instructions, range_us, wide_range
+from robot.bringup.maestro_settings import (
+    clipped,
+    instructions,
+    range_us,
+    settings_file,
+    start_limits,
+    wide_range,
+)
 from robot.bringup.maestro_sweep import sent_home
 from sim_mock.maestro.board import build_board
 from sim_mock.ports import InProcessPort
@@ -190,9 +199,28 @@ def test_ranges_are_rounded_outwards_to_what_a_board_can_keep():
 def test_what_to_set_is_said_for_every_channel():
     said = "\n".join(instructions(MaestroParams(device=5, crc=True), SETUPS, True))
     assert "USB Dual Port" in said and "Device Number: 5" in said and "Enable CRC: on" in said
-    assert "channel  2: Min  896, Max 1808    left_upper_lid" in said and "Timeout: 0.50 s" in said
+    assert "channel  2: Min  896, Max 1808, Speed" in said and "Timeout: 0.50 s" in said
     pins = "\n".join(instructions(MaestroParams(baud=57_600), SETUPS, False))
     assert "UART, fixed baud rate 57600" in pins and "USB Dual Port" not in pins
+
+
+def test_the_same_as_a_settings_file_of_pololu_s_programs():
+    params = MaestroParams(device=5, crc=True)
+    root = fromstring(settings_file(params, SETUPS, True))
+    assert (root.findtext("EnableCrc"), root.findtext("SerialMode")) == ("true", "USB_DUAL_PORT")
+    assert root.findtext("SerialTimeout") == "50"  # hundredths of a second
+    channels = root.findall("Channels/Channel")
+    assert len(channels) == params.channels
+    assert {one.get("homemode") for one in channels} == {"Off"}
+    lid = channels[LID.id]
+    assert (lid.get("name"), lid.get("min"), lid.get("max")) == (LID.name, "3584", "7232")
+    assert (int(lid.get("speed")), int(lid.get("acceleration"))) == start_limits(LID)
+    assert len(fromstring(settings_file(MaestroParams(channels=6), SETUPS, False))[7]) == 6
+
+
+@pytest.mark.parametrize(("steps_s", "units"), [(3100.0, 31), (3300.0, 32), (12_345.0, 124)])
+def test_a_speed_is_given_as_the_board_keeps_it(steps_s, units):
+    assert start_limits(LID._replace(max_speed_steps_s=steps_s))[0] == units
 
 
 def test_a_place_that_is_cut():

@@ -45,3 +45,14 @@ def test_a_joint_that_was_turned_by_hand_is_believed_soon(kind):
     assert seen[0] is None
     assert abs(seen[-1].position_steps - noisy.truth()[2]) <= 2
     assert noisy.bus.health().errors["implausible"] == 2
+
+
+def test_noise_on_the_line_of_a_board_leads_no_joint_out_nor_faster_than_a_servo_catches_up():
+    noisy = Noisy("maestro crc", seed=2)
+    noisy.start()
+    outcome = noisy.run("static 0.5", 0.5, 2000)
+    assert outcome.errors["serial CRC error"] + outcome.errors["serial protocol error"] > 5
+    assert (outcome.outside, outcome.ended) == (0, "")
+    assert outcome.fastest < 2.0
+    assert outcome.recover_s is not None
+    assert outcome.recover_s < 3.0

@@ -42,7 +42,7 @@ class SlowPort:
 
 
 def test_an_answer_after_its_time_is_not_the_next_ones():
-    port = SlowPort(None, b"\x70\x17", late=b"\xff\x00")
+    port = SlowPort(None, *[b"\x70\x17"] * 2, late=b"\xff\x00")
     line = Line(port, MaestroParams())
     assert line.pulses((0,)) is None
     assert line.pulses((0,)) == (6000,)
@@ -50,25 +50,33 @@ def test_an_answer_after_its_time_is_not_the_next_ones():
 
 
 def test_numbers_that_cannot_be_are_damage():
-    line = Line(SlowPort(b"\xff\xff", b"\x70\x17"), MaestroParams())
+    line = Line(SlowPort(b"\xff\xff", *[b"\x70\x17"] * 2), MaestroParams())
     assert line.pulses((0,)) is None
     assert line.errors == {"damaged": 1}
     assert line.pulses((0,)) == (6000,)
 
 
 def test_the_board_is_not_asked_too_much_at_once():
-    port = SlowPort(bytes(12), bytes(6))
+    port = SlowPort(*[bytes(12), bytes(6)] * 2)
     assert Line(port, MaestroParams()).pulses(range(9)) == (0,) * 9
-    assert [len(packet) for packet in port.sent] == [12, 6]
+    assert [len(packet) for packet in port.sent] == [12, 6] * 2
 
 
 def test_more_than_was_asked_for_is_damage():
     """A channel that answers twice: all behind it would have their neighbour's pulse."""
-    port = SlowPort(b"\x70\x17" * 3, b"\x70\x17", bytes(6))
+    port = SlowPort(*[b"\x70\x17" * 3] * 2, b"\x70\x17", *[bytes(6)] * 2)
     line = Line(port, MaestroParams())
     assert line.pulses((0, 1, 2)) is None
     assert line.errors == {"damaged": 1}
     assert line.pulses((0, 1, 2)) == (0, 0, 0)
+
+
+def test_pulses_that_differ_when_asked_twice_are_damage():
+    """Answers carry no check, and a channel is held at the pulse that it is said to give."""
+    line = Line(SlowPort(b"\x70\x17", b"\x70\x1b", *[b"\x70\x17"] * 2), MaestroParams())
+    assert line.pulses((0,)) is None
+    assert line.errors == {"damaged": 1}
+    assert line.pulses((0,)) == (6000,)
 
 
 def held(setup=SETUP, pulse=6000):

@@ -17,6 +17,9 @@ from drivers.maestro.line import Line
 MOST_RESTARTS, WITHIN_S = 3, 10.0
 """A board that lets go of its channels more often within such a time stays without pulses."""
 
+REST_S, LONGEST_REST_S = 0.1, 1.0
+"""Channels that noise sends home more often than that wait so long, and longer each time."""
+
 SAME_S = 1.0
 """The same error is not told again within such a time."""
 
@@ -39,12 +42,17 @@ class Care:
         self._unheard = 0
         self._restarts: list[float] = []
         self._errors_s: dict[str, float] = {}
-        self._told_s = -inf
+        self._errors_first = False
+        self._disturbed: list[float] = []
+        self._damages = 0
+        self._damaged_s = self._hold_at_s = self._told_s = -inf
 
     def take_on(self) -> None:
         """Begin to look after channels that are held."""
         self.engaged = True
         self._restarts.clear()
+        self._disturbed.clear()
+        self._hold_at_s = -inf
         self._pending.clear()
         self._unsure, self._unheard = False, 0
 
@@ -87,11 +95,15 @@ class Care:
         self._asked = (self._asked + 1) % len(self._channels)
         channel = self._channels[self._asked]
         speech = self._line.speech
-        found = self._line.ask_words(speech.position(channel.id) + speech.errors(), 2)
+        questions = (speech.position(channel.id), speech.errors())
+        # Now in this order, now in the other: a line that says its last answer again gives a
+        # pulse width in the place of the register, which cannot be one.
+        self._errors_first = not self._errors_first
+        found = self._line.ask_words(b"".join(questions[:: -1 if self._errors_first else 1]), 2)
         if found is None:
             self._unsure = True
             return False
-        pulse, register = found
+        pulse, register = found[:: -1 if self._errors_first else 1]
         if register >> len(ERRORS):
             # A pulse width taken for a register, or noise: such errors do not exist.
             self._line.errors["damaged"] += 1
@@ -99,6 +111,7 @@ class Care:
             return False
         now_s = self._line.port.now_s()
         self.advance(now_s)
+        register |= self._line.unheard()
         self.note_errors(register, now_s)
         if self.engaged:
             self._unheard |= register
@@ -119,7 +132,7 @@ class Care:
                 return False
         elif channel.held:
             channel.found(pulse)
-        if self._pending:
+        if self._pending and now_s >= self._hold_at_s:
             self._take_next(now_s)
         for one in self._channels:
             if one.entering and one.inside():
@@ -157,16 +170,20 @@ class Care:
         return True
 
     def _remind(self) -> None:
-        """Arm the limits anew, which a restart forgets, and send the goals in force.
+        """Arm the limits anew, which a restart forgets, then send the goals in force.
 
-        A board that leads its channels home at their armed speed has not yet gone far.
+        A board that leads its channels home at their armed speed has not yet gone far. A goal
+        to a channel that an error has just left without pulses would not be ramped: goals are
+        sent where the limits have arrived well.
         """
         held = [channel for channel in self._channels if channel.held]
         speech = self._line.speech
-        if held:
-            limits = b"".join(channel.limits(speech) for channel in held)
-            goals = {channel.id: channel.goal_steps for channel in held}
-            self._line.send(limits + speech.targets(goals))
+        if not held:
+            return
+        if not self._line.send_checked(b"".join(channel.limits(speech) for channel in held)):
+            self._unsure = True
+            return
+        self._line.send(speech.targets({channel.id: channel.goal_steps for channel in held}))
 
     def _met_end(self, channel: Channel, pulse: int) -> None:
         """Note that a channel stays elsewhere: it meets an end of the board's own range."""
@@ -186,27 +203,48 @@ class Care:
         self._line.errors["restarted"] += 1
         for channel in lost:
             self._drop(channel)
+        if named or self._noise_of_late(now_s):
+            self._wait_for_quiet(who, named or "bytes arrive damaged", now_s)
+            return
         self._restarts = [at_s for at_s in self._restarts if now_s - at_s < WITHIN_S]
         self._restarts.append(now_s)
         if len(self._restarts) > MOST_RESTARTS:
-            self._give_up(named)
-        elif named:
-            self._journal.say(f"{who} was sent home by an error ({named}): set up anew")
+            self._give_up()
         else:
             self._journal.say(f"{who} restarted: set up anew")
+
+    def _noise_of_late(self, now_s: float) -> bool:
+        """Tell whether bytes have been damaged of late, to the board or from it."""
+        errors = self._line.errors
+        damages = sum(errors[name] for name in ("damaged", "incomplete", *ERRORS))
+        if damages != self._damages:
+            self._damages, self._damaged_s = damages, now_s
+        return now_s - self._damaged_s < WITHIN_S
+
+    def _wait_for_quiet(self, who: str, named: str, now_s: float) -> None:
+        """Hold anew who was sent home by noise: at once, but ever later where it does not end.
+
+        Without pulses nothing moves; a servo that is held and let go all the time jerks.
+        """
+        self._disturbed = [at_s for at_s in self._disturbed if now_s - at_s < WITHIN_S]
+        self._disturbed.append(now_s)
+        often = len(self._disturbed) - MOST_RESTARTS
+        self._hold_at_s = now_s + min(LONGEST_REST_S, REST_S * often) if often > 0 else -inf
+        if now_s - self._told_s < WITHIN_S and often != 1:
+            return
+        self._told_s = now_s
+        again = " again and again: held once the line is quiet; check cable, ground and baud rate"
+        rest = again if often > 0 else ": set up anew"
+        self._journal.say(f"{who} was sent home by an error ({named}){rest}")
 
     def _drop(self, channel: Channel) -> None:
         if channel.held:
             channel.let_go()
             self._pending.append(channel)
 
-    def _give_up(self, named: str) -> None:
+    def _give_up(self) -> None:
         """Leave channels that lose their pulses again and again without them."""
-        fault = (
-            f"errors again and again ({named}): check cable, ground and baud rate"
-            if named
-            else "restarts again and again: supply too weak"
-        )
+        fault = "restarts again and again: supply too weak"
         for channel in self._pending:
             channel.fault = fault
             self._journal.say(f"{call(channel.setup)}: {fault}")

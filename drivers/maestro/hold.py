@@ -30,7 +30,9 @@ def take(line: Line, channel: Channel, pulse_steps: int) -> Outcome:
         drivers.errors.BusLost: the port is gone.
     """
     goal = channel.start(pulse_steps, line.port.now_s())
-    line.send(channel.limits(line.speech) + line.speech.target(channel.id, goal))
+    if not line.send_checked(channel.limits(line.speech)):
+        return Outcome.MUTE
+    line.send(line.speech.target(channel.id, goal))
     found = line.pulses((channel.id,))
     channel.advance(line.port.now_s())
     if found is None:

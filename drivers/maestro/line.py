@@ -18,6 +18,9 @@ GREETINGS = 4
 
 WAIT_PIECE_S = 0.1
 
+ALIKE_STEPS, FASTEST_STEPS_S = 200, 40_000.0
+"""Two answers about a pulse may be so far apart, and farther by the time between them."""
+
 
 class Line:
     """A port with one board behind it; every method may raise drivers.errors.BusLost.
@@ -38,6 +41,7 @@ class Line:
         self._byte_s = BITS_PER_BYTE / params.baud
         self._patience_s = params.reply_timeout_ms / 1000.0
         self._late = False
+        self._unheard = 0
 
     def send(self, packet: bytes) -> None:
         """Send commands that are not answered."""
@@ -74,6 +78,22 @@ class Line:
             return None
         return found
 
+    def send_checked(self, packet: bytes) -> bool:
+        """Send commands, and tell whether the board has found no error up to their end.
+
+        On an error it may have stopped all pulses: what moves a servo must not come behind.
+        """
+        found = self.ask_words(packet + self.speech.errors(), 1)
+        if found is None:
+            return False
+        self._unheard |= found[0]
+        return not found[0]
+
+    def unheard(self) -> int:
+        """Give the errors that ``send_checked`` has found since the last call."""
+        register, self._unheard = self._unheard, 0
+        return register
+
     def greet(self) -> int | None:
         """Ask for the errors until the board answers; None where it keeps silent.
 
@@ -105,9 +125,28 @@ class Line:
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Ask for the pulse widths of some channels, quarter microseconds; 0: no pulses.
 
-        None where they did not come, or more came than was asked for: who has been answered
-        twice takes the next ones' pulses for his own.
+        Asked twice, as answers carry no check, and much follows from what they are: where a
+        channel is held. None where they did not come, where both differ, or where more came
+        than was asked for: who has been answered twice takes the next ones' pulses for his own.
         """
+        first, began_s = self._pulses_once(channels), self.port.now_s()
+        second = None if first is None else self._pulses_once(channels)
+        if first is None or second is None:
+            return None
+        reach = ALIKE_STEPS + FASTEST_STEPS_S * (self.port.now_s() - began_s)
+        alike = all(
+            bool(one) == bool(other) and abs(one - other) <= reach
+            for one, other in zip(first, second, strict=True)
+        )
+        # Not in every read, as it takes 3 ms: all are asked for where something is odd.
+        over = len(channels) > 1 and self.port.read_until(1, self.port.now_s() + QUIET_S)
+        if over or not alike:
+            self.errors["damaged"] += 1
+            self._late = True
+            return None
+        return second
+
+    def _pulses_once(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         found: tuple[int, ...] = ()
         for i in range(0, len(channels), AT_ONCE):
             some = channels[i : i + AT_ONCE]
@@ -116,12 +155,6 @@ class Line:
             if got is None:
                 return None
             found += got
-        # Not in every read, as it takes 3 ms: all are asked for where something is odd, and much
-        # follows from what they are.
-        if len(channels) > 1 and self.port.read_until(1, self.port.now_s() + QUIET_S):
-            self.errors["damaged"] += 1
-            self._late = True
-            return None
         return found
 
     def wait(self, until_s: float) -> None:

@@ -63,7 +63,10 @@ class MaestroParams:
     )
     crc: bool = field(
         default=False,
-        metadata={"unit": "", "says": "The board wants a check byte after every command."},
+        metadata={
+            "unit": "",
+            "says": "The board wants a check byte after every command: damaged ones do nothing.",
+        },
     )
     channels: int = field(
         default=12,

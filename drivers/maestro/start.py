@@ -25,7 +25,10 @@ def find(line: Line, channels: Sequence[Channel], params: MaestroParams, journal
     if register is None:
         raise ServoMissing(f"{where}: no Maestro answers: {_mute_causes(params)}")
     if not line.takes_crc():
-        raise ServoMissing(f"{where}: the board wants no CRC: set crc to false")
+        raise ServoMissing(
+            f"{where}: the board wants no CRC: switch Enable CRC on in Pololu's program, as noise "
+            "moves servos without it, or set crc to false"
+        )
     if register:
         named = ", ".join(name_errors(register))
         journal.say(f"the board held errors from before, cleared now: {named}")

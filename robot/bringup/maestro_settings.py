@@ -1,20 +1,30 @@
 """What must be set on a Maestro in Pololu's program, as no serial command can set it. Pure.
 
+On an error - one damaged byte is one - a board sends every channel where its setting says.
+Off stops the pulses: servos go limp for the moment until they are held again where they are.
+Ignore would go on, but also when the program dies; Go to moves all servos home.
+
 Source: Pololu Maestro User's Guide (0J40), sections 4.b (channel settings; Min and Max are
 kept in multiples of 16 us) and 4.e (serial settings).
 """
 
 from collections.abc import Iterator, Sequence
 from math import ceil, floor
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from drivers.bus_journal import call
+from drivers.maestro.commands import MICRO
 from drivers.maestro.params import US_STEPS, MaestroParams
+from drivers.maestro.ramp import accel_units, speed_units
 from drivers.types import ServoSetup
 
 FACTORY_US = (992, 2000)
 """Range of every channel of a new board."""
 
 UNIT_US = 16
+MANTISSA, MOST_DOUBLED = 31, 7
+"""A board keeps a speed as up to 31, doubled up to seven times."""
+
 TIMEOUT_S = 0.5
 """Long beside a tick, short beside what a hand between lids needs."""
 
@@ -36,6 +46,20 @@ def wide_range(setup: ServoSetup) -> tuple[int, int] | None:
     return low, high
 
 
+def start_limits(setup: ServoSetup) -> tuple[int, int]:
+    """Give Speed and Acceleration of a channel, which the board keeps to from its start on.
+
+    In the board's units (0.25 us in 10 ms; that in 80 ms), 0 for unlimited. A board keeps five
+    bits of a speed and how often they are doubled: what it shows is what it keeps.
+    """
+    speed, doubled = speed_units(setup.max_speed_steps_s), 0
+    while speed >> doubled > MANTISSA:
+        doubled += 1
+    if doubled > MOST_DOUBLED:
+        return 0, accel_units(setup.max_accel_steps_s2)
+    return (speed >> doubled) << doubled, accel_units(setup.max_accel_steps_s2)
+
+
 def instructions(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool) -> Iterator[str]:
     """Say line by line what to set in Pololu's Maestro Control Center.
 
@@ -49,12 +73,63 @@ def instructions(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool)
     yield (
         f"    Timeout: {TIMEOUT_S:.2f} s, so that servos go limp when the program or the cable dies"
     )
-    yield "  tab Channel Settings (Rate 50 Hz), of every channel: Mode Servo, Speed 0,"
-    yield "    Acceleration 0, 'On startup or error' Off; and its range, which cuts goals silently:"
+    yield "  tab Channel Settings (Rate 50 Hz), of every channel: Mode Servo, 'On startup or"
+    yield "    error' Off; its range, which cuts goals silently; limits for after a restart:"
     for setup in setups:
         low, high = range_us(setup)
-        yield f"    channel {setup.id:2}: Min {low:4}, Max {high:4}    {setup.name}"
+        speed, accel = start_limits(setup)
+        yield (
+            f"    channel {setup.id:2}: Min {low:4}, Max {high:4}, Speed {speed:4}, "
+            f"Acceleration {accel:3}    {setup.name}"
+        )
     yield "  tab Script: no script, 'Run script on startup' off. Then Apply Settings, and close it."
+
+
+def settings_file(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool) -> str:
+    """Give the same as a settings file of Pololu's programs.
+
+    Channels of no joint are servos without pulses, as from the factory.
+    """
+    root = Element("UscSettings", version="1")
+    for name, value in (
+        ("NeverSuspend", "false"),
+        ("SerialMode", "USB_DUAL_PORT" if usb else "UART_FIXED_BAUD_RATE"),
+        ("FixedBaudRate", str(params.baud)),
+        ("SerialTimeout", str(round(TIMEOUT_S * 100.0))),
+        ("EnableCrc", str(params.crc).lower()),
+        ("SerialDeviceNumber", str(params.device)),
+        ("SerialMiniSscOffset", "0"),
+    ):
+        SubElement(root, name).text = value
+    # A Micro Maestro counts its period in other units: 156 of them and six servos are 20 ms.
+    period = (
+        {"ServosAvailable": "6", "ServoPeriod": "156"}
+        if params.channels <= MICRO
+        else {"MiniMaestroServoPeriod": "80000", "ServoMultiplier": "1"}
+    )
+    channels = SubElement(root, "Channels", period)
+    by_id = {setup.id: setup for setup in setups}
+    for channel in range(params.channels):
+        setup = by_id.get(channel)
+        low, high = FACTORY_US if setup is None else range_us(setup)
+        speed, accel = (0, 0) if setup is None else start_limits(setup)
+        kept = {
+            "name": "" if setup is None else setup.name,
+            "mode": "Servo",
+            "min": str(low * US_STEPS),
+            "max": str(high * US_STEPS),
+            "homemode": "Off",
+            "home": str(low * US_STEPS),
+            "speed": str(speed),
+            "acceleration": str(accel),
+            "neutral": str(1500 * US_STEPS),
+            "range": "1905",
+        }
+        SubElement(channels, "Channel", kept)
+    SubElement(root, "Sequences")
+    SubElement(root, "Script", ScriptDone="true")
+    indent(root)
+    return tostring(root, encoding="unicode") + "\n"
 
 
 def clipped(setup: ServoSetup, asked_steps: float, got_steps: float) -> str:

@@ -1,5 +1,6 @@
 """The command ``gazerig setup``: each servo gets its id, each channel its person's look."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,7 +14,7 @@ from robot.bringup import servo_setup as servo_setup
 from robot.bringup.kinds import KINDS
 from robot.bringup.servo_kind import ServoKind
 from robot.cli.bench import YesOption, progress, to_open, wipe
-from robot.cli.setup_maestro import set_up_board
+from robot.cli.setup_maestro import set_up_board, write_settings
 from robot.cli.terminal import RigArgument, clear_errors, say
 from robot.cli.wires import MockOption, PortOption, bus_label, setups_on, wires
 from robot.rig_bus import bus_names
@@ -34,6 +35,10 @@ def setup(
     port: PortOption = None,
     mock: MockOption = False,
     yes: YesOption = False,
+    settings: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a Maestro's settings as a file of Pololu's."),
+    ] = None,
 ) -> None:
     """Give each servo its id and baud rate, one connected at a time; try a Maestro's channels."""
     with clear_errors(rig, port, mock):
@@ -45,7 +50,7 @@ def setup(
             if not mine:
                 continue
             if model.bus_named(bus).kind == "maestro":
-                left += _board(model, rig, bus, mine, port, mock, yes)
+                left += _board(model, rig, bus, mine, port, mock, yes, settings)
             else:
                 left += _chain(model, rig, bus, mine, port, mock, yes)
         if left:
@@ -156,6 +161,7 @@ def _board(
     port: str | None,
     mock: bool,
     yes: bool,
+    settings: Path | None,
 ) -> list[str]:
     """Say what to set on a board and try its channels; gives the joints that were skipped."""
     say(f"{title}{_where(rig, bus)}: a Pololu Maestro; {len(setups)} of its channels to try.")
@@ -164,4 +170,7 @@ def _board(
         to_open(wired.paths[bus]) as line,
     ):
         joints = {one.name: rig.joints[one.name] for one in setups}
+        if settings is not None:
+            every = setups_on(rig, bus)
+            write_settings(settings, rig.bus_named(bus).maestro, every, line.port_name)
         return set_up_board(line, rig.bus_named(bus).maestro, setups, joints, yes)

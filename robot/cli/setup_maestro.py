@@ -8,18 +8,19 @@ which channel is seen by moving it a little.
 import os
 from collections.abc import Mapping, Sequence
 from math import radians
+from pathlib import Path
 
 import typer
 
 from drivers.bus_journal import call
-from drivers.errors import DriverError, ServoFault, ServoMissing
+from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from drivers.maestro.line import Line
 from drivers.maestro.params import US_STEPS, MaestroParams
 from drivers.maestro.probe import USB_CHANNELS
 from drivers.port_owner import POLOLU
 from drivers.serial_port import BlockingPort
 from drivers.types import ServoSetup
-from robot.bringup.maestro_settings import clipped, instructions
+from robot.bringup.maestro_settings import clipped, instructions, settings_file
 from robot.bringup.maestro_sweep import FINE_STEPS, Place, walk
 from robot.cli import bench as bench
 from robot.cli.terminal import say, signals
@@ -65,6 +66,22 @@ def set_up_board(
         if not _channel(board, setup, joints[setup.name], yes):
             left.append(setup.name)
     return left
+
+
+def write_settings(
+    file: Path, params: MaestroParams, setups: Sequence[ServoSetup], port: str
+) -> None:
+    """Write what to set on a board as a file of Pololu's programs, and say how it is loaded.
+
+    Raises:
+        drivers.errors.SetupError: the file cannot be written.
+    """
+    try:
+        file.write_text(settings_file(params, setups, on_usb(port)), encoding="utf-8")
+    except OSError as error:
+        raise SetupError(f"--settings {file}: cannot be written ({error.strerror})") from error
+    say(f"   all that is to be set is in {file}: in Pololu's Maestro Control Center File, Open")
+    say(f"   settings file, then Apply Settings; or without it: UscCmd --configure {file}")
 
 
 def _refuse_size(setups: Sequence[ServoSetup], usb: str, where: str) -> None:

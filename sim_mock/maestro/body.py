@@ -97,7 +97,7 @@ class Body:
         self.errors = 0
         self.stop_script()
         for channel in self.channels:
-            channel.restart()
+            channel.restart(self.settings.speed, self.settings.acceleration)
         self._awake_from = self._period + round(RESTART_S * PERIODS_S)
 
     # --- scripts

@@ -72,9 +72,9 @@ class Channel:
             self.target = min(max(self.target, low), high)
             self._at8 = min(max(self._at8, low * EIGHTHS), high * EIGHTHS)
 
-    def restart(self) -> None:
-        """Be as after power-on: no pulses, no limits of speed and acceleration."""
-        self.speed = self.acceleration = 0
+    def restart(self, speed: int = 0, acceleration: int = 0) -> None:
+        """Be as after power-on: no pulses, the limits of speed and acceleration as set up."""
+        self.speed, self.acceleration = speed, acceleration
         self.aim(0)
 
     def step(self) -> None:

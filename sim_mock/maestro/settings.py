@@ -31,6 +31,7 @@ class Settings:
     timeout_s: so long without a valid command is an error; 0: never
     on_error, startup: what all channels do then; home_steps: where home is
     baud: of uart-fixed
+    speed, acceleration: limits of every channel from the start on, in the board's units
     """
 
     mode: Mode = "usb-dual-port"
@@ -40,7 +41,12 @@ class Settings:
     startup: Startup = "off"
     home_steps: int = 1500 * US
     baud: int = FIXED_BAUD
+    speed: int = 0
+    acceleration: int = 0
 
+
+MOST = {"speed": 3968, "acceleration": 255}
+"""Largest limits that a board keeps; 0: none."""
 
 _WORDS: dict[str, tuple[str, ...]] = {
     "mode": get_args(Mode),
@@ -61,6 +67,7 @@ def cases() -> dict[str, str]:
         "on-error": named["on-error"],
         "startup": named["startup"],
         **{name: "US" for name in ("home-us", *LIMITS)},
+        **dict.fromkeys(MOST, "UNITS"),
     }
 
 
@@ -82,6 +89,10 @@ def chosen(settings: Settings, case: str, value: str) -> Settings:
         return replace(settings, timeout_s=_timeout_ms(value) / 1000.0)
     if case == "home-us":
         return replace(settings, home_steps=width_steps(case, value))
+    if case in MOST:
+        if not value.isdecimal() or int(value) > MOST[case]:
+            raise ValueError(f"{case} {value!r}: not a whole number from 0 to {MOST[case]}")
+        return replace(settings, **{case: int(value)})  # type: ignore[arg-type]
     raise ValueError(f"set {case!r}: unknown; there is {', '.join(cases())}")
 
 
