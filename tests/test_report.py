@@ -23,11 +23,13 @@ from robot.report import bands, build, face, human
 from robot.report.about import About
 from robot.report.build import DRAWINGS, found, measured, report_of
 from robot.report.canvas import COLOURS, Shown, png
+from robot.report.compare import differences_of
+from robot.report.compare_page import compare_page
 from robot.report.gathered import Gathered, Gathering, Row
 from robot.report.gaze_events import Blink, Commanded, Fixation, Saccade
 from robot.report.measured import Finding, Measured, judged, mean, median
 from robot.report.model import own, published
-from robot.report.page import band_words, gauge, number
+from robot.report.page import band_words, gauge, number, report_page
 
 RIG = load_rig("desk")
 SLOWER = replace(RIG, loop=replace(RIG.loop, rate_hz=100.0))
@@ -221,6 +223,23 @@ def test_the_whole_report_is_written(walking: Gathered, tmp_path: Path) -> None:
         assert finding.band.title in page and band_words(finding.band) in page
     assert told[-1] == (build.DRAWING, 1.0)
     assert [share for _, share in told] == sorted(share for _, share in told)
+
+
+HOSTILE = "<img src=x onerror=alert(1)> $\\frac{$"
+
+
+def test_names_are_never_markup_nor_formulas(walking: Gathered) -> None:
+    about = About(HOSTILE, (("rig", HOSTILE), (HOSTILE, "x")), warnings=(HOSTILE,))
+    findings = build.found(walking)
+    shown = [Shown(HOSTILE, walking, colour) for colour in COLOURS]
+    for drawing in DRAWINGS[:3]:
+        assert png(drawing, shown).startswith(b"\x89PNG")
+    pages = (
+        report_page(about, walking, findings, ()),
+        compare_page((about, about), [walking, walking], differences_of((), ()), ()),
+    )
+    for page in pages:
+        assert "<img src=x" not in page and page.count("&lt;img src=x onerror=alert(1)&gt;") >= 3
 
 
 @pytest.mark.parametrize("drawing", DRAWINGS, ids=[d.key for d in DRAWINGS])

@@ -20,6 +20,7 @@ HUMAN_FILL = "#dfe4e6"
 INK = "#2c3136"
 
 _STYLE: Any = {
+    "text.parse_math": False,  # names of files are no formulas
     "font.family": "DejaVu Sans", "font.size": 10, "text.color": INK, "axes.labelcolor": INK,
     "axes.edgecolor": "#9aa3a9", "axes.titlesize": 11, "axes.titleweight": "bold",
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
