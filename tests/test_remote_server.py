@@ -21,13 +21,15 @@ import pytest
 
 from config.schema import load_rig
 from drivers.errors import SetupError
-from robot import stop_latch
+from robot import lead, stop_latch
 from robot.assemble import assemble
 from robot.choice import Choice
 from robot.clock import RealClock
 from robot.loop import Robot, Tick
 from robot.orders import Tune, Value
+from robot.remote import server as server_module
 from robot.remote import sockets as remote_socket
+from robot.remote.budget import Budget, Rate
 from robot.remote.requests import Pulse, Requests
 from robot.remote.running_rig import NoRig, Refused, RigGone, RunningRig, running
 from robot.remote.server import RemoteServer
@@ -703,3 +705,73 @@ def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
         for _ in range(2):
             with pytest.raises(RigGone, match="does not answer|has ended or hung up"):
                 rig.get()
+
+
+# Leads of programs, and floods
+
+
+def test_a_program_leads_while_it_lives_and_is_named(
+    rig: RunningRig, beat: Beat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lead, "HEARTBEAT_S", 10.0)  # simulated: time goes faster here
+    with RunningRig.connect(who="a show") as show:
+        reply = show.look_at(-1.0, 0.0, 0.3)
+        assert 60.0 < reply.error_deg < 90.0 and "neck_yaw stays at" in reply.words()
+        assert show.leads
+        status = rig.status()
+        assert status["led"] == f"a show (process {os.getpid()}): look at -1 0 0.3"
+        count = len(beat.ticks)
+        assert beat.pulse.taken_up(20.0, ticks=4000)  # twice as long
+        assert show.leads and beat.ticks[-1].led and len(beat.ticks) > count
+    assert beat.pulse.taken_up(20.0, ticks=2500)
+    assert beat.ticks[-1].led == "" and rig.status()["led"] == ""
+
+
+def test_nobody_passes_himself_off_as_another(rig: RunningRig, folder: Path) -> None:
+    with raw(folder) as end:
+        order = {"order": "stop", "why": "x", "who": "the page"}
+        end.sendall(json.dumps({"do": "order", "order": order}).encode() + b"\n")
+        assert "ok" in line_of(end)
+    said = rig.status()["said"]
+    assert any(f"stopped by the page (process {os.getpid()})" in words for words in said)
+    with pytest.raises(Refused, match="another may only resume who confirms"):
+        rig.resume()
+    rig.resume(confirmed=True)
+
+
+def test_programs_of_other_users_are_hung_up_on(
+    rig: RunningRig, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stranger = remote_socket.Peer(1, os.getuid() + 1)
+    rig.get(RATE)  # let in
+    with monkeypatch.context() as patch:
+        patch.setattr(remote_socket, "peer", lambda end: stranger)
+        with raw(folder) as end:
+            assert hung_up(end)
+    assert rig.get(RATE) == {RATE: 200.0}
+
+
+def test_processor_time_is_shared_out() -> None:
+    budget = Budget(Rate(0.1, 0.5), 100.0)
+    budget.spend(0.5, 100.0)
+    assert budget.wait_s(100.0) == 0.0
+    budget.spend(0.2, 100.0)
+    assert budget.wait_s(100.0) == pytest.approx(2.0)
+    assert budget.wait_s(101.0) == pytest.approx(1.0)
+    assert budget.wait_s(200.0) == 0.0
+    budget.spend(0.6, 200.0)  # never more than the burst was saved
+    assert budget.wait_s(200.0) == pytest.approx(1.0)
+
+
+def test_who_takes_too_much_waits_and_is_refused_but_a_stop_goes_through(
+    rig: RunningRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig.get(RATE)  # let in with the usual rate
+    monkeypatch.setattr(server_module, "EACH", Rate(1e-6, 0.0))
+    with RunningRig.connect() as greedy:
+        greedy.get()
+        with pytest.raises(Refused, match="too many requests: ask again in"):
+            greedy.get()
+        greedy.stop("all the same")
+    assert rig.status()["stopped"] == "all the same"
+    rig.resume(confirmed=True)

@@ -326,6 +326,14 @@ class Requests:
         return {"notes": words}
 
 
+def is_stop(request: object) -> bool:
+    """True if a request is to stop: nothing may hold that up."""
+    match request:
+        case {"do": "order", "order": {"order": "stop"}}:
+            return True
+    return False
+
+
 def plain(value: object) -> object:
     """Make lists and dicts of tuples and mappings, as JSON has them."""
     if isinstance(value, Mapping):

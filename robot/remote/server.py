@@ -8,17 +8,22 @@ answers costs a thread and nothing else.
 import os
 import socket
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
+from robot.clock import RealClock
 from robot.remote import sockets as remote_socket
-from robot.remote.requests import Requests
+from robot.remote.budget import ALL, EACH, Budget
+from robot.remote.requests import Requests, is_stop
 from robot.remote.sockets import REQUEST_BYTES, Garbled, Wire
 
 _REST_S = 2.0
 """A request that has begun must end within this."""
 _TAKES_S = 2.0
 """An answer must be taken within this."""
+_LONGEST_WAIT_S = 0.25
+"""Who has used up their processor time waits so long for an answer at most."""
 _MOST = 16
 """Programs at a time; for one more the one that was quiet longest is hung up on."""
 
@@ -30,6 +35,8 @@ class RemoteServer:
         """Take what carries out requests, and who is told of errors in this program."""
         self._requests = requests
         self._say = say
+        self._clock = RealClock()
+        self._budget = Budget(ALL, self._clock.now_s())
         self._path: Path | None = None
         self._listener: socket.socket | None = None
         self._lock = threading.Lock()
@@ -102,15 +109,16 @@ class RemoteServer:
 
     def _serve(self, wire: Wire, peer: str) -> None:
         """Answer one program until it hangs up or cannot be understood any more."""
+        own = Budget(EACH, self._clock.now_s())
         try:
-            while self._served(wire, peer):
+            while self._served(wire, peer, own):
                 pass
         finally:
             with self._lock:
                 self._wires.pop(wire, None)
             wire.close()
 
-    def _served(self, wire: Wire, peer: str) -> bool:
+    def _served(self, wire: Wire, peer: str, own: Budget) -> bool:
         """Answer one request; tell whether another can follow."""
         try:
             request = wire.read(None, _REST_S)
@@ -121,6 +129,9 @@ class RemoteServer:
         with self._lock:
             if wire in self._wires:
                 self._wires[wire] = self._wires.pop(wire)
+        if not is_stop(request) and (words := self._delayed(own)):
+            return self._answer(wire, {"refused": words})
+        began_s = time.thread_time()
         try:
             answer = self._requests.answer(request, peer)
         except Exception as error:
@@ -128,7 +139,20 @@ class RemoteServer:
             # stop goes the same way.
             answer = {"failed": f"{type(error).__name__}: {error}"}
             self._say(f"remote control: {request!r:.200} met an error: {answer['failed']}")
-        return self._answer(wire, answer)
+        taken = self._answer(wire, answer)
+        used_s, now_s = time.thread_time() - began_s, self._clock.now_s()
+        own.spend(used_s, now_s)
+        self._budget.spend(used_s, now_s)
+        return taken
+
+    def _delayed(self, own: Budget) -> str:
+        """Let a program wait that takes too much time; return why it is refused all the same."""
+        now_s = self._clock.now_s()
+        wait_s = max(own.wait_s(now_s), self._budget.wait_s(now_s))
+        if wait_s > 0.0:
+            self._clock.sleep_until(now_s + min(wait_s, _LONGEST_WAIT_S))
+        left_s = wait_s - _LONGEST_WAIT_S
+        return f"too many requests: ask again in {left_s:.1f} s" if left_s > 0.0 else ""
 
     def _answer(self, wire: Wire, answer: dict[str, object]) -> bool:
         """Send an answer; tell whether it was taken."""

@@ -1,0 +1,103 @@
+"""Floods of requests at a running rig's socket: what they cost the control loop.
+
+Run by hand: ``python tests/attack/remote_flood.py [seconds]``. A loop on the host's clock before
+an emulated bus in this process; other processes flood its socket. Prints a table.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+
+from config.load import ConfigError
+from config.schema import load_rig
+from robot.assemble import assemble
+from robot.choice import Choice
+from robot.clock import RealClock
+from robot.loop import run
+from robot.remote import server
+from robot.remote.budget import ALL, EACH, Rate
+from robot.remote.live_control import LiveControl
+from robot.tuning import Tuning
+
+FLOODS = {
+    "nothing": "",
+    "set": "rig.set('gaze.saccade.max_speed_deg_s', 300.0 + n % 200)",
+    "get": "rig.get('')",
+    "knobs": "rig.knobs('')",
+    "status": "rig.status()",
+    "look": "rig.look_at(1.0, 0.001 * (n % 200), 0.2, stay=True)",
+    "resume": "rig.resume(confirmed=True)",
+}
+FLOOD = """
+import sys, time
+from drivers.errors import DriverError
+from robot.remote.running_rig import RunningRig
+rig, n = RunningRig.connect(), 0
+while True:
+    n += 1
+    try:
+        {}
+    except DriverError:
+        pass
+"""
+
+
+def flooded(what: str, seconds: float, programs: int) -> tuple[float, int, float]:
+    """Return the loop's rate, slots lost, and how long a stop took, in ms."""
+    made = assemble(load_rig("desk"), Choice(True, False, 0, "visitor"))
+    robot = made.robot
+    tuning = Tuning(made.retuner, robot.order, "desk")
+    about = {"rig": "desk", "pid": os.getpid()}
+    live = LiveControl(robot, tuning, (ConfigError,), made.clock, about, lambda _: None)
+    robot.start(made.clock)
+    live.open()
+    command = [sys.executable, "-c", FLOOD.format(FLOODS[what])]
+    others = [subprocess.Popen(command) for _ in range(programs if FLOODS[what] else 0)]
+    try:
+        run(robot, made.clock, made.loop, lambda s: "s" if s > 1.5 else None, live.note)
+        began_s = RealClock().now_s()
+        count = run(robot, made.clock, made.loop, lambda s: "s" if s > seconds else None, live.note)
+        rate = count.ticks / (RealClock().now_s() - began_s)
+        stop = [sys.executable, "-c", _STOP]
+        with subprocess.Popen(stop, stdout=subprocess.PIPE, text=True) as stopper:
+            run(
+                robot, made.clock, made.loop,
+                lambda s: "s" if stopper.poll() is not None or s > 20.0 else None, live.note,
+            )  # fmt: skip
+            took_ms = float(stopper.communicate()[0] or "nan")
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+        live.close()
+        robot.stop()
+        made.close()
+    return rate, count.overruns, took_ms
+
+
+_STOP = """
+import time
+from robot.remote.running_rig import RunningRig
+rig = RunningRig.connect()
+began = time.monotonic()
+rig.stop("a test")
+print(1e3 * (time.monotonic() - began))
+"""
+
+
+def main(seconds: float) -> None:
+    """Print the table."""
+    with tempfile.TemporaryDirectory(prefix="gz-", dir="/tmp") as folder:
+        os.environ["XDG_RUNTIME_DIR"] = folder
+        print(f"{'flood':10} {'allowed':>8} {'Hz':>7} {'slots lost':>10} {'stop ms':>8}")
+        for what in FLOODS:
+            for limits in ((EACH, ALL), (Rate(9.0, 9.0), Rate(9.0, 9.0))):
+                server.EACH, server.ALL = limits
+                rate, lost, took_ms = flooded(what, seconds, 4)
+                share = f"{limits[1].share:.0%}" if limits[1] is ALL else "all"
+                print(f"{what:10} {share:>8} {rate:7.1f} {lost:10} {took_ms:8.1f}", flush=True)
+
+
+if __name__ == "__main__":
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 5.0)
