@@ -262,10 +262,10 @@ class Machine:
 
     def _judge_command(self, command: Sequence[float], rearmed: Sequence[bool], t_s: float) -> None:
         """See that commands keep range, speed and acceleration, but where a joint began anew."""
-        since_s = t_s - self._last_s
-        # No goal came meanwhile: the servo braked, and goes on from its goal for one period.
-        late = since_s > 1.5 * self.period_s
-        dt_s = self.period_s if late else since_s
+        dt_s = t_s - self._last_s
+        # No goal came meanwhile, and servos braked: commands go on from there as the guard may.
+        late = dt_s > 1.5 * self.period_s or self._late
+        self._late = dt_s > 1.5 * self.period_s
         for i, limit in enumerate(self.limits):
             low, high, top, hard = limit[:4]
             if not low - 1e-6 <= command[i] <= high + 1e-6:
@@ -284,6 +284,7 @@ class Machine:
         self._last_s, self._dt_s = t_s, dt_s
 
     _dt_s = 0.0
+    _late = False
 
     def _judge_servos(self) -> list[float]:
         """See that servos are in their range and no faster than they may."""

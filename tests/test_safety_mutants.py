@@ -181,6 +181,20 @@ def late(m: ModuleType) -> None:
             before, speed = now, (now - before) / DT
 
 
+def slow_host(m: ModuleType) -> None:
+    """A loop that always takes two slots is a slower loop, and joints come to their speed."""
+    limit = m.JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
+    guard = m.Guard(m.GuardParams(), (limit,) * 9, JOINTS, period_s=DT)
+    guard.reset(0.0, (LOW,) * 9)
+    guard._gentle = [False] * 9
+    before = LOW
+    for k in range(1, 25):
+        joints = JointState((before,) * 9, (0.0,) * 9, (2 * k * DT,) * 9, ())
+        now = guard.check((HIGH,) * 9, joints, 0.0, 2 * k * DT).command_rad[0]
+        speed, before = (now - before) / (2 * DT), now
+    assert speed > 0.8 * TOP
+
+
 def not_finite(m: ModuleType) -> None:
     for bad in (nan, inf, -inf):
         bench = Bench(m)
@@ -434,6 +448,7 @@ CHECKS: tuple[Callable[[ModuleType], None], ...] = (
     no_overshoot,
     stopped_loop,
     late,
+    slow_host,
     not_finite,
     stale_joints,
     stale_picture,
@@ -498,8 +513,9 @@ MUTATIONS: tuple[Mutation, ...] = (
         no_overshoot,
     ),
     # time
-    (LATE, "return self.period_s, since_s", "return since_s, since_s", stopped_loop),
-    (LATE, "return self.period_s, since_s", "return since_s, since_s", late),
+    (LATE, "return pace_s, since_s", "return since_s, since_s", stopped_loop),
+    (LATE, "return pace_s, since_s", "return since_s, since_s", late),
+    (LATE, "self._recent_s.append(since_s)", "pass", slow_host),
     (LATE, "self._soft_until_s = t_s + soft_s", "pass", late),
     (GUARD, "            self._motion.left_alone(missed_s)", "            pass", late),
     (GUARD, "soft = min(soft, self._late_accel)", "pass", late),
