@@ -1,6 +1,7 @@
 """What has happened on the bus, in words, and how a servo is called in them."""
 
 from collections import deque
+from math import inf
 
 from drivers.maestro.params import HOBBY
 from drivers.types import ServoSetup
@@ -26,6 +27,28 @@ class Journal:
         lines = tuple(self._lines)
         self._lines.clear()
         return lines
+
+
+SELDOM_S = 10.0
+"""The same is not said again within such a time."""
+
+
+class Seldom:
+    """Says what happens again and again once in a while, and how often it has happened since."""
+
+    def __init__(self, journal: Journal) -> None:
+        self._journal = journal
+        self._said_s: dict[str, float] = {}
+        self._since: dict[str, int] = {}
+
+    def say(self, text: str, now_s: float, kind: str = "") -> None:
+        """Add a line unless one of its kind was added of late; a later one tells how many."""
+        if now_s - self._said_s.get(kind, -inf) < SELDOM_S:
+            self._since[kind] = self._since.get(kind, 0) + 1
+            return
+        self._said_s[kind] = now_s
+        often = self._since.pop(kind, 0)
+        self._journal.say(f"{text} ({often} more times since it was said last)" if often else text)
 
 
 def call(setup: ServoSetup) -> str:

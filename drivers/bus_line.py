@@ -7,6 +7,7 @@ from math import inf
 
 from drivers.bus_patience import Patience
 from drivers.bus_roll import silent_ones
+from drivers.host_lateness import HostLateness
 from drivers.serial_port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 
 TRIES, HURRIED = 3, 4.0
@@ -24,6 +25,8 @@ class BusLine(ABC):
     tries: how often a servo is asked outside the cyclic exchange; in the loop, once
     starving_s: silence after which a servo's own watchdog trips; inf where none is armed
     starved: such a silence has happened
+    asleep_s: the longest silence that this computer itself has kept since it was set to 0
+    lateness: answers that came after waiting had ended
     quiet: nothing came any more when the last exchange was given up
     whole_s: when the last exchange's answer was due as far as the wire goes
     deadline_s: end of the last exchange's patience
@@ -46,6 +49,9 @@ class BusLine(ABC):
         self.tries = TRIES
         self.starving_s = inf
         self.starved = False
+        self.asleep_s = 0.0
+        self.lateness = HostLateness()
+        self._unheard = False
         self.quiet = True
         self.whole_s = self.deadline_s = 0.0
         self._byte_s = BITS_PER_BYTE / baud
@@ -61,8 +67,10 @@ class BusLine(ABC):
         now_s = self.port.now_s()
         self.port.write(packet)
         # Up to after the write: the host may have been asleep just before the bytes left.
-        if self.port.now_s() - self._sent_s >= self.starving_s:
+        silent_s = self.port.now_s() - self._sent_s
+        if silent_s >= self.starving_s:
             self.starved = True
+            self.asleep_s = max(self.asleep_s, silent_s)
         self._sent_s = now_s
         # Bytes leave after those still on their way out, at the bus's own speed.
         free_s = self._free_s
@@ -78,6 +86,8 @@ class BusLine(ABC):
         """
         port = self.port
         # What is here before the question cannot be its answer.
+        if self._unheard and port.getBytesAvailable():
+            self.lateness.late_answer(port.now_s())
         port.clearPort()
         self.send(request)
         self.quiet = False
@@ -92,6 +102,7 @@ class BusLine(ABC):
         at_s = port.now_s()
         self.whole_s, self.deadline_s = whole_s, whole_s + 2.0 * half_s
         self.rx_bytes += len(raw)
+        self._unheard = not raw
         if len(raw) == length:
             self.patience.note(at_s - whole_s)
         return raw, at_s
@@ -119,6 +130,10 @@ class BusLine(ABC):
             dropped += len(more)
             self.rx_bytes += len(more)
             if not more or self.port.now_s() >= end_s or dropped >= 16 * _ROOM:
+                if dropped and self._unheard:
+                    # Nothing came in its time, and then something did: an answer, not noise.
+                    self.lateness.late_answer(self.port.now_s())
+                    self._unheard = False
                 return dropped
 
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:

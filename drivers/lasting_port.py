@@ -55,7 +55,9 @@ class LastingPort:
         gone_s = self._link.gone_for_s(now_s)
         if self._link.due(now_s):
             if self._open():
-                self._journal.say(f"port back after {self._link.back(now_s):.1f} s")
+                where = getattr(self._port, "opened_as", self._port.port_name)
+                renamed = f" as {where}" if where != self._port.port_name else ""
+                self._journal.say(f"port back after {self._link.back(now_s):.1f} s{renamed}")
                 return True
             self._link.failed(now_s, FIRST_S if self.release_due else LAST_S)
         if gone_s >= self._give_up_s:

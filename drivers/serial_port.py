@@ -8,6 +8,7 @@ import os
 import select
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Protocol
 
 from dynamixel_sdk import PortHandler
@@ -16,6 +17,7 @@ from serial.tools import list_ports
 
 from drivers.errors import BusLost, PortError
 from drivers.feetech.table import BAUD_RATES as FEETECH_RATES
+from drivers.serial_ports import holders, lasting_name
 
 BITS_PER_BYTE = 10
 SDK_MARGIN_S = 0.034
@@ -64,6 +66,14 @@ class BusPort(Protocol):
         """
         ...
 
+    def getBytesAvailable(self) -> int:
+        """Count the bytes that have arrived.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        ...
+
     def clearPort(self) -> None:
         """Throw away what has arrived, without waiting.
 
@@ -88,6 +98,9 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         port_name: its path.
         exclusive: opened for this program alone; False: beside the program that has it open.
         on_traffic: called whenever bytes are sent or waited for, None where nobody asks.
+        by_id: folder of names that adaptors keep, None for the system's.
+
+    opened_as: the path that was opened last: an adaptor may come back under another name
     """
 
     def __init__(
@@ -95,8 +108,12 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         port_name: str,
         exclusive: bool = True,
         on_traffic: Callable[[], None] | None = None,
+        by_id: Path | None = None,
     ) -> None:
         super().__init__(port_name)
+        self.opened_as = port_name
+        self._lasting: str | None = None
+        self._by_id = by_id
         self._exclusive = exclusive
         self._on_traffic = on_traffic
         self.ser: Serial | None = None
@@ -151,7 +168,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
                     return got
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
-        if not got and not os.path.exists(self.port_name):
+        if not got and not os.path.exists(self.opened_as):
             raise self._lost("it was unplugged")
         return got
 
@@ -221,16 +238,17 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             drivers.errors.PortError: absent, busy or not permitted.
         """
         self.closePort()
+        where = self._where()
         try:
-            self.ser = Serial(
-                self.port_name, cflag_baud, timeout=0, exclusive=self._exclusive or None
-            )
+            self.ser = Serial(where, cflag_baud, timeout=0, exclusive=self._exclusive or None)
         except (SerialException, OSError) as error:
             raise PortError(explain(self.port_name, error.errno)) from error
         except ValueError as error:  # pyserial: an adapter that does not do this rate
             raise PortError(
                 f"{self.port_name} cannot run at {cflag_baud} bit/s: choose 115200 or 1000000"
             ) from error
+        self.opened_as = os.path.realpath(where) if where != self.port_name else where
+        self._lasting = lasting_name(where, self._by_id) or self._lasting
         self._fd = self.ser.fileno()
         self._fds = (self._fd,)
         ask_low_latency(self.ser)
@@ -238,6 +256,23 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self.is_using = False
         self.tx_time_per_byte = 1000.0 * BITS_PER_BYTE / cflag_baud
         return True
+
+    def _where(self) -> str:
+        """Return the path to open: a port that was open is found again by its adaptor's number.
+
+        Raises:
+            drivers.errors.PortError: another adaptor has its name now.
+        """
+        lasting, name = self._lasting, str(self.port_name)
+        if lasting is None:
+            return name
+        if os.path.exists(lasting):
+            same = os.path.realpath(lasting) == os.path.realpath(self.port_name)
+            return name if same else lasting
+        now = lasting_name(self.port_name, self._by_id)
+        if now not in (None, lasting):
+            raise PortError(f"{self.port_name} is another adaptor now ({now}): plug in {lasting}")
+        return name
 
     def closePort(self) -> None:
         """Close; safe to call twice."""
@@ -307,7 +342,9 @@ def explain(port_name: str, code: int | None) -> str:
             "'sudo usermod -aG dialout $USER' and log in again"
         )
     if code in (errno.EBUSY, errno.EAGAIN):
-        return f"{port_name} is busy: close the other program that uses it"
+        held = ", ".join(holders(port_name))
+        who = f", {held}," if held else ""
+        return f"{port_name} is busy: close the other program{who} that uses it"
     reason = os.strerror(code) if code else "not a serial port"
     return f"cannot open {port_name} ({reason}); ports here: {name_ports()}"
 

@@ -82,6 +82,11 @@ def _lasting_names(by_id: Path) -> dict[str, str]:
     return {os.path.realpath(link): str(link) for link in sorted(by_id.iterdir())}
 
 
+def lasting_name(device: str, by_id: Path | None = None) -> str | None:
+    """Return the name of a port that stays the same after every plugging; None without one."""
+    return _lasting_names(by_id or Host().by_id).get(os.path.realpath(device))
+
+
 def access(device: str) -> Access:
     """Tell whether this user may open a path."""
     try:

@@ -325,7 +325,9 @@ class DynamixelBus:
                 readings[slot] = self._readings.one(slot, one)
             elif believed:
                 self._line.errors["implausible"] += 1
-        self._health.note_silent(self._roll.out, now_s, self._roll.garbling)
+        self._health.note_silent(
+            self._roll.out, now_s, self._roll.garbling, self._line.lateness.busy(now_s)
+        )
         return readings
 
     def _mind_silence(self, now_s: float) -> None:

@@ -173,7 +173,7 @@ class Care:
         for servo_id in ids:
             self._readings.name_fault(servo_id, self._health.faults.get(servo_id, ""))
         for servo_id, position in found.items():
-            self._line.errors["restarted"] += 1
+            self._line.errors["rearmed"] += 1
             slot = self._ids.index(servo_id)
             readings[slot] = self._readings.held(slot, position, at_s, self.engaged)
             if self.engaged:
@@ -253,3 +253,6 @@ class Care:
         healed = heal_tripped(self._line, ids, self._watchdog, self._revival.clip)
         self._rearmed.update(healed)
         self._line.errors["watchdog"] += len(healed)
+        if healed:
+            self._health.stopped(len(healed), self._line.asleep_s, self._line.port.now_s())
+        self._line.asleep_s = 0.0

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping
 
-from drivers.bus_journal import Journal, call
+from drivers.bus_journal import Journal, Seldom, call
 from drivers.dynamixel.table import name_errors
 from drivers.types import ServoSetup
 
@@ -12,6 +12,9 @@ MOST_RESTARTS, WITHIN_S = 3, 10.0
 AGAIN_AND_AGAIN = "restarts again and again: supply too weak"
 
 GARBLES = "answers, but its bytes arrive damaged: a second servo with its id, or a bad cable"
+
+BUSY_S = 2.0
+"""Where answers come late a servo may be silent for so long before it is named."""
 
 SAY_SILENT_S = 0.25
 """Silence is spoken of from so long on: one lost answer is no news."""
@@ -33,6 +36,7 @@ class Health:
         self._silent_since: dict[int, float] = {}
         self._told: set[int] = set()
         self._all_silent = False
+        self._seldom = Seldom(journal)
 
     def latched(self, servo_id: int, status: int) -> bool:
         """Note Hardware Error Status; gives whether that is news."""
@@ -70,9 +74,12 @@ class Health:
         self._journal.say(f"{call(self._setups[servo_id])} restarted: set up anew")
 
     def note_silent(
-        self, out: Collection[int], now_s: float, garbling: Collection[int] = ()
+        self, out: Collection[int], now_s: float, garbling: Collection[int] = (), late: int = 0
     ) -> None:
-        """Note who is out now; speaks of those who have been so for a while, once."""
+        """Note who is out now; speaks of those who have been so for a while, once.
+
+        late: answers that came late of late: then it is this computer that is to blame, at first
+        """
         for servo_id in [i for i in self._silent_since if i not in out]:
             since_s = self._silent_since.pop(servo_id)
             if servo_id in self._told:
@@ -81,7 +88,27 @@ class Health:
                 self._journal.say(f"{who} answers again after {now_s - since_s:.1f} s")
         for servo_id in out:
             self._silent_since.setdefault(servo_id, now_s)
+        if late and out and now_s - min(self._silent_since.values()) < BUSY_S:
+            self._seldom.say(f"this computer is busy: {late} answers late in the last s", now_s)
+            return
         self._tell(out, now_s, garbling)
+
+    def stopped(self, count: int, asleep_s: float, now_s: float) -> None:
+        """Note that servos were stopped by their own watchdog and go on from where they are.
+
+        asleep_s: for so long this computer has sent nothing; 0 where it has
+        """
+        servos = f"the watchdog of {count} servo{'s' if count > 1 else ''}"
+        if asleep_s:
+            self._seldom.say(
+                f"this computer was late: it sent nothing for {asleep_s:.2f} s, so {servos} "
+                "stopped them; they go on from where they are", now_s, "late",
+            )  # fmt: skip
+        else:
+            self._seldom.say(
+                f"{servos} stopped them, as packets get lost: check cable and plugs; they go on "
+                "from where they are", now_s, "lost",
+            )  # fmt: skip
 
     def _tell(self, out: Collection[int], now_s: float, garbling: Collection[int]) -> None:
         everybody = len(out) == len(self._setups)

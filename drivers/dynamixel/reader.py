@@ -11,6 +11,7 @@ from typing import NamedTuple
 from drivers.bus_roll import Roll, silent_ones
 from drivers.dynamixel.group import FastGroup, Group, PlainGroup, Values
 from drivers.dynamixel.line import Line
+from drivers.dynamixel.packets import HEADER
 from drivers.dynamixel.views import Sample, View
 from drivers.read_turns import Turns
 
@@ -130,6 +131,8 @@ class Reader:
             if len(samples) == len(group.ids):
                 return
             silent = silent_ones(group.ids, samples.keys() | damaged | unproved)
+            if not samples and not damaged and HEADER in raw:
+                self._line.lateness.late_answer(now_s)  # that of an earlier question
             self._blame(damaged, silent, now_s, turns)
             done = heard.keys() | damaged | frozenset(silent)
             left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
@@ -143,6 +146,8 @@ class Reader:
     ) -> None:
         """Note who failed; what still comes must not be taken for the next answer."""
         line, roll = self._line, self.roll
+        if damaged:
+            line.lateness.forget()  # noise looks late, too
         for servo_id in damaged:
             line.errors["corrupt"] += 1
             roll.damaged(servo_id, now_s)

@@ -83,6 +83,7 @@ class Revival:
         for servo_id in well:
             self._health.cleared(servo_id)
             if engaged and not torque[servo_id]:
+                line.errors["restarted"] += 1
                 self._health.restarted(servo_id, now_s)
         return found
 

@@ -293,7 +293,9 @@ class FeetechBus:
             else:
                 self._line.errors["implausible"] += 1
         self._care.note_out(self._roll.out, now_s)
-        self._health.note_silent(self._roll.out, now_s, self._roll.garbling)
+        self._health.note_silent(
+            self._roll.out, now_s, self._roll.garbling, self._line.lateness.busy(now_s)
+        )
         return readings
 
     def _confirmed(self, heard: dict[int, Heard]) -> dict[int, Heard]:

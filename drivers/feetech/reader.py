@@ -11,6 +11,7 @@ from typing import NamedTuple
 from drivers.bus_roll import Roll, silent_ones
 from drivers.feetech.group import Group
 from drivers.feetech.line import StsLine
+from drivers.feetech.packets import HEADER
 from drivers.feetech.views import Sample, View
 from drivers.read_turns import Turns
 
@@ -124,6 +125,8 @@ class Reader:
             if len(samples) == len(group.ids):
                 return
             silent = silent_ones(group.ids, samples.keys() | damaged)
+            if not samples and not damaged and HEADER in raw:
+                self._line.lateness.late_answer(now_s)  # that of an earlier question
             self._blame(damaged, silent, now_s, turns)
             done = heard.keys() | damaged | frozenset(silent)
             left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
@@ -137,6 +140,8 @@ class Reader:
     ) -> None:
         """Note who failed; what still comes must not be taken for the next answer."""
         line, roll = self._line, self.roll
+        if damaged:
+            line.lateness.forget()  # noise looks late, too
         for servo_id in damaged:
             line.errors["corrupt"] += 1
             roll.damaged(servo_id, now_s)

@@ -1,0 +1,95 @@
+"""A busy computer is told as that, and not as a bad plug."""
+
+import os
+
+import pytest
+from line_noise import Noisy
+
+from drivers.bus_journal import SELDOM_S, Journal, Seldom
+from drivers.errors import PortError
+from drivers.host_lateness import BUSY, WITHIN_S, HostLateness
+from drivers.serial_port import BlockingPort
+
+KINDS = ("dynamixel", "feetech")
+
+
+def test_few_late_answers_are_no_busy_computer():
+    lateness = HostLateness()
+    for k in range(BUSY - 1):
+        lateness.late_answer(5.0 + 0.01 * k)
+    assert lateness.busy(5.1) == 0
+    lateness.late_answer(5.1)
+    assert lateness.busy(5.1) == BUSY
+    assert lateness.busy(5.2 + WITHIN_S) == 0
+
+
+def test_the_same_is_said_seldom_and_counted():
+    journal = Journal()
+    seldom = Seldom(journal)
+    for k in range(30):
+        seldom.say("late", 7.0 + 0.1 * k)
+    seldom.say("late", 7.0 + SELDOM_S)
+    assert journal.take() == ("late", "late (29 more times since it was said last)")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_answers_that_come_late_are_the_computer_s_not_a_plug_s(kind):
+    noisy = Noisy(kind)
+    noisy.start()
+    outcome = noisy.run("delay all 40", 0.0, 150)
+    assert any("this computer is busy" in text for text in outcome.said), outcome.said
+    assert not any("check its cable" in text for text in outcome.said)
+    assert outcome.wrong == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_servo_that_is_silent_is_named_where_nothing_comes_late(kind):
+    noisy = Noisy(kind)
+    noisy.start()
+    outcome = noisy.run("lose 3", 0.0, 150)
+    assert any("joint_3 (servo 3) does not answer" in text for text in outcome.said)
+    assert not any("busy" in text for text in outcome.said)
+
+
+def test_a_host_that_slept_is_told_as_that_and_servos_go_on():
+    noisy = Noisy("dynamixel")
+    noisy.start()
+    noisy.now += 0.5  # the loop was stopped; the servos' own watchdog is not
+    outcome = noisy.run("clear", 0.0, 40)
+    assert sum("this computer was late: it sent nothing for 0.5" in t for t in outcome.said) == 1
+    assert outcome.errors["watchdog"] == 6
+    assert "restarted" not in outcome.errors
+    assert outcome.outside == 0
+
+
+# --- which port it is
+
+
+def adaptors(folder):
+    """Two pseudo-terminals with names that they keep, and a path that is now the first."""
+    ends = [os.openpty() for _ in range(2)]
+    by_id = folder / "by-id"
+    by_id.mkdir()
+    paths = [os.ttyname(slave) for _, slave in ends]
+    for name, path in zip(("usb-A", "usb-B"), paths, strict=True):
+        (by_id / name).symlink_to(path)
+    named = folder / "ttyUSB0"
+    named.symlink_to(paths[0])
+    return by_id, named, paths
+
+
+def test_an_adaptor_is_found_again_under_another_name_and_no_other_is_taken_for_it(tmp_path):
+    by_id, named, paths = adaptors(tmp_path)
+    port = BlockingPort(str(named), by_id=by_id)
+    assert port.setBaudRate(1_000_000)
+    assert port.opened_as == str(named)
+    named.unlink()  # back as another ttyUSB
+    assert port.setBaudRate(1_000_000)
+    assert port.opened_as == paths[0]
+    named.symlink_to(paths[1])  # another adaptor has got the name
+    assert port.setBaudRate(1_000_000)
+    assert port.opened_as == paths[0]
+    (by_id / "usb-A").unlink()
+    with pytest.raises(PortError, match="is another adaptor now"):
+        port.setBaudRate(1_000_000)
+    port.closePort()
