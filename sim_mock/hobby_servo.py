@@ -114,7 +114,7 @@ def checked(spec: HobbySpec) -> HobbySpec:
 
 
 _RANGES: dict[str, tuple[float, float]] = {
-    "channel": (0, 23),
+    "channel": (0, 255),
     "start_steps": (0.0, 16_383.0),
     "speed_steps_s": (100.0, 1e6),
     "lag_s": (0.0, 1.0),

@@ -1,0 +1,146 @@
+"""Emulated PCA9685 boards with a hobby servo on each channel, and the I2C bus they are on.
+
+Time passes in whole steps of 10 ms; a servo hears a new pulse once a period of its board.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from sim_mock.hobby_servo import HobbyServo
+from sim_mock.pca9685.chip import CHANNELS, Chip
+
+STEPS_S = 100
+US_STEPS = 4
+GENERAL_CALL, SOFTWARE_RESET = 0x00, b"\x06"
+STRANGE = 0xA5
+"""What a chip of another kind answers, whatever it is asked."""
+
+
+class NotAcknowledged(Exception):
+    """Nobody has acknowledged an address, or a byte."""
+
+
+class BusStuck(Exception):
+    """The lines do not go high: the adapter gives up."""
+
+
+class Body:
+    """The bus with its boards and servos.
+
+    Args:
+        chips: by their addresses.
+        servos: sixteen a board, in the order of the boards.
+
+    servo_power: the servos have their supply
+    stuck: somebody holds the data line down
+    absent: boards are not there; foreign: a chip of another kind is in their place
+    """
+
+    def __init__(
+        self, chips: Mapping[int, Chip], servos: Sequence[HobbyServo], now_s: Callable[[], float]
+    ) -> None:
+        self.now_s = now_s
+        self.chips = dict(chips)
+        self.servos = tuple(servos)
+        self.servo_power = True
+        self.stuck = self.absent = self.foreign = False
+        self._outputs = [
+            (chip, channel) for chip in self.chips.values() for channel in range(CHANNELS)
+        ]
+        self._step = self._steps(now_s())
+
+    # --- transfers
+
+    def write(self, address: int, data: bytes) -> None:
+        """Write up to a stop condition.
+
+        Raises:
+            NotAcknowledged: nobody has this address.
+            BusStuck: the lines do not go high.
+        """
+        self.advance()
+        if self.stuck:
+            raise BusStuck
+        if self.absent:
+            raise NotAcknowledged
+        if self.foreign:
+            if address not in self.chips:
+                raise NotAcknowledged
+            return
+        if address == GENERAL_CALL and data == SOFTWARE_RESET:
+            for chip in self.chips.values():
+                chip.reset()
+            return
+        heard = [chip for own, chip in self.chips.items() if address in (own, chip.all_call)]
+        if not heard:
+            raise NotAcknowledged
+        for chip in heard:
+            chip.write(data, self.now_s())
+        self._settle()
+
+    def read(self, address: int, length: int) -> bytes:
+        """Read up to a stop condition.
+
+        Raises:
+            NotAcknowledged: nobody has this address.
+            BusStuck: the lines do not go high.
+        """
+        self.advance()
+        if self.stuck:
+            raise BusStuck
+        if self.absent or address not in self.chips:
+            raise NotAcknowledged
+        return bytes([STRANGE] * length) if self.foreign else self.chips[address].read(length)
+
+    def restart(self) -> None:
+        """Restart all boards as a dip of their supply makes it."""
+        self.advance()
+        for chip in self.chips.values():
+            chip.reset()
+        self._settle()
+
+    # --- time
+
+    @staticmethod
+    def _steps(now_s: float) -> int:
+        # The margin keeps .03 s from being two steps.
+        return int(now_s * STEPS_S + 1e-3)
+
+    def width_steps(self, place: int, now_s: float) -> int:
+        """Return the pulses that truly leave a channel, quarter microseconds; 0: none."""
+        chip, channel = self._outputs[place]
+        return round(chip.width_s(channel, now_s) * 1e6 * US_STEPS)
+
+    def advance(self) -> None:
+        """Let time pass up to now."""
+        until = self._steps(self.now_s())
+        while self._step < until:
+            if self._at_rest():
+                self._step = until
+                return
+            self._step += 1
+            self._pass(self._step)
+
+    def _settle(self) -> None:
+        """Let pulses that have ended end at once: a servo hears none from then on."""
+        now_s = self.now_s()
+        for place, servo in enumerate(self.servos):
+            if servo.width_steps and not self._heard(place, now_s):
+                servo.width_steps = 0
+
+    def _heard(self, place: int, now_s: float) -> int:
+        return self.width_steps(place, now_s) if self.servo_power else 0
+
+    def _at_rest(self) -> bool:
+        now_s = self.now_s()
+        return all(
+            servo.resting and servo.width_steps == self._heard(place, now_s)
+            for place, servo in enumerate(self.servos)
+        )
+
+    def _pass(self, step: int) -> None:
+        now_s = step / STEPS_S
+        for place, servo in enumerate(self.servos):
+            period_s = self._outputs[place][0].period_s
+            if int(now_s / period_s) != int((now_s - 1.0 / STEPS_S) / period_s):
+                servo.width_steps = self._heard(place, now_s)
+            servo.step()

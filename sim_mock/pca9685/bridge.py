@@ -1,0 +1,237 @@
+"""The host's end of an emulated I2C bus: commands as bytes in, what they answer out.
+
+Commands are those of NXP's SC18IM700, a bridge from a serial line to I2C: S, the address with
+its direction bit, a count and, of a write, so many bytes; further S are further starts; P ends
+it. R, a register, P reads a register of the bridge's own: how the last transfer ended. Source:
+NXP, SC18IM700 data sheet, section 7.1.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from sim_mock.device import Reply
+from sim_mock.hobby_servo import HobbyServo, HobbySpec
+from sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
+from sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
+from sim_mock.pca9685.faults import CASES, COMMANDS, BoardFaults
+from sim_mock.servo_packets import Piece
+from sim_mock.wire_faults import NOBODY
+
+START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")
+STATUS_REGISTER = 0x0A
+OK, NO_ACKNOWLEDGE, TIMED_OUT = 0xF0, 0xF1, 0xF8
+
+
+class Part(NamedTuple):
+    """One start of a transfer; length: of a read, None where it is a write."""
+
+    address: int
+    data: bytes
+    length: int | None
+
+
+class Bridge:
+    """One bus behind a bridge; a servo's id is sixteen times its board's number and its channel.
+
+    Args:
+        servos: sixteen for each board.
+        addresses: of the boards, in their order.
+        seed: of the dice that faults throw.
+    """
+
+    def __init__(
+        self,
+        servos: Sequence[HobbyServo],
+        now_s: Callable[[], float],
+        addresses: Sequence[int],
+        oscillator_hz: float,
+        seed: int,
+    ) -> None:
+        self.now_s = now_s
+        chips = {address: Chip(oscillator_hz) for address in addresses}
+        self.body = Body(chips, servos, now_s)
+        self.faults = BoardFaults(self, COMMANDS, seed)
+        self._wire = self.faults.wire
+        self._order = {address: board for board, address in enumerate(addresses)}
+        self._unread = b""
+        self._status = OK
+        self._pointers: dict[int, int] = {}
+        self.heed_baud = False
+
+    # --- what it is
+
+    def hears(self, client_baud: int) -> bool:
+        """Return True: it takes any baud rate."""
+        return True
+
+    def choose(self, case: str, value: str) -> None:
+        """Choose what the boards are like.
+
+        Raises:
+            ValueError: there is no such case or value.
+        """
+        if case not in CASES:
+            raise ValueError(f"set {case!r}: unknown; there is {', '.join(CASES)}")
+        try:
+            mhz = float(value)
+        except ValueError:
+            mhz = 0.0
+        if not 20.0 <= mhz <= 30.0:
+            raise ValueError(f"{case} {value!r}: not a number of MHz from 20 to 30")
+        self.body.advance()
+        for chip in self.body.chips.values():
+            chip.oscillator_hz = mhz * 1e6
+
+    def restart(self) -> None:
+        """Restart the boards as a dip of their supply makes it."""
+        self.body.restart()
+
+    def here(self, place: int) -> HobbyServo:
+        """Return the servo of a channel, brought up to now.
+
+        Raises:
+            KeyError: there is no such channel.
+        """
+        self.body.advance()
+        if not 0 <= place < len(self.body.servos):
+            raise KeyError(f"no channel {place}; there is 0 to {len(self.body.servos) - 1}")
+        return self.body.servos[place]
+
+    def positions_steps(self) -> tuple[float, ...]:
+        """Return where the shafts truly are now, in quarter microseconds, by channel."""
+        self.body.advance()
+        return tuple(servo.place_steps for servo in self.body.servos)
+
+    # --- bytes
+
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Reply]:
+        """Take bytes off the wire and return what is answered to each command in them."""
+        self.body.advance()
+        came = data
+        if self._wire.any and self._wire.on("lose_bytes", self.now_s()):
+            came = bytes(
+                b for b in data if self._wire.take("lose_bytes", None, self.now_s()) is None
+            )
+        missing, replies = len(data) - len(came), []
+        for end, pieces in self._commands(came):
+            if pieces:
+                replies.append(Reply(missing + end, pieces))
+        return self.faults.around(replies, data) if self._wire.any else replies
+
+    def _commands(self, came: bytes) -> Iterator[tuple[int, list[Piece]]]:
+        """Carry out every whole command; what is not whole waits for its rest."""
+        kept, at = len(self._unread), 0
+        text = self._unread + came
+        while at < len(text):
+            if text[at] == READ_REGISTER:
+                if len(text) < at + 3:
+                    break
+                known = text[at + 1] == STATUS_REGISTER and text[at + 2] == STOP
+                said = [Piece(NOBODY, bytes((self._status,)))] if known else []
+                at += 3
+                yield at - kept, self._sent(said)
+            elif text[at] == START:
+                found = _transfer(text, at)
+                if found is None:
+                    break
+                at, parts = found
+                yield at - kept, self._sent(self._carry_out(parts))
+            else:
+                at += 1  # no command begins so
+        self._unread = text[at:]
+
+    def _sent(self, pieces: list[Piece]) -> list[Piece]:
+        """Return an answer as it arrives; faults of one channel spoil only its own registers."""
+        if not self._wire.any or not pieces:
+            return pieces
+        now_s = self.now_s()
+        left = [p for p in pieces if self._wire.take("lose", p.servo_id, now_s) is None]
+        return self._wire.spoil_pieces(left, False, now_s)
+
+    def _carry_out(self, parts: Sequence[Part]) -> list[Piece]:
+        """Carry out one transfer; the first part that fails ends it."""
+        self._status = OK
+        now_s, said = self.now_s(), []
+        if self._wire.any:
+            if self._wire.take("nack", None, now_s) is not None:
+                self._status = NO_ACKNOWLEDGE
+                return []
+            asks = any(part.length is not None for part in parts)
+            if not asks and self._wire.take("lose_writes", None, now_s) is not None:
+                return []
+            self.body.stuck = self._wire.on("stuck", now_s)
+            self.body.absent = self._wire.on("absent", now_s)
+            self.body.foreign = self._wire.on("foreign", now_s)
+        else:
+            self.body.stuck = self.body.absent = self.body.foreign = False
+        try:
+            for part in parts:
+                if part.length is None:
+                    self.body.write(part.address, part.data)
+                    self._pointers[part.address] = part.data[0] if part.data else 0
+                else:
+                    data = self.body.read(part.address, part.length)
+                    said.append(Piece(self._whose(part), data))
+        except NotAcknowledged:
+            self._status = NO_ACKNOWLEDGE
+        except BusStuck:
+            self._status = TIMED_OUT
+        return said
+
+    def _whose(self, part: Part) -> int:
+        """Return the channel whose registers are read, NOBODY where it is not one's alone."""
+        register = self._pointers.get(part.address, 0) - LED0
+        if part.length != 4 or register % 4 or not 0 <= register < 4 * CHANNELS:
+            return NOBODY
+        return self._order.get(part.address, 0) * CHANNELS + register // 4
+
+
+def _transfer(text: bytes, at: int) -> tuple[int, list[Part]] | None:
+    """Take a transfer apart; gives where it ends. None where bytes are missing."""
+    parts: list[Part] = []
+    while True:
+        if at >= len(text):
+            return None
+        if text[at] == STOP:
+            return at + 1, parts
+        if text[at] != START:
+            return at + 1, []  # broken: it is dropped
+        if len(text) < at + 3:
+            return None
+        address, count = text[at + 1], text[at + 2]
+        at += 3
+        if address & 1:
+            parts.append(Part(address >> 1, b"", count))
+            continue
+        if len(text) < at + count:
+            return None
+        parts.append(Part(address >> 1, text[at : at + count], None))
+        at += count
+
+
+def build_bridge(
+    addresses: Sequence[int],
+    now_s: Callable[[], float],
+    oscillator_hz: float = NOMINAL_HZ,
+    seed: int = 0,
+    servos: Sequence[HobbySpec | Sequence[float]] = (),
+) -> Bridge:
+    """Build the boards of one bus; channels without a spec have a servo as from the shop.
+
+    Raises:
+        ValueError: such boards or servos do not exist.
+    """
+    if not addresses or len(set(addresses)) < len(addresses):
+        raise ValueError(f"every board needs an address of its own; there is {list(addresses)}")
+    for address in addresses:
+        if not 0x40 <= address <= 0x7F:
+            raise ValueError(f"address {address:#x}: a PCA9685 has one from 0x40 to 0x7f")
+    count = CHANNELS * len(addresses)
+    given: Mapping[int, HobbySpec] = {int(spec[0]): HobbySpec(*spec) for spec in servos}
+    if len(given) < len(servos):
+        raise ValueError("two servos are on one channel")
+    for channel in given:
+        if not 0 <= channel < count:
+            raise ValueError(f"servo on channel {channel}: there is 0 to {count - 1}")
+    built = [HobbyServo(given.get(channel, HobbySpec(channel))) for channel in range(count)]
+    return Bridge(built, now_s, addresses, oscillator_hz, seed)

@@ -1,0 +1,159 @@
+"""An emulated PCA9685, register by register: what it is sent, and which pulses it gives.
+
+Left out: the sub-addresses (kept, never answered), inverted and open-drain outputs (kept, no
+effect), the output enable pin (tied to ground), an external clock (there is none, so choosing
+it ends the pulses). Source: NXP, PCA9685 data sheet, rev. 4, section 7.3; [A] is assumed.
+"""
+
+MODE1, MODE2, ALLCALLADR = 0x00, 0x01, 0x05
+LED0 = 0x06
+LAST_IN_TURN = 0x45
+"""Behind it auto-increment begins at 0 again."""
+ALL_LED, PRESCALE, TEST_MODE = 0xFA, 0xFE, 0xFF
+
+RESTART, EXTCLK, AI, SLEEP, ALLCALL = 0x80, 0x40, 0x20, 0x10, 0x01
+OCH = 0x08
+FULL = 0x10
+"""In the high byte of ON or OFF: all the time; OFF goes before ON."""
+
+CHANNELS, COUNTS = 16, 4096
+LEAST_PRESCALE = 3
+START_S = 500e-6
+"""From the end of sleep until the oscillator is steady."""
+
+NOMINAL_HZ = 25e6
+
+
+class Chip:
+    """One chip.
+
+    Args:
+        oscillator_hz: of its own oscillator, which differs from the nominal 25 MHz by some
+            percent from chip to chip.
+    """
+
+    def __init__(self, oscillator_hz: float = NOMINAL_HZ) -> None:
+        self.oscillator_hz = oscillator_hz
+        self._awake_s = -1.0
+        self.reset()
+
+    def reset(self) -> None:
+        """Set all registers to their values after power-up."""
+        self._registers = bytearray(256)
+        self._registers[MODE1] = SLEEP | ALLCALL
+        self._registers[MODE2] = 0x04
+        self._registers[2:6] = bytes((0xE2, 0xE4, 0xE8, 0xE0))
+        self._registers[PRESCALE] = 0x1E
+        for channel in range(CHANNELS):
+            self._registers[LED0 + 4 * channel + 3] = FULL
+        self._shown = bytes(self._registers[LED0 : LAST_IN_TURN + 1])
+        self._pointer = 0
+        self._staged = False
+        self._held_back = False
+
+    # --- the bus
+
+    @property
+    def all_call(self) -> int | None:
+        """Return the second address that it answers writes at, None where it has none."""
+        if not self._registers[MODE1] & ALLCALL:
+            return None
+        return self._registers[ALLCALLADR] >> 1
+
+    def write(self, data: bytes, now_s: float) -> None:
+        """Take the bytes behind the address of one write, up to the stop condition."""
+        if data:
+            self._pointer = data[0]
+        for byte in data[1:]:
+            self._store(self._pointer, byte, now_s)
+            self._step()
+        if self._staged:
+            self._show()
+
+    def read(self, length: int) -> bytes:
+        """Return the bytes of one read, from the register that was chosen last."""
+        found = bytearray()
+        for _ in range(length):
+            # What is written to all channels at once cannot be read.
+            unreadable = ALL_LED <= self._pointer < PRESCALE
+            found.append(0 if unreadable else self._registers[self._pointer])
+            self._step()
+        return bytes(found)
+
+    def _step(self) -> None:
+        if self._registers[MODE1] & AI:
+            after = 0 if self._pointer == LAST_IN_TURN else self._pointer + 1
+            self._pointer = after & 0xFF
+
+    def _store(self, register: int, byte: int, now_s: float) -> None:
+        if register == MODE1:
+            self._set_mode(byte, now_s)
+        elif register == PRESCALE:
+            if self._registers[MODE1] & SLEEP:
+                self._registers[PRESCALE] = max(LEAST_PRESCALE, byte)
+        elif LED0 <= register <= LAST_IN_TURN:
+            self._set_output(register - LED0, byte)
+        elif ALL_LED <= register < PRESCALE:
+            for channel in range(CHANNELS):
+                self._set_output(4 * channel + register - ALL_LED, byte)
+        elif register < LED0:
+            self._registers[register] = byte
+        # The test mode and the reserved registers take nothing.
+
+    def _set_mode(self, byte: int, now_s: float) -> None:
+        before = self._registers[MODE1]
+        if byte & RESTART and not byte & SLEEP:
+            self._held_back = False
+        if byte & SLEEP and not before & SLEEP and self._gives_any():
+            self._held_back = True
+        if before & SLEEP and not byte & SLEEP:
+            self._awake_s = now_s + START_S
+        # The external clock is chosen while asleep, and for good.
+        clock = before & EXTCLK or (byte & EXTCLK if before & SLEEP else 0)
+        self._registers[MODE1] = byte & ~(RESTART | EXTCLK) | clock
+        self._mark_restart()
+
+    def _mark_restart(self) -> None:
+        mode = self._registers[MODE1] & ~RESTART
+        self._registers[MODE1] = mode | (RESTART if self._held_back else 0)
+
+    def _set_output(self, at: int, byte: int) -> None:
+        self._registers[LED0 + at] = byte & (0x1F if at % 2 else 0xFF)
+        self._staged = True
+        if self._registers[MODE2] & OCH and at % 4 == 3:
+            self._show()
+
+    def _show(self) -> None:
+        """Let the outputs take what was written; what a sleep has held back goes on as well."""
+        self._shown = bytes(self._registers[LED0 : LAST_IN_TURN + 1])
+        self._staged = False
+        if self._held_back and not self._registers[MODE1] & SLEEP:
+            self._held_back = False
+            self._mark_restart()
+
+    # --- the outputs
+
+    def _gives_any(self) -> bool:
+        return any(not high & FULL for high in self._shown[3::4])
+
+    @property
+    def period_s(self) -> float:
+        """Return the time from pulse to pulse."""
+        return (self._registers[PRESCALE] + 1) * COUNTS / self.oscillator_hz
+
+    def counts(self, channel: int) -> int:
+        """Return the width that is set, in 4096ths of a period, whether it is awake or not."""
+        on_low, on_high, off_low, off_high = self._shown[4 * channel : 4 * channel + 4]
+        if off_high & FULL:
+            return 0
+        if on_high & FULL:
+            return COUNTS
+        on, off = on_low | (on_high & 0x0F) << 8, off_low | (off_high & 0x0F) << 8
+        return (off - on) % COUNTS
+
+    def width_s(self, channel: int, now_s: float) -> float:
+        """Return how long the pulses of a channel truly are; 0: there are none."""
+        mode = self._registers[MODE1]
+        if mode & (SLEEP | EXTCLK) or self._held_back or now_s < self._awake_s:
+            return 0.0
+        return self.counts(channel) / COUNTS * self.period_s
