@@ -206,13 +206,14 @@ def test_close_ends_even_a_frozen_page(shared: tuple[Page, str, int]) -> None:
 def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None:
     with running_page() as (page, url):
         page.offer({"lids": ("wink", "blink")})
-        first = page_process(os.getpid())
-        assert first is not None
+        first, folder = page_process(os.getpid()), Path(page._folder)
+        assert first is not None and folder.exists()
         os.kill(first, signal.SIGKILL)
         words = wait_for(page.notice, "the notice")
         assert words.startswith("the page has stopped") and "started again" in words
         page.show(SNAPSHOT)  # hurts nobody
         assert wait_for(page.url, "the page") == url  # the same port and token
+        assert not folder.exists() and Path(page._folder).stat().st_mode & 0o077 == 0
         assert page_process(os.getpid()) not in (None, first) and page.started == 2
         assert wait_for(page.notice, "the second notice") == f"the page is there again, at {url}"
         with Visitor(url).open() as talk:

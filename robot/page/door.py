@@ -44,6 +44,7 @@ _SCRIPT = Path(__file__).with_name("stop.js")
 _SCRIPT_TAG = b'<script src="/rig/stop.js"></script>'
 _HEAD = b"<head>"
 _ASKED_PER_S, _ASKED_BURST = 20.0, 40.0  # clicks of all people together
+_TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each is told all there is, which takes a moment
 _READ_S = 5.0
 _BEAT_S = 1.0
 _RENEWED_EVERY_S = 0.25
@@ -89,6 +90,7 @@ class Door:
         self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
         self._state: Mapping[str, object] = {}
         self._asked_rate = Rate(_ASKED_PER_S, _ASKED_BURST)
+        self._tab_rate = Rate(_TABS_PER_S, _TABS_BURST)
         self._news: set[asyncio.Event] = set()
         self._lines, self._tabs = Places(MOST_LINES), Places(MOST_TABS)
         self._loop = asyncio.new_event_loop()
@@ -319,6 +321,8 @@ class Door:
 
     async def _relay(self, request: web.Request) -> web.StreamResponse:
         """Carry a browser's websocket to the server and back, each side as slow as the other."""
+        if not self._tab_rate.take(self._loop.time()):
+            return web.Response(status=429, text="too many tabs at once\n", headers=_HEADERS)
         offered = [
             word.strip()
             for word in request.headers.get("Sec-WebSocket-Protocol", "").split(",")

@@ -11,9 +11,11 @@ import json
 import os
 import pickle
 import secrets
+import shutil
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -35,6 +37,8 @@ SNAPSHOT, PICTURE, CHOICES, KNOBS, VALUES, WORDS, REPLAY = b"s", b"p", b"c", b"k
 URL, NOTICE = b"u", b"n"
 TOKEN_VARIABLE = "GAZERIG_PAGE_TOKEN"
 """Of the page's environment: what browsers must show."""
+FOLDER_VARIABLE = "GAZERIG_PAGE_FOLDER"
+"""Of the page's environment: a folder of this user's alone, for its server's socket."""
 CANNOT_OPEN = 3
 """Exit code of a page that cannot have its address: it need not be tried again."""
 EVERYBODY = "*"
@@ -117,6 +121,7 @@ class Page:
         self.started = 0
         self.gone = False
         self._errors_fd = -1
+        self._folder = ""
         self._url: str | None = None
         self._notices: deque[str] = deque()
         self._owed: deque[bytes] = deque(maxlen=_MOST_OWED)
@@ -136,6 +141,7 @@ class Page:
         stops, their_stops = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # The page's own words are of interest only if it dies, and a pipe nobody reads fills.
         self._errors_fd = os.memfd_create("page_errors")
+        self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
         with theirs, their_stops:
             fds = theirs.fileno(), their_stops.fileno()
             self._process = subprocess.Popen(
@@ -144,7 +150,11 @@ class Page:
                 stdout=subprocess.DEVNULL,
                 stderr=self._errors_fd,
                 pass_fds=fds,
-                env={**_environment(), TOKEN_VARIABLE: self._token},
+                env={
+                    **_environment(),
+                    TOKEN_VARIABLE: self._token,
+                    FOLDER_VARIABLE: self._folder,
+                },
                 start_new_session=True,  # Ctrl-C in the terminal is the rig's, not the page's
             )
         self._began_s = self._clock.now_s()
@@ -325,6 +335,7 @@ class Page:
         self._process = None
         os.close(self._errors_fd)
         self._errors_fd = -1
+        shutil.rmtree(self._folder, ignore_errors=True)  # it may have been killed
 
 
 def _code(process: subprocess.Popen[bytes]) -> int | None:

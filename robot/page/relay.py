@@ -8,7 +8,7 @@ from aiohttp import web
 
 from robot.page.rate import Rate
 
-MESSAGES_PER_S, MESSAGES_BURST = 300.0, 600.0
+MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
 """From one browser; a person who drags with two hands sends some 60 a second."""
 BYTES_PER_S, BYTES_BURST = 1e6, 4e6
 TAKES_S = 20.0

@@ -1,7 +1,8 @@
 """The page's own process: take the newest snapshot off the socket and draw it.
 
 Started by ``robot.page.link.Page`` as ``python -m robot.page.view FD STOP_FD PARENT HOST PORT``,
-with the token in its environment, which other users cannot read as they can its arguments. It
+with the token and a folder of its own in its environment, which other users cannot read as
+they can its arguments. It
 ends when the other side of the socket closes. Nothing is fetched from anywhere: the
 page's script comes from the viser package and all shapes are made here. Browsers come in
 by ``robot.page.door``; what people do there goes to the rig over the same socket.
@@ -15,7 +16,6 @@ import shutil
 import signal
 import socket
 import sys
-import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from math import atan
@@ -33,6 +33,7 @@ from robot.page.link import (
     CANNOT_OPEN,
     CHOICES,
     EVERYBODY,
+    FOLDER_VARIABLE,
     KNOBS,
     NOTICE,
     PICTURE,
@@ -361,7 +362,7 @@ def main(arguments: list[str]) -> int:
     # and those of an exception are written only after a ``with`` has been left.
     feed = socket.socket(fileno=int(fd))
     teller, stop = Teller(feed), StopSender(socket.socket(fileno=int(stop_fd)))
-    folder = Path(tempfile.mkdtemp(prefix="gazerig-page-"))
+    folder = Path(os.environ.pop(FOLDER_VARIABLE))
     try:
         return _show(feed, teller, stop, (host, int(port)), token, folder, int(parent))
     finally:

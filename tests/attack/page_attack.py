@@ -1,6 +1,6 @@
 """Floods, silent and malformed connections against the page of a running rig. Prints a table.
 
-    PYTHONPATH=.:tests python tests/attack/page_attack.py [seconds of each attack]
+    PYTHONPATH=.:tests python tests/attack/page_attack.py [seconds of each [names of attacks]]
 
 A simulated rig runs in a process of its own, its page on the loopback. Each attack runs in
 another process; meanwhile the loop's rate is counted, then STOP is pressed 20 times as the
@@ -337,13 +337,13 @@ def attacked(rig: Rig, name: str, seconds: float, quiet_hz: float) -> float:
     return hz
 
 
-def main(seconds: float) -> None:
+def main(seconds: float, names: list[str]) -> None:
     """Attack in every way."""
     rig = Rig()
     print("attack             STOP taken, slowest  obeyed     loop page MB  rig MB  page")
     try:
         quiet_hz = attacked(rig, "nothing", seconds, 0.0)
-        for name in ATTACKS:
+        for name in names or ATTACKS:
             attacked(rig, name, seconds, quiet_hz)
     finally:
         rig.close()
@@ -353,4 +353,4 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["--attack"]:
         ATTACKS[sys.argv[2]](Visitor(sys.argv[3]))
     else:
-        main(float(sys.argv[1]) if len(sys.argv) > 1 else 4.0)
+        main(float(sys.argv[1]) if len(sys.argv) > 1 else 4.0, sys.argv[2:])
