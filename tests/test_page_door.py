@@ -219,6 +219,31 @@ def test_what_is_asked_goes_to_the_rig_with_the_name_of_who_asks(near: Rig) -> N
     assert near.asked[-1]["pick"] == {"x": 0.5, "y": 0.5, "who": named[1]}
 
 
+def test_a_lead_is_renewed_while_the_browser_that_leads_is_there(near: Rig) -> None:
+    ana = f"{near.cookie}; {near.door._name_cookie}=ana"
+    who = near.door.browsers.name("ana")
+
+    def renewed() -> int:
+        return near.asked.count({"order": "renew", "who": who})
+
+    near.asked.clear()
+    with near.knock("/rig/line", Cookie=ana):
+        body = b'{"order": "look_at", "p_world_m": [1, 0, 0]}'
+        assert near.post(body, Cookie=ana)[0] == 204 and near.asked[0]["who"] == who
+        for _ in range(400):
+            if renewed() > 2:
+                break
+            time.sleep(0.05)
+        assert renewed() > 2
+    for _ in range(400):
+        if not near.door.browsers.leading():
+            break
+        time.sleep(0.05)
+    before = renewed()
+    time.sleep(0.6)  # more than two heartbeats
+    assert renewed() <= before + 1
+
+
 def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:
     near.takes = False
     try:

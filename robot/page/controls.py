@@ -76,9 +76,10 @@ class LeadView:
         self._menus: dict[str, viser.GuiButtonGroupHandle] = {}
         self._characters: viser.GuiButtonGroupHandle | None = None
         self._target_m = (0.8, 0.0, 0.15)
-        self._now, self._character = "", ""
+        self._now, self._character, self._led = "", "", ""
         with tab:
             self._words = server.gui.add_html("", order=1)
+            self._leader = server.gui.add_html(_leader(""), order=1.5)
             server.gui.add_html(
                 _note("Click in the camera picture, or drag a target: the head looks there."),
                 order=3,
@@ -157,12 +158,21 @@ class LeadView:
             "behaviour": snapshot.behaviour,
             "conversation": snapshot.conversation,
             "character": snapshot.character or self._character,
-            "led by": snapshot.led,
         }
         now = ", ".join(f"{name} <b>{escape(word)}</b>" for name, word in said.items() if word)
         if now != self._now:
             self._now = now
             self._words.content = _note(f"in force: {now}")
+        if snapshot.led != self._led:
+            self._led = snapshot.led
+            self._leader.content = _leader(snapshot.led)
+
+
+def _leader(led: str) -> str:
+    """Say who leads on one line, always there: the buttons below must not slip away."""
+    words = f"led by <b>{escape(led)}</b>" if led else "led by nobody"
+    cut = "height:1.5em;overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
+    return _note(f"<div title='{escape(led)}' style='{cut}'>{words}</div>")
 
 
 def _note(html: str) -> str:
