@@ -3,7 +3,7 @@
 from collections import deque
 from math import inf
 
-from drivers.maestro.params import HOBBY
+from drivers.hobby_board.models import HOBBY
 from drivers.types import ServoSetup
 
 MOST = 200

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, get_args
 from drivers.dynamixel.table import MODELS as DYNAMIXEL
 from drivers.dynamixel.table import STEPS_PER_TURN
 from drivers.feetech.table import MODELS as FEETECH
-from drivers.maestro.params import HOBBY, US_STEPS
+from drivers.hobby_board.models import HOBBY, US_STEPS
 
 BusKind = Literal["dynamixel", "feetech", "maestro"]
 BUS_KINDS: tuple[BusKind, ...] = get_args(BusKind)

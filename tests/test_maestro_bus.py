@@ -551,7 +551,7 @@ def test_a_late_answer_is_never_taken_for_another(held):
 
 
 def test_a_silent_board_costs_little_time_and_is_given_up_in_the_end(held):
-    held.bus._params = MaestroParams(give_up_s=2.0)
+    held.bus._board.timing = held.bus._board.timing._replace(give_up_s=2.0)
     held.board.choose("mode", "mute")
     began_s, ticks = held.now_s, 0
     with pytest.raises(BusLost, match="has not answered for 2"):

@@ -2,8 +2,8 @@
 
 import pytest
 
-from drivers.maestro.channel import Channel
-from drivers.maestro.commands import Speech
+from drivers.hobby_board.channel import Channel
+from drivers.maestro.limits import SPEED_STEPS_S, speed_units
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
 from drivers.types import ServoSetup
@@ -83,7 +83,7 @@ def held(setup=SETUP, pulse=6000):
     channel = Channel(setup)
     channel.settle(pulse)
     channel.start(pulse, 0.0)
-    channel.limits(Speech())
+    channel.ramp.speed_steps_s = speed_units(setup.max_speed_steps_s) * SPEED_STEPS_S
     channel.hold()
     return channel
 

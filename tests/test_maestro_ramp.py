@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.maestro.ramp import Ramp, accel_units, speed_units
+from drivers.hobby_board.ramp import Ramp
+from drivers.maestro.limits import accel_units, speed_units
 
 
 def moved(ramp, goal, seconds, tick_s=0.01):
@@ -53,14 +54,14 @@ def test_without_limits_the_pulse_jumps_and_the_shaft_follows_at_its_own_speed()
 
 def test_a_speed_limit_is_kept():
     ramp = Ramp(6000.0, 1e6)
-    ramp.speed_units = 20
+    ramp.speed_steps_s = 2000.0
     assert moved(ramp, 8000.0, 0.5).pulse_steps == pytest.approx(7000.0)
     assert moved(ramp, 8000.0, 0.6).pulse_steps == 8000.0
 
 
 def test_an_acceleration_limit_takes_as_long_as_a_trapezoid():
     ramp = Ramp(4000.0, 1e6)
-    ramp.speed_units, ramp.accel_units = 40, 4  # 4000 steps/s, 5000 steps/s2
+    ramp.speed_steps_s, ramp.accel_steps_s2 = 4000.0, 5000.0
     seconds = 0.0
     while ramp.pulse_steps < 8000.0:
         ramp.move(8000.0, 0.01)
@@ -71,7 +72,7 @@ def test_an_acceleration_limit_takes_as_long_as_a_trapezoid():
 
 def test_a_long_pause_ends_at_the_goal():
     ramp = Ramp(4000.0, 100.0)
-    ramp.speed_units = 1
+    ramp.speed_steps_s = 100.0
     ramp.move(8000.0, 3600.0)
     assert (ramp.pulse_steps, ramp.shaft_steps) == (8000.0, 8000.0)
 
@@ -90,7 +91,7 @@ def test_without_pulses_the_shaft_is_taken_to_stay():
 )
 def test_it_never_leaves_the_range_of_its_goals(moves, speed, accel):
     ramp = Ramp(6000.0, 5000.0)
-    ramp.speed_units, ramp.accel_units = speed, accel
+    ramp.speed_steps_s, ramp.accel_steps_s2 = 100.0 * speed, 1250.0 * accel
     low = high = 6000.0
     for goal, seconds in moves:
         low, high = min(low, goal), max(high, goal)

@@ -94,6 +94,11 @@ class Line:
         register, self._unheard = self._unheard, 0
         return register
 
+    def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
+        """Stop pulses."""
+        # Each by its own command: one that is damaged on the way takes no other with it.
+        self.send(b"".join(self.speech.target(channel, 0) for channel in channels))
+
     def greet(self) -> int | None:
         """Ask for the errors until the board answers; None where it keeps silent.
 

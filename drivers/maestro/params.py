@@ -1,35 +1,12 @@
-"""How to speak with a Pololu Maestro, and the servos behind it: what a rig file may choose.
+"""How to speak with a Pololu Maestro: what a rig file may choose.
 
 Source: Pololu Maestro Servo Controller User's Guide (0J40).
 """
 
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
-
-US_STEPS = 4
-"""The board counts pulse widths in quarters of a microsecond."""
+from typing import Literal
 
 Form = Literal["compact", "pololu"]
-
-
-class HobbyModel(NamedTuple):
-    """A hobby servo: its shaft turns with the pulse width, and it tells nothing.
-
-    steps_per_turn: quarter microseconds that would be one turn
-    lowest, highest: pulse widths that such servos take, quarter microseconds
-    """
-
-    name: str
-    steps_per_turn: float
-    lowest: int
-    highest: int
-
-
-HOBBY = {
-    # 1000..2000 us are 90 deg by custom; most take 500..2500 us.
-    model.name: model
-    for model in (HobbyModel("hobby", 1000 * US_STEPS * 4.0, 500 * US_STEPS, 2500 * US_STEPS),)
-}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,42 +1,12 @@
-"""Stopping a Maestro's pulses: two files, as whoever lets go in an emergency needs no more."""
+"""Stopping a Maestro's pulses: a few files, as whoever lets go in an emergency needs no more."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from drivers.errors import PortError
+from drivers.hobby_board.release import switch_off
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
 from drivers.serial_port import BusPort
-
-TRIES = 3
-
-
-class Released(NamedTuple):
-    """Channels that still give pulses, and those of which nothing was heard."""
-
-    holding: tuple[int, ...]
-    mute: tuple[int, ...]
-
-
-def switch_off(line: Line, channels: Sequence[int]) -> Released:
-    """Stop the pulses, and see that they are gone.
-
-    Raises:
-        drivers.errors.BusLost: the port is gone.
-    """
-    left = tuple(channels)
-    heard: set[int] = set()
-    for _ in range(TRIES):
-        # Each by its own command: one that is damaged on the way takes no other with it.
-        line.send(b"".join(line.speech.target(channel, 0) for channel in left))
-        found = line.pulses(left)
-        if found is not None:
-            heard.update(left)
-            left = tuple(channel for channel, pulse in zip(left, found, strict=True) if pulse)
-        if not left:
-            break
-    holding = tuple(channel for channel in left if channel in heard)
-    return Released(holding, tuple(channel for channel in left if channel not in heard))
 
 
 def stop_pulses(port: BusPort, params: MaestroParams, channels: Sequence[int]) -> tuple[int, ...]:

@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 
 from drivers.bus_journal import call
 from drivers.errors import PortError
+from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.commands import MICRO, MOST_INPUT
 from drivers.maestro.line import Line
-from drivers.maestro.params import US_STEPS, MaestroParams
+from drivers.maestro.params import MaestroParams
 from drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from drivers.serial_port import BusPort
 from drivers.types import ServoSetup

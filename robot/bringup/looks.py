@@ -19,9 +19,10 @@ from drivers.feetech.table import LOAD_UNIT
 from drivers.feetech.table import REGISTERS as STS
 from drivers.feetech.table import name_errors as name_feetech
 from drivers.feetech.views import ARMED
+from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.commands import MOST_INPUT
 from drivers.maestro.line import Line
-from drivers.maestro.params import US_STEPS, MaestroParams
+from drivers.maestro.params import MaestroParams
 from drivers.serial_port import BusPort
 from robot.joint import JointParams
 

@@ -13,9 +13,10 @@ from math import ceil, floor
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from drivers.bus_journal import call
+from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.commands import MICRO
-from drivers.maestro.params import US_STEPS, MaestroParams
-from drivers.maestro.ramp import accel_units, speed_units
+from drivers.maestro.limits import accel_units, speed_units
+from drivers.maestro.params import MaestroParams
 from drivers.types import ServoSetup
 
 FACTORY_US = (992, 2000)

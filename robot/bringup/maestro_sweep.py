@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from drivers.bus_journal import call
 from drivers.errors import BusLost, ServoFault, ServoMissing
+from drivers.hobby_board.release import switch_off
 from drivers.maestro.commands import MOST_INPUT, name_errors
+from drivers.maestro.limits import SPEED_STEPS_S, speed_units
 from drivers.maestro.line import Line
-from drivers.maestro.ramp import SPEED_STEPS_S, speed_units
-from drivers.maestro.release import switch_off
 from drivers.types import ServoSetup
 
 SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0

@@ -7,8 +7,9 @@ The board knows no watchdog: a guardian stops its pulses when this program is ki
 from collections.abc import Callable
 
 from drivers.errors import BusLost
+from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.bus import MaestroBus
-from drivers.maestro.params import US_STEPS, MaestroParams
+from drivers.maestro.params import MaestroParams
 from drivers.serial_port import BusPort
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from robot.bringup.single_joint import Stopped

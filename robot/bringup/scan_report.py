@@ -2,7 +2,7 @@
 
 from collections.abc import Container, Iterator, Sequence
 
-from drivers.maestro.params import US_STEPS
+from drivers.hobby_board.models import US_STEPS
 from drivers.servo_models import BusKind
 from robot.bringup.searching import Looked, found_of
 from robot.bringup.servo_kind import Found

@@ -14,8 +14,9 @@ import typer
 
 from drivers.bus_journal import call
 from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
+from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.line import Line
-from drivers.maestro.params import US_STEPS, MaestroParams
+from drivers.maestro.params import MaestroParams
 from drivers.maestro.probe import USB_CHANNELS
 from drivers.port_owner import POLOLU
 from drivers.serial_port import BlockingPort

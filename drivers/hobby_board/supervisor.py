@@ -1,18 +1,17 @@
 """Looking after a board between the goals: errors, restarts, channels that lost their pulses.
 
-On any error a Maestro sends its channels to what its settings call home: no pulses, or a
-place of its own, or nothing. A restart does the same and forgets speeds and accelerations.
-Both show in one short question a tick: a channel's pulse and the error register.
+On an error a board may send its channels home: to no pulses, or a place of its own. A restart does
+the same and forgets how it was set up. Both show in one short question a tick: a channel's pulse
+and what the board says of itself.
 """
 
 from collections.abc import Sequence
 from math import inf
 
 from drivers.bus_journal import Journal, call
-from drivers.maestro.channel import Channel
-from drivers.maestro.commands import ERRORS, name_errors
-from drivers.maestro.hold import Outcome, refusal, take
-from drivers.maestro.line import Line
+from drivers.hobby_board.board import Board
+from drivers.hobby_board.channel import Channel
+from drivers.hobby_board.hold import Outcome, refusal, take
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
 """A board that lets go of its channels more often within such a time stays without pulses."""
@@ -24,25 +23,24 @@ SAME_S = 1.0
 """The same error is not told again within such a time."""
 
 
-class Care:
+class Supervisor:
     """What the board says about itself, and what is done about it.
 
     engaged: goals are followed
     """
 
-    def __init__(self, line: Line, channels: Sequence[Channel], journal: Journal) -> None:
-        self._line = line
+    def __init__(self, board: Board, channels: Sequence[Channel], journal: Journal) -> None:
+        self._board = board
+        self._line = board.line
         self._channels = tuple(channels)
-        self._ids = tuple(channel.id for channel in channels)
         self._journal = journal
         self.engaged = False
         self._pending: list[Channel] = []
         self._asked = -1
         self._unsure = False
-        self._unheard = 0
+        self._unheard: tuple[str, ...] = ()
         self._restarts: list[float] = []
         self._errors_s: dict[str, float] = {}
-        self._errors_first = False
         self._disturbed: list[float] = []
         self._damages = 0
         self._damaged_s = self._hold_at_s = self._told_s = -inf
@@ -54,7 +52,7 @@ class Care:
         self._disturbed.clear()
         self._hold_at_s = -inf
         self._pending.clear()
-        self._unsure, self._unheard = False, 0
+        self._unsure, self._unheard = False, ()
 
     def let_go(self) -> None:
         """Leave the channels alone."""
@@ -70,9 +68,9 @@ class Care:
             for channel in self._channels:
                 self._drop(channel)
 
-    def note_errors(self, register: int, now_s: float) -> None:
-        """Note the error register, which the board has cleared now."""
-        for name in name_errors(register):
+    def note_errors(self, names: Sequence[str], now_s: float) -> None:
+        """Note what the board has reported."""
+        for name in names:
             self._line.errors[name] += 1
             if now_s - self._errors_s.get(name, -inf) >= SAME_S:
                 self._journal.say(f"the board reports: {name}")
@@ -94,29 +92,19 @@ class Care:
         """
         self._asked = (self._asked + 1) % len(self._channels)
         channel = self._channels[self._asked]
-        speech = self._line.speech
-        questions = (speech.position(channel.id), speech.errors())
-        # Now in this order, now in the other: a line that says its last answer again gives a
-        # pulse width in the place of the register, which cannot be one.
-        self._errors_first = not self._errors_first
-        found = self._line.ask_words(b"".join(questions[:: -1 if self._errors_first else 1]), 2)
+        if self.engaged:
+            self.lead()
+        found = self._board.look(channel)
         if found is None:
-            self._unsure = True
-            return False
-        pulse, register = found[:: -1 if self._errors_first else 1]
-        if register >> len(ERRORS):
-            # A pulse width taken for a register, or noise: such errors do not exist.
-            self._line.errors["damaged"] += 1
             self._unsure = True
             return False
         now_s = self._line.port.now_s()
         self.advance(now_s)
-        register |= self._line.unheard()
-        self.note_errors(register, now_s)
+        self.note_errors(found.errors, now_s)
         if self.engaged:
-            self._unheard |= register
-            return self._tend(channel, pulse, now_s)
-        channel.found(pulse)
+            self._unheard = (*self._unheard, *found.errors)
+            return self._service(channel, found.pulse_steps, now_s)
+        channel.found(found.pulse_steps)
         self._unsure = False
         return True
 
@@ -125,7 +113,15 @@ class Care:
         for channel in self._channels:
             channel.advance(now_s)
 
-    def _tend(self, channel: Channel, pulse: int, now_s: float) -> bool:
+    def lead(self) -> None:
+        """Lead pulses that are on their way, where the board does not do that itself."""
+        if self._board.timing.longest_lead_s == inf:
+            return
+        self.advance(self._line.port.now_s())
+        if self.sure:
+            self._board.lead([channel for channel in self._channels if channel.held])
+
+    def _service(self, channel: Channel, pulse: int, now_s: float) -> bool:
         odd = channel.held and channel.strange(pulse, now_s)
         if self._unheard or self._unsure or odd:
             if not self._look_at_all():
@@ -137,26 +133,26 @@ class Care:
         for one in self._channels:
             if one.entering and one.inside():
                 one.entering = False
-                self._line.send(one.limits(self._line.speech))
+                self._board.send_limits([one], confirmed=False)
         return True
 
     def _look_at_all(self) -> bool:
         """Compare every channel's pulse with what it should be; tells whether they came."""
-        pulses = self._line.pulses(self._ids)
+        pulses = self._board.pulses([channel.id for channel in self._channels])
         if pulses is None:
             self._unsure = True
             return False
         now_s = self._line.port.now_s()
         self.advance(now_s)
-        register, unsure = self._unheard, self._unsure
-        self._unheard, self._unsure = 0, False
-        away = bool(register or unsure)
+        errors, unsure = tuple(dict.fromkeys(self._unheard)), self._unsure
+        self._unheard, self._unsure = (), False
+        away = bool(errors or unsure)
         found = dict(zip(self._channels, pulses, strict=True))
         held = [channel for channel in self._channels if channel.held]
         odd = [channel for channel in held if channel.strange(found[channel], now_s, away)]
         home = [channel for channel in odd if not found[channel]]
         if home or (odd and (away or len(odd) == len(held))):
-            self._lost_hold(odd, register, now_s)
+            self._lost_hold(odd, errors, now_s)
         else:
             for channel in odd:
                 self._met_end(channel, found[channel])
@@ -177,24 +173,23 @@ class Care:
         sent where the limits have arrived well.
         """
         held = [channel for channel in self._channels if channel.held]
-        speech = self._line.speech
         if not held:
             return
-        if not self._line.send_checked(b"".join(channel.limits(speech) for channel in held)):
+        if not self._board.send_limits(held, confirmed=True):
             self._unsure = True
             return
-        self._line.send(speech.targets({channel.id: channel.goal_steps for channel in held}))
+        self._board.send_goals(held)
 
     def _met_end(self, channel: Channel, pulse: int) -> None:
         """Note that a channel stays elsewhere: it meets an end of the board's own range."""
         if channel.met_end(pulse) and not channel.told:
             channel.told = True
             self._line.errors["other pulse"] += 1
-            self._journal.say(refusal(channel))
+            self._journal.say(refusal(self._board, channel))
 
-    def _lost_hold(self, lost: Sequence[Channel], register: int, now_s: float) -> None:
+    def _lost_hold(self, lost: Sequence[Channel], errors: Sequence[str], now_s: float) -> None:
         """Note that channels are not where they were sent, and that they are to be held anew."""
-        named = " and ".join(name_errors(register))
+        named = " and ".join(errors)
         who = (
             "the board"
             if len(lost) == len(self._channels)
@@ -216,7 +211,7 @@ class Care:
     def _noise_of_late(self, now_s: float) -> bool:
         """Tell whether bytes have been damaged of late, to the board or from it."""
         errors = self._line.errors
-        damages = sum(errors[name] for name in ("damaged", "incomplete", *ERRORS))
+        damages = sum(errors[name] for name in self._board.damage)
         if damages != self._damages:
             self._damages, self._damaged_s = damages, now_s
         return now_s - self._damaged_s < WITHIN_S
@@ -233,7 +228,7 @@ class Care:
         if now_s - self._told_s < WITHIN_S and often != 1:
             return
         self._told_s = now_s
-        again = " again and again: held once the line is quiet; check cable, ground and baud rate"
+        again = f" again and again: held once the line is quiet; {self._board.texts.noise}"
         rest = again if often > 0 else ": set up anew"
         self._journal.say(f"{who} was sent home by an error ({named}){rest}")
 
@@ -248,7 +243,7 @@ class Care:
         for channel in self._pending:
             channel.fault = fault
             self._journal.say(f"{call(channel.setup)}: {fault}")
-        self._line.send(self._line.speech.targets(dict.fromkeys([c.id for c in self._pending], 0)))
+        self._board.stop([channel.id for channel in self._pending])
         for channel in self._pending:
             channel.stop()
         self._pending.clear()
@@ -256,11 +251,11 @@ class Care:
     def _take_next(self, now_s: float) -> None:
         """Take hold of one channel anew; the next at the next read, to spare the supply."""
         channel = self._pending[0]
-        found = self._line.pulses((channel.id,))
+        found = self._board.pulses((channel.id,))
         if found is None:
             return
         channel.found(found[0])
-        outcome = take(self._line, channel, found[0])
+        outcome = take(self._board, channel, found[0])
         if outcome is Outcome.HELD:
             channel.rearm()
             self._pending.remove(channel)

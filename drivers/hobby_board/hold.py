@@ -7,9 +7,9 @@ where its servo is, and a first pulse is not ramped: the servo goes there at its
 from enum import Enum
 
 from drivers.bus_journal import call
-from drivers.maestro.channel import FINE_STEPS, Channel
-from drivers.maestro.line import Line
-from drivers.maestro.params import US_STEPS
+from drivers.hobby_board.board import Board
+from drivers.hobby_board.channel import FINE_STEPS, Channel
+from drivers.hobby_board.models import US_STEPS
 
 
 class Outcome(Enum):
@@ -20,7 +20,7 @@ class Outcome(Enum):
     ELSEWHERE = "elsewhere"
 
 
-def take(line: Line, channel: Channel, pulse_steps: int) -> Outcome:
+def take(board: Board, channel: Channel, pulse_steps: int) -> Outcome:
     """Hold a channel at the pulse that it gives, or at its last place where it gives none.
 
     Speed and acceleration are armed before the goal is sent, and the pulse is asked for
@@ -29,12 +29,12 @@ def take(line: Line, channel: Channel, pulse_steps: int) -> Outcome:
     Raises:
         drivers.errors.BusLost: the port is gone.
     """
-    goal = channel.start(pulse_steps, line.port.now_s())
-    if not line.send_checked(channel.limits(line.speech)):
+    goal = channel.start(pulse_steps, board.line.port.now_s())
+    if not board.send_limits([channel], confirmed=True):
         return Outcome.MUTE
-    line.send(line.speech.target(channel.id, goal))
-    found = line.pulses((channel.id,))
-    channel.advance(line.port.now_s())
+    board.send_goals([channel])
+    found = board.pulses((channel.id,))
+    channel.advance(board.line.port.now_s())
     if found is None:
         return Outcome.MUTE
     low, high = sorted((pulse_steps or goal, goal))
@@ -48,15 +48,10 @@ def take(line: Line, channel: Channel, pulse_steps: int) -> Outcome:
     return Outcome.HELD
 
 
-def refusal(channel: Channel) -> str:
+def refusal(board: Board, channel: Channel) -> str:
     """Say why a channel gives another pulse than asked for, and the cure."""
     goal, pulse = channel.goal_steps, round(channel.ramp.pulse_steps) if channel.on else 0
     if not pulse:
-        return (
-            f"{call(channel.setup)} gives no pulses: set its channel to Servo in Pololu's program"
-        )
+        return f"{call(channel.setup)} gives no pulses: {board.texts.no_pulses}"
     sent, got = f"{goal / US_STEPS:g} us", f"{pulse / US_STEPS:g} us"
-    return (
-        f"{call(channel.setup)} is sent to {sent} and gets {got}: "
-        "widen its range in Pololu's program, or delete the board's script"
-    )
+    return f"{call(channel.setup)} is sent to {sent} and gets {got}: {board.texts.other_pulse}"

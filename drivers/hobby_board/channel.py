@@ -1,11 +1,10 @@
-"""One channel of a Maestro as the driver knows it: what it was sent to and where it must be."""
+"""One channel of a board as the driver knows it: what it was sent to and where it must be."""
 
 from collections import deque
 from math import inf
 
-from drivers.maestro.commands import HIGHEST, LOWEST, Speech
-from drivers.maestro.params import HOBBY
-from drivers.maestro.ramp import SPEED_STEPS_S, Ramp, accel_units, speed_units
+from drivers.hobby_board.models import HOBBY
+from drivers.hobby_board.ramp import Ramp
 from drivers.slow_entry import entry_speed_steps_s
 from drivers.types import ServoReading, ServoSetup
 
@@ -26,9 +25,15 @@ class Channel:
     rearmed: it was taken hold of anew, which nobody has been told yet
     fault: why it stays without pulses; "" where nothing is wrong
     told: a person has been told that it does not give the pulses it should
+
+    Args:
+        setup: the servo.
+        longest_lead_s: its pulses go on their way for no longer than this where nothing was sent
+            for a while: the driver leads them.
     """
 
-    def __init__(self, setup: ServoSetup) -> None:
+    def __init__(self, setup: ServoSetup, longest_lead_s: float = inf) -> None:
+        self._longest_lead_s = longest_lead_s
         self.setup = setup
         self.id = setup.id
         self.on = self.held = self.entering = self.rearmed = self.told = False
@@ -65,16 +70,12 @@ class Channel:
 
     # --- what it is told
 
-    def limits(self, speech: Speech) -> bytes:
-        """Give the commands that arm its speed and acceleration."""
-        speed = self.setup.max_speed_steps_s
+    @property
+    def top_speed_steps_s(self) -> float:
+        """Return the speed that its pulses may have now: on its way inside a low one."""
         if self.entering:
-            speed = entry_speed_steps_s(self.setup, HOBBY["hobby"].steps_per_turn)
-        self.ramp.speed_units = speed_units(speed)
-        self.ramp.accel_units = accel_units(self.setup.max_accel_steps_s2)
-        return speech.speed(self.id, self.ramp.speed_units) + speech.acceleration(
-            self.id, self.ramp.accel_units
-        )
+            return entry_speed_steps_s(self.setup, HOBBY["hobby"].steps_per_turn)
+        return self.setup.max_speed_steps_s
 
     def start(self, pulse_steps: int, now_s: float) -> int:
         """Begin to hold: at its pulse, or where there is none at its last place; gives the goal."""
@@ -119,7 +120,12 @@ class Channel:
     def advance(self, now_s: float) -> None:
         """Let time pass."""
         if self.on and self._at_s > -inf:
-            self.ramp.move(self._reached(self.goal_steps), now_s - self._at_s)
+            spent_s = now_s - self._at_s
+            if spent_s > self._longest_lead_s:
+                # Nobody has led it on: it stood, and begins from rest.
+                self.ramp.move(self.ramp.pulse_steps, spent_s - self._longest_lead_s)
+                spent_s = self._longest_lead_s
+            self.ramp.move(self._reached(self.goal_steps), spent_s)
         self._at_s = now_s
 
     def strange(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
@@ -148,7 +154,7 @@ class Channel:
 
     def room_steps(self) -> float:
         """Give how far a pulse may be from where it is expected."""
-        return FINE_STEPS + self.ramp.speed_units * SPEED_STEPS_S * BEHIND_S
+        return FINE_STEPS + self.ramp.speed_steps_s * BEHIND_S
 
     def found(self, pulse_steps: int) -> None:
         """Take the board's word for the pulse that it gives now."""
@@ -211,21 +217,6 @@ class Channel:
             self.fault,
             rearmed=anew or self.entering,
             measured=False,
-        )
-
-
-def check(setup: ServoSetup, channels: int) -> None:
-    """Refuse a servo that no channel of the board can have.
-
-    Raises:
-        ValueError: so it is; the message names the servo and what would be right.
-    """
-    if not 0 <= setup.id < channels:
-        raise ValueError(f"channel {setup.id}: a board with {channels} has 0..{channels - 1}")
-    if not LOWEST <= setup.min_steps <= setup.max_steps <= HIGHEST:
-        raise ValueError(
-            f"channel {setup.id}: {setup.min_steps}..{setup.max_steps} steps must ascend within "
-            f"{LOWEST}..{HIGHEST} (64..4080 us)"
         )
 
 

@@ -1,51 +1,16 @@
 """Where a channel's pulse and the shaft behind it are, as far as known speeds tell.
 
-The board moves a pulse towards its goal at a limited speed and acceleration; the servo's
-shaft moves towards the pulse as fast as it can. Nobody measures the shaft: what is
+A pulse is led towards its goal at a limited speed and acceleration, by the board or by the driver;
+the servo's shaft moves towards the pulse as fast as it can. Nobody measures the shaft: what is
 computed here is an estimate that a stuck or loaded servo does not keep.
-Steps are quarter microseconds. Source: Pololu Maestro User's Guide (0J40), section 5.e.
+Steps are quarter microseconds.
 """
 
 from math import ceil, sqrt
 
-from drivers.maestro.commands import MOST
-
-SPEED_STEPS_S = 100.0
-"""Unit of the board's speed limit: a quarter microsecond in 10 ms."""
-
-ACCEL_STEPS_S2 = SPEED_STEPS_S / 0.08
-"""Unit of its acceleration limit: that much more speed in 80 ms."""
-
-MOST_ACCEL = 255
-
 _SLICE_S = 0.005
 _LONG_S = 5.0
 """After so long any pulse has arrived."""
-
-
-def speed_units(steps_s: float) -> int:
-    """Give the smallest speed limit that is not below a speed; 0, unlimited, where none is.
-
-    Raises:
-        ValueError: it is not a positive number.
-    """
-    return _units(steps_s / SPEED_STEPS_S, MOST, "speed")
-
-
-def accel_units(steps_s2: float | None) -> int:
-    """Give the smallest acceleration limit that is not below one; 0, unlimited, where none is.
-
-    Raises:
-        ValueError: it is not a positive number.
-    """
-    return 0 if steps_s2 is None else _units(steps_s2 / ACCEL_STEPS_S2, MOST_ACCEL, "acceleration")
-
-
-def _units(wanted: float, most: int, what: str) -> int:
-    if not wanted > 0.0:
-        raise ValueError(f"a {what} limit must be above 0, not {wanted}")
-    # A hair more than whole units is whole units that were divided and multiplied.
-    return 0 if wanted > most else max(1, ceil(wanted - 1e-9))
 
 
 class Ramp:
@@ -53,13 +18,13 @@ class Ramp:
 
     pulse_steps: what the board gives now; shaft_steps, shaft_steps_s: where the servo is
         taken to be, and how fast
-    speed_units, accel_units: the board's limits; 0: unlimited
+    speed_steps_s, accel_steps_s2: limits of the pulse; 0: unlimited
     shaft_speed_steps_s: how fast the servo itself is
     """
 
     def __init__(self, place_steps: float, shaft_speed_steps_s: float) -> None:
         self.shaft_speed_steps_s = shaft_speed_steps_s
-        self.speed_units = self.accel_units = 0
+        self.speed_steps_s = self.accel_steps_s2 = 0.0
         self.shaft_steps = place_steps
         self.begin(place_steps)
 
@@ -79,7 +44,7 @@ class Ramp:
 
     def longest_s(self, way_steps: float) -> float:
         """Give a time within which the board has led a pulse so far, from rest."""
-        speed, accel = self.speed_units * SPEED_STEPS_S, self.accel_units * ACCEL_STEPS_S2
+        speed, accel = self.speed_steps_s, self.accel_steps_s2
         cruise_s = way_steps / speed if speed else 0.0
         return cruise_s + (2.0 * sqrt(way_steps / accel) if accel else 0.0)
 
@@ -99,13 +64,13 @@ class Ramp:
 
     def _turn_pulse(self, goal_steps: float, for_s: float) -> None:
         left = goal_steps - self.pulse_steps
-        if not (self.speed_units or self.accel_units) or for_s > _LONG_S or left == 0.0:
+        if not (self.speed_steps_s or self.accel_steps_s2) or for_s > _LONG_S or left == 0.0:
             self.pulse_steps, self._pulse_steps_s = goal_steps, 0.0
             return
         way = 1.0 if left > 0.0 else -1.0
-        speed = self.speed_units * SPEED_STEPS_S or abs(left) / for_s
-        if self.accel_units:
-            accel = self.accel_units * ACCEL_STEPS_S2
+        speed = self.speed_steps_s or abs(left) / for_s
+        if self.accel_steps_s2:
+            accel = self.accel_steps_s2
             towards = max(0.0, way * self._pulse_steps_s)
             speed = min(speed, towards + accel * for_s, sqrt(2.0 * accel * abs(left)))
         if speed * for_s >= abs(left):

@@ -1,0 +1,160 @@
+"""What is asked of a board that sends pulses to hobby servos: one class a make implements this.
+
+A board either leads its pulses to their goals itself, at limits that are armed in it (Maestro), or
+takes pulses as they are, and the driver leads them (PCA9685): then ``send_goals`` sends where
+the pulses are on their way, and ``lead`` is called again and again.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+from drivers.bus_journal import Journal
+from drivers.hobby_board.channel import Channel
+from drivers.serial_port import BusPort
+from drivers.types import ServoSetup
+
+
+class Exchange(Protocol):
+    """Where bytes go: their counts, and errors by kind."""
+
+    tx_bytes: int
+    rx_bytes: int
+
+    @property
+    def port(self) -> BusPort:
+        """Return the port."""
+        ...
+
+    @property
+    def errors(self) -> Counter[str]:
+        """Return the errors by kind; who finds more adds them."""
+        ...
+
+
+class BoardTexts(NamedTuple):
+    """What people are told of a make of board.
+
+    name: of the board, with its number or address
+    no_pulses, other_pulse: the cure where a channel gives no pulses, or others than it is sent
+    noise: the cure where its line is disturbed
+    unheard: the cure where it does not answer
+    left_alone: what it does that cannot be reached any more
+    """
+
+    name: str
+    no_pulses: str
+    other_pulse: str
+    noise: str
+    unheard: str
+    left_alone: str
+
+
+class Seen(NamedTuple):
+    """What a board has said of one channel and of itself.
+
+    pulse_steps: what the channel gives now, quarter microseconds; 0: none
+    errors: that it has found since it was asked last, by name
+    """
+
+    pulse_steps: int
+    errors: tuple[str, ...] = ()
+
+
+class Timing(NamedTuple):
+    """How a board is dealt with in time.
+
+    baud: bit/s of its port
+    watch_s: it is looked at so often
+    stagger_s: between the first pulses of two servos
+    give_up_s: it may be silent or away for so long
+    longest_lead_s: pulses that the driver leads go on for no longer than this where nothing was
+        sent for a while; inf where the board itself leads them
+    """
+
+    baud: int
+    watch_s: float
+    stagger_s: float
+    give_up_s: float
+    longest_lead_s: float
+
+
+class Board(Protocol):
+    """One board, or several on one line; all may raise drivers.errors.BusLost.
+
+    line: what carries the bytes; texts: what people are told
+    damage: the kinds of errors that noise makes
+    """
+
+    @property
+    def line(self) -> Exchange: ...
+
+    @property
+    def texts(self) -> BoardTexts: ...
+
+    @property
+    def timing(self) -> Timing: ...
+
+    @property
+    def damage(self) -> Sequence[str]: ...
+
+    def check(self, setup: ServoSetup) -> None:
+        """Refuse a servo that no channel of the board can have.
+
+        Raises:
+            ValueError: so it is; the message names the servo and what would be right.
+        """
+        ...
+
+    def find(self, setups: Sequence[ServoSetup], journal: Journal) -> tuple[int, ...]:
+        """Find the board; return the pulses of these servos. Nothing moves.
+
+        Raises:
+            drivers.errors.ServoMissing: it does not answer, or a channel is no servo's.
+        """
+        ...
+
+    def prepare(self, journal: Journal) -> None:
+        """Make it ready for goals, before any is sent.
+
+        Raises:
+            drivers.errors.ServoMissing: it does not answer.
+        """
+        ...
+
+    def look(self, channel: Channel) -> Seen | None:
+        """Ask for one channel's pulse and the board's errors; None where no answer came."""
+        ...
+
+    def wake(self) -> tuple[str, ...] | None:
+        """Ask a board that has long been silent for its errors; None where no answer came."""
+        ...
+
+    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+        """Return what channels give now, beyond doubt; None where that did not succeed."""
+        ...
+
+    def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
+        """Arm what limits the speed of channels; False where it is to be confirmed and is not."""
+        ...
+
+    def send_goals(self, channels: Sequence[Channel]) -> None:
+        """Send channels to their goals."""
+        ...
+
+    def lead(self, channels: Sequence[Channel]) -> None:
+        """Send pulses that are on their way a little farther, where the board does not itself."""
+        ...
+
+    def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
+        """Stop pulses; on the last try by whatever else may help."""
+        ...
+
+    def wait(self, until_s: float) -> None:
+        """Let time pass."""
+        ...
+
+
+def goals_of(channels: Sequence[Channel]) -> Mapping[int, int]:
+    """Return the goals of channels by their numbers."""
+    return {channel.id: channel.goal_steps for channel in channels}

@@ -1,0 +1,319 @@
+"""Hobby servos behind a board that tells nothing of them: a short question and goals in every tick.
+
+What such a board cannot do, and so this bus cannot promise:
+
+- Nobody measures a servo. Readings are goals moved by known speeds (``measured`` is
+  False), no load and no current is known, and a stuck servo is not noticed.
+- Where a servo is before its pulses begin is unknown. It goes to the first pulse at its
+  own speed, whatever limit is armed.
+- No watchdog can be armed over the line: when this program dies the servos hold their last
+  goals, unless a guardian beside it stops the pulses (robot.guardian).
+- The board knows nothing of its servos' supply: servos that restart alone go unnoticed.
+"""
+
+from collections.abc import Sequence
+from math import inf
+
+from drivers.bus_journal import Journal, call
+from drivers.errors import BusLost, PortError, ServoMissing
+from drivers.hobby_board.board import Board
+from drivers.hobby_board.channel import Channel
+from drivers.hobby_board.release import TRIES, switch_off
+from drivers.hobby_board.silence import Silence
+from drivers.hobby_board.start import take_on
+from drivers.hobby_board.supervisor import Supervisor
+from drivers.lasting_port import LastingPort
+from drivers.types import BusHealth, ServoReading, ServoSetup
+
+UNMEASURED = "hobby servos tell no positions: what is shown is where they were sent"
+
+
+class HobbyBoardBus:
+    """The channels of one board; implements drivers.types.ServoBus.
+
+    Args:
+        board: what carries its pulses.
+        setups: the servos, in the order of every sequence given and taken; a servo's id is
+            its channel, and steps are quarter microseconds.
+
+    Raises:
+        ValueError: a servo is on a channel or at a pulse width that the board cannot have.
+    """
+
+    def __init__(self, board: Board, setups: Sequence[ServoSetup]) -> None:
+        for setup in setups:
+            board.check(setup)
+        self._board, self._line, self._port = board, board.line, board.line.port
+        self._setups = self._wanted = tuple(setups)
+        self._ids = tuple(setup.id for setup in setups)
+        if len(set(self._ids)) < len(self._ids):
+            raise ValueError(f"channels {self._ids}: each can move one servo only")
+        self._journal = Journal()
+        self._opened = self._told = False
+        self._now_s = 0.0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Make the parts that have memory, with a clean sheet."""
+        timing = self._board.timing
+        self._channels = tuple(Channel(setup, timing.longest_lead_s) for setup in self._setups)
+        self._supervisor = Supervisor(self._board, self._channels, self._journal)
+        self._silence = Silence(self._journal)
+        self._link = LastingPort(
+            self._port, timing.baud, timing.give_up_s, self._journal, self._trust_nobody
+        )
+        self._heard_s = -inf
+
+    # --- the bus as others see it
+
+    def open(self) -> None:
+        """Open the port, find the board and every channel; nothing moves.
+
+        Raises:
+            drivers.errors.PortError: the port cannot be opened.
+            drivers.errors.ServoMissing: the board or a channel does not answer.
+        """
+        self._setups = self._wanted
+        self._begin()
+        baud = self._board.timing.baud
+        if not self._port.setBaudRate(baud):
+            raise PortError(f"{self._port.port_name} cannot run at {baud} bit/s: choose 115200")
+        try:
+            self._port.clearPort()
+            pulses = self._board.find(self._setups, self._journal)
+            for channel, pulse in zip(self._channels, pulses, strict=True):
+                channel.settle(pulse)
+        except (ServoMissing, BusLost):
+            self._port.closePort()
+            raise
+        self._opened = True
+
+    def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
+        """Ask the board for its errors and one pulse, and say where all servos must be.
+
+        None where the board did not answer, and for channels that lost their pulses until
+        they are held again. Whatever is wrong, a read takes a bounded time. While the port
+        is gone all is None, and the port is tried again now and then.
+
+        Raises:
+            drivers.errors.BusLost: port or board have been gone for longer than ``give_up_s``.
+        """
+        self._now_s = now_s
+        if self._link.down and not self._link.returned(now_s):
+            return (None,) * len(self._ids)
+        if self._link.release_due and not self._caught_up():
+            return (None,) * len(self._ids)
+        try:
+            answered = self._watch(now_s)
+        except BusLost as lost:
+            self._lose(lost)
+            return (None,) * len(self._ids)
+        if not answered:
+            self._mind_silence(now_s)
+            return (None,) * len(self._ids)
+        return tuple(
+            channel.reading(self._heard_s) if self._supervisor.believed(channel) else None
+            for channel in self._channels
+        )
+
+    def engage(self) -> tuple[int, ...]:
+        """Hold every channel at the pulse that it gives, clipped to its limits.
+
+        A channel without pulses begins at its servo's last place, or at its rest where it
+        has not been held yet: the servo goes there at once, at its own speed, and the next
+        such channel follows ``stagger_ms`` later. A joint outside its limits is brought
+        inside at 30 deg/s. Returns the goals that are now in force, in steps.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+            drivers.errors.ServoMissing: the board does not answer, or a channel does not take
+                its goal.
+        """
+        self._take_wanted()
+        try:
+            if not self._told:
+                self._told = True
+                self._journal.say(UNMEASURED)
+            take_on(self._board, self._channels, self._journal)
+        except ServoMissing:
+            self.release()
+            raise
+        except BusLost:
+            self._link.refused_release()  # some may have their pulses already
+            raise
+        self._link.release_due = False
+        self._supervisor.take_on()
+        return tuple(channel.goal_steps for channel in self._channels)
+
+    def write(self, goals_steps: Sequence[int]) -> None:
+        """Send one goal to every channel in one write; goals are clipped to the limits.
+
+        Sends nothing while nothing is held, the port is gone, or the board did not answer:
+        it may have restarted, and would take goals without any limit of speed.
+
+        Raises:
+            ValueError: a goal is not a number, or there are not as many as servos.
+        """
+        goals = [
+            channel.clip(goal) for channel, goal in zip(self._channels, goals_steps, strict=True)
+        ]
+        if not self._supervisor.engaged or self._link.down or not self._supervisor.sure:
+            return
+        held = [channel for channel in self._channels if channel.held]
+        if not held:
+            return
+        now_s = self._port.now_s()
+        for channel, goal in zip(self._channels, goals, strict=True):
+            if channel.held:
+                channel.aim(goal, now_s)
+        try:
+            self._board.send_goals(held)
+        except BusLost as lost:
+            self._lose(lost)
+
+    def retune(self, setups: Sequence[ServoSetup]) -> None:
+        """Set the servos up so when they are held the next time; the same ids and models.
+
+        Raises:
+            ValueError: these are other servos, or limits that the board cannot have.
+        """
+        same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
+        if not same:
+            raise ValueError("other servos need another bus: ids and models must stay")
+        for setup in setups:
+            self._board.check(setup)
+        self._wanted = tuple(setups)
+
+    def faults(self) -> tuple[str, ...]:
+        """Name what channels suffer from now, and the board's errors of the last 10 s."""
+        channels = (f"{call(c.setup)}: {c.fault}" for c in self._channels if c.fault)
+        errors = self._supervisor.errors_of_late(self._port.now_s())
+        return (*channels, *(f"{self._board.texts.name}: {name}" for name in errors))
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call."""
+        return self._journal.take()
+
+    def release(self) -> None:
+        """Stop all pulses, confirmed; never raises for a board that does not answer.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone, and stays so when tried once more; the
+                torque is taken off by the first read after it is back.
+        """
+        self._supervisor.let_go()
+        if not self._opened:
+            return
+        if self._link.down and not self._link.open_once_more(self._now_s):
+            self._link.refused_release()
+            raise BusLost(self._cannot_release())
+        self._switch_all_off()
+
+    def _caught_up(self) -> bool:
+        """Take off the torque that was asked off while the port was gone; True if that is done."""
+        try:
+            self._switch_all_off()
+        except BusLost:
+            return False
+        return True
+
+    def _switch_all_off(self) -> None:
+        """Take the torque off, see that it is gone, and say where it is not.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        try:
+            released = switch_off(self._board, self._ids)
+        except BusLost as lost:
+            self._lose(lost)
+            self._link.refused_release()
+            raise BusLost(self._cannot_release()) from lost
+        self._link.released()
+        self._line.errors["refused"] += len(released.holding)
+        for channel in self._channels:
+            if channel.id in released.holding:
+                self._journal.say(f"{call(channel.setup)} still gets pulses: cut the servo power")
+            elif channel.id in released.mute:
+                self._journal.say(
+                    f"{call(channel.setup)} does not confirm that its pulses have stopped: "
+                    "cut the servo power"
+                )
+            else:
+                channel.stop()
+
+    def health(self) -> BusHealth:
+        """Give byte and error counts of all exchanges."""
+        errors = {kind: count for kind, count in self._line.errors.items() if count}
+        return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
+
+    def close(self) -> None:
+        """Close the port; safe to call twice. The board goes on as it was last told."""
+        self._opened = False
+        self._supervisor.let_go()
+        self._port.closePort()
+
+    # --- holding
+
+    def _take_wanted(self) -> None:
+        """Put in force what was asked for since the servos were held last."""
+        self._setups = self._wanted
+        for channel, setup in zip(self._channels, self._setups, strict=True):
+            channel.want(setup)
+
+    # --- reading
+
+    def _watch(self, now_s: float) -> bool:
+        """Ask the board, where that is due; tells whether it is known to be alive."""
+        if self._supervisor.sure and now_s - self._heard_s < self._board.timing.watch_s:
+            self._supervisor.advance(self._port.now_s())
+            self._supervisor.lead()
+            return True
+        if not self._silence.due(now_s):
+            return False
+        if self._silence.missed > TRIES and not self._wake(now_s):
+            return False
+        if not self._supervisor.watch():
+            self._silence.miss(now_s)
+            return False
+        self._heard_s = self._port.now_s()
+        self._silence.answer(now_s)
+        return True
+
+    def _wake(self, now_s: float) -> bool:
+        """Ask a board that has long been silent; it may have to detect its baud rate anew."""
+        errors = self._board.wake()
+        if errors is None:
+            self._silence.miss(now_s)
+            return False
+        self._supervisor.note_errors(errors, self._port.now_s())
+        return True
+
+    def _mind_silence(self, now_s: float) -> None:
+        """Give up where the board has not answered for too long.
+
+        Raises:
+            drivers.errors.BusLost: so it is.
+        """
+        silent_s = self._silence.seconds(now_s)
+        if silent_s >= self._board.timing.give_up_s:
+            raise BusLost(
+                f"{self._port.port_name}: the board has not answered for {silent_s:.1f} s: "
+                "check its power and the cable"
+            )
+
+    # --- a port that goes away
+
+    def _lose(self, lost: BusLost) -> None:
+        self._link.lose(lost, self._now_s)
+
+    def _trust_nobody(self) -> None:
+        """Begin anew with a port that was away."""
+        self._supervisor.suspect_all()
+
+    def _cannot_release(self) -> str:
+        """Say what servos do that cannot be told to let go."""
+        return (
+            f"{self._port.port_name} is gone: pulses could not be stopped; "
+            f"{self._board.texts.left_alone}: cut the servo power to free them"
+        )

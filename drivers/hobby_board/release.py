@@ -1,0 +1,42 @@
+"""Letting go of hobby servos: no more than whoever does it in an emergency needs."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+TRIES = 3
+"""So often is asked or told again what must not fail."""
+
+
+class Released(NamedTuple):
+    """Channels that still give pulses, and those of which nothing was heard."""
+
+    holding: tuple[int, ...]
+    mute: tuple[int, ...]
+
+
+class Stoppable(Protocol):
+    """As much of a board as letting go needs."""
+
+    def stop(self, channels: Sequence[int], last_try: bool = False) -> None: ...
+
+    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None: ...
+
+
+def switch_off(board: Stoppable, channels: Sequence[int]) -> Released:
+    """Stop the pulses, and see that they are gone.
+
+    Raises:
+        drivers.errors.BusLost: the port is gone.
+    """
+    left = tuple(channels)
+    heard: set[int] = set()
+    for attempt in range(TRIES):
+        board.stop(left, attempt == TRIES - 1)
+        found = board.pulses(left)
+        if found is not None:
+            heard.update(left)
+            left = tuple(channel for channel, pulse in zip(left, found, strict=True) if pulse)
+        if not left:
+            break
+    holding = tuple(channel for channel in left if channel in heard)
+    return Released(holding, tuple(channel for channel in left if channel not in heard))

@@ -1,0 +1,72 @@
+"""Taking hold of a board's channels, with every trouble named for a person."""
+
+from collections.abc import Sequence
+from math import inf
+
+from drivers.bus_journal import Journal, call
+from drivers.errors import ServoMissing
+from drivers.hobby_board.board import Board
+from drivers.hobby_board.channel import Channel
+from drivers.hobby_board.hold import Outcome, refusal, take
+from drivers.hobby_board.release import TRIES
+from drivers.types import ServoSetup
+
+
+def every_pulse(board: Board, setups: Sequence[ServoSetup]) -> tuple[int, ...]:
+    """Ask for every pulse.
+
+    Raises:
+        drivers.errors.BusLost: the port is gone.
+        drivers.errors.ServoMissing: a channel does not answer.
+    """
+    ids = tuple(setup.id for setup in setups)
+    for _ in range(TRIES):
+        pulses = board.pulses(ids)
+        if pulses is not None:
+            return pulses
+    where = board.line.port.port_name
+    for setup in setups:
+        if board.pulses((setup.id,)) is None:
+            raise ServoMissing(f"{where}: no answer about {call(setup)}: {board.texts.unheard}")
+    raise ServoMissing(f"{where}: answers get lost: {board.texts.noise}")
+
+
+def take_on(board: Board, channels: Sequence[Channel], journal: Journal) -> None:
+    """Take hold of every channel, those without pulses one after another.
+
+    Raises:
+        drivers.errors.BusLost: the port is gone.
+        drivers.errors.ServoMissing: the board does not answer, or a channel does not take
+            its goal.
+    """
+    board.prepare(journal)
+    pulses = every_pulse(board, [channel.setup for channel in channels])
+    for channel, pulse in zip(channels, pulses, strict=True):
+        channel.found(pulse)
+    limp = [call(channel.setup) for channel in channels if not channel.on]
+    if limp:
+        journal.say(f"{', '.join(limp)} had no pulses: they go to their places at once")
+    start_s = -inf
+    for channel, pulse in zip(channels, pulses, strict=True):
+        if not pulse:
+            board.wait(start_s + board.timing.stagger_s)
+            start_s = board.line.port.now_s()
+        _insist(board, channel, pulse)
+
+
+def _insist(board: Board, channel: Channel, pulse: int) -> None:
+    """Take hold of one channel.
+
+    Raises:
+        drivers.errors.ServoMissing: it does not take its goal.
+    """
+    for _ in range(TRIES):
+        outcome = take(board, channel, pulse)
+        if outcome is Outcome.HELD:
+            return
+        if outcome is Outcome.ELSEWHERE and channel.on:
+            break
+    where = board.line.port.port_name
+    if outcome is Outcome.MUTE:
+        raise ServoMissing(f"{where}: no answer about {call(channel.setup)}: check its cable")
+    raise ServoMissing(f"{where}: {refusal(board, channel)}")

@@ -1,0 +1,165 @@
+"""A Pololu Maestro as a board of hobby servos: it leads its pulses to their goals itself.
+
+Its own serial timeout, set with Pololu's program, helps where the cable or the computer dies.
+"""
+
+from collections.abc import Sequence
+from math import inf
+
+from drivers.bus_journal import Journal, call
+from drivers.errors import ServoMissing
+from drivers.hobby_board.board import BoardTexts, Seen, Timing, goals_of
+from drivers.hobby_board.channel import Channel
+from drivers.hobby_board.start import every_pulse
+from drivers.maestro.commands import (
+    ERRORS,
+    HIGHEST,
+    LOWEST,
+    MOST_INPUT,
+    name_errors,
+)
+from drivers.maestro.limits import ACCEL_STEPS_S2, SPEED_STEPS_S, accel_units, speed_units
+from drivers.maestro.line import Line
+from drivers.maestro.params import MaestroParams
+from drivers.serial_port import BusPort
+from drivers.types import ServoSetup
+
+
+class MaestroBoard:
+    """One board; implements drivers.hobby_board.board.Board."""
+
+    damage = ("damaged", "incomplete", *ERRORS)
+
+    def __init__(self, port: BusPort, params: MaestroParams) -> None:
+        self.params = params
+        self.line = Line(port, params)
+        self.timing = Timing(
+            params.baud, params.watch_ms / 1000.0, params.stagger_ms / 1000.0, params.give_up_s, inf
+        )
+        self.texts = BoardTexts(
+            name=f"board {params.device}",
+            no_pulses="set its channel to Servo in Pololu's program",
+            other_pulse="widen its range in Pololu's program, or delete the board's script",
+            noise="check cable, ground and baud rate",
+            unheard=f"has the board {params.channels} channels?",
+            left_alone="the board goes on with its last goals as long as it has power",
+        )
+        self._errors_first = False
+
+    def check(self, setup: ServoSetup) -> None:
+        """Refuse a servo that no channel of the board can have.
+
+        Raises:
+            ValueError: so it is; the message names the servo and what would be right.
+        """
+        channels = self.params.channels
+        if not 0 <= setup.id < channels:
+            raise ValueError(f"channel {setup.id}: a board with {channels} has 0..{channels - 1}")
+        if not LOWEST <= setup.min_steps <= setup.max_steps <= HIGHEST:
+            raise ValueError(
+                f"channel {setup.id}: {setup.min_steps}..{setup.max_steps} steps must ascend "
+                f"within {LOWEST}..{HIGHEST} (64..4080 us)"
+            )
+
+    def find(self, setups: Sequence[ServoSetup], journal: Journal) -> tuple[int, ...]:
+        """Greet the board and return the pulses of these servos; nothing moves.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+            drivers.errors.ServoMissing: it does not answer, or a channel is no servo's.
+        """
+        where = self.line.port.port_name
+        register = self.line.greet()
+        if register is None:
+            raise ServoMissing(f"{where}: no Maestro answers: {self._mute_causes()}")
+        if not self.line.takes_crc():
+            raise ServoMissing(
+                f"{where}: the board wants no CRC: switch Enable CRC on in Pololu's program, as "
+                "noise moves servos without it, or set crc to false"
+            )
+        if register:
+            named = ", ".join(name_errors(register))
+            journal.say(f"the board held errors from before, cleared now: {named}")
+        pulses = every_pulse(self, setups)
+        for setup, pulse in zip(setups, pulses, strict=True):
+            if 0 < pulse <= MOST_INPUT:
+                raise ServoMissing(
+                    f"{where}: channel {setup.id} is an input, {call(setup)} cannot "
+                    "move: set it to Servo in Pololu's program"
+                )
+        return pulses
+
+    def _mute_causes(self) -> str:
+        """Say what keeps a board from answering."""
+        params = self.params
+        number = f", its device number {params.device}" if params.protocol == "pololu" else ""
+        check_byte = "on" if params.crc else "off"
+        return (
+            "on USB take the first of its two ports and set it to 'USB Dual Port' in Pololu's "
+            f"program; on its serial pins check TX, RX, ground and {params.baud} bit/s{number}; "
+            f"its CRC must be {check_byte}"
+        )
+
+    def prepare(self, journal: Journal) -> None:
+        """Stop the board's own script where one runs: it would move servos against us."""
+        if self.line.ask(self.line.speech.script_status(), 1) == b"\0":
+            self.line.send(self.line.speech.stop_script())
+            journal.say("the board ran a script of its own: stopped")
+
+    def look(self, channel: Channel) -> Seen | None:
+        """Ask for one channel's pulse and the error register; None where no answer came."""
+        speech = self.line.speech
+        questions = (speech.position(channel.id), speech.errors())
+        # Now in this order, now in the other: a line that says its last answer again gives a
+        # pulse width in the place of the register, which cannot be one.
+        self._errors_first = not self._errors_first
+        order = -1 if self._errors_first else 1
+        found = self.line.ask_words(b"".join(questions[::order]), 2)
+        if found is None:
+            return None
+        pulse, register = found[::order]
+        if register >> len(ERRORS):
+            # A pulse width taken for a register, or noise: such errors do not exist.
+            self.line.errors["damaged"] += 1
+            return None
+        return Seen(pulse, name_errors(register | self.line.unheard()))
+
+    def wake(self) -> tuple[str, ...] | None:
+        """Ask a board that may have to detect its baud rate anew; None: no answer."""
+        register = self.line.wake()
+        return None if register is None else name_errors(register)
+
+    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+        """Return what channels give now, beyond doubt; None where that did not succeed."""
+        return self.line.pulses(channels)
+
+    def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
+        """Arm speed and acceleration; False where that is to be confirmed and is not."""
+        packet = b"".join(self._limits(channel) for channel in channels)
+        if confirmed:
+            return self.line.send_checked(packet)
+        self.line.send(packet)
+        return True
+
+    def _limits(self, channel: Channel) -> bytes:
+        speed = speed_units(channel.top_speed_steps_s)
+        accel = accel_units(channel.setup.max_accel_steps_s2)
+        channel.ramp.speed_steps_s = speed * SPEED_STEPS_S
+        channel.ramp.accel_steps_s2 = accel * ACCEL_STEPS_S2
+        speech = self.line.speech
+        return speech.speed(channel.id, speed) + speech.acceleration(channel.id, accel)
+
+    def send_goals(self, channels: Sequence[Channel]) -> None:
+        """Send channels to their goals."""
+        self.line.send(self.line.speech.targets(goals_of(channels)))
+
+    def lead(self, channels: Sequence[Channel]) -> None:
+        """Do nothing: the board leads its pulses itself."""
+
+    def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
+        """Stop pulses."""
+        self.line.stop(channels)
+
+    def wait(self, until_s: float) -> None:
+        """Let time pass."""
+        self.line.wait(until_s)
