@@ -24,6 +24,7 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import struck_rigs
 from mixed_rig import mixed_text
 from struck_rigs import CASES, Machine, pair_of, quick
 from true_shafts import Judge, Late, looked_at, on_time, run, sometimes_late
@@ -109,6 +110,7 @@ def soak(args: argparse.Namespace) -> None:
     """Strike rigs with random faults for simulated hours and print what was found."""
     dice, ends, seen_s, struck, stale = random.Random(args.seed), Counter[str](), 0.0, 0, 0
     first_mb, first_files = resources()
+    struck_rigs.PATIENCE_S = 8.0  # a bus that was late long is slow for a while
     for k in count():
         if seen_s >= 3600.0 * args.hours:
             break
