@@ -78,6 +78,7 @@ class Noisy:
         if kind == "maestro crc":
             self.device.choose("crc", "on")
         self._seen: list[tuple[float, ...]] = []
+        self._writes, self._strike = 0, None  # type: tuple[int, tuple[int, str] | None]
         self.port = InProcessPort(self.device, self._tap, "noisy line", self._sleep_until)
         self.bus = self._bus(kind)
         self._command: list[float] = []
@@ -89,6 +90,13 @@ class Noisy:
     def _tap(self, data: bytes) -> None:
         """Note where the joints are when anything is asked: an answer tells one of these."""
         self._seen.append(self.truth())
+        self._writes += 1
+        if self._strike is not None and self._writes == self._strike[0]:
+            self.device.faults.command(self._strike[1])
+
+    def strike(self, packet: int, fault: str) -> None:
+        """Let a fault begin with the ``packet``-th packet from now on."""
+        self._writes, self._strike = 0, (packet, fault)
 
     def _emulated(self, kind: str) -> Emulated:
         middle = (self.low + self.high) // 2
@@ -130,7 +138,9 @@ class Noisy:
     def truth(self) -> tuple[float, ...]:
         """Give where the joints truly are."""
         places = self.device.positions_steps()
-        return tuple(places[i] for i in IDS) if self._make == "maestro" else places
+        if self._make == "maestro":
+            return tuple(places[i] for i in IDS)
+        return places[: len(IDS)]  # without whoever has joined them
 
     def goals(self, t_s: float) -> list[int]:
         """Give goals that swing slower than the joints' limits and reach the ends of the range."""
@@ -150,10 +160,14 @@ class Noisy:
                 self._command[k] += min(max(goals[k] - self._command[k], -most), most)
         return [round(command) for command in self._command]
 
+    def engage(self) -> None:
+        """Switch torque on, and plan from there."""
+        self._command = [float(goal) for goal in self.bus.engage()]
+
     def start(self) -> None:
         """Open the bus, switch torque on and lead all joints to their first goals."""
         self.bus.open()
-        self._command = [float(goal) for goal in self.bus.engage()]
+        self.engage()
         self.bus.events()
         for _ in range(200):
             self._tick(None)

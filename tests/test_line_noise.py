@@ -56,3 +56,13 @@ def test_noise_on_the_line_of_a_board_leads_no_joint_out_nor_faster_than_a_servo
     assert outcome.fastest < 2.0
     assert outcome.recover_s is not None
     assert outcome.recover_s < 3.0
+
+
+def test_a_board_of_which_only_damaged_answers_come_is_not_given_up_and_nothing_moves():
+    noisy = Noisy("maestro crc")
+    noisy.start()
+    outcome = noisy.run("repeat", 0.0, 14_000)  # 70 s, longer than give_up_s
+    assert outcome.ended == ""
+    assert any("arrives damaged" in text for text in outcome.said)
+    assert outcome.recover_s is not None
+    assert outcome.recover_s < 3.0

@@ -313,6 +313,7 @@ class DynamixelBus:
         readings: list[ServoReading | None] = [None] * len(self._ids)
         if heard and self._health.silent_for_s(now_s) >= RESTART_S:
             self._care.suspect_all()
+        dark = not self._roll.group
         for servo_id, one in heard.items():
             slot = self._slot[servo_id]
             was_out = self._roll.answered(servo_id)
@@ -321,6 +322,8 @@ class DynamixelBus:
                 self._care.check(servo_id)
             if one.sample.error & ERROR_NUMBER:
                 self._line.errors["refused"] += 1
+            elif was_out and dark:
+                continue  # the first answer after long silence may be an old one
             elif believed and self._readings.believes(slot, one):
                 readings[slot] = self._readings.one(slot, one)
             elif believed:

@@ -284,10 +284,12 @@ class FeetechBus:
             places.damaged(now_s)
         if heard and places.disturbed(now_s):
             heard = self._confirmed(heard)
+        believed, dark = self._readings.all_believed(heard), not self._roll.group
         for servo_id, one in heard.items():
             slot = self._slot[servo_id]
-            self._roll.answered(servo_id)
-            if self._readings.believes(slot, one):
+            if self._roll.answered(servo_id) and dark:
+                continue  # the first answer after long silence may be an old one
+            if believed or self._readings.believes(slot, one):
                 self._care.judge(servo_id, one.sample, now_s)
                 readings[slot] = self._readings.one(slot, one)
             else:

@@ -6,7 +6,7 @@ then. So a position that no joint can have come to since the last one is not giv
 the same.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from drivers.feetech.reader import Heard
 from drivers.feetech.table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
@@ -30,6 +30,7 @@ class Readings:
     def __init__(self, setups: Sequence[ServoSetup]) -> None:
         count = len(setups)
         self.want(setups)
+        self._ids = tuple(setup.id for setup in setups)
         self.places = Plausibility(
             [MODELS[s.model].no_load_rpm / 60.0 * STEPS_PER_TURN for s in setups]
         )
@@ -54,6 +55,20 @@ class Readings:
         """Tell whether one servo's answer can be true; to be asked once for every answer."""
         position = nearest_turn(heard.sample.position, *self._ranges[slot])
         return self.places.one(slot, position, heard.at_s)
+
+    def all_believed(self, heard: Mapping[int, Heard]) -> bool:
+        """Tell whether everybody has answered in one exchange, and all of it can be true."""
+        if len(heard) < len(self._ranges):
+            return False
+        answers = list(heard.values())
+        at_s = answers[0].at_s
+        if any(one.at_s != at_s for one in answers):
+            return False
+        positions = [
+            nearest_turn(one.sample.position, *span)
+            for one, span in zip([heard[i] for i in self._ids], self._ranges, strict=True)
+        ]
+        return self.places.whole(positions, at_s)
 
     def confirmed(self, slot: int, first: Heard, second: Heard) -> Heard | None:
         """Give what two answers right after one another both say; None where they differ."""

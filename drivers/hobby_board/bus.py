@@ -59,6 +59,7 @@ class HobbyBoardBus:
         self._channels = tuple(Channel(setup, timing.longest_lead_s) for setup in self._setups)
         self._supervisor = Supervisor(self._board, self._channels, self._journal)
         self._silence = Silence(self._journal)
+        self._rx_bytes, self._byte_s = 0, -inf
         self._link = LastingPort(
             self._port, timing.baud, timing.give_up_s, self._journal, self._trust_nobody
         )
@@ -274,9 +275,10 @@ class HobbyBoardBus:
         if self._silence.missed > TRIES and not self._wake(now_s):
             return False
         if not self._supervisor.watch():
-            self._silence.miss(now_s)
+            self._silence.miss(now_s, self._any_byte_s(now_s))
             return False
         self._heard_s = self._port.now_s()
+        self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
         self._silence.answer(now_s)
         return True
 
@@ -284,10 +286,16 @@ class HobbyBoardBus:
         """Ask a board that has long been silent; it may have to detect its baud rate anew."""
         errors = self._board.wake()
         if errors is None:
-            self._silence.miss(now_s)
+            self._silence.miss(now_s, self._any_byte_s(now_s))
             return False
         self._supervisor.note_errors(errors, self._port.now_s())
         return True
+
+    def _any_byte_s(self, now_s: float) -> float:
+        """Return when anything at all came last, damaged or not."""
+        if self._board.line.rx_bytes != self._rx_bytes:
+            self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
+        return self._byte_s
 
     def _mind_silence(self, now_s: float) -> None:
         """Give up where the board has not answered for too long.
@@ -295,7 +303,8 @@ class HobbyBoardBus:
         Raises:
             drivers.errors.BusLost: so it is.
         """
-        silent_s = self._silence.seconds(now_s)
+        # Where anything arrives the board is there: it is noise that keeps it from being read.
+        silent_s = min(self._silence.seconds(now_s), now_s - self._byte_s)
         if silent_s >= self._board.timing.give_up_s:
             raise BusLost(
                 f"{self._port.port_name}: the board has not answered for {silent_s:.1f} s: "

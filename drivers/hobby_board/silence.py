@@ -30,8 +30,8 @@ class Silence:
         """Tell whether to ask now."""
         return now_s >= self._due_s
 
-    def miss(self, now_s: float) -> None:
-        """Note an answer that stayed out."""
+    def miss(self, now_s: float, heard_s: float = -inf) -> None:
+        """Note an answer that stayed out, or could not be read; anything came last at heard_s."""
         if not self.missed:
             self._since_s, self._wait_s = now_s, AGAIN_FIRST_S
         self.missed += 1
@@ -40,7 +40,12 @@ class Silence:
             self._wait_s = min(AGAIN_LAST_S, 2.0 * self._wait_s)
         if not self._told and now_s - self._since_s >= SAY_S:
             self._told = True
-            self._journal.say("the board does not answer: check its power and the cable")
+            damaged = heard_s >= self._since_s
+            self._journal.say(
+                "what the board answers arrives damaged: check cable, ground and baud rate"
+                if damaged
+                else "the board does not answer: check its power and the cable"
+            )
 
     def answer(self, now_s: float) -> None:
         """Note an answer."""
