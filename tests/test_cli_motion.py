@@ -117,11 +117,15 @@ def test_a_shipped_rig_is_copied_not_written(tmp_path: Path) -> None:
         (("--joint", "nose"), "no such joint; there is left_eye_pan"),
         (("--port", "/dev/null"), "exclude each other"),
         (("--answers", "/nowhere"), "No such file"),
-        (("--joint", "neck_yaw", "--answers", "/dev/null"), "no answer left to: turn neck_yaw"),
+        (("--joint", "neck_yaw", "--answers", "EMPTY"), "no answer left to: turn neck_yaw"),
+        (("--joint", "neck_yaw", "--answers", "/dev/null"), "is a device"),
     ],
 )
-def test_what_cannot_be_is_said(rig: Path, words: tuple[str, ...], says: str) -> None:
+def test_what_cannot_be_is_said(
+    rig: Path, tmp_path: Path, words: tuple[str, ...], says: str
+) -> None:
     before = rig.read_bytes()
+    words = tuple(script(tmp_path) if word == "EMPTY" else word for word in words)
     done = run("calibrate", str(rig), "--mock", *words)
     assert done.exit_code == 2 and says in done.stderr
     assert rig.read_bytes() == before

@@ -136,13 +136,15 @@ def test_joints_of_several_buses_are_calibrated_in_one_go(
         ("mixed", ("--set-middle", "--joint", "neck_yaw"), "only Feetech servos"),
         ("feetech", ("--set-middle", "--dry-run"), "exclude each other"),
         ("maker", ("--joint", "neck_yaw"), "no such joint; there is eyes_pan"),
-        ("maker", ("--joint", "eyes_pan", "--answers", "/dev/null"), "no answer left to"),
+        ("maker", ("--joint", "eyes_pan", "--answers", "EMPTY"), "no answer left to"),
     ],
 )
 def test_what_cannot_be_is_said(
-    rigs: dict[str, str], kind: str, words: tuple[str, ...], says: str
+    rigs: dict[str, str], tmp_path: Path, kind: str, words: tuple[str, ...], says: str
 ) -> None:
     before = Path(rigs[kind]).read_bytes()
+    (empty := tmp_path / "empty").touch()
+    words = tuple(str(empty) if word == "EMPTY" else word for word in words)
     done = run("calibrate", rigs[kind], "--mock", *words)
     assert done.exit_code == 2 and says in done.stderr, done.stderr
     assert Path(rigs[kind]).read_bytes() == before
