@@ -6,14 +6,14 @@ Bounds stand with the values, in the rooms; the rules between sections in config
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from drivers.camera_params import CameraCareParams, WebcamParams
-from drivers.dynamixel.bus import DynamixelParams
-from drivers.face_params import FaceDetectorParams
+from drivers.camera.oak_params import OakParams
+from drivers.camera.params import CameraCareParams, WebcamParams
 from drivers.feetech.params import FeetechParams
 from drivers.maestro.params import MaestroParams
-from drivers.motion_params import MotionParams
-from drivers.oak_params import OakParams
+from drivers.servo_bus.bus import DynamixelParams
 from drivers.servo_models import BUS_KINDS
+from drivers.vision.face_params import FaceDetectorParams
+from drivers.vision.motion.params import MotionParams
 from gaze.attention import AttentionParams
 from gaze.aversion import AversionParams
 from gaze.bottom_up import BottomUpParams

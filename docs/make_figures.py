@@ -30,7 +30,7 @@ from gaze.types import PART_NAMES  # noqa: E402
 from robot.assemble import assemble, gaze_parts  # noqa: E402
 from robot.choice import Choice  # noqa: E402
 from robot.loop import Tick, run  # noqa: E402
-from sim_mock.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
+from sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
 from sim_mock.true_gaze import (  # noqa: E402
     angles_of_place,
     gaze_angles,

@@ -3,9 +3,9 @@
 from math import inf
 from typing import Literal, NamedTuple, get_args
 
-from drivers.dynamixel.table import MODELS as DYNAMIXEL
-from drivers.dynamixel.table import STEPS_PER_TURN
-from drivers.feetech.table import MODELS as FEETECH
+from drivers.dynamixel.control_table import MODELS as DYNAMIXEL
+from drivers.dynamixel.control_table import STEPS_PER_TURN
+from drivers.feetech.memory_table import MODELS as FEETECH
 from drivers.hobby_board.models import HOBBY, US_STEPS
 
 BusKind = Literal["dynamixel", "feetech", "maestro"]

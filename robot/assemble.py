@@ -9,11 +9,11 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from config.schema import Rig, load_rules, load_walk
-from drivers.camera_depth import depth_at
-from drivers.camera_poses import PoseRing
+from drivers.camera.depth_roi import depth_at
+from drivers.camera.pose_buffer import PoseRing
 from drivers.errors import SetupError
-from drivers.port_owner import refuse_owner
-from drivers.serial_ports import serial_ports
+from drivers.serial.list_ports import serial_ports
+from drivers.serial.port_owner import refuse_owner
 from drivers.types import ServoBus
 from gaze.attention import Attention
 from gaze.aversion import Aversion
@@ -46,11 +46,11 @@ from robot.seeing.perception import Perception
 from robot.seeing.tracks import Tracker
 from robot.types import JointAngles
 from sim_mock.device import Device
-from sim_mock.emulated import build
-from sim_mock.ports import InProcessPort
-from sim_mock.pty_bus import PtyBuses
-from sim_mock.scene import Scene
-from sim_mock.scenes import scenes
+from sim_mock.devices import build
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.pty.client import PtyBuses
+from sim_mock.scenes.registry import scenes
+from sim_mock.scenes.scene import Scene
 
 P = TypeVar("P", ScanpathParams, SaccadeParams)
 

@@ -7,29 +7,29 @@ from math import radians
 import numpy as np
 
 from config.schema import Rig
-from drivers.camera_poses import PoseRing
-from drivers.camera_process import CameraProcess
-from drivers.camera_replay import CameraReplay
-from drivers.camera_worker import CameraParts
+from drivers.camera.oak import OakSource
+from drivers.camera.playback import CameraReplay
+from drivers.camera.pose_buffer import PoseRing
+from drivers.camera.process import CameraProcess
+from drivers.camera.source import PictureSource
+from drivers.camera.video_file import VideoFile
+from drivers.camera.webcam import Webcam
+from drivers.camera.worker import CameraParts
 from drivers.errors import SetupError
-from drivers.face_detector import face_detector
-from drivers.motion_detector import MotionDetector, turned_between
-from drivers.motion_params import MotionParams
-from drivers.oak_camera import OakSource
-from drivers.picture_source import PictureSource
 from drivers.types import Camera, MovingBlob
-from drivers.video_file import VideoFile
-from drivers.webcam import Webcam
+from drivers.vision.face_detector import face_detector
+from drivers.vision.motion.detector import MotionDetector, turned_between
+from drivers.vision.motion.params import MotionParams
 from gaze.types import Mat3, Vec3
 from robot.choice import Choice
 from robot.clock import Clock
 from robot.frames import CameraMount, CameraParams
 from robot.seeing.intrinsics import Intrinsics
 from robot.seeing.motion_finder import motion_finder, retuned
-from sim_mock.film_camera import FilmCamera
-from sim_mock.pixel_camera import Exposure, PixelCamera, PixelCameraParams
-from sim_mock.scene import Scene
-from sim_mock.scene_camera import SceneCamera, SceneCameraParams
+from sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams
+from sim_mock.cameras.video import FilmCamera
+from sim_mock.scenes.scene import Scene
 
 HeadPose = Callable[[float], tuple[Mat3, Vec3]]
 """Gives R_world_head and p_world_head_m at a time."""

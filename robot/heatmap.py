@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drivers.errors import SetupError
-from drivers.face_detector import face_detector
-from drivers.face_params import FaceDetectorParams
 from drivers.file_input import read_limited
 from drivers.file_output import write_file
+from drivers.vision.face_detector import face_detector
+from drivers.vision.face_params import FaceDetectorParams
 from gaze.types import PARTS, Floats
 from robot.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
 from robot.heatmap_legend import with_legend

@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 
 from config.schema import Rig
-from drivers.dynamixel.bus import DynamixelBus
 from drivers.errors import SetupError
 from drivers.feetech.bus import FeetechBus
 from drivers.maestro.bus import MaestroBus
-from drivers.mixed_bus import MixedBus, Share
-from drivers.serial_port import BlockingPort, BusPort
+from drivers.multi_bus import MixedBus, Share
+from drivers.serial.port import BlockingPort, BusPort
+from drivers.servo_bus.bus import DynamixelBus
 from drivers.servo_models import BUS_KINDS
 from drivers.types import ServoBus, ServoSetup
 from robot.body import setups

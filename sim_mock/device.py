@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from sim_mock.servo_packets import Piece
-from sim_mock.wire_faults import ActiveFaults
+from sim_mock.faults.active import ActiveFaults
+from sim_mock.replies import Piece
 
 
 class Reply(NamedTuple):

@@ -4,7 +4,7 @@ from gaze.angles import add, angle_between, rotate, rotation, scale, sub, unit, 
 from gaze.field_of_view import line_of_sight
 from gaze.types import Angles2, GazeState, Vec3
 from robot.seeing.face_pose import PARTS_FACE_M
-from sim_mock.scene import Person
+from sim_mock.scenes.scene import Person
 
 
 def true_part(person: Person, part: str | None) -> Vec3:

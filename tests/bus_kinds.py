@@ -6,19 +6,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.maestro.bus import MaestroBus, MaestroParams
 from drivers.maestro.commands import Speech
-from drivers.mixed_bus import MixedBus, Share
-from drivers.serial_port import BlockingPort, BusPort
+from drivers.multi_bus import MixedBus, Share
+from drivers.serial.port import BlockingPort, BusPort
+from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from sim_mock.device import Device
-from sim_mock.emulated import DynamixelLine, Emulated, MaestroLine, StsLine, build
+from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, StsLine, build
 from sim_mock.hobby_servo import HobbySpec
-from sim_mock.ports import InProcessPort
-from sim_mock.pty_bus import PtyBuses
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.pty.client import PtyBuses
+from sim_mock.smart_servo.physics import ServoSpec
 
 TICK_S = 0.01
 NAMES = ("eye", "jaw", "neck", "lid", "brow", "ear")

@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import pi, sin
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.errors import DriverError
 from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.maestro.bus import MaestroBus, MaestroParams
+from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from sim_mock.device import Device
-from sim_mock.emulated import DynamixelLine, Emulated, MaestroLine, StsLine, build
+from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, StsLine, build
 from sim_mock.hobby_servo import HobbySpec
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.physics import ServoSpec
 
 TICK_S = 0.005
 IDS = (1, 2, 3, 4, 5, 6)

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 from config.rig import Rig
 from config.schema import load_rig
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
 from robot.emulated_rig import emulated_lines
 from robot.rig_bus import guarded_rig_bus, ports_of, rig_bus, rig_setups
-from sim_mock.pty_bus import PtyBuses
+from sim_mock.pty.client import PtyBuses
 
 RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker"}
 SLOW_DEG_S = 4.0

@@ -10,7 +10,7 @@ from math import pi, radians, sin
 from typing import NamedTuple
 
 from config.schema import Rig
-from drivers.bus_journal import call
+from drivers.event_log import call
 from robot.body import Body
 from robot.clock import SimulatedClock
 from robot.emulated_rig import emulated_lines, place_of
@@ -18,9 +18,9 @@ from robot.rig_angles import limits, park_rad
 from robot.rig_bus import rig_bus, rig_setups
 from robot.safety.guard import Guard
 from sim_mock.device import Device
-from sim_mock.emulated import build
+from sim_mock.devices import build
+from sim_mock.in_process_port import InProcessPort
 from sim_mock.maestro.board import MaestroBoard
-from sim_mock.ports import InProcessPort
 
 STRUCK_S, PATIENCE_S = 1.0, 3.0
 FAST = 1.3

@@ -4,9 +4,9 @@ from moving_bus import IDS, NAMES, MovingBus
 
 from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.types import ServoSetup
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_physics import ServoSpec
-from sim_mock.sts.chain import build_sts
+from sim_mock.feetech.chain import build_sts
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.physics import ServoSpec
 
 SPEED = 3000.0
 

@@ -59,10 +59,15 @@ TOP = {
 
 # Vendor packages, and the only modules that may see each.
 OWNERS = {
-    "serial": ("drivers.serial_port", "sim_mock.ports"),
-    "dynamixel_sdk": ("drivers.dynamixel.", "drivers.serial_port", "sim_mock.ports"),
-    "depthai": ("drivers.oak_sdk",),
-    "mcap": ("drivers.recording_", "robot.recording."),
+    "serial": ("drivers.serial.", "sim_mock.in_process_port"),
+    "dynamixel_sdk": (
+        "drivers.dynamixel.",
+        "drivers.servo_bus.registers",
+        "drivers.serial.port",
+        "sim_mock.in_process_port",
+    ),
+    "depthai": ("drivers.camera.oak_sdk",),
+    "mcap": ("drivers.camera.recording_", "robot.recording."),
     "zstandard": ("robot.recording.",),
     "orjson": ("robot.recording.",),
     "matplotlib": ("robot.report.",),
@@ -151,8 +156,8 @@ def test_package_files_hold_a_docstring_and_nothing_else() -> None:
 
 def test_it_would_catch_a_wrong_arrow() -> None:
     assert not room_allowed("gaze.head", "robot.loop")
-    assert not room_allowed("drivers.webcam", "gaze.types")
-    assert not room_allowed("robot.loop", "sim_mock.visitor")
+    assert not room_allowed("drivers.camera.webcam", "gaze.types")
+    assert not room_allowed("robot.loop", "sim_mock.scenes.visitor")
     assert not room_allowed("robot.loop", "config.schema")
-    assert not room_allowed("sim_mock.visitor", "robot.loop")
-    assert room_allowed("sim_mock.scene_camera", "robot.frames")
+    assert not room_allowed("sim_mock.scenes.visitor", "robot.loop")
+    assert room_allowed("sim_mock.cameras.detections", "robot.frames")

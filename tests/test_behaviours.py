@@ -13,9 +13,9 @@ from gaze.types import Target, Vec3
 from robot.assemble import Assembly, Choice, assemble
 from robot.behaviours import Behaviours
 from robot.loop import Tick, run
-from sim_mock.scene import Event, Person, Scene, Thing, there_and_back
-from sim_mock.scene_camera import SceneCamera, SceneCameraParams
-from sim_mock.scenes import scenes
+from sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from sim_mock.scenes.registry import scenes
+from sim_mock.scenes.scene import Event, Person, Scene, Thing, there_and_back
 
 FACE: Vec3 = (1.0, 0.0, 0.2)
 HAND: Vec3 = (0.7, 0.2, 0.1)

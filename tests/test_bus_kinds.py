@@ -12,8 +12,8 @@ from bus_kinds import KINDS, PLACES, SHARES, Twin, in_process, twin_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bus_journal import call
 from drivers.errors import BusLost, PortError, ServoMissing
+from drivers.event_log import call
 
 TWINS = ("in-process", "pty")
 AWAY = (0.2, 0.8, 0.3, 0.7, 0.25, 0.75)

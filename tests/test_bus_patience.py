@@ -3,18 +3,18 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.bus_journal import MOST, Journal, call, title
-from drivers.bus_patience import WINDOW, Patience
-from drivers.bus_reconnect import Reconnect
-from drivers.dynamixel.health import AGAIN_AND_AGAIN, Health
-from drivers.dynamixel.table import MODELS, indirect_blocks
-from drivers.dynamixel.views import (
+from drivers.dynamixel.control_table import MODELS, indirect_blocks
+from drivers.event_log import MOST, Journal, call, title
+from drivers.serial.reopening import Reconnect
+from drivers.servo_bus.adaptive_timeout import WINDOW, Patience
+from drivers.servo_bus.faults import AGAIN_AND_AGAIN, Health
+from drivers.servo_bus.read_windows import (
     INDIRECT_MAP,
     alone_turns,
     direct_turns,
     indirect_turns,
 )
-from drivers.read_turns import CALM_S
+from drivers.servo_bus.window_schedule import CALM_S
 from drivers.types import ServoSetup
 
 

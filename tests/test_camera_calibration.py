@@ -16,8 +16,8 @@ from robot.calibrate.camera_calibration import (
 )
 from robot.calibrate.charuco_board import CharucoBoard, SeenBoard
 from robot.seeing.intrinsics import Intrinsics, intrinsics_of_view, project
-from sim_mock.board_camera import BoardCamera, BoardCameraParams, true_lens
-from sim_mock.board_scene import held_pose
+from sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
+from sim_mock.cameras.charuco_scene import held_pose
 
 SIZE = (640, 400)
 BOARD = CharucoBoard()

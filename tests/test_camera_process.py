@@ -10,19 +10,19 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera_params import CameraCareParams
-from drivers.camera_process import CameraProcess
-from drivers.camera_replay import CameraReplay
-from drivers.camera_silence import FIRST_PICTURE_S, PictureSilence
-from drivers.camera_slots import SlotReader, SlotWriter
-from drivers.camera_worker import CameraParts
+from drivers.camera.params import CameraCareParams
+from drivers.camera.playback import CameraReplay
+from drivers.camera.process import CameraProcess
+from drivers.camera.recording_writer import RecordingWriter
+from drivers.camera.shared_frames import SlotReader, SlotWriter
+from drivers.camera.silence import FIRST_PICTURE_S, PictureSilence
+from drivers.camera.source import Shot
+from drivers.camera.video_file import VideoFile
+from drivers.camera.worker import CameraParts
 from drivers.errors import CameraError, ModelFileError
-from drivers.face_detector import face_detector
-from drivers.face_params import FaceDetectorParams
-from drivers.picture_source import Shot
-from drivers.recording_write import RecordingWriter
 from drivers.types import PictureLens
-from drivers.video_file import VideoFile
+from drivers.vision.face_detector import face_detector
+from drivers.vision.face_params import FaceDetectorParams
 
 PATIENCE_S = 40.0
 DETECTOR = partial(face_detector, FaceDetectorParams(work_width_px=64))

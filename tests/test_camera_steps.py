@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from desk import JOINTS, LIDS
 
+from drivers.camera.source import Shot
 from drivers.errors import CameraError
-from drivers.picture_source import Shot
 from gaze.types import Angles3
 from robot.calibrate.board_views import ViewParams
 from robot.calibrate.camera_calibration import CameraCalibrationRefused, LensCalibrationParams
@@ -18,7 +18,7 @@ from robot.calibrate.hand_eye import camera_on_head
 from robot.clock import SimulatedClock
 from robot.frames import CameraParams
 from robot.kinematics import GeometryParams, Kinematics
-from sim_mock.board_scene import BoardScene
+from sim_mock.cameras.charuco_scene import BoardScene
 
 BOARD = CharucoBoard()
 KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), JOINTS, LIDS)

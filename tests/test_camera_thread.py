@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera_params import CameraCareParams
-from drivers.camera_thread import CameraThread
+from drivers.camera.params import CameraCareParams
+from drivers.camera.source import Shot
+from drivers.camera.thread import CameraThread
+from drivers.camera.video_file import VideoFile
 from drivers.errors import CameraError
-from drivers.picture_source import Shot
 from drivers.types import DetectedFace, MovingBlob, PictureLens
-from drivers.video_file import VideoFile
 
 PATIENCE_S = 20.0  # how long a test waits before it calls the thread stuck
 

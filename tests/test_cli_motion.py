@@ -20,8 +20,8 @@ from typer.testing import CliRunner
 from config.save import save_rig
 from config.schema import load_rig
 from robot.cli.motion import app
-from sim_mock.pty_bus import PtyBus
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.pty.client import PtyBus
+from sim_mock.smart_servo.physics import ServoSpec
 
 ROOT = Path(__file__).parents[1]
 DESK = ROOT / "config" / "rigs" / "desk.yaml"

@@ -15,7 +15,7 @@ from config.schema import load_rig
 from robot.cli.motion import app
 from robot.cli.servo_words import holding, left_alone
 from robot.emulated_rig import emulated_lines
-from sim_mock.pty_bus import PtyBuses
+from sim_mock.pty.client import PtyBuses
 
 
 def run(*words: str) -> Any:

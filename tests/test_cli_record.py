@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from drivers.recording_read import Recording
+from drivers.camera.recording_reader import Recording
 from robot.cli.record import app
 
 

@@ -9,13 +9,13 @@ from desk import JOINTS
 from typer.testing import CliRunner
 
 from config.save import copy_shipped, save_rig
-from drivers.dynamixel.registers import Registers
-from drivers.serial_port import BlockingPort
-from drivers.serial_ports import Host, SerialPort
+from drivers.serial.list_ports import Host, SerialPort
+from drivers.serial.port import BlockingPort
+from drivers.servo_bus.registers import Registers
 from robot.cli import bench
 from robot.cli import servos as cli_servos
-from sim_mock.pty_bus import PtyBus
-from sim_mock.servo import ServoSpec
+from sim_mock.pty.client import PtyBus
+from sim_mock.smart_servo.servo import ServoSpec
 
 SMALL = [ServoSpec(1, "xl330-m077", 2048), ServoSpec(7, "xc330-m288", 2048)]
 

@@ -9,14 +9,14 @@ from mixed_rig import mixed_text
 from typer.testing import CliRunner
 
 from config.schema import load_rig
-from drivers.serial_port import BlockingPort
-from drivers.serial_ports import Host, SerialPort
+from drivers.serial.list_ports import Host, SerialPort
+from drivers.serial.port import BlockingPort
 from robot.cli import bench
 from robot.cli import servos as cli_servos
 from robot.emulated_rig import emulated_lines
-from sim_mock.emulated import MaestroLine, StsLine
-from sim_mock.pty_bus import PtyBus, PtyBuses
-from sim_mock.servo import ServoSpec
+from sim_mock.devices import MaestroLine, StsLine
+from sim_mock.pty.client import PtyBus, PtyBuses
+from sim_mock.smart_servo.servo import ServoSpec
 
 
 def gazerig(*words, answers=""):

@@ -13,7 +13,7 @@ import typer
 from command_line import gazerig, parse, typed
 from typer.core import TyperGroup
 
-from drivers.serial_ports import SerialPort
+from drivers.serial.list_ports import SerialPort
 from robot.cli.examples import EXAMPLES
 from robot.cli.main import app
 from robot.cli.start import next_steps

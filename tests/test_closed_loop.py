@@ -15,10 +15,10 @@ from robot.assemble import assemble, gaze_parts
 from robot.choice import Choice
 from robot.frames import NewestPose, PoseHistory
 from robot.loop import Tick, run
-from sim_mock.pixel_camera import PixelCameraParams
-from sim_mock.steps_aside import STEP_AT_S, STEP_S
+from sim_mock.cameras.rendered import PixelCameraParams
+from sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S
+from sim_mock.scenes.walks_past import HALF_WAY_M, WALK_M_S
 from sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
-from sim_mock.walks_past import HALF_WAY_M, WALK_M_S
 
 RIG = load_rig("desk")
 ARRIVED_S = STEP_AT_S + STEP_S

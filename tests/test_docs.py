@@ -18,7 +18,7 @@ from config.schema import Rig, load_rig
 from drivers.servo_models import SERVOS
 from robot.cli.examples import EXAMPLES
 from robot.joint import JointParams
-from sim_mock.scenes import scenes
+from sim_mock.scenes.registry import scenes
 
 FOLDERS = ("config", "drivers", "gaze", "robot", "sim_mock")
 RIGS = {name: load_rig(name) for name in shipped_names("rigs")}

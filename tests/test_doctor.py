@@ -2,22 +2,22 @@
 
 import pytest
 
-from drivers.dynamixel.scan import Found
 from drivers.errors import PortError
-from drivers.serial_ports import Access, Host, SerialPort
+from drivers.serial.list_ports import Access, Host, SerialPort
+from drivers.servo_bus.discovery import Found
 from drivers.types import ServoSetup
-from robot.bringup.checkup import check, check_all, look, mend, mend_latency
-from robot.bringup.doctor import READ, examine
-from robot.bringup.doctor_patient import Patient
-from robot.bringup.doctor_port import UDEV_RULE, PortFacts, examine_latency, examine_port
-from robot.bringup.findings import Finding, Fix, worst
-from robot.bringup.kinds import DYNAMIXEL
+from robot.bringup.doctor.checks import READ, examine
+from robot.bringup.doctor.findings import Finding, Fix, worst
+from robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
+from robot.bringup.doctor.run import check, check_all, look, mend, mend_latency
+from robot.bringup.doctor.subject import Patient
 from robot.bringup.scan_report import remarks
 from robot.bringup.searching import Looked
+from robot.bringup.servo_families import DYNAMIXEL
 from robot.bringup.servo_report import grouped, summed_up, together
-from sim_mock.ports import InProcessPort
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.servo import ServoSpec
 
 BAUD = 1_000_000
 SETUPS = (

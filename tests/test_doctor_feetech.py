@@ -2,18 +2,18 @@
 
 import pytest
 
+from drivers.feetech.memory_table import REGISTERS, TABLE_END
 from drivers.feetech.registers import StsRegisters
 from drivers.feetech.scan import Found
-from drivers.feetech.table import REGISTERS, TABLE_END
 from drivers.types import ServoSetup
-from robot.bringup.checkup import check, mend
-from robot.bringup.doctor_feetech import examine, take
-from robot.bringup.doctor_feetech_patient import StsPatient
-from robot.bringup.findings import worst
-from robot.bringup.kinds import FEETECH
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_physics import ServoSpec
-from sim_mock.sts.chain import build_sts
+from robot.bringup.doctor.feetech import examine, take
+from robot.bringup.doctor.feetech_subject import StsPatient
+from robot.bringup.doctor.findings import worst
+from robot.bringup.doctor.run import check, mend
+from robot.bringup.servo_families import FEETECH
+from sim_mock.feetech.chain import build_sts
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 SETUPS = (

@@ -8,10 +8,10 @@ from drivers.errors import ServoMissing
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
 from drivers.types import ServoSetup
-from robot.bringup.checkup import mend
-from robot.bringup.doctor_maestro import mend as mend_board
-from robot.bringup.doctor_maestro import visit
-from robot.bringup.findings import worst
+from robot.bringup.doctor.findings import worst
+from robot.bringup.doctor.maestro import mend as mend_board
+from robot.bringup.doctor.maestro import visit
+from robot.bringup.doctor.run import mend
 from robot.bringup.maestro_settings import (
     clipped,
     instructions,
@@ -21,8 +21,8 @@ from robot.bringup.maestro_settings import (
     wide_range,
 )
 from robot.bringup.maestro_sweep import sent_home
+from sim_mock.in_process_port import InProcessPort
 from sim_mock.maestro.board import build_board
-from sim_mock.ports import InProcessPort
 
 PAN = ServoSetup(0, "hobby", 4400, 7600, 9000.0, "eyes_pan", rest_steps=6000)
 LID = ServoSetup(2, "hobby", 3600, 7200, 9000.0, "left_upper_lid", rest_steps=5000)

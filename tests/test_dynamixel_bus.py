@@ -7,15 +7,15 @@ from typing import NamedTuple
 import pytest
 from dynamixel_sdk import PacketHandler
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.dynamixel.packets import instruction
+from drivers.dynamixel.protocol import instruction
 from drivers.errors import ServoMissing
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
+from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
-from sim_mock.ports import InProcessPort
-from sim_mock.pty_bus import PtyBus
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.pty.client import PtyBus
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.servo import ServoSpec
 
 SPEED = 6000.0
 REBOOT = 8

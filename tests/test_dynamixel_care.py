@@ -2,11 +2,11 @@
 
 import pytest
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
-from sim_mock.ports import InProcessPort
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.servo import ServoSpec
 
 IDS = (1, 2, 3)
 STARTS = (2001, 2002, 2003)

@@ -4,13 +4,13 @@ import struct
 
 import pytest
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.dynamixel.packets import instruction
+from drivers.dynamixel.protocol import instruction
 from drivers.errors import BusLost, ServoFault, ServoMissing
+from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
-from sim_mock.ports import InProcessPort
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain, status
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain, status
+from sim_mock.smart_servo.servo import ServoSpec
 
 IDS = (1, 2, 3)
 GROUP_READS = (0x82, 0x8A)

@@ -4,10 +4,10 @@ import struct
 
 import pytest
 
-from drivers.bus_roll import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
-from drivers.dynamixel.group import FastGroup, PlainGroup
-from drivers.dynamixel.views import DIRECT, direct_turns
-from sim_mock.servo_chain import build_chain, status
+from drivers.dynamixel.sync_packets import FastGroup, PlainGroup
+from drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
+from drivers.servo_bus.read_windows import DIRECT, direct_turns
+from sim_mock.smart_servo.chain import build_chain, status
 
 IDS = (4, 1, 9)
 PLACES = {4: 1000, 1: 2000, 9: 3000}

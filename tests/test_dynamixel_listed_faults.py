@@ -61,13 +61,13 @@ from moving_bus import (
     live_through_missing_ids,
 )
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.dynamixel.health import AGAIN_AND_AGAIN
 from drivers.errors import BusLost, PortError, ServoMissing
+from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
+from drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from drivers.types import ServoSetup
-from sim_mock.ports import InProcessPort
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.servo import ServoSpec
 
 
 class Rig(MovingBus):

@@ -5,14 +5,14 @@ import struct
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.dynamixel.packets import (
+from drivers.dynamixel.protocol import (
     SyncWrite,
     bytes_missing,
     instruction,
     statuses,
     sync_read,
 )
-from sim_mock.servo_chain import status
+from sim_mock.smart_servo.chain import status
 
 
 def vector(text: str) -> bytes:

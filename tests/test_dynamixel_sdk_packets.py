@@ -26,13 +26,13 @@ from itertools import pairwise
 import pytest
 from dynamixel_sdk import COMM_SUCCESS
 
-from drivers.dynamixel.packets import instruction, statuses
-from drivers.dynamixel.registers import Identity, Registers
-from drivers.dynamixel.sdk_packets import SdkPackets
+from drivers.dynamixel.protocol import instruction, statuses
+from drivers.dynamixel.sdk_handler import SdkPackets
 from drivers.errors import BusLost
-from sim_mock.ports import InProcessPort
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain, status
+from drivers.servo_bus.registers import Identity, Registers
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain, status
+from sim_mock.smart_servo.servo import ServoSpec
 
 HEADER = b"\xff\xff\xfd\x00"
 

@@ -3,14 +3,14 @@
 import pytest
 from dynamixel_sdk import PacketHandler
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.dynamixel.packets import HEADER
-from drivers.dynamixel.registers import Registers
+from drivers.dynamixel.protocol import HEADER
 from drivers.errors import PortError, ServoMissing
+from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
+from drivers.servo_bus.registers import Registers
 from drivers.types import ServoSetup
-from sim_mock.ports import InProcessPort
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain, status
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain, status
+from sim_mock.smart_servo.servo import ServoSpec
 
 IDS = (1, 2, 3)
 

@@ -13,11 +13,11 @@ from dynamixel_sdk import COMM_SUCCESS, PacketHandler
 from typer.testing import CliRunner
 
 from drivers.errors import SetupError
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
 from robot.cli import emulate as command
 from robot.cli.emulate import app
-from sim_mock.emulated import DynamixelLine, StsLine
-from sim_mock.servo_words import line_of, parse_servos
+from sim_mock.device_spec import line_of, parse_servos
+from sim_mock.devices import DynamixelLine, StsLine
 
 ROOT = Path(__file__).parents[1]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTTIN)

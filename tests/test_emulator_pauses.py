@@ -4,12 +4,12 @@ import pytest
 from sts_bench import Bench
 from test_maestro_board import World, acceleration, speed, target
 
-from drivers.dynamixel.table import MODELS
-from sim_mock.servo import Servo
-from sim_mock.servo_motion import PAUSE_MS, Loop, Shaft, long_pause
-from sim_mock.servo_physics import Physics, ServoSpec
-from sim_mock.servo_profile import Profile, SpeedProfile
-from sim_mock.sts.protection import StsProtection
+from drivers.dynamixel.control_table import MODELS
+from sim_mock.dynamixel.motor import PAUSE_MS, Loop, Shaft, long_pause
+from sim_mock.dynamixel.profile import Profile, SpeedProfile
+from sim_mock.feetech.protection import StsProtection
+from sim_mock.smart_servo.physics import Physics, ServoSpec
+from sim_mock.smart_servo.servo import Servo
 
 HOUR_S = 3600.0
 GOAL, GOAL_SPEED, MODE = 42, 46, 33

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from skimage import data
 
+from drivers.camera.video_file import VideoFile
 from drivers.errors import ModelFileError
-from drivers.face_detector import face_detector
-from drivers.face_mtcnn import package_folder, read_model
-from drivers.face_params import FaceDetectorParams
-from drivers.face_picture import prepare
 from drivers.types import DetectedFace, FaceDetector, Picture, Pixels
-from drivers.video_file import VideoFile
+from drivers.vision.face_detector import face_detector
+from drivers.vision.face_mtcnn import package_folder, read_model
+from drivers.vision.face_params import FaceDetectorParams
+from drivers.vision.face_preprocess import prepare
 
 SHARED = Path(__file__).parents[2] / "shared"
 YUNET_FILE = SHARED / "models" / "face_detection_yunet_2026may.onnx"

@@ -15,7 +15,7 @@ from robot.calibrate.face_calibration import begun, point_world_m
 from robot.calibrate.face_steering import AIMED_DEG, STALE_S, WAIT_S, FaceSteering
 from robot.choice import Choice
 from robot.loop import Tick
-from sim_mock.sits_still import SitsStill
+from sim_mock.scenes.sits_still import SitsStill
 
 RIG = load_rig("desk")
 REST = (1.5, 0.0, 0.2)

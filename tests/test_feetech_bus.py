@@ -11,11 +11,11 @@ from sts_rig import Rig
 
 from drivers.errors import ServoFault, ServoMissing
 from drivers.feetech.bus import FeetechBus, FeetechParams
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
 from drivers.types import ServoSetup
-from sim_mock.emulated import StsLine
-from sim_mock.pty_bus import PtyBus
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.devices import StsLine
+from sim_mock.pty.client import PtyBus
+from sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = (
     ServoSpec(3, "sts3215", 1800),

@@ -21,11 +21,11 @@ from moving_bus import (
 )
 from sts_rig import Rig
 
-from drivers.dynamixel.health import AGAIN_AND_AGAIN
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from drivers.feetech.revival import FAR_SIDE
+from drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from drivers.types import ServoSetup
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 
 @pytest.fixture(scope="module")

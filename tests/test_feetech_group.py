@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from drivers.feetech.group import Group
-from drivers.feetech.packets import checksum
+from drivers.feetech.protocol import checksum
 from drivers.feetech.reader import Heard
 from drivers.feetech.readings import Readings
 from drivers.feetech.views import ARMED, SENSED, View, alone_turns, together_turns

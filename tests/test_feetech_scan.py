@@ -5,11 +5,11 @@ from sts_rig import Rig
 
 from drivers.errors import ServoFault, ServoMissing
 from drivers.feetech.assign import assign
-from drivers.feetech.middle import set_middle
+from drivers.feetech.homing import set_middle
+from drivers.feetech.memory_table import BAUD_RATES
 from drivers.feetech.registers import Identity, StsRegisters
 from drivers.feetech.scan import Found, everybody, garbled, ping, scan
-from drivers.feetech.table import BAUD_RATES
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 
 def rig_at(baud, *ids):

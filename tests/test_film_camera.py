@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.camera_replay import CameraReplay
+from drivers.camera.playback import CameraReplay
+from drivers.camera.recording_writer import RecordingWriter
+from drivers.camera.source import Shot
+from drivers.camera.video_file import VideoFile
 from drivers.errors import CameraError
-from drivers.face_detector import face_detector
-from drivers.face_params import FaceDetectorParams
-from drivers.picture_source import Shot
-from drivers.recording_write import RecordingWriter
 from drivers.types import DetectedFace, MovingBlob, PictureLens
-from drivers.video_file import VideoFile
-from sim_mock.film_camera import FilmCamera
+from drivers.vision.face_detector import face_detector
+from drivers.vision.face_params import FaceDetectorParams
+from sim_mock.cameras.video import FilmCamera
 
 FILM_FILE = Path(__file__).parents[2] / "shared" / "media" / "Megamind.avi"
 RATE_HZ = 25.0

@@ -17,7 +17,7 @@ from robot.calibrate.hand_eye import HandEye, HandEyeParams, NeckView, camera_on
 from robot.frames import CameraParams
 from robot.kinematics import GeometryParams, Kinematics
 from robot.seeing.intrinsics import project
-from sim_mock.board_scene import BoardScene
+from sim_mock.cameras.charuco_scene import BoardScene
 
 BOARD = CharucoBoard()
 KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), JOINTS, LIDS)

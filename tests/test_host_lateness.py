@@ -5,10 +5,10 @@ import os
 import pytest
 from line_noise import Noisy
 
-from drivers.bus_journal import SELDOM_S, Journal, Seldom
 from drivers.errors import PortError
+from drivers.event_log import SELDOM_S, Journal, Seldom
 from drivers.host_lateness import BUSY, WITHIN_S, HostLateness
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
 
 KINDS = ("dynamixel", "feetech")
 

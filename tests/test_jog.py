@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.schema import Rig, load_rig
-from drivers.dynamixel.bus import DynamixelBus
 from drivers.errors import SetupError
+from drivers.servo_bus.bus import DynamixelBus
 from robot.assemble import gaze_parts
 from robot.body import Body
 from robot.bringup.applied import Step
@@ -18,9 +18,9 @@ from robot.bringup.jog import JogParams, ManualControl, duration_s
 from robot.bringup.look_at import ends_reached, look_at
 from robot.clock import SimulatedClock
 from robot.safety.guard import Guard
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_chain import build_chain
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.physics import ServoSpec
 
 RIG = load_rig("desk")
 CROOKED = {"neck_yaw": -12.0, "left_eye_pan": 6.0, "neck_pitch": -8.0}

@@ -17,8 +17,8 @@ from robot.emulated_rig import emulated_lines, place_of
 from robot.rig_angles import limits, park_rad
 from robot.rig_bus import rig_bus
 from robot.safety.guard import Guard
-from sim_mock.emulated import build
-from sim_mock.ports import InProcessPort
+from sim_mock.devices import build
+from sim_mock.in_process_port import InProcessPort
 
 MAKER, FEETECH = load_rig("maker"), load_rig("feetech")
 

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import BusLost, PortError
-from sim_mock.fault_commands import VERBS, usage
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_chain import build_chain, status
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain, status
+from sim_mock.smart_servo.fault_commands import VERBS, usage
 
 IDS = (1, 2, 3)
 GOLDEN_PING = bytes.fromhex("FFFFFD0001030001194E")

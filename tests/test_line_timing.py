@@ -7,10 +7,10 @@ from fastcrc.crc16 import umts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sim_mock.feetech.chain import build_sts
 from sim_mock.maestro.board import build_board
-from sim_mock.servo_chain import build_chain
-from sim_mock.servo_line import ServoLine
-from sim_mock.sts.chain import build_sts
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.wire import ServoLine
 
 
 def instruction(servo_id, code, params=b""):

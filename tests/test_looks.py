@@ -8,15 +8,15 @@ import pytest
 from mixed_rig import mixed_text
 
 from config.schema import Rig, load_rig
-from drivers.dynamixel.registers import Registers
 from drivers.feetech.registers import StsRegisters
-from robot.bringup.looks import DynamixelLooks, FeetechLooks, Look, MaestroLooks, look_at_pulse
+from drivers.servo_bus.registers import Registers
 from robot.bringup.monitor import Monitor, as_json
+from robot.bringup.telemetry import DynamixelLooks, FeetechLooks, Look, MaestroLooks, look_at_pulse
 from robot.clock import SimulatedClock
 from robot.emulated_rig import emulated_lines
 from robot.rig_bus import bus_names
-from sim_mock.emulated import build
-from sim_mock.ports import InProcessPort
+from sim_mock.devices import build
+from sim_mock.in_process_port import InProcessPort
 
 FEETECH, MAKER = load_rig("feetech"), load_rig("maker")
 STS_WRITES = {0x03, 0x04, 0x05, 0x06, 0x08, 0x83}

@@ -23,7 +23,7 @@ from robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
 from robot.seeing.perception import Perception
 from robot.seeing.tracks import Sighting, Tracker, TrackParams
 from robot.types import Verdict
-from sim_mock.visitor import Visitor
+from sim_mock.scenes.visitor import Visitor
 
 
 def made(seed: int = 0) -> Assembly:

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from drivers.errors import BusLost, PortError, ServoMissing
 from drivers.maestro.bus import MaestroBus, MaestroParams
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
 from drivers.types import ServoSetup
-from sim_mock.emulated import MaestroLine
+from sim_mock.devices import MaestroLine
+from sim_mock.in_process_port import InProcessPort
 from sim_mock.maestro.board import build_board
-from sim_mock.ports import InProcessPort
-from sim_mock.pty_bus import PtyBus
+from sim_mock.pty.client import PtyBus
 
 CENTRE = 6000
 SPEED = 12_000.0

@@ -5,8 +5,8 @@ from numpy.random import default_rng
 
 from drivers.maestro.bus import MaestroBus, MaestroParams
 from drivers.types import ServoSetup
+from sim_mock.in_process_port import InProcessPort
 from sim_mock.maestro.board import build_board
-from sim_mock.ports import InProcessPort
 
 SPEED = 12_000.0
 LOW, HIGH = 4400, 7600

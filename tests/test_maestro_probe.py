@@ -5,8 +5,8 @@ import pytest
 from drivers.errors import PortError
 from drivers.maestro.params import MaestroParams
 from drivers.maestro.probe import USB_CHANNELS, probe
+from sim_mock.in_process_port import InProcessPort
 from sim_mock.maestro.board import build_board
-from sim_mock.ports import InProcessPort
 
 
 def make(channels=12, device=12, crc=False, chosen=()):

@@ -8,8 +8,8 @@ from drivers.maestro.params import MaestroParams
 from drivers.types import ServoSetup
 from robot.bringup.maestro_sweep import SLOW_STEPS_S, Place, walk
 from sim_mock.hobby_servo import HobbySpec
+from sim_mock.in_process_port import InProcessPort
 from sim_mock.maestro.board import build_board
-from sim_mock.ports import InProcessPort
 
 LID = ServoSetup(2, "hobby", 4400, 7600, 9000.0, "left_upper_lid", rest_steps=5000)
 PLACES = (5000, 4780, 5220, 5000)

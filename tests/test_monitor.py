@@ -6,15 +6,15 @@ from math import radians
 
 import pytest
 
-from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.table import MODELS
-from robot.bringup.looks import DynamixelLooks, load_share, look
+from drivers.dynamixel.control_table import MODELS
+from drivers.servo_bus.registers import Registers
 from robot.bringup.monitor import Monitor, as_json
+from robot.bringup.telemetry import DynamixelLooks, load_share, look
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_chain import build_chain
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.physics import ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0, sign=-1, ratio=2.0, zero_step=2000)

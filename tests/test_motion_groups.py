@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from drivers.motion_groups import gathered
-from drivers.motion_params import MotionParams
-from drivers.motion_things import Things
-from drivers.motion_tracks import Follow, MotionTracks
+from drivers.vision.motion.clustering import gathered
+from drivers.vision.motion.params import MotionParams
+from drivers.vision.motion.segmentation import Things
+from drivers.vision.motion.tracking import Follow, MotionTracks
 
 SHAPE = (240, 320)
 Box = tuple[int, int, int, int]

@@ -15,9 +15,9 @@ from robot.calibrate.placing import HandPlacer, Steered, by_places
 from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_physics import Physics, ServoSpec
-from sim_mock.sts.chain import build_sts
+from sim_mock.feetech.chain import build_sts
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.physics import Physics, ServoSpec
 
 EYE = JointParams(3, "sts3215", -35.0, 35.0, 300.0, 20000.0)
 GENTLY = StopSearchParams()

@@ -8,14 +8,14 @@ import pytest
 from config.schema import load_rig
 from drivers.errors import BusLost, ServoMissing
 from drivers.maestro.params import MaestroParams
-from robot.bringup.one_hobby import SPEED_US_S, OneHobby
+from robot.bringup.hobby_servo import SPEED_US_S, OneHobby
 from robot.bringup.single_joint import Stopped
 from robot.calibrate.calibration import CalibrationRefused
 from robot.calibrate.placing import LEAD_US, HobbyPlacer, Steered, by_places
 from robot.clock import SimulatedClock
 from robot.emulated_rig import emulated_lines
-from sim_mock.emulated import build
-from sim_mock.ports import InProcessPort
+from sim_mock.devices import build
+from sim_mock.in_process_port import InProcessPort
 
 RIG = load_rig("maker")
 

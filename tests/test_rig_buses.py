@@ -9,7 +9,7 @@ from mixed_rig import mixed_text
 from config.load import ConfigError
 from config.schema import Rig, load_rig
 from drivers.errors import SetupError
-from drivers.mixed_bus import MixedBus
+from drivers.multi_bus import MixedBus
 from robot.choice import Choice
 from robot.rig_bus import bus_names, joints_on, ports_of, rig_setups
 

@@ -6,8 +6,8 @@ import pytest
 from drivers.types import Detections
 from gaze.types import Vec3
 from robot.frames import CameraMount, CameraParams
-from sim_mock.scene import Event, Person, Thing
-from sim_mock.scene_camera import SceneCamera, SceneCameraParams
+from sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from sim_mock.scenes.scene import Event, Person, Thing
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

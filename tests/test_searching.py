@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.dynamixel.scan import COMMON_FIRST
+from drivers.servo_bus.discovery import COMMON_FIRST
 from robot.bringup.searching import (
     BOARD_RATES,
     Looked,
@@ -11,11 +11,11 @@ from robot.bringup.searching import (
     plan,
     search,
 )
+from sim_mock.feetech.chain import build_sts
+from sim_mock.in_process_port import InProcessPort
 from sim_mock.maestro.board import build_board
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_chain import build_chain
-from sim_mock.servo_physics import ServoSpec
-from sim_mock.sts.chain import build_sts
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.physics import ServoSpec
 
 ALL = known_kinds("all")
 FEW = (1_000_000, 57_600)

@@ -4,8 +4,8 @@ import struct
 
 import pytest
 
-from sim_mock.servo import Servo, ServoSpec
-from sim_mock.servo_physics import Physics, Quirks
+from sim_mock.smart_servo.physics import Physics, Quirks
+from sim_mock.smart_servo.servo import Servo, ServoSpec
 
 
 class Bench:

@@ -7,8 +7,8 @@ from fastcrc.crc16 import umts
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_mock.servo_chain import ServoChain, build_chain, status
-from sim_mock.servo_physics import Quirks, ServoSpec
+from sim_mock.smart_servo.chain import ServoChain, build_chain, status
+from sim_mock.smart_servo.physics import Quirks, ServoSpec
 
 ALERT = 0x80
 

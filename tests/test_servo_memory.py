@@ -2,9 +2,9 @@
 
 import pytest
 
-from drivers.dynamixel.table import MODELS, indirect_blocks, registers_of
-from sim_mock.servo import Servo, ServoSpec
-from sim_mock.servo_memory import ACCESS, DATA_LENGTH, DATA_RANGE, Memory
+from drivers.dynamixel.control_table import MODELS, indirect_blocks, registers_of
+from sim_mock.smart_servo.memory import ACCESS, DATA_LENGTH, DATA_RANGE, Memory
+from sim_mock.smart_servo.servo import Servo, ServoSpec
 
 EVERY = pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
 

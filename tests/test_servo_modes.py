@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_mock.servo import Servo, ServoSpec
-from sim_mock.servo_physics import Physics
+from sim_mock.smart_servo.physics import Physics
+from sim_mock.smart_servo.servo import Servo, ServoSpec
 
 SIZE = {11: 1, 36: 2, 38: 2, 44: 4, 62: 1, 64: 1, 98: 1, 100: 2, 102: 2, 104: 4, 108: 4, 112: 4}
 

@@ -11,10 +11,10 @@ from dynamixel_sdk import (
 )
 
 from drivers.errors import BusLost, PortError
-from sim_mock.emulated import DynamixelLine, MaestroLine, StsLine, build
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_chain import build_chain
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.devices import DynamixelLine, MaestroLine, StsLine, build
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.physics import ServoSpec
 
 STEADY_STEPS = 12
 """Friction keeps a servo with factory gains so far from its goal."""

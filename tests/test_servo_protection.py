@@ -2,8 +2,8 @@
 
 import pytest
 
-from sim_mock.servo import Servo, ServoSpec
-from sim_mock.servo_physics import Physics
+from sim_mock.smart_servo.physics import Physics
+from sim_mock.smart_servo.servo import Servo, ServoSpec
 
 
 class Bench:

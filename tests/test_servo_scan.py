@@ -2,7 +2,17 @@
 
 import os
 
-from drivers.dynamixel.scan import (
+from drivers.dynamixel.control_table import BAUD_RATES
+from drivers.serial.list_ports import (
+    Host,
+    access,
+    holders,
+    latency_file,
+    latency_ms,
+    serial_ports,
+    set_latency,
+)
+from drivers.servo_bus.discovery import (
     COMMON_FIRST,
     Found,
     ask_one,
@@ -13,19 +23,9 @@ from drivers.dynamixel.scan import (
     ping,
     scan,
 )
-from drivers.dynamixel.table import BAUD_RATES
-from drivers.serial_ports import (
-    Host,
-    access,
-    holders,
-    latency_file,
-    latency_ms,
-    serial_ports,
-    set_latency,
-)
-from sim_mock.ports import InProcessPort
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.servo import ServoSpec
 
 SPECS = (
     ServoSpec(9, "xc330-m288", 2100, 53),

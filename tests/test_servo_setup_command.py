@@ -2,17 +2,17 @@
 
 import pytest
 
-from drivers.dynamixel.scan import COMMON_FIRST, Found
-from drivers.dynamixel.table import BAUD_RATES
+from drivers.dynamixel.control_table import BAUD_RATES
 from drivers.errors import PortError, ServoFault, ServoMissing
+from drivers.servo_bus.discovery import COMMON_FIRST, Found
 from drivers.types import ServoSetup
-from robot.bringup.kinds import DYNAMIXEL
+from robot.bringup.servo_families import DYNAMIXEL
 from robot.bringup.servo_kind import Standing
 from robot.bringup.servo_reboot import restart
 from robot.bringup.servo_setup import assign, find_alone, search_order
-from sim_mock.ports import InProcessPort
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain, status
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain, status
+from sim_mock.smart_servo.servo import ServoSpec
 
 BAUD = 1_000_000
 YAW = ServoSetup(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw")

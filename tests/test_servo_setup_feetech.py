@@ -4,14 +4,14 @@ import pytest
 
 from drivers.errors import ServoFault, ServoMissing
 from drivers.types import ServoSetup
-from robot.bringup.kinds import DYNAMIXEL, FEETECH
+from robot.bringup.servo_families import DYNAMIXEL, FEETECH
 from robot.bringup.servo_kind import Standing
 from robot.bringup.servo_reboot import restart
 from robot.bringup.servo_setup import assign, find_alone, search_order
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_chain import build_chain
-from sim_mock.servo_physics import ServoSpec
-from sim_mock.sts.chain import build_sts
+from sim_mock.feetech.chain import build_sts
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 YAW = ServoSetup(7, "sts3215", 1252, 2844, 2000.0, "neck_yaw")

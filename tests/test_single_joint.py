@@ -4,18 +4,18 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.dynamixel.registers import Registers
 from drivers.errors import BusLost, ServoFault, ServoMissing
-from robot.bringup.one_dynamixel import OneDynamixel
+from drivers.servo_bus.registers import Registers
 from robot.bringup.single_joint import SingleJoint, Stopped
+from robot.bringup.smart_servo import OneDynamixel
 from robot.calibrate.calibrating import by_hand, by_motion
 from robot.calibrate.calibration import CalibrationRefused
 from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_chain import build_chain
-from sim_mock.servo_physics import Physics, ServoSpec
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.physics import Physics, ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0)

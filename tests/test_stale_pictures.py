@@ -16,7 +16,7 @@ from robot import assemble as assembling
 from robot.assemble import Assembly, assemble
 from robot.choice import Choice
 from robot.loop import Tick, run
-from sim_mock.scene import Event, Person, Thing
+from sim_mock.scenes.scene import Event, Person, Thing
 
 GONE_S, BACK_S, END_S = 2.0, 9.0, 12.0
 LOST, FOUND = "camera lost: trying it again", "camera back after 7.0 s"

@@ -11,7 +11,7 @@ from robot import assemble as assembling
 from robot.assemble import assemble
 from robot.choice import Choice
 from robot.loop import Tick, run
-from sim_mock.scene import Event, Person, Thing
+from sim_mock.scenes.scene import Event, Person, Thing
 
 SECONDS = 3.0
 

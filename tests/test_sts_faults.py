@@ -5,7 +5,7 @@ import json
 import pytest
 from sts_bench import ALL, PING, READ, SYNC_READ, SYNC_WRITE, Bench, instruction, packets
 
-from sim_mock.servo_physics import Physics, ServoSpec
+from sim_mock.smart_servo.physics import Physics, ServoSpec
 
 VOLTAGE, ANGLE, HEAT, CURRENT, OVERLOAD = 1, 2, 4, 8, 32
 

@@ -8,9 +8,9 @@ import time
 
 import pytest
 
-from sim_mock.emulated import StsLine
-from sim_mock.pty_bus import PtyBus
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.devices import StsLine
+from sim_mock.pty.client import PtyBus
+from sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 IDS = [1, 2, 3]

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from robot.cli.main import app
 from robot.cli.suggestions import completed
-from sim_mock.pty_bus import PtyBus
+from sim_mock.pty.client import PtyBus
 
 DESK = Path(__file__).parents[1] / "config/rigs/desk.yaml"
 GIVEN = {"rig": "my rig.yaml", "port": "/dev/ttyACM3", "mock": False}

@@ -6,9 +6,9 @@ import select
 
 import pytest
 
-from sim_mock.emulated import DynamixelLine, MaestroLine, StsLine
-from sim_mock.servo_physics import ServoSpec
-from sim_mock.terminal_line import BusSettings, TerminalLine
+from sim_mock.devices import DynamixelLine, MaestroLine, StsLine
+from sim_mock.pty.line import BusSettings, TerminalLine
+from sim_mock.smart_servo.physics import ServoSpec
 
 PING, PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
 STS = StsLine((ServoSpec(1, "sts3215"),))

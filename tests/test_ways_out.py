@@ -24,7 +24,7 @@ from robot.loop import Robot
 from robot.power_down import PowerDown
 from robot.summary import Summary
 from sim_mock.device import Device
-from sim_mock.emulated import build
+from sim_mock.devices import build
 
 # --- the door by itself
 

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera_params import WebcamParams
+from drivers.camera.params import WebcamParams
+from drivers.camera.webcam import Webcam
 from drivers.errors import CameraError
-from drivers.webcam import Webcam
 
 GO_ON = threading.Event()
 

@@ -25,8 +25,8 @@ from robot.rig_bus import rig_bus
 from robot.safety.guard import Guard
 from robot.types import JointAngles
 from sim_mock.device import Device
-from sim_mock.emulated import build
-from sim_mock.ports import InProcessPort
+from sim_mock.devices import build
+from sim_mock.in_process_port import InProcessPort
 
 MS_S = 0.001
 SPEED_MS, ACCEL_MS = 5, 10

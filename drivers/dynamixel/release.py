@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from drivers.dynamixel.line import Line
-from drivers.dynamixel.torque import switch_off
 from drivers.errors import PortError
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
+from drivers.servo_bus.line import Line
+from drivers.servo_bus.torque import switch_off
 
 LEAST_S, MOST_S = 0.005, 0.02
 """Patience for an answer beyond its time on the wire."""

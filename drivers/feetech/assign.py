@@ -8,10 +8,10 @@ at the new rate. Source: Feetech memory table STS3215.
 from typing import NamedTuple
 
 from drivers.errors import PortError, ServoFault, ServoMissing
+from drivers.feetech.memory_table import BAUD_RATES, HIGHEST_ID
 from drivers.feetech.registers import StsRegisters
 from drivers.feetech.scan import Found, ping
-from drivers.feetech.table import BAUD_RATES, HIGHEST_ID
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 
 
 class Assigned(NamedTuple):

@@ -17,26 +17,26 @@ Faults do not latch: their bits come and go, and so do the names in ``faults``.
 
 from collections.abc import Sequence
 
-from drivers.bus_journal import Journal, call
-from drivers.bus_roll import Roll
-from drivers.dynamixel.health import Health
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
+from drivers.event_log import Journal, call
 from drivers.feetech.care import RESTART_S, Care
 from drivers.feetech.line import StsLine
-from drivers.feetech.packets import MOST_GOALS, GoalWrite
+from drivers.feetech.memory_table import STEPS_PER_TURN
 from drivers.feetech.params import FeetechParams as FeetechParams
+from drivers.feetech.protocol import MOST_GOALS, GoalWrite
 from drivers.feetech.reader import Heard, Reader
 from drivers.feetech.readings import Readings
 from drivers.feetech.registers import StsRegisters
 from drivers.feetech.revival import Revival
 from drivers.feetech.roster import find
 from drivers.feetech.setup import Fitting
-from drivers.feetech.table import STEPS_PER_TURN
 from drivers.feetech.torque import switch_off
 from drivers.feetech.views import again_turns, alone_turns, together_turns
-from drivers.goals import clipped
-from drivers.lasting_port import LastingPort
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
+from drivers.serial.reconnect import LastingPort
+from drivers.servo_bus.faults import Health
+from drivers.servo_bus.goals import clipped
+from drivers.servo_bus.poll_list import Roll
 from drivers.types import BusHealth, ServoReading, ServoSetup
 
 
@@ -44,7 +44,7 @@ class FeetechBus:
     """A chain of STS servos in position mode; implements drivers.types.ServoBus.
 
     Args:
-        port: drivers.serial_port.BlockingPort, or an emulated port with its methods.
+        port: drivers.serial.port.BlockingPort, or an emulated port with its methods.
         setups: the servos, in the order of every sequence given and taken.
         params: how to speak with them.
 

@@ -3,13 +3,13 @@
 from collections.abc import Collection, Mapping
 from math import inf
 
-from drivers.bus_line import TRIES
-from drivers.dynamixel.health import Health
 from drivers.feetech.line import StsLine
+from drivers.feetech.memory_table import REGISTERS, TORQUE_FULL, acceleration_units, name_errors
 from drivers.feetech.readings import Readings
 from drivers.feetech.revival import FAR_SIDE, Revival
-from drivers.feetech.table import REGISTERS, TORQUE_FULL, acceleration_units, name_errors
 from drivers.feetech.views import ARMED, Sample
+from drivers.servo_bus.faults import Health
+from drivers.servo_bus.transaction import TRIES
 from drivers.slow_entry import SlowEntry
 from drivers.types import ServoReading, ServoSetup
 

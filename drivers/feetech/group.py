@@ -7,7 +7,7 @@ be proved right is taken out piece by piece, so that a bad servo costs only itse
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from drivers.feetech.packets import (
+from drivers.feetech.protocol import (
     HEADER,
     STATUS_OVERHEAD,
     bytes_missing,

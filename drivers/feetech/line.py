@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 
-from drivers.bus_line import BusLine
-from drivers.feetech.packets import (
+from drivers.feetech.memory_table import REGISTERS
+from drivers.feetech.protocol import (
     STATUS_OVERHEAD,
     bytes_missing,
     statuses,
@@ -11,8 +11,8 @@ from drivers.feetech.packets import (
     sync_write,
 )
 from drivers.feetech.scan import everybody
-from drivers.feetech.table import REGISTERS
-from drivers.serial_port import BITS_PER_BYTE
+from drivers.serial.port import BITS_PER_BYTE
+from drivers.servo_bus.transaction import BusLine
 
 
 class StsLine(BusLine):

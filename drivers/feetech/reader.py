@@ -8,12 +8,12 @@ from collections.abc import Collection, Sequence
 from math import inf
 from typing import NamedTuple
 
-from drivers.bus_roll import Roll, silent_ones
 from drivers.feetech.group import Group
 from drivers.feetech.line import StsLine
-from drivers.feetech.packets import HEADER
+from drivers.feetech.protocol import HEADER
 from drivers.feetech.views import Sample, View
-from drivers.read_turns import Turns
+from drivers.servo_bus.poll_list import Roll, silent_ones
+from drivers.servo_bus.window_schedule import Turns
 
 MOST_GROUPS = 64
 """So many prepared exchanges are kept."""

@@ -8,8 +8,8 @@ the same.
 
 from collections.abc import Mapping, Sequence
 
+from drivers.feetech.memory_table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
 from drivers.feetech.reader import Heard
-from drivers.feetech.table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
 from drivers.feetech.turn import nearest_turn
 from drivers.plausibility import Plausibility
 from drivers.types import ServoReading, ServoSetup

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from drivers.feetech.packets import (
+from drivers.feetech.memory_table import REGISTERS, Register
+from drivers.feetech.protocol import (
     PING,
     STATUS_OVERHEAD,
     Status,
@@ -15,8 +16,7 @@ from drivers.feetech.packets import (
     write,
 )
 from drivers.feetech.scan import FACTORY_BAUD, IDENTITY_LENGTH, REPLY_S
-from drivers.feetech.table import REGISTERS, Register
-from drivers.serial_port import BITS_PER_BYTE, BusPort
+from drivers.serial.port import BITS_PER_BYTE, BusPort
 
 TRIES = 3
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from drivers.errors import PortError
 from drivers.feetech.line import StsLine
 from drivers.feetech.torque import switch_off
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 
 LEAST_S, MOST_S = 0.005, 0.02
 """Patience for an answer beyond its time on the wire."""

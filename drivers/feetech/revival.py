@@ -6,14 +6,14 @@ becomes the present position, and only then comes the torque.
 
 from collections.abc import Collection, Mapping, Sequence
 
-from drivers.bus_journal import Journal
-from drivers.dynamixel.health import Health
 from drivers.errors import ServoFault, ServoMissing
+from drivers.event_log import Journal
 from drivers.feetech.line import StsLine
+from drivers.feetech.memory_table import MODELS, STEPS_PER_TURN, acceleration_units, speed_units
 from drivers.feetech.setup import Fitting
-from drivers.feetech.table import MODELS, STEPS_PER_TURN, acceleration_units, speed_units
 from drivers.feetech.torque import insist, positions, switch_off, switch_on
 from drivers.feetech.turn import lost
+from drivers.servo_bus.faults import Health
 from drivers.slow_entry import entry_speed_steps_s
 from drivers.types import ServoSetup
 

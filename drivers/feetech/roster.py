@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from drivers.bus_journal import call
 from drivers.errors import ServoMissing
+from drivers.event_log import call
 from drivers.feetech.line import StsLine
+from drivers.feetech.memory_table import MODELS
 from drivers.feetech.registers import Identity, StsRegisters
 from drivers.feetech.scan import Found
-from drivers.feetech.table import MODELS
 from drivers.types import ServoSetup
 
 

@@ -10,7 +10,8 @@ Source of the packets: Feetech, communication protocol of the SCS and STS series
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from drivers.feetech.packets import (
+from drivers.feetech.memory_table import BAUD_RATES, HIGHEST_ID, MODELS, REGISTERS, STEPS_PER_TURN
+from drivers.feetech.protocol import (
     BROADCAST,
     PING,
     STATUS_OVERHEAD,
@@ -19,8 +20,7 @@ from drivers.feetech.packets import (
     read,
     statuses,
 )
-from drivers.feetech.table import BAUD_RATES, HIGHEST_ID, MODELS, REGISTERS, STEPS_PER_TURN
-from drivers.serial_port import BITS_PER_BYTE, BusPort
+from drivers.serial.port import BITS_PER_BYTE, BusPort
 
 FACTORY_BAUD = 1_000_000
 COMMON_FIRST = BAUD_RATES

@@ -8,11 +8,11 @@ the journal.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from drivers.bus_journal import Journal, call, title
 from drivers.errors import ServoMissing
+from drivers.event_log import Journal, call, title
 from drivers.feetech.line import StsLine
+from drivers.feetech.memory_table import MULTI_TURN, REGISTERS, TORQUE_FULL, Register
 from drivers.feetech.registers import StsRegisters
-from drivers.feetech.table import MULTI_TURN, REGISTERS, TORQUE_FULL, Register
 from drivers.types import ServoSetup
 
 POSITION_MODE = 0

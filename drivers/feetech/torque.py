@@ -11,8 +11,8 @@ from typing import NamedTuple, TypeVar
 
 from drivers.errors import ServoFault, ServoMissing
 from drivers.feetech.line import StsLine
-from drivers.feetech.packets import GoalWrite
-from drivers.feetech.table import REGISTERS, STEPS_PER_TURN, name_errors
+from drivers.feetech.memory_table import REGISTERS, STEPS_PER_TURN, name_errors
+from drivers.feetech.protocol import GoalWrite
 
 TRIES = 3
 

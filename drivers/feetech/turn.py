@@ -6,7 +6,7 @@ turns may have counted some while the joint was limp. What the joint is told is 
 nearest to its range. The servo itself would go the other way round: it must not.
 """
 
-from drivers.feetech.table import STEPS_PER_TURN
+from drivers.feetech.memory_table import STEPS_PER_TURN
 
 
 def nearest_turn(steps: int, low: int, high: int) -> int:

@@ -9,9 +9,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from drivers.bus_journal import Journal
+from drivers.event_log import Journal
 from drivers.hobby_board.channel import Channel
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 from drivers.types import ServoSetup
 
 

@@ -14,15 +14,15 @@ What such a board cannot do, and so this bus cannot promise:
 from collections.abc import Sequence
 from math import inf
 
-from drivers.bus_journal import Journal, call
 from drivers.errors import BusLost, PortError, ServoMissing
+from drivers.event_log import Journal, call
 from drivers.hobby_board.board import Board
 from drivers.hobby_board.channel import Channel
 from drivers.hobby_board.release import TRIES, switch_off
 from drivers.hobby_board.silence import Silence
 from drivers.hobby_board.start import take_on
 from drivers.hobby_board.supervisor import Supervisor
-from drivers.lasting_port import LastingPort
+from drivers.serial.reconnect import LastingPort
 from drivers.types import BusHealth, ServoReading, ServoSetup
 
 UNMEASURED = "hobby servos tell no positions: what is shown is where they were sent"

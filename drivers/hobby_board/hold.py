@@ -6,7 +6,7 @@ where its servo is, and a first pulse is not ramped: the servo goes there at its
 
 from enum import Enum
 
-from drivers.bus_journal import call
+from drivers.event_log import call
 from drivers.hobby_board.board import Board
 from drivers.hobby_board.channel import FINE_STEPS, Channel
 from drivers.hobby_board.models import US_STEPS

@@ -2,7 +2,7 @@
 
 from math import inf
 
-from drivers.bus_journal import Journal
+from drivers.event_log import Journal
 
 AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
 """Time between questions to a board that stays silent: doubled from the first to the last."""

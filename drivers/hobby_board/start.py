@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from math import inf
 
-from drivers.bus_journal import Journal, call
 from drivers.errors import ServoMissing
+from drivers.event_log import Journal, call
 from drivers.hobby_board.board import Board
 from drivers.hobby_board.channel import Channel
 from drivers.hobby_board.hold import Outcome, refusal, take

@@ -8,7 +8,7 @@ and what the board says of itself.
 from collections.abc import Sequence
 from math import inf
 
-from drivers.bus_journal import Journal, call
+from drivers.event_log import Journal, call
 from drivers.hobby_board.board import Board
 from drivers.hobby_board.channel import Channel
 from drivers.hobby_board.hold import Outcome, refusal, take

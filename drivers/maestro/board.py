@@ -6,8 +6,8 @@ Its own serial timeout, set with Pololu's program, helps where the cable or the 
 from collections.abc import Sequence
 from math import inf
 
-from drivers.bus_journal import Journal, call
 from drivers.errors import ServoMissing
+from drivers.event_log import Journal, call
 from drivers.hobby_board.board import BoardTexts, Seen, Timing, goals_of
 from drivers.hobby_board.channel import Channel
 from drivers.hobby_board.start import every_pulse
@@ -21,7 +21,7 @@ from drivers.maestro.commands import (
 from drivers.maestro.limits import ACCEL_STEPS_S2, SPEED_STEPS_S, accel_units, speed_units
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 from drivers.types import ServoSetup
 
 

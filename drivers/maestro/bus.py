@@ -6,7 +6,7 @@ from drivers.hobby_board.bus import HobbyBoardBus
 from drivers.maestro.board import MaestroBoard
 from drivers.maestro.commands import MICRO
 from drivers.maestro.params import MaestroParams as MaestroParams
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 from drivers.types import ServoSetup
 
 
@@ -14,7 +14,7 @@ class MaestroBus(HobbyBoardBus):
     """The channels of one Maestro; implements drivers.types.ServoBus.
 
     Args:
-        port: drivers.serial_port.BlockingPort, or an emulated port with its methods.
+        port: drivers.serial.port.BlockingPort, or an emulated port with its methods.
         setups: the servos, in the order of every sequence given and taken; a servo's id is
             its channel, and steps are quarter microseconds.
         params: how to speak with the board.

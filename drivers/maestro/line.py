@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, Speech, words
 from drivers.maestro.params import MaestroParams
-from drivers.serial_port import BITS_PER_BYTE, QUIET_S, BusPort
+from drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
 
 AT_ONCE = 6
 """So many questions in one write: the board's receive buffer is small."""

@@ -16,7 +16,7 @@ from drivers.errors import PortError
 from drivers.maestro.commands import ERRORS, MICRO, PROTOCOL_ERROR, name_errors
 from drivers.maestro.line import Line
 from drivers.maestro.params import Form, MaestroParams
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 
 USB_CHANNELS = {"1ffb:0089": 6, "1ffb:008a": 12, "1ffb:008b": 18, "1ffb:008c": 24}
 """Channels by USB vendor and product id."""

@@ -6,7 +6,7 @@ from drivers.errors import PortError
 from drivers.hobby_board.release import switch_off
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 
 
 def stop_pulses(port: BusPort, params: MaestroParams, channels: Sequence[int]) -> tuple[int, ...]:

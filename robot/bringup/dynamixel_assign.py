@@ -3,11 +3,11 @@
 Source: ROBOTIS e-Manual (ID and Baud Rate act after the status of their own write).
 """
 
-from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.scan import Found, ping
-from drivers.dynamixel.table import BAUD_RATES
+from drivers.dynamixel.control_table import BAUD_RATES
 from drivers.errors import PortError, ServoFault, ServoMissing
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
+from drivers.servo_bus.discovery import Found, ping
+from drivers.servo_bus.registers import Registers
 from drivers.types import ServoSetup
 from robot.bringup.servo_kind import SetUp, Tell
 

@@ -1,9 +1,9 @@
 """Single Dynamixel servos in bring-up: how one stands, and one fix written."""
 
-from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.table import name_errors
-from drivers.serial_port import BusPort
-from robot.bringup.findings import Fix
+from drivers.dynamixel.control_table import name_errors
+from drivers.serial.port import BusPort
+from drivers.servo_bus.registers import Registers
+from robot.bringup.doctor.findings import Fix
 from robot.bringup.servo_kind import Standing
 
 

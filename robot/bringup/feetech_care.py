@@ -1,10 +1,10 @@
 """Single STS servos in bring-up: how one stands, one fix written, a restart."""
 
-from drivers.feetech.packets import REBOOT, instruction
+from drivers.feetech.memory_table import REGISTERS, name_errors
+from drivers.feetech.protocol import REBOOT, instruction
 from drivers.feetech.registers import StsRegisters
-from drivers.feetech.table import REGISTERS, name_errors
-from drivers.serial_port import BusPort
-from robot.bringup.findings import Fix
+from drivers.serial.port import BusPort
+from robot.bringup.doctor.findings import Fix
 from robot.bringup.servo_kind import Standing
 
 ANSWERS_ALL = 1

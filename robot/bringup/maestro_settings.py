@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from math import ceil, floor
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from drivers.bus_journal import call
+from drivers.event_log import call
 from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.commands import MICRO
 from drivers.maestro.limits import accel_units, speed_units

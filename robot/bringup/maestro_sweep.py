@@ -8,8 +8,8 @@ happens.
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from drivers.bus_journal import call
 from drivers.errors import BusLost, ServoFault, ServoMissing
+from drivers.event_log import call
 from drivers.hobby_board.release import switch_off
 from drivers.maestro.commands import MOST_INPUT, name_errors
 from drivers.maestro.limits import SPEED_STEPS_S, speed_units

@@ -6,7 +6,7 @@ A bus that is opened for moving prepares its servos, which is a write; this one 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from robot.bringup.looks import Look, Looks
+from robot.bringup.telemetry import Look, Looks
 from robot.joint import JointParams
 
 _DIGITS = {"goal_deg": 2, "position_deg": 2, "velocity_deg_s": 1, "load": 3}

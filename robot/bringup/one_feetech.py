@@ -1,13 +1,12 @@
-"""One Feetech STS servo by itself, for calibrating; implements robot.bringup.one_servo.OneServo.
+"""One Feetech STS servo by itself, for calibrating; implements robot.bringup.servo_access.OneServo.
 
 Its limits are opened with the lock (55) shut: the servo obeys and its EEPROM keeps the old
 ones, so switching it off and on puts back what a killed program left.
 """
 
 from drivers.errors import ServoFault, ServoMissing
-from drivers.feetech.middle import set_middle
-from drivers.feetech.registers import StsRegisters
-from drivers.feetech.table import (
+from drivers.feetech.homing import set_middle
+from drivers.feetech.memory_table import (
     CURRENT_UNIT_MA,
     MODELS,
     MULTI_TURN,
@@ -16,8 +15,9 @@ from drivers.feetech.table import (
     name_errors,
     speed_units,
 )
-from drivers.serial_port import BusPort
-from robot.bringup.one_servo import Asked, Found
+from drivers.feetech.registers import StsRegisters
+from drivers.serial.port import BusPort
+from robot.bringup.servo_access import Asked, Found
 
 POSITION_MODE = 0
 GENTLE_ACCELERATION = 10

@@ -1,16 +1,16 @@
 """What bring-up asks of a kind of smart servo: finding, naming, examining and restarting one.
 
-One value a kind stands in robot.bringup.kinds; a Maestro, which has channels instead of
-servos that answer, is looked at in robot.bringup.doctor_maestro.
+One value a kind stands in robot.bringup.servo_families; a Maestro, which has channels instead of
+servos that answer, is looked at in robot.bringup.doctor.maestro.
 """
 
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 from drivers.servo_models import BusKind
 from drivers.types import ServoSetup
-from robot.bringup.findings import Finding, Fix
+from robot.bringup.doctor.findings import Finding, Fix
 
 Tell = Callable[[str], None]
 """Is told in a few words what is being done now."""

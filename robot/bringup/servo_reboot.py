@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from drivers.errors import ServoFault, ServoMissing
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 from robot.bringup.servo_kind import Found, ServoKind, Standing
 
 BACK_S = 3.0

@@ -6,9 +6,9 @@ both would make it worse.
 
 from collections.abc import Iterable, Sequence
 
-from drivers.bus_journal import call
 from drivers.errors import ServoMissing
-from drivers.serial_port import BusPort
+from drivers.event_log import call
+from drivers.serial.port import BusPort
 from drivers.types import ServoSetup
 from robot.bringup.servo_kind import Found, ServoKind, SetUp, Tell
 

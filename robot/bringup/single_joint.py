@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from drivers.dynamixel.table import STEPS_PER_TURN
+from drivers.dynamixel.control_table import STEPS_PER_TURN
 from drivers.errors import DriverError, ServoFault
-from robot.bringup.one_servo import Found, OneServo
+from robot.bringup.servo_access import Found, OneServo
 from robot.calibrate.stop_search import STEPS_PER_DEG, Stop, StopSearchParams, go, search
 from robot.clock import Clock
 from robot.joint import JointParams

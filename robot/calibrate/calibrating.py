@@ -6,7 +6,7 @@ Nothing is printed or written here: questions go to ``Person``, the result is a 
 from collections.abc import Callable
 from typing import Literal, Protocol
 
-from drivers.dynamixel.table import STEPS_PER_TURN
+from drivers.dynamixel.control_table import STEPS_PER_TURN
 from robot.bringup.single_joint import SingleJoint
 from robot.calibrate.calibration import (
     Calibration,

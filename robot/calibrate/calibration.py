@@ -3,7 +3,7 @@
 A servo counts 4096 steps a turn; where 4095 meets 0 is its seam. After a restart it knows
 only the place within the turn, so a joint whose travel holds the seam would wake up a whole
 turn from where it is: such a joint cannot be used and must be built in anew.
-Steps as in drivers.dynamixel.table, angles in degrees at the joint.
+Steps as in drivers.dynamixel.control_table, angles in degrees at the joint.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from dataclasses import replace
 from math import floor
 from typing import NamedTuple
 
-from drivers.dynamixel.table import STEPS_PER_TURN
+from drivers.dynamixel.control_table import STEPS_PER_TURN
 from drivers.errors import SetupError
 from robot.joint import JointParams
 

@@ -11,8 +11,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from drivers.camera.source import Shot
 from drivers.errors import CameraError
-from drivers.picture_source import Shot
 from gaze.types import Angles2, Angles3, HeadGeometry
 from robot.calibrate.board_views import Coverage, ViewCollector
 from robot.calibrate.camera_calibration import (

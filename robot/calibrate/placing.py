@@ -7,7 +7,7 @@ that tells its place is turned by hand. Nothing is printed or written here.
 from collections.abc import Callable
 from typing import Protocol
 
-from robot.bringup.one_hobby import OneHobby
+from robot.bringup.hobby_servo import OneHobby
 from robot.bringup.single_joint import SingleJoint
 from robot.calibrate.calibrating import Person, Watched
 from robot.calibrate.calibration import Places, ends_of, is_lid

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from drivers.port_owner import usb_of
-from drivers.serial_port import BlockingPort
-from drivers.serial_ports import Host, SerialPort, serial_ports
+from drivers.serial.list_ports import Host, SerialPort, serial_ports
+from drivers.serial.port import BlockingPort
+from drivers.serial.port_owner import usb_of
 from robot.cli.terminal import status
 
 host = Host()

@@ -6,15 +6,15 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from config.schema import Rig
-from drivers.dynamixel.registers import Registers
 from drivers.errors import ServoFault, ServoMissing, SetupError
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
+from drivers.servo_bus.registers import Registers
 from drivers.servo_models import SERVOS
-from robot.bringup.one_dynamixel import OneDynamixel
+from robot.bringup.hobby_servo import OneHobby
 from robot.bringup.one_feetech import OneFeetech
-from robot.bringup.one_hobby import OneHobby
-from robot.bringup.one_servo import OneServo
+from robot.bringup.servo_access import OneServo
 from robot.bringup.single_joint import SingleJoint
+from robot.bringup.smart_servo import OneDynamixel
 from robot.calibrate.calibrating import by_hand, by_motion
 from robot.calibrate.calibration import Calibration, CalibrationRefused, Places
 from robot.calibrate.placing import HandPlacer, HobbyPlacer, by_places

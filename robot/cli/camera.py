@@ -15,11 +15,11 @@ from rich.console import Console
 from rich.table import Table
 
 from config.schema import Rig, load_rig
-from drivers.camera_thread import CameraThread
+from drivers.camera.source import Shot
+from drivers.camera.thread import CameraThread
+from drivers.camera.webcam import Webcam
 from drivers.errors import SetupError
-from drivers.picture_source import Shot
 from drivers.types import DetectedFace, Picture
-from drivers.webcam import Webcam
 from robot.calibrate.camera_calibration import LensCalibration
 from robot.calibrate.camera_steps import LensSteps, Neck, NeckStep, neck_angles, neck_steps
 from robot.calibrate.charuco_board import BoardParams, CharucoBoard
@@ -32,7 +32,7 @@ from robot.frames import CameraParams
 from robot.kinematics import NECK, Kinematics
 from robot.rig_angles import lid_ends, neck_span
 from robot.seeing.intrinsics import intrinsics_of_lens
-from sim_mock.board_scene import BoardScene
+from sim_mock.cameras.charuco_scene import BoardScene
 
 app = typer.Typer()
 

@@ -19,7 +19,7 @@ from robot.power_down import PowerDown
 from robot.rig_angles import limits, park_rad
 from robot.rig_bus import guarded_rig_bus
 from robot.safety.guard import Guard
-from sim_mock.board_scene import BoardScene
+from sim_mock.cameras.charuco_scene import BoardScene
 
 Stopped = Callable[[], str | None]
 """Gives why to stop, None while there is no reason."""

@@ -7,13 +7,13 @@ from typing import Annotated
 import typer
 
 from config.schema import Rig, load_rig
-from drivers.serial_port import BlockingPort
-from robot.bringup import checkup as checkup
-from robot.bringup import doctor_maestro as doctor_maestro
-from robot.bringup.checkup import Done
-from robot.bringup.doctor_guardian import examine_guardian
-from robot.bringup.findings import Finding, worst
-from robot.bringup.kinds import KINDS
+from drivers.serial.port import BlockingPort
+from robot.bringup.doctor import maestro as doctor_maestro
+from robot.bringup.doctor import run as checkup
+from robot.bringup.doctor.findings import Finding, worst
+from robot.bringup.doctor.guardian import examine_guardian
+from robot.bringup.doctor.run import Done
+from robot.bringup.servo_families import KINDS
 from robot.bringup.servo_report import as_plain, grouped, summed_up
 from robot.cli import bench as bench
 from robot.cli.bench import JsonOption, console, progress, wipe

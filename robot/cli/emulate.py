@@ -14,11 +14,11 @@ from drivers.errors import SetupError
 from drivers.servo_models import BusKind
 from robot.cli.terminal import clear_errors
 from robot.emulated_rig import emulated_lines
-from sim_mock.emulate import Settings, run
-from sim_mock.emulate import say as say_line
-from sim_mock.emulated import BAUDS, CASES, CHANNELS, Emulated, MaestroLine
-from sim_mock.servo_words import DEFAULT_FIRMWARE, EXAMPLE, line_of
-from sim_mock.terminal_line import BusSettings
+from sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
+from sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine
+from sim_mock.pty.line import BusSettings
+from sim_mock.pty.server import Settings, run
+from sim_mock.pty.server import say as say_line
 
 app = typer.Typer()
 

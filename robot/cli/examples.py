@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import typer
 
 from config.load import shipped_names
-from sim_mock.scenes import scenes
+from sim_mock.scenes.registry import scenes
 
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "run": (

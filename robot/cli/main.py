@@ -12,7 +12,7 @@ from config.load import load
 from config.schema import Rig, load_rig
 from drivers.file_input import read_limited
 from drivers.file_output import write_file
-from drivers.serial_ports import serial_ports
+from drivers.serial.list_ports import serial_ports
 from robot.cli import emulate as cli_emulate
 from robot.cli import motion as cli_motion
 from robot.cli import record as cli_record

@@ -12,11 +12,11 @@ from rich.live import Live
 from rich.table import Table
 
 from config.schema import Rig, load_rig
-from drivers.dynamixel.registers import Registers
 from drivers.feetech.registers import StsRegisters
-from drivers.serial_port import BlockingPort
-from robot.bringup.looks import DynamixelLooks, FeetechLooks, Look, Looks, MaestroLooks
+from drivers.serial.port import BlockingPort
+from drivers.servo_bus.registers import Registers
 from robot.bringup.monitor import Monitor, Sample, as_json
+from robot.bringup.telemetry import DynamixelLooks, FeetechLooks, Look, Looks, MaestroLooks
 from robot.cli.opened import opened
 from robot.cli.terminal import RigArgument, clear_errors, signals
 from robot.cli.wires import MockOption, PortOption, Wires, wires

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from config.schema import Rig
 from drivers.errors import PortError
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
 from robot.cli.bench import to_open
 from robot.cli.wires import Wires
 from robot.guardian.guardian import Guardian

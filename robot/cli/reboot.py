@@ -7,10 +7,10 @@ import typer
 from config.schema import Rig, load_rig
 from drivers.errors import SetupError
 from drivers.maestro.line import Line
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
 from robot.bringup import servo_reboot as servo_reboot
-from robot.bringup.kinds import KINDS
 from robot.bringup.maestro_sweep import sent_home
+from robot.bringup.servo_families import KINDS
 from robot.bringup.servo_kind import ServoKind
 from robot.cli.bench import YesOption, to_open
 from robot.cli.terminal import FAULT, clear_errors, say

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from drivers.camera_params import WebcamParams
+from drivers.camera.params import WebcamParams
+from drivers.camera.source import PictureSource
 from drivers.errors import SetupError
-from drivers.picture_source import PictureSource
 from robot.cli.terminal import clear_errors, say, signals, status
 from robot.clock import RealClock
 
@@ -60,16 +60,16 @@ def _source(
     width, height, rate_hz = wishes
     # OpenCV and depthai are heavy: loaded when it is clear that there is something to do.
     if oak:
-        from drivers.oak_camera import OakSource
-        from drivers.oak_params import OakParams
+        from drivers.camera.oak import OakSource
+        from drivers.camera.oak_params import OakParams
 
         params = OakParams(width_px=width, height_px=height or 400, rate_hz=rate_hz)
         return OakSource(params), "OAK-D"
     if video is not None:
-        from drivers.video_file import VideoFile
+        from drivers.camera.video_file import VideoFile
 
         return VideoFile(video), f"film {video.name}"
-    from drivers.webcam import Webcam
+    from drivers.camera.webcam import Webcam
 
     wanted = WebcamParams(width_px=width, height_px=height or 480, rate_hz=rate_hz)
     return Webcam.of(camera or 0, wanted), f"webcam {camera}"
@@ -85,7 +85,7 @@ def _record(
     stopped: Callable[[], str | None],
 ) -> None:
     """Record until told to stop, and say what is in the file."""
-    from drivers.camera_recorder import CameraRecorder
+    from drivers.camera.recorder import CameraRecorder
 
     clock = RealClock()
     recorder = CameraRecorder(source, file, {"source": name}, jpeg, force)

@@ -12,14 +12,14 @@ from rich.table import Table
 
 from config.schema import load_rig
 from drivers.errors import SetupError
-from drivers.port_owner import POLOLU
-from drivers.serial_port import BlockingPort
-from drivers.serial_ports import SerialPort
+from drivers.serial.list_ports import SerialPort
+from drivers.serial.port import BlockingPort
+from drivers.serial.port_owner import POLOLU
 from drivers.servo_models import BusKind
-from robot.bringup.doctor_port import name_ports
-from robot.bringup.kinds import KINDS
+from robot.bringup.doctor.port import name_ports
 from robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
 from robot.bringup.searching import RATES, Looked, found_of, known_kinds, plan, search
+from robot.bringup.servo_families import KINDS
 from robot.cli import bench as bench
 from robot.cli.bench import JsonOption, console
 from robot.cli.suggestions import completed

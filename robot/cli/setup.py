@@ -6,20 +6,20 @@ from typing import Annotated
 import typer
 
 from config.schema import Rig, load_rig
-from drivers.bus_journal import call
 from drivers.errors import DriverError, SetupError
-from drivers.serial_port import BlockingPort
+from drivers.event_log import call
+from drivers.serial.port import BlockingPort
 from drivers.types import ServoSetup
 from robot.bringup import servo_setup as servo_setup
-from robot.bringup.kinds import KINDS
+from robot.bringup.servo_families import KINDS
 from robot.bringup.servo_kind import ServoKind
 from robot.cli.bench import YesOption, progress, to_open, wipe
 from robot.cli.setup_maestro import set_up_board, write_settings
 from robot.cli.terminal import RigArgument, clear_errors, say
 from robot.cli.wires import MockOption, PortOption, bus_label, setups_on, wires
 from robot.rig_bus import bus_names
-from sim_mock.emulated import DynamixelLine, Emulated, StsLine
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.devices import DynamixelLine, Emulated, StsLine
+from sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()
 

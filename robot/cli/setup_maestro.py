@@ -12,14 +12,14 @@ from pathlib import Path
 
 import typer
 
-from drivers.bus_journal import call
 from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
+from drivers.event_log import call
 from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
 from drivers.maestro.probe import USB_CHANNELS
-from drivers.port_owner import POLOLU
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
+from drivers.serial.port_owner import POLOLU
 from drivers.types import ServoSetup
 from robot.bringup.maestro_settings import clipped, instructions, settings_file
 from robot.bringup.maestro_sweep import FINE_STEPS, Place, walk

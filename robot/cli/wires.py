@@ -8,14 +8,14 @@ import typer
 
 from config.schema import Rig
 from drivers.errors import SetupError
-from drivers.port_owner import refuse_owner
-from drivers.serial_port import BlockingPort
-from drivers.serial_ports import serial_ports
+from drivers.serial.list_ports import serial_ports
+from drivers.serial.port import BlockingPort
+from drivers.serial.port_owner import refuse_owner
 from drivers.types import ServoSetup
 from robot.emulated_rig import emulated_lines
 from robot.rig_bus import bus_names, joints_on, ports_of, rig_setups
-from sim_mock.emulated import Emulated
-from sim_mock.pty_bus import PtyBuses
+from sim_mock.devices import Emulated
+from sim_mock.pty.client import PtyBuses
 
 MockOption = Annotated[
     bool, typer.Option("--mock", help="Emulated servo bus instead of the rig's.")

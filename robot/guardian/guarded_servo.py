@@ -1,12 +1,12 @@
 """One servo without a watchdog, driven for calibrating under a guardian's eyes."""
 
 from drivers.errors import ServoFault
-from robot.bringup.one_servo import Found, OneServo
+from robot.bringup.servo_access import Found, OneServo
 from robot.guardian.guardian import Guardian
 
 
 class GuardedServo:
-    """Adds a guardian to a servo by itself; implements robot.bringup.one_servo.OneServo.
+    """Adds a guardian to a servo by itself; implements robot.bringup.servo_access.OneServo.
 
     Signs of life are the bytes that its port sends and waits for.
 

@@ -20,7 +20,7 @@ import signal
 import sys
 
 from drivers.errors import DriverError
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
 from robot.clock import RealClock
 from robot.guardian.hang_detector import HangDetector
 from robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, Heartbeat

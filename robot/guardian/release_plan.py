@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from drivers.maestro.params import Form, MaestroParams
-from drivers.serial_port import BusPort
+from drivers.serial.port import BusPort
 from drivers.servo_models import BusKind
 
 

@@ -5,7 +5,7 @@ from math import hypot, radians
 
 import numpy as np
 
-from drivers.camera_depth import depth_at
+from drivers.camera.depth_roi import depth_at
 from drivers.types import Detections
 from gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
 from gaze.types import Percept, Vec3

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from drivers.camera_look import Motion
-from drivers.camera_poses import PoseRing
-from drivers.motion_detector import MotionDetector
-from drivers.motion_params import MotionParams
-from drivers.picture_source import Shot
+from drivers.camera.frame_analysis import Motion
+from drivers.camera.pose_buffer import PoseRing
+from drivers.camera.source import Shot
 from drivers.types import MovingBlob
+from drivers.vision.motion.detector import MotionDetector
+from drivers.vision.motion.params import MotionParams
 from gaze.types import Floats
 from robot.frames import LensParams
 from robot.seeing.intrinsics import intrinsics_of_lens

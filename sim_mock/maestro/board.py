@@ -9,6 +9,7 @@ and scripts but for the one that a fault starts. Source: Pololu Maestro User's G
 from collections.abc import Callable, Sequence
 
 from sim_mock.device import Reply
+from sim_mock.faults.active import NOBODY
 from sim_mock.hobby_servo import HobbyServo, HobbySpec
 from sim_mock.maestro.body import Body
 from sim_mock.maestro.channel import Channel
@@ -34,8 +35,7 @@ from sim_mock.maestro.commands import (
 )
 from sim_mock.maestro.faults import COMMANDS, BoardFaults
 from sim_mock.maestro.settings import LIMITS, Settings, chosen, width_steps
-from sim_mock.servo_packets import Piece
-from sim_mock.wire_faults import NOBODY
+from sim_mock.replies import Piece
 
 SIZES = (6, 12, 18, 24)
 ASKING = (GET_POSITION, GET_MOVING, GET_ERRORS, GET_SCRIPT)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from sim_mock.fault_words import (
+from sim_mock.faults.grammar import (
     SWITCH,
     TIME,
     Commands,
@@ -15,9 +15,9 @@ from sim_mock.fault_words import (
     or_all,
     whole,
 )
+from sim_mock.faults.line import LineFaults
+from sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs
 from sim_mock.hobby_servo import HobbyServo
-from sim_mock.line_faults import LineFaults
-from sim_mock.line_verbs import adapter_verbs, closing_verbs, line_verbs
 from sim_mock.maestro.body import Body
 from sim_mock.maestro.commands import ERRORS
 from sim_mock.maestro.settings import cases

@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from sim_mock.device import Reply
+from sim_mock.faults.active import NOBODY
 from sim_mock.hobby_servo import HobbyServo, HobbySpec
 from sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
 from sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
 from sim_mock.pca9685.faults import CASES, COMMANDS, BoardFaults
-from sim_mock.servo_packets import Piece
-from sim_mock.wire_faults import NOBODY
+from sim_mock.replies import Piece
 
 START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")
 STATUS_REGISTER = 0x0A

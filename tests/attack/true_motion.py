@@ -34,7 +34,7 @@ from drivers.errors import DriverError
 from robot.assemble import Assembly
 from robot.choice import Choice
 from robot.orders import LookAt
-from sim_mock.scenes import scenes
+from sim_mock.scenes.registry import scenes
 
 RIGS = ("desk", "feetech", "maker", "mixed")
 LATES: dict[str, Callable[[], Late]] = {

@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 from config.schema import Rig, load_rig
 from robot.emulated_rig import emulated_lines
 from robot.rig_angles import park_rad
-from sim_mock.pty_bus import PtyBuses
+from sim_mock.pty.client import PtyBuses
 
 ROOT = Path(__file__).parents[2]
 RIGS = {"desk": "dynamixel", "feetech": "feetech", "maker": "maestro"}

@@ -21,13 +21,13 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Xl330PyController
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.serial_port import BlockingPort
+from drivers.serial.port import BlockingPort
+from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
-from sim_mock.ports import InProcessPort
-from sim_mock.pty_bus import PtyBus
-from sim_mock.servo import ServoSpec
-from sim_mock.servo_chain import build_chain
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.pty.client import PtyBus
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.servo import ServoSpec
 
 IDS = tuple(range(1, 10))
 MODEL = "xl330-m077"

@@ -24,17 +24,17 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Sts3215PyController, Xl330PyController
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.maestro.bus import MaestroBus, MaestroParams
-from drivers.mixed_bus import MixedBus, Share
-from drivers.serial_port import BlockingPort, BusPort
+from drivers.multi_bus import MixedBus, Share
+from drivers.serial.port import BlockingPort, BusPort
+from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoSetup
-from sim_mock.emulated import DynamixelLine, Emulated, MaestroLine, StsLine, build
+from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, StsLine, build
 from sim_mock.hobby_servo import HobbySpec
-from sim_mock.ports import InProcessPort
-from sim_mock.pty_bus import PtyBus
-from sim_mock.servo_physics import ServoSpec
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.pty.client import PtyBus
+from sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3, 4, 5, 6)
 BAUD = {"dynamixel": 1_000_000, "feetech": 1_000_000, "maestro": 115_200}

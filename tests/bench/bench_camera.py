@@ -19,18 +19,18 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 
-from drivers.camera_process import CameraProcess
-from drivers.camera_recorder import CameraRecorder
-from drivers.camera_thread import CameraThread
-from drivers.camera_worker import CameraParts
-from drivers.face_detector import face_detector
-from drivers.face_params import FaceDetectorParams
-from drivers.motion_params import MotionParams
-from drivers.picture_source import Shot
-from drivers.recording_format import encoded
-from drivers.recording_read import Recording
+from drivers.camera.process import CameraProcess
+from drivers.camera.recorder import CameraRecorder
+from drivers.camera.recording_format import encoded
+from drivers.camera.recording_reader import Recording
+from drivers.camera.source import Shot
+from drivers.camera.thread import CameraThread
+from drivers.camera.video_file import VideoFile
+from drivers.camera.worker import CameraParts
 from drivers.types import FaceDetector
-from drivers.video_file import VideoFile
+from drivers.vision.face_detector import face_detector
+from drivers.vision.face_params import FaceDetectorParams
+from drivers.vision.motion.params import MotionParams
 from robot.seeing.motion_finder import motion_finder
 
 RATE_HZ, ROUNDS, SECONDS = 200.0, 12, 1.0

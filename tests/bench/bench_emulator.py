@@ -17,10 +17,10 @@ from fastcrc.crc16 import umts
 from rich.console import Console
 from rich.table import Table
 
-from drivers.serial_port import BlockingPort
-from sim_mock.pty_bus import PtyBus
-from sim_mock.servo_chain import ServoChain, build_chain
-from sim_mock.servo_line import ServoLine
+from drivers.serial.port import BlockingPort
+from sim_mock.pty.client import PtyBus
+from sim_mock.smart_servo.chain import ServoChain, build_chain
+from sim_mock.wire import ServoLine
 
 IDS = tuple(range(1, 10))
 SPECS = [(i, "xl330-m077" if i < 7 else "xc330-m288", 2048) for i in IDS]

@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 
 from config.schema import load_rig
-from drivers.face_detector import face_detector
 from drivers.types import Detections
+from drivers.vision.face_detector import face_detector
 from robot.assemble import Assembly, assemble
 from robot.choice import Choice
 from robot.loop import Tick, run

@@ -16,13 +16,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.motion_detector import MotionDetector
-from drivers.motion_ego import own_motion
-from drivers.motion_flow import FlowSearch, turn_homography
-from drivers.motion_groups import gathered
-from drivers.motion_params import MotionParams
-from drivers.motion_picture import made_small
-from drivers.motion_things import what_moves
+from drivers.vision.motion.clustering import gathered
+from drivers.vision.motion.detector import MotionDetector
+from drivers.vision.motion.ego_motion import own_motion
+from drivers.vision.motion.image import made_small
+from drivers.vision.motion.optical_flow import FlowSearch, turn_homography
+from drivers.vision.motion.params import MotionParams
+from drivers.vision.motion.segmentation import what_moves
 
 PICTURES, DT_S, TURN_RAD = 150, 1 / 30, np.radians(20.0) / 30
 Picture = NDArray[np.uint8]

@@ -19,13 +19,13 @@ from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler
 from fastcrc import crc16
 
 from config.schema import load_rig
-from drivers.dynamixel.bus import DynamixelBus
+from drivers.servo_bus.bus import DynamixelBus
 from robot.assemble import Assembly, Choice, assemble
 from robot.loop import run
 from robot.summary import Summary
 from robot.types import in_order
-from sim_mock.ports import InProcessPort
-from sim_mock.servo_chain import build_chain
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.smart_servo.chain import build_chain
 
 
 def main() -> None:

@@ -1,0 +1,207 @@
+"""An OAK-D through depthai 3: colour, aligned depth and faces, in host time."""
+
+import threading
+from collections.abc import Callable
+from datetime import timedelta
+from typing import Any
+
+from drivers.camera.clock_sync import ClockBridge
+from drivers.camera.oak_discovery import find_oak
+from drivers.camera.oak_messages import depth_of, faces_of, lens_of, picture_of
+from drivers.camera.oak_params import OakParams
+from drivers.camera.oak_pipeline import COLOUR, MakeNodes, device_nodes, joined
+from drivers.camera.oak_sdk import load_depthai
+from drivers.camera.source import Shot
+from drivers.errors import CameraError
+
+_SLICE = timedelta(milliseconds=100)  # so long may a wish to stop be unheard
+# The camera's stamp in host time is believed if it is no older than this, nor of the future.
+_OLDEST_STAMP_S = 1.0
+
+
+class OakSource:
+    """An OAK-D as a source of pictures."""
+
+    def __init__(
+        self,
+        params: OakParams,
+        nodes: MakeNodes = device_nodes,
+        on_device: bool = True,
+        load: Callable[[], Any] = load_depthai,
+    ) -> None:
+        """Take what is asked of the camera; nothing is imported or opened yet.
+
+        nodes: makes the nodes; on_device: False for nodes that all run on the host and need
+        no camera; load: gives depthai
+        """
+        self._params = params
+        self._nodes = nodes
+        self._on_device = on_device
+        self._load = load
+        self._dai: Any = None
+        self._device: Any = None
+        self._pipeline: Any = None
+        self._queue: Any = None
+        self._bridge = ClockBridge()
+        self._in_step = True
+        self._number = 0
+        self._events: list[str] = []
+
+    def open(self) -> None:
+        """Find the camera, start it, and make sure of its rate.
+
+        Raises:
+            drivers.errors.CameraError: there is none, it may not be used, is busy, or hangs on
+                USB 2 where that is refused.
+        """
+        self.close()
+        self._dai = self._load()
+        try:
+            if self._on_device:
+                self._device = self._connect()
+                self._pipeline = self._dai.Pipeline(self._device)
+            else:
+                self._pipeline = self._dai.Pipeline(createImplicitDevice=False)
+            outputs = self._nodes(self._dai, self._pipeline, self._params)
+            self._queue = joined(self._dai, self._pipeline, outputs, self._params.rate_hz)
+            self._pipeline.start()
+        except RuntimeError as error:
+            self.close()
+            raise CameraError(
+                f"the OAK camera cannot be started ({_line(error)}): unplug it, wait a second, "
+                "plug it in again; if another program uses it, end that"
+            ) from error
+        except BaseException:
+            self.close()
+            raise
+        self._bridge, self._in_step, self._number = ClockBridge(), True, 0
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Wait for the next picture; its time is the middle of its exposure.
+
+        Raises:
+            drivers.errors.CameraError: the camera is not open, was unplugged or is silent.
+        """
+        if self._queue is None:
+            raise CameraError("the OAK camera is not open: call open() before taking")
+        began_s = now_s()
+        while not stop.is_set():
+            group = self._next_group()
+            arrived_s = now_s()
+            if group is not None and (shot := self._shot(group, arrived_s)) is not None:
+                return shot
+            if arrived_s - began_s > self._params.silence_ms / 1e3:
+                raise CameraError(
+                    f"the OAK camera gave no picture for {self._params.silence_ms / 1e3:g} s: "
+                    "check its cable and power supply"
+                )
+        return None
+
+    def events(self) -> tuple[str, ...]:
+        """Say what is not as it should be: USB 2, a clock set anew."""
+        told, self._events = tuple(self._events), []
+        return told
+
+    def close(self) -> None:
+        """Stop and free the camera; safe to call twice."""
+        pipeline, device = self._pipeline, self._device
+        self._pipeline = self._device = self._queue = None
+        # A camera that was unplugged throws from whatever it is asked; it is gone already.
+        for end in (_ended(pipeline), device.close if device is not None else None):
+            if end is not None:
+                try:
+                    end()
+                except RuntimeError as error:
+                    self._events.append(f"closing the OAK camera: {_line(error)}")
+
+    def _connect(self) -> Any:
+        """Open the device, and see how fast its USB is."""
+        info = find_oak(self._dai, self._params.device)
+        device = self._dai.Device(info)
+        # It is this program that opens a lost camera anew, and tells.
+        device.setMaxReconnectionAttempts(0)
+        speed = device.getUsbSpeed()
+        slow = (self._dai.UsbSpeed.LOW, self._dai.UsbSpeed.FULL, self._dai.UsbSpeed.HIGH)
+        if speed in slow:
+            text = (
+                f"the OAK camera runs at USB 2 speed ({speed.name}): use a USB 3 cable (its plug "
+                "is often blue) and port, or set a smaller rate_hz and size"
+            )
+            if self._params.usb2 == "refuse":
+                device.close()
+                raise CameraError(text)
+            self._events.append(text)
+        if self._params.dot_projector > 0.0:
+            device.setIrLaserDotProjectorIntensity(self._params.dot_projector)
+        return device
+
+    def _next_group(self) -> Any:
+        """Give the newest group of messages, None after a short wait without any."""
+        try:
+            group = self._queue.get(_SLICE)
+            while group is not None and (newer := self._queue.tryGet()) is not None:
+                group = newer
+        except (RuntimeError, self._dai.MessageQueue.QueueException) as error:
+            raise CameraError(
+                f"the OAK camera was lost ({_line(error)}): check its cable and power supply"
+            ) from error
+        return group
+
+    def _shot(self, group: Any, arrived_s: float) -> Shot | None:
+        """Make a picture of a group of messages."""
+        picture = picture_of(group)
+        if picture is None:
+            return None
+        self._number += 1
+        height, width = picture.shape[:2]
+        return Shot(
+            self._captured_s(group[COLOUR], arrived_s),
+            self._number,
+            picture,
+            depth_of(group, width, height),
+            lens_of(group),
+            faces_of(group, width, height, self._params.min_confidence),
+        )
+
+    def _captured_s(self, frame: Any, arrived_s: float) -> float:
+        """Translate the device's own stamp by the bridge.
+
+        depthai measures the offset of the clocks by asking to and fro, so its stamp in host
+        time holds no transport; where it cannot be right, arrivals serve instead.
+        """
+        middle = self._dai.CameraExposureOffset.MIDDLE
+        device_s = frame.getTimestampDevice(middle).total_seconds()
+        stamped_s = frame.getTimestamp(middle).total_seconds()
+        jumps = self._bridge.jumps
+        if self._in_step and not 0.0 <= arrived_s - stamped_s <= _OLDEST_STAMP_S:
+            self._in_step = False
+            self._bridge = ClockBridge(self._params.latency_ms / 1e3)
+            jumps = 0
+            self._events.append(
+                "the OAK camera's clock is not in step with the host's: arrivals less "
+                f"{self._params.latency_ms:g} ms (latency_ms) are used"
+            )
+        host_s = self._bridge.host_s(device_s, stamped_s if self._in_step else arrived_s)
+        if self._bridge.jumps > jumps:
+            self._events.append("the OAK camera's clock was set anew: its times are found again")
+        return host_s
+
+
+def _ended(pipeline: Any) -> Callable[[], None] | None:
+    """Give what stops a pipeline and waits for its threads."""
+    if pipeline is None:
+        return None
+
+    def end() -> None:
+        if pipeline.isRunning():
+            pipeline.stop()
+        # Also where the stream has ended by itself: left to its destructor, the wait for its
+        # threads would keep the interpreter's lock that nodes written in Python need to end.
+        pipeline.wait()
+
+    return end
+
+
+def _line(error: BaseException) -> str:
+    """Give an error's words on one line."""
+    return " ".join(str(error).split())

@@ -1,0 +1,82 @@
+"""Messages of an OAK pipeline as pictures with distances, lens and faces."""
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from drivers.camera.depth_roi import metres, resized
+from drivers.camera.oak_pipeline import COLOUR, DEPTH, FACES
+from drivers.camera.source import bgr
+from drivers.types import Depth, DetectedFace, Picture, PictureLens
+
+_LANDMARKS = 5
+# A frame that never saw a lens carries the unit matrix.
+_LEAST_FOCAL_PX = 10.0
+
+
+def names(group: Any) -> set[str]:
+    """Give which messages are in a group."""
+    return set(group.getMessageNames())
+
+
+def picture_of(group: Any) -> Picture | None:
+    """Give the colour picture of a group, None where it is none."""
+    return bgr(group[COLOUR].getCvFrame())
+
+
+def depth_of(group: Any, width_px: int, height_px: int) -> Depth | None:
+    """Give the depth of a group in metres and in the size of its picture."""
+    if DEPTH not in names(group):
+        return None
+    mm = np.asarray(group[DEPTH].getFrame())
+    if mm.dtype != np.uint16 or mm.ndim != 2 or not mm.size:
+        return None
+    return resized(metres(mm), width_px, height_px)
+
+
+def lens_of(group: Any) -> PictureLens | None:
+    """Give the lens that the picture carries, None where it carries none."""
+    matrix = np.asarray(group[COLOUR].getTransformation().getIntrinsicMatrix(), dtype=float)
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or matrix[0, 0] < _LEAST_FOCAL_PX:
+        return None
+    return PictureLens(
+        float(matrix[0, 0]), float(matrix[1, 1]), float(matrix[0, 2]), float(matrix[1, 2])
+    )
+
+
+def faces_of(
+    group: Any, width_px: int, height_px: int, min_confidence: float
+) -> tuple[DetectedFace, ...] | None:
+    """Give the faces that the camera found, the largest first; None where it did not look.
+
+    Detections without five landmarks are left out: nobody could tell where they look.
+    """
+    if FACES not in names(group):
+        return None
+    message = group[FACES]
+    target = group[COLOUR].getTransformation()
+    if message.getTransformation() is not None and target is not None:
+        message = message.transformTo(target)
+    found = [_face(detection, width_px, height_px) for detection in message.detections]
+    sure = [face for face in found if face is not None and face.confidence >= min_confidence]
+    return tuple(sorted(sure, key=lambda face: -face.box_px[2] * face.box_px[3]))
+
+
+def _face(detection: Any, width_px: int, height_px: int) -> DetectedFace | None:
+    """Turn a detection in shares of the picture into one in pixels."""
+    points = np.array([[p.x, p.y] for p in detection.getKeypoints2f()], dtype=np.float64)
+    edges = (detection.xmin, detection.ymin, detection.xmax, detection.ymax)
+    if points.shape != (_LANDMARKS, 2) or not all(map(isfinite, (*edges, *points.ravel()))):
+        return None
+    # Pixels have their centres at whole numbers; the picture begins half a pixel before 0.
+    landmarks = points * (width_px, height_px) - 0.5
+    left, top, right, bottom = edges
+    box = (
+        left * width_px - 0.5,
+        top * height_px - 0.5,
+        (right - left) * width_px,
+        (bottom - top) * height_px,
+    )
+    landmarks.setflags(write=False)
+    return DetectedFace(box, landmarks, min(1.0, max(0.0, float(detection.confidence))))

@@ -1,0 +1,109 @@
+"""The nodes that run on the camera, and how their messages are brought together.
+
+``device_nodes`` is all that needs a camera. Any other function that gives the same outputs
+serves as well: depthai's replay and host nodes do, without a camera.
+"""
+
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from drivers.camera.oak_params import OakParams
+from drivers.errors import CameraError
+
+COLOUR, DEPTH, FACES = "colour", "depth", "faces"
+"""Names of the messages in a group."""
+# Two groups may wait: one that is read and the newest.
+_QUEUE = 2
+
+
+class Outputs(NamedTuple):
+    """Outputs of nodes: pictures, depth in millimetres (RAW16) and found faces.
+
+    depth and faces are None where they are not wanted
+    """
+
+    colour: Any
+    depth: Any | None = None
+    faces: Any | None = None
+
+
+MakeNodes = Callable[[Any, Any, OakParams], Outputs]
+"""Takes depthai, a pipeline and the parameters; gives the outputs of the nodes it made."""
+
+
+def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
+    """Make the nodes on the camera: colour without distortion, aligned depth, faces.
+
+    Raises:
+        drivers.errors.CameraError: the face model cannot be read.
+    """
+    socket = dai.CameraBoardSocket
+    camera = pipeline.create(dai.node.Camera).build(socket.CAM_A)
+    size = params.width_px, params.height_px
+    colour = camera.requestOutput(
+        size, type=dai.ImgFrame.Type.NV12, fps=params.rate_hz, enableUndistortion=True
+    )
+    depth = _stereo(dai, pipeline, params, colour) if params.depth else None
+    faces = None
+    if params.face_model:
+        archive = read_archive(dai, params.face_model)
+        network = pipeline.create(dai.node.DetectionNetwork)
+        network = network.build(camera, archive, fps=params.rate_hz)
+        network.setConfidenceThreshold(params.min_confidence)
+        faces = network.out
+    return Outputs(colour, depth, faces)
+
+
+def read_archive(dai: Any, path: str) -> Any:
+    """Read a network for the camera from a local NNArchive.
+
+    Raises:
+        drivers.errors.CameraError: there is no such file, or it is no archive.
+    """
+    file = Path(path).expanduser()
+    if not file.is_file():
+        raise CameraError(f"no face model at {file}: give the path of an NNArchive (.tar.xz)")
+    try:
+        return dai.NNArchive(str(file))
+    except RuntimeError as error:
+        raise CameraError(
+            f"{file} is no NNArchive ({' '.join(str(error).split())}): "
+            "take one made for this camera's chip"
+        ) from error
+
+
+def joined(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:
+    """Give the queue of message groups, each with all outputs of one instant."""
+    sync = pipeline.create(dai.node.Sync)
+    sync.setRunOnHost(True)
+    sync.setSyncThreshold(timedelta(seconds=0.5 / rate_hz))
+    for name, output in zip((COLOUR, DEPTH, FACES), outputs, strict=True):
+        if output is not None:
+            output.link(sync.inputs[name])
+    return sync.out.createOutputQueue(maxSize=_QUEUE, blocking=False)
+
+
+def _stereo(dai: Any, pipeline: Any, params: OakParams, colour: Any) -> Any:
+    """Make depth that lies on the colour picture pixel by pixel."""
+    socket = dai.CameraBoardSocket
+    stereo = pipeline.create(dai.node.StereoDepth)
+    preset = getattr(dai.node.StereoDepth.PresetMode, params.stereo_preset.upper())
+    stereo.setDefaultProfilePreset(preset)
+    stereo.setLeftRightCheck(params.left_right_check)
+    stereo.setExtendedDisparity(params.extended_disparity)
+    stereo.setSubpixel(params.subpixel)
+    for side, eye in ((socket.CAM_B, stereo.left), (socket.CAM_C, stereo.right)):
+        pipeline.create(dai.node.Camera).build(side).requestOutput(
+            (640, 400), fps=params.rate_hz
+        ).link(eye)
+    platform = pipeline.getDefaultDevice().getPlatform()
+    if platform != dai.Platform.RVC4:
+        colour.link(stereo.inputAlignTo)
+        return stereo.depth
+    # The newer chip aligns in a node of its own.
+    align = pipeline.create(dai.node.ImageAlign)
+    stereo.depth.link(align.input)
+    colour.link(align.inputAlignTo)
+    return align.outputAligned

@@ -1,0 +1,88 @@
+"""A camera recording played again: the same pictures at the same times from each other."""
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+from drivers.camera.recording_reader import Recording
+from drivers.camera.source import Shot
+from drivers.camera.video_pacing import FilmPace
+from drivers.camera.video_timestamps import FilmTimes
+from drivers.errors import CameraError
+
+_ALONE_S = 0.1  # how long a recording of one picture lasts
+
+
+class CameraReplay:
+    """A recording, repeated for ever like a film; film time starts at 0 with picture 1."""
+
+    def __init__(self, path: str | Path) -> None:
+        """Name the file; nothing is opened yet."""
+        self._path = Path(path).expanduser()
+        self._recording: Recording | None = None
+        self._times = FilmTimes(1.0)
+        self._pace = FilmPace()
+        self._untold = ""
+
+    def open(self) -> None:
+        """Open the file, or open it anew at film time 0.
+
+        Raises:
+            drivers.errors.CameraError: it is absent, no recording, or holds no picture.
+        """
+        self.close()
+        self._recording = Recording(self._path)
+        starts = self._recording.times_s
+        steps = [b - a for a, b in zip(starts, starts[1:], strict=False)]
+        length_s = starts[-1] + (median(steps) if steps else _ALONE_S)
+        self._times = FilmTimes(len(starts) / length_s, starts, length_s)
+        self._pace, self._untold = FilmPace(), self._recording.note
+
+    @property
+    def length_s(self) -> float:
+        """Give how long one showing lasts."""
+        self._opened()
+        return self._times.length_s
+
+    def due_s(self, number: int) -> float:
+        """Give the film time at which a picture is due."""
+        self._opened()
+        return self._times.due_s(number)
+
+    def shot(self, number: int) -> Shot:
+        """Read a picture by number, with the film time at which it is due.
+
+        Raises:
+            drivers.errors.CameraError: the file is damaged there.
+        """
+        recording = self._opened()
+        found = recording.shot((number - 1) % len(recording.times_s))
+        return found._replace(captured_s=self._times.due_s(number), number=number)
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Wait until the next picture is due, then read the newest; time starts here.
+
+        Raises:
+            drivers.errors.CameraError: the file is damaged there.
+        """
+        self._opened()
+        due = self._pace.wait(self._times, now_s, stop)
+        return None if due is None else self.shot(due.number)._replace(captured_s=due.host_s)
+
+    def events(self) -> tuple[str, ...]:
+        """Say once what is not as it should be with the file."""
+        told, self._untold = self._untold, ""
+        return (told,) if told else ()
+
+    def close(self) -> None:
+        """Free the file; safe to call twice."""
+        if self._recording is not None:
+            self._recording.close()
+        self._recording = None
+
+    def _opened(self) -> Recording:
+        """Give the open file."""
+        if self._recording is None:
+            raise CameraError(f"{self._path} is not open: call open() before reading")
+        return self._recording

@@ -1,0 +1,314 @@
+"""Pictures looked at in a process of its own: nothing of it can hold up or end the control loop.
+
+Python runs one thread of a process at a time, so what finds faces would cost a loop in the
+same process milliseconds now and then; and where processors are few, the loop's process is
+to go first. What was found comes back through a pipe, pictures through shared memory.
+
+A process that crashes, or is blocked in a camera's driver, is started again while the loop
+goes on without pictures: the last detections stay, and their age tells.
+"""
+
+import multiprocessing
+import threading
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from select import select
+from typing import NamedTuple
+
+from drivers.camera.capture_loop import BACK, LOST
+from drivers.camera.frame_analysis import Motion
+from drivers.camera.params import CameraCareParams
+from drivers.camera.shared_frames import SlotReader
+from drivers.camera.silence import PictureSilence
+from drivers.camera.worker import LONGEST_END_S, CameraParts, Ended, Found, Retune, run
+from drivers.errors import CameraError, SetupError
+from drivers.types import Detections, FaceDetector
+
+_LONGEST_START_S = 60.0
+_LOOK_S = 0.1
+_SOUND_S = 10.0
+"""A process that lived for so long is well: the next end is news, and tried again quickly."""
+_MOST_EVENTS = 100
+_BLOB_IDS = 1_000_000
+"""Things that a process finds are numbered from 0; those of the next one from so many on."""
+
+
+class _End(NamedTuple):
+    """Why a process gives no more pictures; final: no other one is started."""
+
+    reason: str
+    final: bool = False
+
+
+class CameraProcess:
+    """A camera, or a film paced by the real clock, watched from another process.
+
+    The same calls as a camera thread; while a lost source is tried again the last detections
+    stay, and their age tells.
+
+    Args:
+        parts: how to make what gives pictures and what finds things; nothing starts yet.
+        now_s: the host's monotonic clock, picklable; all processes share its zero.
+        care: how a camera that is lost is tried again.
+
+    pictures, pictures_with_face: counts of pictures looked at since open
+    """
+
+    def __init__(
+        self,
+        parts: CameraParts,
+        now_s: Callable[[], float],
+        care: CameraCareParams | None = None,
+    ) -> None:
+        self._parts = parts
+        self._now_s = now_s
+        self._care = care or CameraCareParams()
+        self._process: BaseProcess | None = None
+        self._pipe: Connection | None = None
+        self._thread: threading.Thread | None = None
+        self._newest: Detections | None = None
+        self._failure = ""
+        self._closing = threading.Event()
+        self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
+        self._motion: Callable[[Motion | None], Motion | None] | None = None
+        self._forget()
+
+    def _forget(self) -> None:
+        """Begin to count at picture 1."""
+        self.pictures = self.pictures_with_face = 0
+        self._starts = self._counted = self._number = 0
+        self._lost_s: float | None = None
+        self._back_s = 0.0
+        self._losses = 0  # without a sound time between them
+        self._owes_back = False
+
+    def open(self) -> None:
+        """Start the process and wait until its source is open.
+
+        Raises:
+            drivers.errors.CameraError: the source cannot be opened, or is open already.
+            drivers.errors.SetupError: the detector cannot be made.
+        """
+        if self._process is not None:
+            raise CameraError("the camera process runs already: close() it before opening it anew")
+        self._newest, self._failure, self._motion = None, "", None
+        self._closing.clear()
+        self._events.clear()
+        self._forget()
+        error = self._start()
+        if error is not None:
+            self.close()
+            raise error
+        self._thread = threading.Thread(target=self._supervise, name="camera", daemon=True)
+        self._thread.start()
+
+    def latest(self, now_s: float) -> Detections | None:
+        """Return what the newest picture showed, or None before the first.
+
+        Raises:
+            drivers.errors.CameraError: the source has been gone for longer than ``give_up_s``.
+        """
+        if self._failure:
+            raise CameraError(self._failure)
+        return self._newest
+
+    def retune(
+        self,
+        detector: Callable[[], FaceDetector] | None,
+        motion: Callable[[Motion | None], Motion | None] | None,
+    ) -> bool:
+        """Let the process look otherwise from one of the next pictures on.
+
+        Never waits; return whether the process has room for the word. A detector that cannot
+        be made there is told of as an event, and the old one goes on.
+
+        detector: makes another one; motion: gives what finds motion from what did; None: as is
+        """
+        pipe = self._pipe
+        try:
+            if pipe is None or not select([], [pipe], [], 0.0)[1]:
+                return False
+            pipe.send(Retune(detector, motion))
+        except (OSError, ValueError):  # it has ended, and the next one is on its way
+            return False
+        # For the process after this one.
+        self._parts = self._parts._replace(detector=detector or self._parts.detector)
+        self._motion = motion or self._motion
+        return True
+
+    def events(self) -> tuple[str, ...]:
+        """Return what has happened since the last call, one line each."""
+        told = []
+        while self._events:
+            told.append(self._events.popleft())
+        return tuple(told)
+
+    def close(self) -> None:
+        """End the process; safe to call twice."""
+        self._closing.set()
+        if self._pipe is not None:
+            with suppress(OSError):  # it may have ended already
+                self._pipe.send("stop")
+        if self._thread is not None:
+            self._thread.join()
+        self._end(LONGEST_END_S)
+        self._thread = None
+
+    # --- one process
+
+    def _start(self) -> SetupError | None:
+        """Start a process and wait for its first word; return why it cannot do its work."""
+        context = multiprocessing.get_context("spawn")
+        pipe, theirs = context.Pipe()
+        process = context.Process(
+            target=run,
+            args=(theirs, self._parts, self._now_s, self._care),
+            name="camera",
+            daemon=True,
+        )
+        process.start()
+        theirs.close()
+        self._process, self._pipe = process, pipe
+        self._starts += 1
+        end_s = self._now_s() + _LONGEST_START_S
+        try:
+            while not pipe.poll(_LOOK_S):
+                if self._closing.is_set() or self._now_s() >= end_s:
+                    return _no_word()
+            word = pipe.recv()
+        except (EOFError, OSError):
+            return _no_word()
+        return word if isinstance(word, SetupError) else None
+
+    def _end(self, patience_s: float) -> None:
+        """End the process, by force where it does not end in time; safe to call twice."""
+        process, pipe = self._process, self._pipe
+        if process is None or pipe is None:
+            return
+        process.join(patience_s)
+        if process.is_alive():
+            process.kill()
+            process.join()
+        self._process = self._pipe = None
+        pipe.close()
+
+    # --- one after the other, in a thread
+
+    def _supervise(self) -> None:
+        """Take what processes find; start the next one until it may not be tried any more."""
+        wait_s = self._care.retry_ms / 1e3
+        while not self._closing.is_set():
+            began_s = self._now_s()
+            end = self._receive()
+            if self._closing.is_set():
+                return
+            if self._now_s() - began_s >= _SOUND_S:
+                wait_s = self._care.retry_ms / 1e3
+            while not self._closing.is_set():
+                if not self._may_go_on(end):
+                    self._failure = end.reason
+                    return
+                self._end(0.0)
+                if self._closing.wait(wait_s):
+                    return
+                wait_s = min(2.0 * wait_s, self._care.longest_retry_ms / 1e3)
+                error = self._start()
+                if error is None:
+                    break
+                end = _End(str(error))
+            if self._pipe is not None and self._motion is not None:
+                with suppress(OSError):
+                    self._pipe.send(Retune(None, self._motion))
+
+    def _may_go_on(self, end: _End) -> bool:
+        """Tell of an end, and return whether another process may be started."""
+        if self._lost_s is None:
+            self._lose(end.reason, "starting its process again")
+        gone_s = self._now_s() - (self._lost_s or 0.0)
+        return not end.final and gone_s < self._care.give_up_s
+
+    def _lose(self, reason: str, remedy: str) -> None:
+        """Record that no pictures come; a loss soon after another one is told once at most."""
+        self._lost_s = self._now_s()
+        self._losses += 1
+        if self._care.give_up_s > 0.0 and self._losses == 1:
+            self._owes_back = True
+            self._events.append(f"{LOST} ({reason}): {remedy}")
+        elif self._losses == 2:
+            self._events.append(f"{LOST} again ({reason}): from now on it is tried without a word")
+
+    def _receive(self) -> _End:
+        """Take what a process finds until it ends, or nothing more is to be expected of it."""
+        pipe = self._pipe
+        assert pipe is not None
+        slots = SlotReader(), SlotReader()
+        silence = PictureSilence(self._care, self._now_s())
+        retrying = False  # the process itself opens a lost source again and again
+        self._counted = self._number
+        try:
+            while True:
+                if not pipe.poll(_LOOK_S):
+                    if self._closing.is_set() and not self._alive():
+                        return _End("closed")
+                    if not retrying and self._is_hung(silence):
+                        return _End("no new picture, and its process does not go on")
+                    continue
+                word = pipe.recv()
+                if isinstance(word, Ended):
+                    return _End(word.reason, word.final)
+                if isinstance(word, str):
+                    retrying = word.startswith(LOST) or (retrying and not word.startswith(BACK))
+                    silence.record_life(self._now_s())
+                    self._events.append(word)
+                else:
+                    retrying = False
+                    silence.record_picture(self._now_s())
+                    self._note(word, slots)
+        except (EOFError, OSError):
+            return _End("the process that looks at pictures has ended")
+        finally:
+            for slot in slots:
+                slot.forget()
+
+    def _alive(self) -> bool:
+        return self._process is not None and self._process.is_alive()
+
+    def _is_hung(self, silence: PictureSilence) -> bool:
+        """Tell of a camera that gives no more pictures; return whether to end its process."""
+        verdict = silence.verdict(self._now_s())
+        if verdict and self._lost_s is None:
+            self._lose("no new picture", "waiting for it")
+        if verdict == "hung" and self._owes_back:
+            self._events.append("still no picture: starting the camera's process again")
+        return verdict == "hung"
+
+    def _note(self, word: Found, slots: tuple[SlotReader, SlotReader]) -> None:
+        """Leave what was found in the slot, with the picture if it is still there."""
+        found = word.detections
+        self.pictures += 1
+        self.pictures_with_face += bool(found.faces)
+        self._number = self._counted + found.number
+        picture = slots[0].take(word.picture) if word.picture is not None else None
+        depth = slots[1].take(word.depth) if word.depth is not None else None
+        blobs = found.blobs
+        if self._starts > 1:
+            first = (self._starts - 1) * _BLOB_IDS
+            blobs = tuple(replace(blob, id=first + blob.id) for blob in blobs)
+        self._newest = replace(
+            found, number=self._number, blobs=blobs, picture=picture, depth_m=depth
+        )
+        now_s = self._now_s()
+        if self._lost_s is not None:
+            if self._owes_back:
+                self._events.append(f"{BACK} after {now_s - self._lost_s:.1f} s")
+            self._lost_s, self._owes_back, self._back_s = None, False, now_s
+        elif self._losses and now_s - self._back_s >= _SOUND_S:
+            self._losses = 0
+
+
+def _no_word() -> SetupError:
+    return CameraError("the process that looks at pictures did not start: start anew")

@@ -1,0 +1,151 @@
+"""Recording what a camera gives while it is used: encoded and written by threads of its own."""
+
+import queue
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from drivers.camera.recording_format import encoded
+from drivers.camera.recording_writer import RecordingWriter
+from drivers.camera.source import PictureSource, Shot
+
+_ENCODERS = 2  # PNG of colour and depth takes most of a picture's time; OpenCV frees the others
+_MOST_WAITING = 30  # pictures; where the disk is slower than the camera, pictures are left out
+
+
+class _Waiting(NamedTuple):
+    """A picture on its way into the file."""
+
+    captured_s: float
+    number: int
+    messages: Future[list[tuple[str, bytes]]]
+
+
+class CameraRecorder:
+    """A source of pictures that also go into a file; they come through unchanged.
+
+    A fault of the disk ends the recording, is told, and leaves the camera running. The file
+    stays open while the source is closed and opened again; ``finish`` closes it.
+
+    failure: why the recording ended early, or ""; left_out: pictures the disk was too slow for
+    """
+
+    def __init__(
+        self,
+        source: PictureSource,
+        path: Path,
+        about: dict[str, str] | None = None,
+        jpeg_quality: int | None = None,
+        over: bool = False,
+    ) -> None:
+        """Take what gives pictures and where they go.
+
+        about: what should be known of the recording; jpeg_quality: 1..100, None keeps the
+        pictures exactly; over: an existing file is written over
+        """
+        self._source = source
+        self._path = path
+        self._about = about or {}
+        self._jpeg_quality = jpeg_quality
+        self._over = over
+        self._writer: RecordingWriter | None = None
+        self._thread: threading.Thread | None = None
+        self._encoders: ThreadPoolExecutor | None = None
+        self._waiting: queue.Queue[_Waiting | None] = queue.Queue(_MOST_WAITING)
+        self._events: list[str] = []
+        self.failure = ""
+        self.left_out = 0
+
+    @property
+    def written(self) -> int:
+        """Give how many pictures are in the file."""
+        return 0 if self._writer is None else self._writer.written
+
+    def open(self) -> None:
+        """Open the source and, the first time, create the file.
+
+        Raises:
+            drivers.errors.CameraError: the source cannot be opened or the file not be made.
+        """
+        self._source.open()
+        if self._writer is None:
+            try:
+                self._writer = RecordingWriter(
+                    self._path, self._about, self._jpeg_quality, self._over
+                )
+            except BaseException:
+                self._source.close()
+                raise
+            self._encoders = ThreadPoolExecutor(_ENCODERS, "encoder")
+            self._thread = threading.Thread(target=self._write, name="recorder", daemon=True)
+            self._thread.start()
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Wait for the next picture, and hand it to the recording.
+
+        Raises:
+            drivers.errors.CameraError: there will be no more pictures.
+        """
+        shot = self._source.take(now_s, stop)
+        if shot is not None and not self.failure:
+            self._hand_on(shot)
+        return shot
+
+    def events(self) -> tuple[str, ...]:
+        """Say what happened to the source and to the recording."""
+        told, self._events = tuple(self._events), []
+        return (*self._source.events(), *told)
+
+    def close(self) -> None:
+        """Free the source; the file stays open for when it comes back."""
+        self._source.close()
+
+    def finish(self) -> None:
+        """Write what is waiting and close the file; safe to call twice."""
+        if self._thread is not None:
+            self._waiting.put(None)
+            self._thread.join()
+            self._thread = None
+        if self._encoders is not None:
+            self._encoders.shutdown()
+            self._encoders = None
+
+    def _hand_on(self, shot: Shot) -> None:
+        """Begin to encode a picture, unless too many wait already."""
+        if self._waiting.full():
+            if self.left_out == 0:
+                self._events.append(
+                    f"{self._path}: this machine is slower than the camera, pictures are left out "
+                    "of the recording; --jpeg makes them smaller and faster"
+                )
+            self.left_out += 1
+        elif self._encoders is not None:
+            messages = self._encoders.submit(encoded, shot, self._jpeg_quality)
+            self._waiting.put(_Waiting(shot.captured_s, shot.number, messages))
+
+    def _write(self) -> None:
+        """Write pictures until told to finish; after a fault only throw them away."""
+        writer = self._writer
+        assert writer is not None
+        while (one := self._waiting.get()) is not None:
+            if not self.failure:
+                self._try(partial(_add, writer, one))
+        self._try(writer.close)
+
+    def _try(self, write: Callable[[], None]) -> None:
+        """Do it, or note why it cannot be done: whatever it is, the camera goes on."""
+        try:
+            write()
+        except Exception as error:
+            if not self.failure:
+                words = getattr(error, "strerror", None) or " ".join(str(error).split())
+                self.failure = f"{self._path}: recording ended: {words}"
+                self._events.append(self.failure)
+
+
+def _add(writer: RecordingWriter, one: _Waiting) -> None:
+    """Wait until a picture is encoded, and write it."""
+    writer.add(one.captured_s, one.number, one.messages.result())

@@ -1,0 +1,182 @@
+"""A camera recording as a list of pictures; what a killed program left counts up to its end."""
+
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Header, Message
+from mcap.stream_reader import MAGIC_SIZE, read_magic
+
+from drivers.camera import recording_format as fmt
+from drivers.camera.source import Shot
+from drivers.errors import CameraError
+
+_HEAD = 9  # bytes of a record before its content: kind and length
+_LARGEST = 1 << 30  # bytes of a message; more is damage
+_FIXED = 22  # bytes of a message before its data
+
+
+class _Place(NamedTuple):
+    """Where a record's content lies in the file."""
+
+    offset: int
+    length: int
+
+
+class _Picture(NamedTuple):
+    """When a picture was taken, and where in the file it and what belongs to it lie."""
+
+    stamp_ns: int
+    places: dict[str, _Place]
+
+
+class Recording:
+    """An open recording.
+
+    times_s: when each picture was taken, rising, the first at 0; note: what is not as it
+        should be with the file, or ""
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the file and find its pictures.
+
+        Raises:
+            drivers.errors.CameraError: it is absent, no recording, or holds no picture.
+        """
+        self._path = path
+        self._file = _open(path)
+        try:
+            self._channels: dict[int, str] = {}
+            self._pictures: list[_Picture] = []
+            ended = self._index()
+        except BaseException:
+            self._file.close()
+            raise
+        if not self._pictures:
+            self._file.close()
+            raise CameraError(f"{path} holds no picture: record anew")
+        first = self._pictures[0].stamp_ns
+        self.times_s = tuple((p.stamp_ns - first) / 1e9 for p in self._pictures)
+        self.note = (
+            ""
+            if ended
+            else (f"{path.name} was not closed: its {len(self.times_s)} whole pictures are there")
+        )
+
+    def shot(self, index: int) -> Shot:
+        """Read a picture, counted from 0, with its time from the first picture's.
+
+        Raises:
+            drivers.errors.CameraError: the file is damaged there.
+        """
+        places = self._pictures[index].places
+        try:
+            return Shot(
+                self.times_s[index],
+                index + 1,
+                fmt.picture(self._data(places[fmt.PICTURE])),
+                fmt.depth(self._data(places[fmt.DEPTH])) if fmt.DEPTH in places else None,
+                fmt.lens(self._data(places[fmt.LENS])) if fmt.LENS in places else None,
+                fmt.faces(self._data(places[fmt.FACES])) if fmt.FACES in places else None,
+            )
+        except (fmt.BadMessage, McapError, OSError, KeyError) as error:
+            raise CameraError(
+                f"picture {index + 1} of {self._path} is damaged ({error}): copy the file anew"
+            ) from error
+
+    def close(self) -> None:
+        """Free the file; safe to call twice."""
+        self._file.close()
+
+    def _data(self, place: _Place) -> bytes:
+        """Read the data of a message."""
+        self._file.seek(place.offset)
+        content = self._file.read(place.length)
+        if len(content) < place.length:
+            raise fmt.BadMessage("the file ends within it")
+        return bytes(Message.read(ReadDataStream(BytesIO(content)), place.length).data)
+
+    def _index(self) -> bool:
+        """Note where the pictures are; tell whether the file was closed as it should."""
+        waiting: dict[str, _Place] = {}
+        stamp_ns = -1
+        for kind, place in self._records():
+            if kind == Opcode.DATA_END:
+                return True
+            if kind in (Opcode.CHUNK, Opcode.HEADER, Opcode.CHANNEL):
+                self._meet(kind, place)
+            elif kind == Opcode.MESSAGE:
+                head = Message.read(self._content(place, _FIXED), _FIXED)
+                topic = self._channels.get(head.channel_id, "")
+                if head.log_time != stamp_ns:  # what came before belongs to no picture
+                    stamp_ns, waiting = head.log_time, {}
+                waiting[topic] = place
+                if topic == fmt.PICTURE:
+                    self._add(stamp_ns, waiting)
+        return False
+
+    def _add(self, stamp_ns: int, places: dict[str, _Place]) -> None:
+        """Note a picture if it is later than the last one."""
+        if not self._pictures or stamp_ns > self._pictures[-1].stamp_ns:
+            self._pictures.append(_Picture(stamp_ns, places))
+
+    def _meet(self, kind: int, place: _Place) -> None:
+        """Read the records that say what the file is."""
+        if kind == Opcode.CHUNK:
+            raise CameraError(
+                f"{self._path} was packed into chunks by another program: play the file as recorded"
+            )
+        if kind == Opcode.HEADER:
+            profile = Header.read(self._content(place, place.length)).profile
+            if profile != fmt.PROFILE:
+                raise CameraError(
+                    f"{self._path} is no camera recording of gazerig (its profile is {profile!r}): "
+                    "make one with gazerig record-camera"
+                )
+        else:
+            channel = Channel.read(self._content(place, place.length))
+            self._channels[channel.id] = channel.topic
+
+    def _records(self) -> Iterator[tuple[int, _Place]]:
+        """Walk over the records that are whole: kind and place of each."""
+        end = self._path.stat().st_size
+        offset = MAGIC_SIZE
+        while offset + _HEAD <= end:
+            self._file.seek(offset)
+            head = self._file.read(_HEAD)
+            kind, length = head[0], int.from_bytes(head[1:], "little")
+            if length > _LARGEST:
+                raise CameraError(f"{self._path} is damaged after byte {offset}: copy it anew")
+            if offset + _HEAD + length > end:
+                return
+            yield kind, _Place(offset + _HEAD, length)
+            offset += _HEAD + length
+
+    def _content(self, place: _Place, length: int) -> ReadDataStream:
+        """Read the beginning of a record's content."""
+        self._file.seek(place.offset)
+        return ReadDataStream(BytesIO(self._file.read(min(length, place.length))))
+
+
+def _open(path: Path) -> BinaryIO:
+    """Open a file that begins as MCAP files do."""
+    if not path.exists():
+        raise CameraError(f"no recording at {path}: check the path")
+    if not path.is_file():
+        raise CameraError(f"{path} is not a file: name a recording in it")
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise CameraError(f"cannot read {path} ({error.strerror}): check its rights") from error
+    try:
+        read_magic(ReadDataStream(file))
+    except McapError as error:
+        file.close()
+        raise CameraError(
+            f"{path} is no recording: make one with gazerig record-camera; films go to --video"
+        ) from error
+    return file

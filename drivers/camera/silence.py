@@ -1,0 +1,57 @@
+"""When a camera whose process is alive counts as lost, or as hung: numbers in, a verdict out."""
+
+from typing import Literal
+
+from drivers.camera.params import CameraCareParams
+
+FIRST_PICTURE_S = 15.0
+"""A camera may take so long for its first picture: exposure settles, networks are loaded."""
+
+LOST_PERIODS, HUNG_PERIODS = 5.0, 15.0
+"""So many of its usual periods may go by at least: films and weak computers are slow."""
+
+_SHARE = 0.2
+
+Silence = Literal["", "lost", "hung"]
+
+
+class PictureSilence:
+    """Compares the time since the last picture with what is usual.
+
+    Args:
+        care: how long is too long.
+        now_s: when the waiting for the first picture begins, monotonic seconds.
+    """
+
+    def __init__(self, care: CameraCareParams, now_s: float) -> None:
+        self._care = care
+        self._last_s = now_s
+        self._period_s: float | None = None
+        self._first = True
+
+    def record_picture(self, now_s: float) -> None:
+        """Record that a picture came."""
+        period_s = now_s - self._last_s
+        if self._first:
+            self._first = False
+        elif self._period_s is None:
+            self._period_s = period_s
+        elif period_s < self._lost_after_s():
+            self._period_s += _SHARE * (period_s - self._period_s)
+        self._last_s = now_s
+
+    def record_life(self, now_s: float) -> None:
+        """Record that the process is busy with something else than pictures."""
+        self._last_s = now_s
+
+    def verdict(self, now_s: float) -> Silence:
+        """Return "lost" where no picture came for too long, "hung" where none will come."""
+        silent_s = now_s - self._last_s
+        if self._first:
+            return "hung" if silent_s >= FIRST_PICTURE_S else ""
+        lost_s = self._lost_after_s()
+        hung_s = max(lost_s, self._care.restart_s, HUNG_PERIODS * (self._period_s or 0.0))
+        return "hung" if silent_s >= hung_s else "lost" if silent_s >= lost_s else ""
+
+    def _lost_after_s(self) -> float:
+        return max(self._care.silent_s, LOST_PERIODS * (self._period_s or 0.0))

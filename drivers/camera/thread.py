@@ -1,0 +1,106 @@
+"""Pictures in real time: a thread looks, and leaves what it found in one slot.
+
+No queue and no lock: the slot holds one frozen value, and a Python name is rebound in
+one piece. Pictures that come while the detector works are skipped.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+
+from drivers.camera.capture_loop import CameraWatch, failed
+from drivers.camera.frame_analysis import Motion
+from drivers.camera.params import CameraCareParams
+from drivers.camera.source import PictureSource
+from drivers.errors import CameraError
+from drivers.types import Detections, FaceDetector
+
+# OpenCV gives up waiting for a camera after 10 s; a film stops at once.
+_LONGEST_WAIT_S = 12.0
+_MOST_EVENTS = 100
+
+
+class CameraThread:
+    """A camera, or a film paced by the real clock, watched for faces and motion.
+
+    While a lost source is tried again the last detections stay, and their age tells.
+
+    pictures, pictures_with_face: counts of pictures looked at since open
+    """
+
+    def __init__(
+        self,
+        source: PictureSource,
+        detector: FaceDetector,
+        now_s: Callable[[], float],
+        care: CameraCareParams | None = None,
+        motion: Motion | None = None,
+    ) -> None:
+        """Take what gives pictures, what finds faces, and the host's monotonic clock.
+
+        motion: called in the camera's thread with every picture
+        """
+        self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
+        self._camera = CameraWatch(
+            source, detector, now_s, care or CameraCareParams(), motion, self._events.append
+        )
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._newest: Detections | None = None
+        self._failure: Exception | None = None
+        self.pictures = 0
+        self.pictures_with_face = 0
+
+    def open(self) -> None:
+        """Open the source and start looking.
+
+        Raises:
+            drivers.errors.CameraError: the source cannot be opened, or is open already.
+        """
+        if self._thread is not None:
+            raise CameraError("the camera thread runs already: close() it before opening it anew")
+        self._events.clear()
+        self._camera.open()
+        self._stop.clear()
+        self._newest, self._failure = None, None
+        self.pictures = self.pictures_with_face = 0
+        self._thread = threading.Thread(target=self._watch, name="camera", daemon=True)
+        self._thread.start()
+
+    def latest(self, now_s: float) -> Detections | None:
+        """Give what the newest picture showed, or None before the first.
+
+        Raises:
+            drivers.errors.CameraError: the source is gone for good, or looking has failed.
+        """
+        if self._failure is not None:
+            raise failed(self._failure) from self._failure
+        return self._newest
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call, one line each."""
+        told = []
+        while self._events:
+            told.append(self._events.popleft())
+        return tuple(told)
+
+    def close(self) -> None:
+        """Stop looking and free the source; safe to call twice."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join(_LONGEST_WAIT_S)
+            if not self._thread.is_alive():
+                self._thread = None
+
+    def _watch(self) -> None:
+        """Look at one picture after another until told to stop."""
+        try:
+            while (found := self._camera.next(self._stop)) is not None:
+                self.pictures += 1
+                self.pictures_with_face += bool(found.faces)
+                self._newest = found
+        except Exception as failure:  # handed to the loop by latest()
+            self._failure = failure
+        finally:
+            # Freed by the thread that reads it: never under a picture being fetched.
+            self._camera.close()

@@ -1,0 +1,118 @@
+"""A film or still picture as a source of pictures that never ends.
+
+Film time starts at 0 with picture 1 and runs on through every repeat; so do numbers.
+Reading goes forward only. A still repeats ten times a second.
+"""
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from drivers.camera.source import Shot
+from drivers.camera.video_pacing import FilmPace
+from drivers.camera.video_reader import Reel, open_reel
+from drivers.errors import CameraError
+from drivers.types import Picture
+
+
+class FilmPicture(NamedTuple):
+    """A picture of a film: its number from 1, the film time it is due, the picture (read-only)."""
+
+    number: int
+    film_time_s: float
+    picture: Picture
+
+
+class VideoFile:
+    """A film or still picture, repeated for ever."""
+
+    def __init__(self, path: str | Path) -> None:
+        """Name the file; nothing is opened yet."""
+        self._path = Path(path).expanduser()
+        self._reel: Reel | None = None
+        self._pace = FilmPace()
+        self._untold = ""
+
+    def open(self) -> None:
+        """Open the file, or open it anew at film time 0.
+
+        Raises:
+            drivers.errors.CameraError: it is absent, no film or picture, empty or cut short.
+        """
+        self.close()
+        self._reel = open_reel(self._path)
+        self._pace = FilmPace()
+        self._untold = self._reel.times.note
+
+    @property
+    def rate_hz(self) -> float:
+        """Pictures a second."""
+        return self._opened().times.rate_hz
+
+    @property
+    def note(self) -> str:
+        """What had to be assumed about the file, in one line, or ""."""
+        return self._opened().times.note
+
+    def due_s(self, number: int) -> float:
+        """Give the film time at which a picture is due."""
+        return self._opened().times.due_s(number)
+
+    def number_at(self, film_s: float) -> int:
+        """Give the number of the newest picture at a film time; below 1 before the first."""
+        return self._opened().times.number_at(film_s)
+
+    def picture(self, number: int) -> Picture:
+        """Read a picture by number: (height, width, 3) BGR, read-only.
+
+        Raises:
+            ValueError: the number is below 1 or below the last one read.
+            drivers.errors.CameraError: the file cannot be read any more.
+        """
+        return self._opened().picture(number)
+
+    def shot(self, number: int) -> Shot:
+        """Read a picture by number with the film time at which it is due.
+
+        Raises:
+            ValueError: the number is below 1 or below the last one read.
+            drivers.errors.CameraError: the file cannot be read any more.
+        """
+        return Shot(self.due_s(number), number, self.picture(number))
+
+    def picture_at(self, film_s: float) -> FilmPicture:
+        """Read the newest picture at a film time (0 or later, never running back).
+
+        Raises:
+            ValueError: film time is negative or ran back.
+            drivers.errors.CameraError: the file cannot be read any more.
+        """
+        number = self.number_at(film_s)
+        return FilmPicture(number, self.due_s(number), self.picture(number))
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Wait until the next picture is due, then read the newest; the film starts here.
+
+        Raises:
+            drivers.errors.CameraError: the file cannot be read any more.
+        """
+        due = self._pace.wait(self._opened().times, now_s, stop)
+        return None if due is None else Shot(due.host_s, due.number, self.picture(due.number))
+
+    def events(self) -> tuple[str, ...]:
+        """Say once what had to be assumed about the file."""
+        told, self._untold = self._untold, ""
+        return (f"{self._path.name}: {told}",) if told else ()
+
+    def close(self) -> None:
+        """Free the file; safe to call twice."""
+        if self._reel is not None:
+            self._reel.close()
+        self._reel = None
+
+    def _opened(self) -> Reel:
+        """Give the open file."""
+        if self._reel is None:
+            raise CameraError(f"{self._path} is not open: call open() before reading")
+        return self._reel

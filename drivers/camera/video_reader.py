@@ -1,0 +1,201 @@
+"""An open film, or a still picture, read forward by number and repeated for ever."""
+
+from math import isfinite
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+
+from drivers.camera.quiet_opencv import quiet_opencv
+from drivers.camera.source import bgr
+from drivers.camera.video_timestamps import SAMPLE, FilmTimes, at_a_rate, by_table, rising
+from drivers.errors import CameraError
+from drivers.types import Picture
+
+_STILL_RATE_HZ, _ASSUMED_RATE_HZ = 10.0, 25.0
+_RATES_HZ = (0.5, 1000.0)
+# A container may promise a few pictures too many without being damaged.
+_LEAST_COMPLETE = 0.95
+_MOST_TIMES = 20_000  # pictures of an uneven film whose times are read at the start
+
+
+class Reel(Protocol):
+    """An open film or still.
+
+    times: when its pictures are due, and what had to be assumed for it
+    """
+
+    times: FilmTimes
+
+    def picture(self, number: int) -> Picture:
+        """Give a picture, counted through all repeats, not before the last one given."""
+        ...
+
+    def close(self) -> None:
+        """Free the file."""
+        ...
+
+
+def open_reel(path: Path) -> Reel:
+    """Open a file as what it is.
+
+    Raises:
+        drivers.errors.CameraError: it is absent, no film or picture, empty or cut short.
+    """
+    if not path.exists():
+        raise CameraError(f"no film or picture at {path}: check the path")
+    if not path.is_file():
+        raise CameraError(f"{path} is not a file: name a film or a picture in it")
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        raise CameraError(f"cannot read {path} ({error.strerror}): check its rights") from error
+    # A GIF is a film; OpenCV's picture reader would give its first picture alone.
+    still = path.suffix.lower() != ".gif" and cv2.haveImageReader(str(path))
+    return _Still(path) if still else _Film(path)
+
+
+def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
+    """Give the picture rate to use, and a note where the stated one is no rate."""
+    low, high = _RATES_HZ
+    if isfinite(stated_hz) and low <= stated_hz <= high:
+        return stated_hz, ""
+    return _ASSUMED_RATE_HZ, (
+        f"the film states a rate of {stated_hz:g} pictures a second; {_ASSUMED_RATE_HZ:g} assumed"
+    )
+
+
+class _Still:
+    """One picture that is always there."""
+
+    times = FilmTimes(_STILL_RATE_HZ)
+
+    def __init__(self, path: Path) -> None:
+        """Decode the picture."""
+        try:
+            with quiet_opencv():
+                picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        except cv2.error as error:
+            raise CameraError(f"{path} is too large a picture: scale it down") from error
+        if picture is None:
+            raise CameraError(f"{path} is a damaged picture: copy or save it anew")
+        self._picture = _frozen(picture, path)
+        self._last = 1
+
+    def picture(self, number: int) -> Picture:
+        """Give the picture."""
+        _check_forward(number, self._last)
+        self._last = number
+        return self._picture
+
+    def close(self) -> None:
+        """Have nothing to free."""
+
+
+class _Film:
+    """A film read from its start, again and again."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the film and see whether its last picture is there."""
+        self._path = path
+        self._capture = _open_film(path)
+        stated = usable_rate_hz(self._capture.get(cv2.CAP_PROP_FPS))
+        first_s = _times_s(self._capture, SAMPLE)
+        if not first_s:
+            raise CameraError(f"{path} holds no picture that can be read: use another file")
+        times = at_a_rate(*stated, rising(first_s))
+        if times is None:
+            times = by_table(rising(first_s + _times_s(self._capture, _MOST_TIMES)))
+        elif times.rate_hz == stated[0]:
+            # The number of pictures stated is often the length times the rate: where the
+            # rate is wrong, so is that.
+            _check_complete(path, self._capture, len(first_s))
+        self.times = times
+        self._rewind()
+        self._number, self._index = 0, 0  # last picture reached, and its place in this showing
+        self._length: int | None = None  # known after the first showing
+        self._seen: tuple[int, Picture] | None = None
+
+    def picture(self, number: int) -> Picture:
+        """Read on to a picture; those on the way are decoded but not converted."""
+        _check_forward(number, max(1, self._number))
+        if self._seen is None or self._seen[0] != number:
+            while self._number < number:
+                self._advance(number)
+            found, picture = self._capture.retrieve()
+            if not found:
+                raise CameraError(f"picture {self._index} of {self._path} is damaged: copy it anew")
+            self._seen = number, _frozen(picture, self._path)
+        return self._seen[1]
+
+    def close(self) -> None:
+        """Free the file."""
+        self._capture.release()
+
+    def _advance(self, goal: int) -> None:
+        """Go to the next picture, from the end to the start, past whole showings at once."""
+        if not self._capture.grab():
+            self._length, self._index = self._index, 0
+            self._rewind()
+            if not self._capture.grab():
+                raise CameraError(f"{self._path} cannot be read any more: is it still there?")
+        self._number, self._index = self._number + 1, self._index + 1
+        if self._length:
+            self._number += (goal - self._number) // self._length * self._length
+
+    def _rewind(self) -> None:
+        """Start anew; opening again is exact where seeking back may not be."""
+        self._capture.release()
+        self._capture = _open_film(self._path)
+
+
+def _open_film(path: Path) -> cv2.VideoCapture:
+    """Open a film with FFmpeg, the one reader that takes no name for a pattern."""
+    with quiet_opencv():
+        capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    if not capture.isOpened():
+        raise CameraError(
+            f"{path} is no film or picture that can be read (or is cut short): "
+            "play it in another program, convert it to mp4 or copy it anew"
+        )
+    return capture
+
+
+def _times_s(capture: cv2.VideoCapture, most: int) -> list[float]:
+    """Read on, and give the times that the pictures carry."""
+    found: list[float] = []
+    for _ in range(most):
+        if not capture.grab():
+            break
+        found.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
+    return found
+
+
+def _check_complete(path: Path, capture: cv2.VideoCapture, seen: int) -> None:
+    """Refuse a film that ends long before the end it states.
+
+    seen: so many pictures have been read already
+    """
+    stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+    if stated <= seen:  # all there, or a stream without a table of contents
+        return
+    capture.set(cv2.CAP_PROP_POS_FRAMES, stated - 1)
+    reached = stated if capture.grab() else int(capture.get(cv2.CAP_PROP_POS_FRAMES))
+    if reached < _LEAST_COMPLETE * stated:
+        raise CameraError(
+            f"{path} is cut short after {reached} of {stated} pictures: copy it anew or convert it"
+        )
+
+
+def _check_forward(number: int, least: int) -> None:
+    """Refuse to go back."""
+    if number < least:
+        raise ValueError(f"films are read forward: picture {number} wanted, {least} is the least")
+
+
+def _frozen(picture: Any, path: Path) -> Picture:
+    """Take a picture as bytes that nobody writes to any more."""
+    pixels = bgr(picture)
+    if pixels is None:
+        raise CameraError(f"{path} holds pictures of an unknown kind: convert it to mp4 or png")
+    return pixels

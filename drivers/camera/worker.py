@@ -1,0 +1,134 @@
+"""The process that looks at pictures, from its start to its end; see drivers.camera.process."""
+
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from typing import NamedTuple
+
+import cv2
+
+from drivers.camera.capture_loop import CameraWatch, failed
+from drivers.camera.frame_analysis import Motion
+from drivers.camera.params import CameraCareParams
+from drivers.camera.shared_frames import SlotWriter, Where
+from drivers.camera.source import PictureSource
+from drivers.errors import CameraError, SetupError
+from drivers.types import Detections, FaceDetector
+
+NICE = 10  # the loop goes first
+LONGEST_END_S = 12.0
+"""A process that was told to end, or whose program is gone, ends after this whatever blocks it."""
+
+
+class CameraParts(NamedTuple):
+    """How to make the parts, in the process that uses them; all must be picklable.
+
+    source, detector: functions without arguments; motion: the same, or None
+    """
+
+    source: Callable[[], PictureSource]
+    detector: Callable[[], FaceDetector]
+    motion: Callable[[], Motion] | None = None
+
+
+class Found(NamedTuple):
+    """What the process tells of a picture."""
+
+    detections: Detections  # without picture and depth
+    picture: Where | None
+    depth: Where | None
+
+
+class Retune(NamedTuple):
+    """How to look from now on; None: as before. All must be picklable."""
+
+    detector: Callable[[], FaceDetector] | None
+    motion: Callable[[Motion | None], Motion | None] | None
+
+
+class Ended(NamedTuple):
+    """Why the process ends.
+
+    final: the camera has been tried for as long as it may be; else a new process may do better
+    """
+
+    reason: str
+    final: bool
+
+
+def run(
+    pipe: Connection, parts: CameraParts, now_s: Callable[[], float], care: CameraCareParams
+) -> None:
+    """Be the process: open, look, tell, until told to stop or the other side is gone."""
+    # Ctrl-C reaches all processes of a terminal; it is the loop's to end this one.
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    os.nice(NICE)
+    # One processor stays the loop's: with all of them in OpenCV's hands the loop is later, and
+    # no more pictures are looked at.
+    cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
+    try:
+        motion = parts.motion() if parts.motion is not None else None
+        camera = CameraWatch(parts.source(), parts.detector(), now_s, care, motion, pipe.send)
+        camera.open()
+    except SetupError as error:
+        pipe.send(error)
+        return
+    stop = threading.Event()
+    words: deque[Retune] = deque()
+    pipe.send(None)
+    threading.Thread(target=_heed, args=(pipe, stop, words), daemon=True).start()
+    slots = SlotWriter(), SlotWriter()
+    try:
+        while (found := camera.next(stop)) is not None:
+            pipe.send(_told(found, slots))
+            _retune(camera, words, pipe)
+    except OSError:  # nobody listens any more
+        pass
+    except Exception as failure:
+        pipe.send(Ended(str(failed(failure)), isinstance(failure, CameraError)))
+    finally:
+        camera.close()
+        for slot in slots:
+            slot.close()
+
+
+def _told(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> Found:
+    """Put picture and depth into shared memory, and the rest into words."""
+    picture, depth = found.picture, found.depth_m
+    return Found(
+        replace(found, picture=None, depth_m=None),
+        slots[0].put(picture) if picture is not None else None,
+        slots[1].put(depth) if depth is not None else None,
+    )
+
+
+def _heed(pipe: Connection, stop: threading.Event, words: deque[Retune]) -> None:
+    """Pass words on until the one to stop comes, or the other side is gone."""
+    with suppress(EOFError, OSError):
+        while isinstance(word := pipe.recv(), Retune):
+            words.append(word)
+    stop.set()
+    # Whoever is blocked in a camera's driver would hold that camera for ever.
+    threading.Event().wait(LONGEST_END_S)
+    os._exit(1)
+
+
+def _retune(camera: CameraWatch, words: deque[Retune], pipe: Connection) -> None:
+    """Look otherwise, as asked for; of several detectors only the last is made."""
+    detector: Callable[[], FaceDetector] | None = None
+    while words:
+        word = words.popleft()
+        detector = word.detector or detector
+        camera.retune(None, word.motion)
+    if detector is None:
+        return
+    try:
+        camera.retune(detector, None)
+    except SetupError as error:
+        pipe.send(f"the detector stays as it was: {error}")

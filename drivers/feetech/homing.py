@@ -1,0 +1,47 @@
+"""Making the present place of an STS servo its middle, where the encoder's zero is far away.
+
+The servo reckons the offset (31) itself when it is told so (Torque Enable := 128) and keeps
+it in its EEPROM. Everything that was calibrated in steps before is void afterwards.
+Source: Feetech memory table STS3215, register 40.
+"""
+
+from drivers.errors import ServoFault, ServoMissing
+from drivers.feetech.memory_table import SET_MIDDLE, STEPS_PER_TURN
+from drivers.feetech.registers import StsRegisters
+from drivers.serial.port import BusPort
+
+MIDDLE = STEPS_PER_TURN // 2
+NEAR_STEPS = 8
+"""The joint may be moved by a hand's tremor meanwhile."""
+
+
+def set_middle(port: BusPort, servo_id: int) -> int:
+    """Let a limp servo call its present place 2048; gives the offset it has now, in steps.
+
+    Raises:
+        drivers.errors.ServoMissing: it does not answer.
+        drivers.errors.ServoFault: its torque is on, or it does not take the order.
+        drivers.errors.BusLost: the port is gone.
+    """
+    registers = StsRegisters(port)
+    where = f"{port.port_name}: servo {servo_id}"
+    torque = registers.read(servo_id, "torque_enable")
+    if torque is None:
+        raise ServoMissing(f"{where} does not answer: check its cable and servo power")
+    if torque:
+        raise ServoFault(f"{where} holds its place: let it go before its middle is set")
+    if not registers.write(servo_id, "lock", 0):
+        raise ServoMissing(f"{where} does not answer: check its cable and servo power")
+    registers.write(servo_id, "torque_enable", SET_MIDDLE)
+    # Some firmware is left with the torque on.
+    off = registers.write(servo_id, "torque_enable", 0)
+    locked = registers.write(servo_id, "lock", 1)
+    place, offset = registers.read(servo_id, "present_position"), None
+    if place is not None and abs(place - MIDDLE) <= NEAR_STEPS:
+        offset = registers.read(servo_id, "position_offset")
+    if offset is None or not off or not locked:
+        raise ServoFault(
+            f"{where} does not take its place for its middle (it reads {place}): switch its power "
+            "off and on and try again"
+        )
+    return offset

@@ -1,0 +1,355 @@
+"""Serial port for Dynamixel servos: waits in select() instead of spinning, names its errors.
+
+Owns the host clock of the servo bus (monotonic seconds).
+"""
+
+import errno
+import os
+import select
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from dynamixel_sdk import PortHandler
+from serial import Serial, SerialException
+from serial.tools import list_ports
+
+from drivers.errors import BusLost, PortError
+from drivers.feetech.memory_table import BAUD_RATES as FEETECH_RATES
+from drivers.serial.list_ports import holders, lasting_name
+
+BITS_PER_BYTE = 10
+SDK_MARGIN_S = 0.034
+"""What the SDK allows for two turns of a USB adapter's 16 ms latency timer."""
+
+QUIET_S = 0.003
+"""A line without a byte for so long is quiet: three turns of a 1 ms latency timer."""
+
+BABBLE_S = 0.06
+"""Draining gives up on a line that never falls silent."""
+
+WRITE_S = 0.05
+"""A packet that cannot be handed to the adapter within this time never will be."""
+
+
+class BusPort(Protocol):
+    """What the driver asks of a port; for setup it is also the SDK's PortHandler."""
+
+    port_name: str
+
+    def now_s(self) -> float:
+        """Give the time."""
+        ...
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Open at a baud rate; False where the rate is not possible."""
+        ...
+
+    def closePort(self) -> None:
+        """Close; safe to call twice."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send bytes.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        ...
+
+    def read_until(self, length: int, deadline_s: float) -> bytes:
+        """Give ``length`` bytes, or those that came before the deadline.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        ...
+
+    def getBytesAvailable(self) -> int:
+        """Count the bytes that have arrived.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        ...
+
+    def clearPort(self) -> None:
+        """Throw away what has arrived, without waiting.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        ...
+
+    def drain(self) -> int:
+        """Throw away what arrives until the line is quiet; gives the number of bytes.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        ...
+
+
+class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
+    """A real serial port by path.
+
+    Args:
+        port_name: its path.
+        exclusive: opened for this program alone; False: beside the program that has it open.
+        on_traffic: called whenever bytes are sent or waited for, None where nobody asks.
+        by_id: folder of names that adaptors keep, None for the system's.
+
+    opened_as: the path that was opened last: an adaptor may come back under another name
+    """
+
+    def __init__(
+        self,
+        port_name: str,
+        exclusive: bool = True,
+        on_traffic: Callable[[], None] | None = None,
+        by_id: Path | None = None,
+    ) -> None:
+        super().__init__(port_name)
+        self.opened_as = port_name
+        self._lasting: str | None = None
+        self._by_id = by_id
+        self._exclusive = exclusive
+        self._on_traffic = on_traffic
+        self.ser: Serial | None = None
+        self._fd = -1
+        self._fds: tuple[int, ...] = (-1,)
+        self._deadline_s = 0.0
+
+    # --- what the driver's control loop uses
+
+    def now_s(self) -> float:
+        """Give host monotonic seconds."""
+        return time.monotonic()
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; waits at most 50 ms for room in the adapter's buffer.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone or takes nothing.
+        """
+        if self._on_traffic is not None:
+            self._on_traffic()
+        deadline_s = 0.0
+        while True:
+            try:
+                sent = os.write(self._fd, data)
+            except BlockingIOError:
+                sent = 0
+            except OSError as error:
+                raise self._lost(error) from error
+            if sent == len(data):
+                return
+            data = data[sent:]
+            deadline_s = deadline_s or time.monotonic() + WRITE_S
+            self._wait_for_room(deadline_s)
+
+    def read_until(self, length: int, deadline_s: float) -> bytes:
+        """Give ``length`` bytes, or those that came before the deadline.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        if self._on_traffic is not None:
+            self._on_traffic()
+        got = b""
+        try:
+            while True:
+                left_s = deadline_s - time.monotonic()
+                if not select.select(self._fds, (), (), left_s if left_s > 0.0 else 0.0)[0]:
+                    break
+                got += self._take(length - len(got))
+                if len(got) >= length:
+                    return got
+        except (OSError, ValueError) as error:
+            raise self._lost(error) from error
+        if not got and not os.path.exists(self.opened_as):
+            raise self._lost("it was unplugged")
+        return got
+
+    def drain(self) -> int:
+        """Throw away what arrives until nothing came for 3 ms; gives the number of bytes.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        end_s = time.monotonic() + BABBLE_S
+        dropped = 0
+        while (now_s := time.monotonic()) < end_s and self._wait(now_s + QUIET_S):
+            dropped += len(self._take(4096))
+        return dropped
+
+    def _wait(self, deadline_s: float) -> bool:
+        """Sleep until a byte has arrived; False at the deadline."""
+        try:
+            ready = select.select((self._fd,), (), (), max(0.0, deadline_s - time.monotonic()))
+        except (OSError, ValueError) as error:
+            raise self._lost(error) from error
+        return bool(ready[0])
+
+    def _wait_for_room(self, deadline_s: float) -> None:
+        """Sleep until a byte can be sent."""
+        try:
+            ready = select.select((), (self._fd,), (), max(0.0, deadline_s - time.monotonic()))
+        except (OSError, ValueError) as error:
+            raise self._lost(error) from error
+        if not ready[1]:
+            raise self._lost("it takes no more bytes")
+
+    def _take(self, length: int) -> bytes:
+        try:
+            data = os.read(self._fd, length)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise self._lost(error) from error
+        if not data:
+            raise self._lost("it hung up")
+        return data
+
+    def _lost(self, why: object) -> BusLost:
+        """Make the error; the SDK's busy flag is freed, so that a reopened port works."""
+        self.is_using = False
+        return BusLost(f"{self.port_name} is gone ({why}): check USB cable and servo power")
+
+    # --- what the SDK uses
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Open at a baud rate; False where the rate is not possible.
+
+        Raises:
+            drivers.errors.PortError: absent, busy or not permitted.
+        """
+        # Feetech servos know rates that the SDK's list lacks.
+        if baudrate not in FEETECH_RATES and self.getCFlagBaud(baudrate) <= 0:
+            return False
+        self.baudrate = baudrate
+        return self.setupPort(baudrate)
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """Open at a baud rate.
+
+        Raises:
+            drivers.errors.PortError: absent, busy or not permitted.
+        """
+        self.closePort()
+        where = self._where()
+        try:
+            self.ser = Serial(where, cflag_baud, timeout=0, exclusive=self._exclusive or None)
+        except (SerialException, OSError) as error:
+            raise PortError(explain(self.port_name, error.errno)) from error
+        except ValueError as error:  # pyserial: an adapter that does not do this rate
+            raise PortError(
+                f"{self.port_name} cannot run at {cflag_baud} bit/s: choose 115200 or 1000000"
+            ) from error
+        self.opened_as = os.path.realpath(where) if where != self.port_name else where
+        self._lasting = lasting_name(where, self._by_id) or self._lasting
+        self._fd = self.ser.fileno()
+        self._fds = (self._fd,)
+        ask_low_latency(self.ser)
+        self.is_open = True
+        self.is_using = False
+        self.tx_time_per_byte = 1000.0 * BITS_PER_BYTE / cflag_baud
+        return True
+
+    def _where(self) -> str:
+        """Return the path to open: a port that was open is found again by its adaptor's number.
+
+        Raises:
+            drivers.errors.PortError: another adaptor has its name now.
+        """
+        lasting, name = self._lasting, str(self.port_name)
+        if lasting is None:
+            return name
+        if os.path.exists(lasting):
+            same = os.path.realpath(lasting) == os.path.realpath(self.port_name)
+            return name if same else lasting
+        now = lasting_name(self.port_name, self._by_id)
+        if now not in (None, lasting):
+            raise PortError(f"{self.port_name} is another adaptor now ({now}): plug in {lasting}")
+        return name
+
+    def closePort(self) -> None:
+        """Close; safe to call twice."""
+        if self.ser is not None:
+            self.ser.close()
+        self.ser, self._fd, self._fds = None, -1, (-1,)
+        self.is_open = self.is_using = False
+
+    def clearPort(self) -> None:
+        """Throw away what has arrived."""
+        try:
+            while select.select(self._fds, (), (), 0.0)[0]:
+                self._take(4096)
+        except (OSError, ValueError) as error:
+            raise self._lost(error) from error
+
+    def getBytesAvailable(self) -> int:
+        """Count the bytes that wait; none where the port is closed."""
+        try:
+            return self.ser.in_waiting if self.ser is not None else 0
+        except OSError as error:
+            raise self._lost(error) from error
+
+    def readPort(self, length: int) -> bytes:
+        """Give ``length`` bytes, or those that came before the packet's deadline."""
+        return self.read_until(length, self._deadline_s)
+
+    def writePort(self, packet: bytes | list[int]) -> int:
+        """Send bytes; gives their number."""
+        self.write(bytes(packet))
+        return len(packet)
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Set the packet's deadline from its length."""
+        self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + SDK_MARGIN_S * 1000.0)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """Set the packet's deadline."""
+        self._deadline_s = time.monotonic() + msec / 1000.0
+
+    def isPacketTimeout(self) -> bool:
+        """Tell whether the packet's deadline has passed."""
+        return time.monotonic() >= self._deadline_s
+
+    def getCurrentTime(self) -> float:
+        """Give monotonic milliseconds."""
+        return time.monotonic() * 1000.0
+
+
+def ask_low_latency(port: Any) -> None:
+    """Ask a USB adapter to hand over bytes after 1 ms instead of 16; others know no such thing."""
+    try:
+        port.set_low_latency_mode(True)
+    except (ValueError, OSError):
+        # Only some drivers have the setting (a terminal answers ENOTTY); without it the
+        # bus works, only slower.
+        return
+
+
+def explain(port_name: str, code: int | None) -> str:
+    """Say in one line why a port cannot be opened and what helps."""
+    if code == errno.ENOENT or code == errno.ENODEV or code == errno.ENXIO:
+        return f"no serial port {port_name}: plug the adapter in; ports here: {name_ports()}"
+    if code in (errno.EACCES, errno.EPERM):
+        return (
+            f"no right to open {port_name}: join its group with "
+            "'sudo usermod -aG dialout $USER' and log in again"
+        )
+    if code in (errno.EBUSY, errno.EAGAIN):
+        held = ", ".join(holders(port_name))
+        who = f", {held}," if held else ""
+        return f"{port_name} is busy: close the other program{who} that uses it"
+    reason = os.strerror(code) if code else "not a serial port"
+    return f"cannot open {port_name} ({reason}); ports here: {name_ports()}"
+
+
+def name_ports() -> str:
+    """List the serial ports there are."""
+    ports = [f"{port.device} ({port.description})" for port in list_ports.comports()]
+    return ", ".join(ports) or "none"

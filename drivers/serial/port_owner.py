@@ -1,0 +1,33 @@
+"""Whose a serial port is, by its USB vendor: servo packets must not reach a Maestro.
+
+To a Maestro FF, with which the packets of smart servos begin, is a command that moves a
+servo. Source: Pololu Maestro User's Guide (0J40), section 5.c.
+"""
+
+import os
+from collections.abc import Sequence
+
+from drivers.errors import PortError
+from drivers.serial.list_ports import SerialPort
+
+POLOLU = "1ffb:"
+"""USB vendor of Pololu."""
+
+
+def usb_of(device: str, ports: Sequence[SerialPort]) -> str:
+    """Give the USB vendor and product id of a port, "" where it has none or is not listed."""
+    real = os.path.realpath(device)
+    return next((port.usb for port in ports if os.path.realpath(port.device) == real), "")
+
+
+def refuse_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
+    """See that a port is one that packets of this kind of bus may be sent to.
+
+    Raises:
+        drivers.errors.PortError: it is a board that they would move.
+    """
+    if kind != "maestro" and usb_of(device, ports).startswith(POLOLU):
+        raise PortError(
+            f"{device} is a board of Pololu: {kind} packets would move what hangs on it; name the "
+            "adaptor's port with --port or in the YAML, or say that it is a maestro"
+        )

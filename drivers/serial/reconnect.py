@@ -1,0 +1,95 @@
+"""A port that may be unplugged while in use: noted, tried again now and then, opened anew."""
+
+from collections.abc import Callable
+
+from drivers.errors import BusLost, PortError
+from drivers.event_log import Journal
+from drivers.serial.port import BusPort
+from drivers.serial.reopening import FIRST_S, LAST_S, Reconnect
+
+
+class LastingPort:
+    """The way back to a port of one bus.
+
+    Args:
+        port: opened once already.
+        baud: bit/s to open it with.
+        give_up_s: it may stay away for so long.
+        journal: where its going and coming is told.
+        anew: called when it is open again: nobody on it may be trusted.
+
+    release_due: torque has to be taken off as soon as the port is there, before all else; set
+        and cleared by the bus
+    """
+
+    def __init__(
+        self,
+        port: BusPort,
+        baud: int,
+        give_up_s: float,
+        journal: Journal,
+        anew: Callable[[], None],
+    ) -> None:
+        self._port, self._baud, self._give_up_s = port, baud, give_up_s
+        self._journal, self._anew = journal, anew
+        self._link = Reconnect()
+        self.release_due = False
+
+    @property
+    def down(self) -> bool:
+        """Tell whether the port is gone."""
+        return self._link.down
+
+    def lose(self, lost: BusLost, now_s: float) -> None:
+        """Note that the port is gone."""
+        self._link.lost(now_s)
+        self._port.closePort()
+        self._journal.say(f"port lost: {lost}")
+
+    def returned(self, now_s: float) -> bool:
+        """Try to open the port again where that is due; tell whether it is open.
+
+        Raises:
+            drivers.errors.BusLost: it has been gone for longer than ``give_up_s``.
+        """
+        gone_s = self._link.gone_for_s(now_s)
+        if self._link.due(now_s):
+            if self._open():
+                where = getattr(self._port, "opened_as", self._port.port_name)
+                renamed = f" as {where}" if where != self._port.port_name else ""
+                self._journal.say(f"port back after {self._link.back(now_s):.1f} s{renamed}")
+                return True
+            self._link.failed(now_s, FIRST_S if self.release_due else LAST_S)
+        if gone_s >= self._give_up_s:
+            raise BusLost(
+                f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
+            )
+        return False
+
+    def refused_release(self) -> None:
+        """Note that torque could not be taken off: it is as soon as the port is back."""
+        self.release_due = True
+
+    def released(self) -> None:
+        """Note that torque was taken off on everything that answers."""
+        if self.release_due:
+            self._journal.say("torque switched off, as was asked for while the port was gone")
+        self.release_due = False
+
+    def open_once_more(self, now_s: float) -> bool:
+        """Try to open the port now, whether it is due or not; tell whether it is open."""
+        if not self._open():
+            return False
+        self._link.back(now_s)
+        return True
+
+    def _open(self) -> bool:
+        try:
+            if not self._port.setBaudRate(self._baud):
+                return False
+            self._port.clearPort()
+        except (PortError, BusLost):
+            self._port.closePort()
+            return False
+        self._anew()
+        return True

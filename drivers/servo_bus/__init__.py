@@ -1,0 +1,1 @@
+"""The engine that all smart servos share."""

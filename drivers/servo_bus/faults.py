@@ -1,0 +1,134 @@
+"""What ails each servo: latched errors, restarts that do not stop, long silence."""
+
+from collections.abc import Collection, Mapping
+
+from drivers.dynamixel.control_table import name_errors
+from drivers.event_log import Journal, Seldom, call
+from drivers.types import ServoSetup
+
+MOST_RESTARTS, WITHIN_S = 3, 10.0
+"""A servo that restarts more often within such a time stays without torque."""
+
+AGAIN_AND_AGAIN = "restarts again and again: supply too weak"
+
+GARBLES = "answers, but its bytes arrive damaged: a second servo with its id, or a bad cable"
+
+BUSY_S = 2.0
+"""Where answers come late a servo may be silent for so long before it is named."""
+
+SAY_SILENT_S = 0.25
+"""Silence is spoken of from so long on: one lost answer is no news."""
+
+
+class Health:
+    """The state of every servo, in words.
+
+    faults: what a servo suffers from now, by id
+    latches: those of them that the servo itself has latched
+    """
+
+    def __init__(self, setups: Mapping[int, ServoSetup], journal: Journal) -> None:
+        self._setups = setups
+        self._journal = journal
+        self.faults: dict[int, str] = {}
+        self.latches: set[int] = set()
+        self._restarts: dict[int, list[float]] = {}
+        self._silent_since: dict[int, float] = {}
+        self._told: set[int] = set()
+        self._all_silent = False
+        self._seldom = Seldom(journal)
+
+    def latched(self, servo_id: int, status: int) -> bool:
+        """Note Hardware Error Status; gives whether that is news."""
+        fault = " and ".join(name_errors(status))
+        if self.faults.get(servo_id) == fault:
+            return False
+        self.name(servo_id, fault)
+        self.latches.add(servo_id)
+        return True
+
+    def name(self, servo_id: int, fault: str) -> None:
+        """Note a fault that stays until the servo has been restarted."""
+        self.faults[servo_id] = fault
+        self._journal.say(f"{call(self._setups[servo_id])}: {fault}")
+
+    def cleared(self, servo_id: int) -> None:
+        """Note that a servo's latched error is gone."""
+        if servo_id in self.latches:
+            self.latches.discard(servo_id)
+            del self.faults[servo_id]
+            self._journal.say(f"{call(self._setups[servo_id])}: the fault is gone")
+
+    def exhausted(self, servo_id: int, now_s: float) -> bool:
+        """Tell whether a servo has restarted too often of late; that is a fault then."""
+        lately = [t_s for t_s in self._restarts.get(servo_id, []) if now_s - t_s < WITHIN_S]
+        self._restarts[servo_id] = lately
+        if len(lately) < MOST_RESTARTS:
+            return False
+        self.name(servo_id, AGAIN_AND_AGAIN)
+        return True
+
+    def restarted(self, servo_id: int, now_s: float) -> None:
+        """Note that a servo had restarted and is well again."""
+        self._restarts.setdefault(servo_id, []).append(now_s)
+        self._journal.say(f"{call(self._setups[servo_id])} restarted: set up anew")
+
+    def note_silent(
+        self, out: Collection[int], now_s: float, garbling: Collection[int] = (), late: int = 0
+    ) -> None:
+        """Note who is out now; speaks of those who have been so for a while, once.
+
+        late: answers that came late of late: then it is this computer that is to blame, at first
+        """
+        for servo_id in [i for i in self._silent_since if i not in out]:
+            since_s = self._silent_since.pop(servo_id)
+            if servo_id in self._told:
+                self._told.discard(servo_id)
+                who = call(self._setups[servo_id])
+                self._journal.say(f"{who} answers again after {now_s - since_s:.1f} s")
+        for servo_id in out:
+            self._silent_since.setdefault(servo_id, now_s)
+        if late and out and now_s - min(self._silent_since.values()) < BUSY_S:
+            self._seldom.say(f"this computer is busy: {late} answers late in the last s", now_s)
+            return
+        self._tell(out, now_s, garbling)
+
+    def stopped(self, count: int, asleep_s: float, now_s: float) -> None:
+        """Note that servos were stopped by their own watchdog and go on from where they are.
+
+        asleep_s: for so long this computer has sent nothing; 0 where it has
+        """
+        servos = f"the watchdog of {count} servo{'s' if count > 1 else ''}"
+        if asleep_s:
+            self._seldom.say(
+                f"this computer was late: it sent nothing for {asleep_s:.2f} s, so {servos} "
+                "stopped them; they go on from where they are", now_s, "late",
+            )  # fmt: skip
+        else:
+            self._seldom.say(
+                f"{servos} stopped them, as packets get lost: check cable and plugs; they go on "
+                "from where they are", now_s, "lost",
+            )  # fmt: skip
+
+    def _tell(self, out: Collection[int], now_s: float, garbling: Collection[int]) -> None:
+        everybody = len(out) == len(self._setups)
+        if everybody and not self._all_silent:
+            if now_s - max(self._silent_since.values()) >= SAY_SILENT_S:
+                self._all_silent = True
+                self._journal.say("no servo answers: check servo power and cable")
+            return
+        if not out and self._all_silent:
+            self._all_silent = False
+            self._journal.say("all servos answer again")
+        for servo_id in out:
+            silent_s = now_s - self._silent_since[servo_id]
+            if servo_id not in self._told and silent_s >= SAY_SILENT_S and not self._all_silent:
+                self._told.add(servo_id)
+                what = GARBLES if servo_id in garbling else "does not answer"
+                self._journal.say(f"{call(self._setups[servo_id])} {what}")
+
+    def silent_for_s(self, now_s: float) -> float:
+        """Give for how long nobody at all has answered."""
+        if len(self._silent_since) < len(self._setups):
+            return 0.0
+        return now_s - max(self._silent_since.values())

@@ -1,0 +1,159 @@
+"""The one read of every tick: everybody in one exchange, and what to do about those who fail.
+
+A servo that keeps silent or garbles costs only itself: those whose answers were lost with
+its own are asked again at once without it.
+"""
+
+from collections.abc import Collection
+from math import inf
+from typing import NamedTuple
+
+from drivers.dynamixel.protocol import HEADER
+from drivers.dynamixel.sync_packets import FastGroup, Group, PlainGroup, Values
+from drivers.servo_bus.line import Line
+from drivers.servo_bus.poll_list import Roll, silent_ones
+from drivers.servo_bus.read_windows import Sample, View
+from drivers.servo_bus.window_schedule import Turns
+
+MOST_GROUPS = 64
+"""So many prepared exchanges are kept."""
+
+
+class Heard(NamedTuple):
+    """One servo's answer and when it arrived."""
+
+    sample: Sample
+    at_s: float
+
+
+class Whole(NamedTuple):
+    """A faultless answer of everybody, and when it arrived."""
+
+    group: Group
+    raw: bytes
+    values: Values
+    at_s: float
+
+    def each(self) -> dict[int, Heard]:
+        """Give the answer servo by servo."""
+        samples = self.group.pieces(self.raw).samples
+        return {servo_id: Heard(sample, self.at_s) for servo_id, sample in samples.items()}
+
+
+class Reader:
+    """Reads all servos of a roll.
+
+    Args:
+        line: the bus.
+        roll: who is asked; told who failed.
+        together, alone: the views of the group's reading, and of servos asked alone.
+        fast: ask for one packet of all instead of one status each.
+    """
+
+    def __init__(
+        self, line: Line, roll: Roll, together: Turns[View], alone: Turns[View], fast: bool
+    ) -> None:
+        self._line = line
+        self.roll = roll
+        self._together, self._alone = together, alone
+        self._kind = FastGroup if fast else PlainGroup
+        self._until_s = inf
+        self._groups: dict[tuple[tuple[int, ...], int, int], Group] = {}
+
+    def read(self, now_s: float) -> Whole | dict[int, Heard]:
+        """Read everybody who is asked now; who is not in the answer gave no good one.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        roll = self.roll
+        if self._together.troubled:
+            self._together.calm(now_s)
+        if roll.troubled:
+            return self._with_care(now_s)
+        group = self._group(roll.group, self._together)
+        raw, at_s = self._line.exchange(group.request, group.reply_length)
+        self._until_s = self._line.whole_s + self._line.most_s
+        values = group.whole(raw)
+        if values is not None:
+            return Whole(group, raw, values, at_s)
+        heard: dict[int, Heard] = {}
+        self._save(group, raw, at_s, heard, now_s, self._together)
+        return heard
+
+    def _with_care(self, now_s: float) -> dict[int, Heard]:
+        """Read the group, and one of those who are out of it."""
+        heard: dict[int, Heard] = {}
+        together, due = self.roll.group, self.roll.due(now_s)
+        self._until_s = inf
+        self._read(together, heard, now_s, self._together)
+        if due is not None and self._line.port.now_s() < self._until_s:
+            self._read((due,), heard, now_s, self._alone)
+        return heard
+
+    def _read(
+        self, ids: tuple[int, ...], heard: dict[int, Heard], now_s: float, turns: Turns[View]
+    ) -> None:
+        if not ids:
+            return
+        group = self._group(ids, turns)
+        raw, at_s = self._line.exchange(group.request, group.reply_length)
+        # The whole read has one time limit, that of its first exchange at its most patient.
+        self._until_s = min(self._until_s, self._line.whole_s + self._line.most_s)
+        self._save(group, raw, at_s, heard, now_s, turns)
+
+    def _group(self, ids: tuple[int, ...], turns: Turns[View]) -> Group:
+        """Give the prepared exchange for some servos."""
+        view = turns.next()
+        key = ids, view.address, view.length
+        group = self._groups.get(key)
+        if group is None:
+            if len(self._groups) >= MOST_GROUPS:
+                self._groups.clear()
+            group = self._groups[key] = self._kind(ids, view)
+        return group
+
+    def _save(
+        self,
+        group: Group,
+        raw: bytes,
+        at_s: float,
+        heard: dict[int, Heard],
+        now_s: float,
+        turns: Turns[View],
+    ) -> None:
+        """Save what is right of an answer; ask again those who lost theirs through another."""
+        while True:
+            raw = self._line.complete(raw, group.missing, self._line.deadline_s)
+            samples, damaged, unproved = group.pieces(raw)
+            for servo_id, sample in samples.items():
+                heard[servo_id] = Heard(sample, at_s)
+            if len(samples) == len(group.ids):
+                return
+            silent = silent_ones(group.ids, samples.keys() | damaged | unproved)
+            if not samples and not damaged and HEADER in raw:
+                self._line.lateness.late_answer(now_s)  # that of an earlier question
+            self._blame(damaged, silent, now_s, turns)
+            done = heard.keys() | damaged | frozenset(silent)
+            left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
+            if not left or self._line.port.now_s() >= self._until_s:
+                return
+            group = self._group(left, turns)
+            raw, at_s = self._line.exchange(group.request, group.reply_length)
+
+    def _blame(
+        self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: Turns[View]
+    ) -> None:
+        """Note who failed; what still comes must not be taken for the next answer."""
+        line, roll = self._line, self.roll
+        if damaged:
+            line.lateness.forget()  # noise looks late, too
+        for servo_id in damaged:
+            line.errors["corrupt"] += 1
+            roll.damaged(servo_id, now_s)
+        for servo_id in silent:
+            line.errors["timeout"] += 1
+            roll.silent(servo_id, now_s)
+        turns.trouble(now_s)
+        if not line.quiet and line.drain(line.patience.seconds):
+            line.patience.missed()

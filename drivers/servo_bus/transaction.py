@@ -1,0 +1,174 @@
+"""Exchanges on a servo bus: bounded waiting, clean lines, counts, starvation noticed."""
+
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from math import inf
+
+from drivers.host_lateness import HostLateness
+from drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
+from drivers.servo_bus.adaptive_timeout import Patience
+from drivers.servo_bus.poll_list import silent_ones
+
+TRIES, HURRIED = 3, 4.0
+
+_ROOM = 4096
+_BACKLOG_S = 0.05
+
+
+class BusLine(ABC):
+    """A port with the patience of one bus; every method may raise drivers.errors.BusLost.
+
+    tx_bytes, rx_bytes: counts since it was made
+    errors: counts by kind
+    patience: that of the cyclic exchange; all others have the longest
+    tries: how often a servo is asked outside the cyclic exchange; in the loop, once
+    starving_s: silence after which a servo's own watchdog trips; inf where none is armed
+    starved: such a silence has happened
+    asleep_s: the longest silence that this computer itself has kept since it was set to 0
+    lateness: answers that came after waiting had ended
+    quiet: nothing came any more when the last exchange was given up
+    whole_s: when the last exchange's answer was due as far as the wire goes
+    deadline_s: end of the last exchange's patience
+    """
+
+    def __init__(
+        self,
+        port: BusPort,
+        least_s: float,
+        most_s: float,
+        baud: int,
+        names: Mapping[int, str] | None = None,
+    ) -> None:
+        self.port = port
+        self._names = names or {}
+        self.tx_bytes = self.rx_bytes = 0
+        self.errors: Counter[str] = Counter()
+        self.patience = Patience(least_s, most_s)
+        self.most_s = most_s
+        self.tries = TRIES
+        self.starving_s = inf
+        self.starved = False
+        self.asleep_s = 0.0
+        self.lateness = HostLateness()
+        self._unheard = False
+        self.quiet = True
+        self.whole_s = self.deadline_s = 0.0
+        self._byte_s = BITS_PER_BYTE / baud
+        self._sent_s = port.now_s()
+        self._free_s = self._sent_s
+
+    def who(self, servo_id: int) -> str:
+        """Name a servo for people."""
+        return self._names.get(servo_id, f"servo {servo_id}")
+
+    def send(self, packet: bytes) -> None:
+        """Send a packet."""
+        now_s = self.port.now_s()
+        self.port.write(packet)
+        # Up to after the write: the host may have been asleep just before the bytes left.
+        silent_s = self.port.now_s() - self._sent_s
+        if silent_s >= self.starving_s:
+            self.starved = True
+            self.asleep_s = max(self.asleep_s, silent_s)
+        self._sent_s = now_s
+        # Bytes leave after those still on their way out, at the bus's own speed.
+        free_s = self._free_s
+        if not now_s <= free_s <= now_s + _BACKLOG_S:
+            free_s = now_s
+        self._free_s = free_s + len(packet) * self._byte_s
+        self.tx_bytes += len(packet)
+
+    def exchange(self, request: bytes, length: int) -> tuple[bytes, float]:
+        """Send a request, wait for ``length`` bytes; gives what came, and when.
+
+        The wait ends as the patience does, beyond the time the bytes take on the wire.
+        """
+        port = self.port
+        # What is here before the question cannot be its answer.
+        if self._unheard and port.getBytesAvailable():
+            self.lateness.late_answer(port.now_s())
+        port.clearPort()
+        self.send(request)
+        self.quiet = False
+        whole_s = self._free_s + length * self._byte_s
+        half_s = 0.5 * self.patience.seconds
+        raw = port.read_until(length, whole_s + half_s)
+        if len(raw) < length:
+            # The second half shows whether the line has fallen silent.
+            more = port.read_until(length - len(raw), whole_s + 2.0 * half_s)
+            self.quiet = not more
+            raw += more
+        at_s = port.now_s()
+        self.whole_s, self.deadline_s = whole_s, whole_s + 2.0 * half_s
+        self.rx_bytes += len(raw)
+        self._unheard = not raw
+        if len(raw) == length:
+            self.patience.note(at_s - whole_s)
+        return raw, at_s
+
+    def complete(self, raw: bytes, missing: Callable[[bytes], int], deadline_s: float) -> bytes:
+        """Wait on for an answer that has turned out to be longer than its shortest form."""
+        while wanted := missing(raw):
+            more = self.port.read_until(wanted, deadline_s)
+            if not more:
+                self.quiet = True
+                break
+            self.rx_bytes += len(more)
+            raw += more
+        return raw
+
+    def drain(self, quiet_s: float = QUIET_S) -> int:
+        """Throw away what arrives until the line is quiet; gives the number of bytes.
+
+        Gives up on a line that never falls silent.
+        """
+        end_s = self.port.now_s() + BABBLE_S
+        dropped = 0
+        while True:
+            more = self.port.read_until(_ROOM, self.port.now_s() + quiet_s)
+            dropped += len(more)
+            self.rx_bytes += len(more)
+            if not more or self.port.now_s() >= end_s or dropped >= 16 * _ROOM:
+                if dropped and self._unheard:
+                    # Nothing came in its time, and then something did: an answer, not noise.
+                    self.lateness.late_answer(self.port.now_s())
+                    self._unheard = False
+                return dropped
+
+    def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
+        """Read the same bytes of several servos.
+
+        A silent servo silences those behind it: they are asked again without it, and it
+        alone where it may be asked more than once. In the loop, where nobody answers at all
+        that is the end of it.
+        """
+        values: dict[int, bytes] = {}
+        left, silent = tuple(ids), list[int]()
+        while left:
+            heard = self._ask(left, address, length)
+            values.update(heard)
+            if self.tries == 1 and not heard:
+                break
+            blamed = silent_ones(left, values)
+            silent += blamed
+            left = tuple(i for i in left if i not in values and i not in blamed)
+        for servo_id in silent:
+            for _ in range(self.tries - 1):
+                values.update(self._ask((servo_id,), address, length))
+                if servo_id in values:
+                    break
+        return values
+
+    @abstractmethod
+    def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
+        """Read the same bytes of several servos once; gives those of who answered well."""
+
+    def _ends_s(self, answer_bytes: int) -> float:
+        """Give until when an answer to what was just sent is waited for.
+
+        In the loop others are waiting, and how late answers are has been measured.
+        """
+        hurried_s = min(self.most_s, HURRIED * self.patience.seconds)
+        patience_s = self.most_s if self.tries > 1 else hurried_s
+        return self._free_s + answer_bytes * self._byte_s + patience_s

@@ -1,0 +1,1 @@
+"""Moving things by optical flow."""

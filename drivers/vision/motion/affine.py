@@ -1,0 +1,104 @@
+"""Slide, growth and spin of a patch of flow: an affine motion, fitted robustly.
+
+A thing that turns fast moves its points along arcs between two pictures, not along the
+tangents; growth and spin are therefore taken from the whole map from now to before, as
+the logarithm of its scale and its angle, not from the divergence and curl of the flow.
+"""
+
+from math import atan2, log, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from drivers.vision.motion.image import Floats, middle
+from drivers.vision.motion.lucas_kanade import Back
+
+# Flow at neighbouring pixels is found from the same patches: so many square pixels count
+# as one measurement (8 px at half size).
+_PATCH_PX2 = 256.0
+_TUKEY, _STEPS = 4.685, 4
+_LEAST_POINTS = 6
+# What flow is off by at best.
+_NOISE_PX = 0.03
+
+
+class PatchMotion(NamedTuple):
+    """How a patch moves between two pictures.
+
+    slide_px: motion of its centre
+    growth: logarithm of its size now by its size before
+    spin_rad: clockwise in the picture above 0
+    growth_sd, spin_sd: standard deviations
+    rest_px: what the affine motion leaves unexplained, along one axis
+    """
+
+    slide_px: tuple[float, float]
+    growth: float
+    spin_rad: float
+    growth_sd: float
+    spin_sd: float
+    rest_px: float
+
+
+def flow_map(places: Floats, flow: Floats, centre: Floats, area_px: float) -> tuple[Back, float]:
+    """Fit the map from now to before of points that flow, and what it leaves unexplained.
+
+    places, flow: (n, 2) where they are now, and their motion from the older picture
+    centre: (2,) whose motion is the map's shift
+    area_px: what the points stand for
+    """
+    arms = places - centre
+    rows = np.column_stack((arms, np.ones(len(arms))))
+    numbers, weights, rest = _fit(rows, flow)
+    if numbers is None:
+        return Back(np.eye(2), -np.median(flow, axis=0), np.inf), rest
+    return Back(np.eye(2) - numbers[:2].T, -numbers[2], _spread(rows, weights, rest, area_px)), rest
+
+
+def patch_motion(back: Back, rest_px: float) -> PatchMotion:
+    """Give slide, growth and spin of a map from now to before."""
+    (a, b), (c, d) = back.matrix.tolist()
+    shrink = sqrt(max(abs(a * d - b * c), 1e-6))
+    sd = back.slope_sd / sqrt(2.0)  # growth and spin are half the sum of two numbers each
+    slide = float(-back.shift[0]), float(-back.shift[1])
+    return PatchMotion(slide, -log(shrink), -atan2(c - b, a + d), sd, sd, rest_px)
+
+
+def affine_rest(places: Floats, flow: Floats) -> float:
+    """Give what one affine motion leaves of a flow, root mean square of the lengths."""
+    if len(places) < _LEAST_POINTS:
+        return 0.0
+    rows = np.column_stack((places - places.mean(axis=0), np.ones(len(places))))
+    numbers, *_ = np.linalg.lstsq(rows, flow, rcond=None)
+    return float(np.sqrt(((flow - rows @ numbers) ** 2).sum(axis=1).mean()))
+
+
+def _fit(rows: Floats, flow: Floats) -> tuple[Floats | None, Floats, float]:
+    """Fit (3, 2) numbers by reweighted least squares: them, the weights, what is left."""
+    weights = np.ones(len(rows))
+    numbers: Floats | None = None
+    scale = _NOISE_PX
+    for _ in range(_STEPS):
+        weighted = rows * weights[:, None]
+        normal = rows.T @ weighted
+        if np.count_nonzero(weights) < _LEAST_POINTS or _flat(normal):
+            return None, weights, scale
+        numbers = np.asarray(np.linalg.solve(normal, weighted.T @ flow))
+        errors = np.hypot(*(flow - rows @ numbers).T)
+        scale = max(_NOISE_PX, middle(errors) / 1.177)
+        weights = np.maximum(1.0 - (errors / (_TUKEY * scale)) ** 2, 0.0) ** 2
+    return numbers, weights, scale
+
+
+def _flat(normal: Floats) -> bool:
+    """Tell whether points lie in a row: no area of moments is left."""
+    xx, xy, yy = normal[0, 0], normal[0, 1], normal[1, 1]
+    return bool(xx * yy - xy * xy <= 1e-6 * max(xx, yy) ** 2 + 1e-12)
+
+
+def _spread(rows: Floats, weights: Floats, rest_px: float, area_px: float) -> float:
+    """Give the standard deviation of the map's slopes, root mean square."""
+    inverse = np.linalg.inv(rows.T @ (rows * weights[:, None]) + 1e-9 * np.eye(3))
+    points_a_patch = max(1.0, _PATCH_PX2 * len(rows) / max(area_px, 1.0))
+    both = 0.5 * float(inverse[0, 0] + inverse[1, 1])
+    return rest_px * sqrt(max(both, 0.0) * points_a_patch)

@@ -1,0 +1,78 @@
+"""A moving patch of the picture -> a thing in the camera frame, with place and velocity.
+
+Camera frame: optical, x right, y down, z forward. With p = z (x', y', 1), x' and y' being
+the pixel by focal length, the velocity is z (dx'/dt, dy'/dt, 0) + (dz/dt) (x', y', 1), and
+what grows by a share a second comes nearer by that share: dz/dt = -loom z.
+"""
+
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.vision.motion.clustering import Group
+from drivers.vision.motion.image import Floats, Plane
+from drivers.vision.motion.params import MotionParams
+
+Vec3 = tuple[float, float, float]
+
+# A depth picture has holes and, at edges, the background; a tenth of a thing must be known.
+_LEAST_SHARE, _LEAST_PIXELS = 0.1, 5
+_LEAST_SD_M = 0.005
+# Median absolute deviation to standard deviation.
+_MAD = 1.4826
+
+
+class Distance(NamedTuple):
+    """How far along the optical axis a thing is, in metres, how sure, and whether measured."""
+
+    z_m: float
+    sd_m: float
+    known: bool
+
+
+def small_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane | None:
+    """Bring a depth picture to the small picture's size; what is no distance becomes NaN."""
+    if depth_m is None or depth_m.ndim != 2 or depth_m.size == 0:
+        return None
+    depth = np.asarray(depth_m, dtype=np.float32)
+    if depth.shape != shape:  # nearest: the mean of two surfaces is on neither
+        size = shape[1], shape[0]
+        depth = np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST), np.float32)
+    out: Plane = np.where(np.isfinite(depth) & (depth > 0.0), depth, np.float32(np.nan))
+    return out
+
+
+def distance(group: Group, depth: Plane | None, params: MotionParams) -> Distance:
+    """Give a thing's distance from the depth picture, else the assumed one."""
+    if depth is not None:
+        values = depth[group.y, group.x]
+        values = values[np.isfinite(values)]
+        if len(values) >= max(_LEAST_PIXELS, _LEAST_SHARE * len(group.x)):
+            z = float(np.median(values))
+            spread = _MAD * float(np.median(np.abs(values - z)))
+            return Distance(z, max(_LEAST_SD_M, spread), True)
+    z = params.assumed_distance_m
+    return Distance(z, z * params.assumed_distance_spread, False)
+
+
+def place(point_px: Floats, z_m: float, K: Floats) -> Vec3:
+    """Give the point at depth ``z_m`` that a pixel shows."""
+    x, y = ((point_px - K[:2, 2]) / K[[0, 1], [0, 1]]).tolist()
+    return z_m * x, z_m * y, z_m
+
+
+def velocity(p_m: Vec3, flow_px_s: tuple[float, float], loom_1_s: float, K: Floats) -> Vec3:
+    """Give the velocity of a thing at ``p_m`` whose image moves and grows so."""
+    x, y, z = p_m
+    return (
+        z * flow_px_s[0] / float(K[0, 0]) - loom_1_s * x,
+        z * flow_px_s[1] / float(K[1, 1]) - loom_1_s * y,
+        -loom_1_s * z,
+    )
+
+
+def radius_m(area_px: float, z_m: float, K: Floats) -> float:
+    """Give the radius of the disc that covers as much of the picture."""
+    return z_m * float(np.sqrt(area_px / (np.pi * K[0, 0] * K[1, 1])))

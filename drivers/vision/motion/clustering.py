@@ -1,0 +1,122 @@
+"""Pixels that move, gathered to things: neighbours belong together, unless they part.
+
+What one affine motion explains is one thing, however it turns or grows. What it does not
+explain and what falls into two clearly different motions is two: people who pass.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.vision.motion.affine import affine_rest
+from drivers.vision.motion.image import Floats
+from drivers.vision.motion.optical_flow import Flow, Mask
+from drivers.vision.motion.params import MotionParams
+from drivers.vision.motion.segmentation import Things
+
+Indices = NDArray[np.intp]
+
+# Two motions are two things when they differ by this share of the faster one ...
+_PARTING_SHARE = 0.8
+# ... and leave less than this of what one motion left unexplained.
+_BETTER_SHARE = 0.6
+_MOST_SPLITS = 3
+_SMOOTH_PX = 5
+_SAMPLE = 400
+
+
+class Group(NamedTuple):
+    """Pixels that move together.
+
+    x, y: (n,) columns and rows
+    flow: (n, 2) their motion from the older picture to the newer, pixels
+    """
+
+    x: Indices
+    y: Indices
+    flow: Floats
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """Give x, y, width and height of the pixels' box."""
+        x, y = int(self.x.min()), int(self.y.min())
+        return x, y, int(self.x.max()) - x + 1, int(self.y.max()) - y + 1
+
+
+def gathered(things: Things, params: MotionParams) -> list[Group]:
+    """Give the things that move, the largest first."""
+    least = max(4, round(params.min_area_share * things.mask.size))
+    pieces = [
+        piece
+        for group in _connected(things.mask, things.flow, params.close_px, least)
+        for piece in _parted(group, things, least, _MOST_SPLITS)
+    ]
+    pieces.sort(key=lambda group: (-len(group.x), group.x[0], group.y[0]))
+    return pieces[: params.max_blobs]
+
+
+def _connected(mask: Mask, flow: Flow, close_px: int, least: int) -> list[Group]:
+    """Give the pixels of the mask by neighbourhood, gaps up to ``close_px`` being bridged."""
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (close_px, close_px))
+    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
+    groups = []
+    for k in range(1, count):
+        if stats[k, cv2.CC_STAT_AREA] < least:
+            continue
+        left, top, width, height = (int(v) for v in stats[k, :4])
+        window = np.s_[top : top + height, left : left + width]
+        y, x = np.nonzero((labels[window] == k) & mask[window])
+        if len(x) >= least:
+            groups.append(_group(x + left, y + top, flow))
+    return groups
+
+
+def _group(x: Indices, y: Indices, flow: Flow) -> Group:
+    return Group(x, y, flow[y, x].astype(np.float64))
+
+
+def _parted(group: Group, things: Things, least: int, splits: int) -> list[Group]:
+    """Split a group of two motions, again and again."""
+    if splits == 0 or len(group.x) < 2 * least:
+        return [group]
+    sides = _sides(group, things.threshold_px)
+    if sides is None:
+        return [group]
+    left, top, width, height = group.box
+    parts = []
+    for side in (sides, ~sides):
+        mask = np.zeros((height, width), dtype=np.uint8)
+        mask[group.y[side] - top, group.x[side] - left] = 255
+        own = cv2.medianBlur(mask, _SMOOTH_PX) > 0
+        flow = things.flow[top : top + height, left : left + width]
+        for piece in _connected(own, flow, _SMOOTH_PX, least):
+            parts.append(Group(piece.x + left, piece.y + top, piece.flow))
+    if len(parts) < 2:
+        return [group]
+    return [piece for part in parts for piece in _parted(part, things, least, splits - 1)]
+
+
+def _sides(group: Group, threshold_px: float) -> Mask | None:
+    """Tell which pixels of two things are the one's; None where there is but one."""
+    step = max(1, len(group.x) // _SAMPLE)
+    places = np.column_stack((group.x, group.y)).astype(np.float64)
+    flow = group.flow
+    together = affine_rest(places[::step], flow[::step])
+    if together < threshold_px:
+        return None
+    middle = flow.mean(axis=0)
+    _, axes = np.linalg.eigh(np.cov((flow - middle).T))
+    sides: Mask = (flow - middle) @ axes[:, -1] > 0.0
+    share = float(sides.mean())
+    if not 0.0 < share < 1.0:
+        return None
+    a, b = flow[sides].mean(axis=0), flow[~sides].mean(axis=0)
+    faster = max(float(np.hypot(*a)), float(np.hypot(*b)))
+    if float(np.hypot(*(a - b))) < _PARTING_SHARE * faster:
+        return None
+    rests = [affine_rest(places[side][::step], flow[side][::step]) for side in (sides, ~sides)]
+    apart = np.sqrt(share * rests[0] ** 2 + (1.0 - share) * rests[1] ** 2)
+    return sides if apart < _BETTER_SHARE * together else None

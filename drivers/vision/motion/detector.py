@@ -1,0 +1,250 @@
+"""Things that move, found in a picture and the one before it, whatever the camera did itself.
+
+Small grey picture -> flow to the older one, turned as the joints say (motion_flow) -> the
+camera's own motion (motion_ego) -> what moves besides (motion_things) -> patches
+(motion_groups) -> slide, growth and spin (motion_affine) -> place and velocity
+(motion_place) -> numbers that last (motion_tracks). No clock: times come with pictures.
+
+While the camera turns fast, and where the picture does not tell its own motion from that
+of things, nothing is said, as our own eyes say nothing during a saccade.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.types import MovingBlob
+from drivers.vision.motion.affine import PatchMotion, flow_map, patch_motion
+from drivers.vision.motion.anchor import anchor
+from drivers.vision.motion.backprojection import distance, place, radius_m, small_depth, velocity
+from drivers.vision.motion.clustering import Group, gathered
+from drivers.vision.motion.ego_motion import Ego, own_motion, turn_rad
+from drivers.vision.motion.image import Floats, Lens, Plane, SmallPicture, made_small, to_given
+from drivers.vision.motion.lucas_kanade import Blurred, Room, blurred, refined
+from drivers.vision.motion.optical_flow import Compared, FlowSearch, searchable, turn_homography
+from drivers.vision.motion.parallax import parallax
+from drivers.vision.motion.params import MotionParams
+from drivers.vision.motion.segmentation import what_moves
+from drivers.vision.motion.tracking import Follow, MotionTracks
+
+_KIND = "thing"
+# With less of the older picture in view, too little is left to tell motions apart.
+_LEAST_KNOWN = 0.4
+# Points enough for an affine fit.
+_SAMPLE = 400
+
+
+class MotionReport(NamedTuple):
+    """What became of a picture, for the page and the summary.
+
+    blobs: what moves
+    silent: why nothing could be said, "" where it could
+    turn_deg_s: the camera's own turn as seen
+    background_share: share of the picture's texture that moved as one
+    noise_px, threshold_px: flow noise of the still room, and the least motion believed, in
+        pixels of the small picture
+    """
+
+    blobs: tuple[MovingBlob, ...] = ()
+    silent: str = ""
+    turn_deg_s: float = 0.0
+    background_share: float = 0.0
+    noise_px: float = 0.0
+    threshold_px: float = 0.0
+
+
+class MotionDetector:
+    """Finds what moves from picture to picture; pure but for the memory of the last."""
+
+    def __init__(self, params: MotionParams) -> None:
+        """Take how finely and carefully to look."""
+        self._params = params
+        self._search = FlowSearch(params.preset, params.finest_level)
+        self._tracks = MotionTracks(params)
+        self._before: SmallPicture | None = None
+        self.report = MotionReport()
+
+    def retune(self, params: MotionParams) -> None:
+        """Look more or less finely from the next picture on; what is followed stays."""
+        if (params.preset, params.finest_level) != (self._params.preset, self._params.finest_level):
+            self._search = FlowSearch(params.preset, params.finest_level)
+        self._params = params
+        self._tracks.retune(params)
+
+    @property
+    def before_s(self) -> float | None:
+        """Give the capture time of the picture that the next one will be compared with."""
+        return None if self._before is None else self._before.captured_s
+
+    def find(
+        self,
+        picture: NDArray[Any],
+        captured_s: float,
+        lens: Lens,
+        R_now_before: NDArray[np.float64] | None,
+        depth_m: NDArray[Any] | None = None,
+        t_now_before_m: NDArray[np.float64] | None = None,
+    ) -> tuple[MovingBlob, ...]:
+        """Find what moves between the last picture and this one.
+
+        picture: (h, w), or with 1, 3 or 4 channels, uint8
+        lens: focal lengths and centre in pixels of this picture
+        R_now_before: (3, 3) turns directions from the camera's axes at ``before_s`` into
+            those at ``captured_s``; identity for a camera that stands, None where unknown
+        depth_m: (any, any) distance along the optical axis, aligned with the picture; 0, NaN
+            and infinite where unknown
+        t_now_before_m: (3,) where the lens was at ``before_s`` seen from where it is now, in
+            its axes of now; with it and depth, near things do not seem to move past far ones
+
+        Raises:
+            ValueError: the picture is none of those.
+        """
+        now = made_small(picture, self._params.work_px, lens, captured_s)
+        before, self._before = self._before, now
+        self.report = self._look(now, before, R_now_before, depth_m, t_now_before_m)
+        return self.report.blobs
+
+    def forget(self) -> None:
+        """Forget the last picture: the next one is the first of another scene."""
+        self._before = None
+        self._tracks.forget()
+
+    def _look(
+        self,
+        now: SmallPicture,
+        before: SmallPicture | None,
+        R_now_before: Floats | None,
+        depth_m: NDArray[Any] | None,
+        t_now_before_m: Floats | None,
+    ) -> MotionReport:
+        """Compare two pictures, or say why they cannot be."""
+        if not searchable(now.grey):
+            return MotionReport(silent="picture too small")
+        if before is None or before.grey.shape != now.grey.shape:
+            self._tracks.forget()
+            return MotionReport(silent="first picture")
+        dt_s = now.captured_s - before.captured_s
+        if not 0.0 < dt_s <= self._params.max_gap_ms / 1e3:
+            return MotionReport(silent="no picture shortly before")
+        H = turn_homography(R_now_before, now, before)
+        pair = self._search.compare(now, before, H)
+        depth = small_depth(depth_m, now.grey.shape)
+        pair = pair._replace(shift=parallax(depth, now.K, t_now_before_m))
+        ego = own_motion(pair, now.K, R_now_before is not None)
+        turn = float(np.degrees(turn_rad(ego, now.grey, now.K))) / dt_s
+        why = self._cannot_tell(pair, ego, turn)
+        if why:
+            self._tracks.pass_over(ego.total, now.captured_s, dt_s)
+            return MotionReport((), why, turn, ego.share, ego.noise_px)
+        things = what_moves(pair, ego, self._params)
+        groups = gathered(things, self._params)
+        blobs = self._blobs(groups, now, pair, ego, depth, dt_s)
+        return MotionReport(blobs, "", turn, ego.share, ego.noise_px, things.threshold_px)
+
+    def _cannot_tell(self, pair: Compared, ego: Ego, turn_deg_s: float) -> str:
+        """Say why the camera's motion cannot be told from that of things, "" where it can."""
+        if not turn_deg_s <= self._params.max_turn_deg_s:
+            return "the camera turns too fast"
+        if pair.known.mean() < _LEAST_KNOWN:
+            return "too little of the last picture in view"
+        if ego.share < self._params.min_background_share:
+            return "no common motion of the background"
+        return ""
+
+    def _blobs(
+        self,
+        groups: list[Group],
+        now: SmallPicture,
+        pair: Compared,
+        ego: Ego,
+        depth: Plane | None,
+        dt_s: float,
+    ) -> tuple[MovingBlob, ...]:
+        """Measure each patch and give it its number."""
+        pictures = blurred(pair.now, pair.before) if groups else Blurred(())
+        motions = [_measured(group, pictures, _room(group, pair, ego)) for group in groups]
+        follows = self._tracks.step(
+            [centre for centre, _ in motions],
+            [np.array(motion.slide_px) / dt_s for _, motion in motions],
+            [float(np.sqrt(group.box[2] * group.box[3])) for group in groups],
+            ego.total,
+            now.captured_s,
+            dt_s,
+        )
+        return tuple(
+            self._blob(group, motion, follow, now, depth, dt_s)
+            for group, (_, motion), follow in zip(groups, motions, follows, strict=True)
+            if self._tracks.told(follow)
+        )
+
+    def _blob(
+        self,
+        group: Group,
+        motion: PatchMotion,
+        follow: Follow,
+        now: SmallPicture,
+        depth: Plane | None,
+        dt_s: float,
+    ) -> MovingBlob:
+        """Put together what is known of one thing."""
+        far = distance(group, depth, self._params)
+        point = anchor(group, now.grey, follow.centre, follow.offset)
+        follow.offset = point - follow.centre
+        p = place(point, far.z_m, now.K)
+        flow_px_s = motion.slide_px[0] / dt_s, motion.slide_px[1] / dt_s
+        loom = _believed(motion.growth, motion.growth_sd) / dt_s
+        (sx, sy), (x, y, width, height) = now.scale, group.box
+        left, top = to_given((x - 0.5, y - 0.5), now.scale)
+        return MovingBlob(
+            follow.id,
+            _KIND,
+            p,
+            radius_m(len(group.x), far.z_m, now.K),
+            spin_rad_s=_believed(motion.spin_rad, motion.spin_sd) / dt_s,
+            loom_1_s=loom,
+            v_camera_m_s=velocity(p, flow_px_s, loom, now.K),
+            depth_known=far.known,
+            depth_sd_m=far.sd_m,
+            spin_sd_rad_s=motion.spin_sd / dt_s,
+            loom_sd_1_s=motion.growth_sd / dt_s,
+            box_px=(left, top, width / sx, height / sy),
+            centre_px=to_given((float(point[0]), float(point[1])), now.scale),
+            area_px=len(group.x) / (sx * sy),
+            flow_px_s=(flow_px_s[0] / sx, flow_px_s[1] / sy),
+        )
+
+
+def turned_between(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> Floats:
+    """Give R_now_before of two orientations of the camera in the world, (3, 3) each."""
+    now, before = np.asarray(R_world_now, float), np.asarray(R_world_before, float)
+    out: Floats = now.T @ before
+    return out
+
+
+def _room(group: Group, pair: Compared, ego: Ego) -> Room:
+    """Give where a patch would be in the older picture if it stood still."""
+    if pair.shift is None:
+        return Room(ego.B, np.zeros(2))
+    return Room(ego.B, np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64))
+
+
+def _measured(group: Group, pictures: Blurred, room: Room) -> tuple[Floats, PatchMotion]:
+    """Give a patch's middle, and the motion there."""
+    places = np.column_stack((group.x, group.y)).astype(np.float64)
+    middle = places.mean(axis=0)
+    step = max(1, len(places) // _SAMPLE)
+    places, flow = places[::step], group.flow[::step]
+    start, rest = flow_map(places, flow, middle, float(len(group.x)))
+    return middle, patch_motion(refined(start, places, middle, pictures, room), rest)
+
+
+def _believed(value: float, sd: float) -> float:
+    """Draw a measurement towards 0 by its noise: what is not told from 0 is 0.
+
+    The positive part of James and Stein's estimator for one number; attention takes the
+    length of it, which noise would otherwise always make longer.
+    """
+    if value == 0.0 or not np.isfinite(sd):
+        return 0.0
+    return value * max(0.0, 1.0 - (sd / value) ** 2)

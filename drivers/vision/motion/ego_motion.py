@@ -1,0 +1,190 @@
+"""What the camera itself did: the one motion that most of the still room agrees on.
+
+The joints give a first guess that lags, and knows nothing of the lens moving sideways as
+the neck turns. What is left in the flow is fitted by a homography (exact for a turn and
+for one plane, eight numbers for the rest), by iteratively reweighted least squares with
+Tukey's weights. The fit starts from the guess and from the scale of its usual error, so
+that a body which fills the picture cannot pass for the room while the joints say that
+the camera stands.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from drivers.vision.motion.image import Floats, Grey, middle
+from drivers.vision.motion.optical_flow import Compared, moved
+
+_GRID_PX = 8
+# At the edge the flow is worst, and leads out of the picture.
+_EDGE_PX = 6
+# Corner strength (smaller eigenvalue of the gradients' matrix, at half size) for which
+# noise of a few grey levels does not pass.
+_CORNER_BLOCK = 5
+_LEAST_CORNER = 2e-4
+_LEAST_POINTS = 30
+# A room is around us: what fills fewer of the picture's 48 cells is a thing.
+_CELLS, _LEAST_CELLS = (8, 6), 12
+_STEPS = 8
+# A step that moves the picture by less is the last.
+_SMALL_PX = 0.01
+_TUKEY = 4.685
+_LEAST_NOISE_PX, _MOST_NOISE_PX = 0.02, 1.5
+# Joints at rest are right; in motion they may be wrong by all of the motion, at its onset.
+_STANDING_REACH_PX = 0.75
+# What a homography's last numbers may be, in focal lengths: keeps it tame between points.
+_SPREADS = np.array([0.1, 0.1, 0.2, 0.1, 0.1, 0.2, 0.05, 0.05])
+_PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+_POINT_NOISE = 1e-3
+
+
+class Ego(NamedTuple):
+    """The camera's own motion between two pictures.
+
+    B: (3, 3) pixels of the newer picture to those of the older one, turned as predicted
+    total: (3, 3) pixels of the older picture to those of the newer
+    share: of the points with texture, those that moved with the room; 0 where they agree on
+        nothing better than noise
+    noise_px: how far the flow there is from it, standard deviation along one axis
+    way_px: how far the camera's motion moved the picture, median
+    fitted: the picture had enough texture to be asked
+    """
+
+    B: Floats
+    total: Floats
+    share: float
+    noise_px: float
+    way_px: float
+    fitted: bool
+
+
+def own_motion(pair: Compared, K: Floats, predicted: bool) -> Ego:
+    """Find the camera's own motion.
+
+    K: (3, 3) camera matrix
+    predicted: ``pair`` was turned by what the joints said; else nothing is known of the
+        camera, and any motion that most agree on is taken for its
+    """
+    points = _textured(pair)
+    B, share, noise, fitted = np.eye(3), 1.0, _LEAST_NOISE_PX, False
+    if len(points) >= _LEAST_POINTS:
+        at = points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)
+        there = points + pair.flow[at]
+        if pair.shift is not None:
+            there -= pair.shift[at]
+        turn = _way(_inverse(pair.H), points)
+        reach = _STANDING_REACH_PX + turn if predicted else np.inf
+        found = _fitted(points, there, K, pair.now.shape, reach)
+        if found is not None:
+            B, share, noise = found
+            share, fitted = (share if noise <= _MOST_NOISE_PX else 0.0), True
+    back = _inverse(pair.H) @ B
+    way = _way(back, points) if len(points) else 0.0
+    total = _inverse(back)
+    return Ego(B, total / total[2, 2], share, noise, way, fitted)
+
+
+def _textured(pair: Compared) -> Floats:
+    """Give the points of a grid, (n, 2), at which the flow can be believed."""
+    half = cv2.resize(pair.now, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    strength = cv2.cornerMinEigenVal(half, _CORNER_BLOCK)
+    height, width = pair.now.shape
+    y, x = np.mgrid[_EDGE_PX : height - _EDGE_PX : _GRID_PX, _EDGE_PX : width - _EDGE_PX : _GRID_PX]
+    x, y = x.ravel(), y.ravel()
+    rows, columns = strength.shape[:2]
+    strong = strength[np.minimum(y // 2, rows - 1), np.minimum(x // 2, columns - 1)]
+    good = (strong > _LEAST_CORNER) & pair.known[y, x]
+    return np.column_stack((x[good], y[good])).astype(np.float64)
+
+
+def _fitted(
+    points: Floats, there: Floats, K: Floats, shape: tuple[int, ...], reach_px: float
+) -> tuple[Floats, float, float] | None:
+    """Fit the homography that most points agree on: it, their share, and the noise.
+
+    None where they are too few, or all in one place: that would be a thing.
+    """
+    focal, centre = float(K[0, 0]), K[:2, 2]
+    a, b = (points - centre) / focal, (there - centre) / focal
+    rows = _rows(a, b)
+    h = _PLAIN
+    errors = focal * np.hypot(*(b - a).T)
+    # A third of the points is room, at worst: their error is the scale to start from.
+    scale = min(1.5 * float(np.quantile(errors, 0.3)), reach_px / 3) + 2 * _LEAST_NOISE_PX
+    noise = _LEAST_NOISE_PX
+    for _ in range(_STEPS):
+        weights = np.maximum(1.0 - (errors / (_TUKEY * scale)) ** 2, 0.0) ** 2
+        if np.count_nonzero(weights) < _LEAST_POINTS:
+            return None
+        last, h = h, _solved(rows, b, weights)
+        errors = focal * np.hypot(*(_image(h, a) - b).T)
+        done = np.abs(h - last).max() * focal < _SMALL_PX and scale < 2 * noise
+        noise = _noise(errors, weights > 0.0)
+        scale = min(scale, max(0.5 * scale, noise))
+        if done:
+            break
+    near = errors < _TUKEY * scale
+    if not _spread(points[near], shape):
+        return None
+    square = np.array([[focal, 0.0, centre[0]], [0.0, focal, centre[1]], [0.0, 0.0, 1.0]])
+    B = square @ np.append(h, 1.0).reshape(3, 3) @ np.linalg.inv(square)
+    return B / B[2, 2], float(near.mean()), _noise(errors, near)
+
+
+def _rows(a: Floats, b: Floats) -> Floats:
+    """Give the (2 n, 8) rows of b (h6 x + h7 y + 1) = (h0 x + h1 y + h2, h3 x + h4 y + h5)."""
+    n = len(a)
+    rows = np.zeros((2, n, 8))
+    for axis in (0, 1):
+        rows[axis, :, 3 * axis : 3 * axis + 2] = a
+        rows[axis, :, 3 * axis + 2] = 1.0
+        rows[axis, :, 6:] = -a * b[:, axis : axis + 1]
+    return rows.reshape(2 * n, 8)
+
+
+def _solved(rows: Floats, b: Floats, weights: Floats) -> Floats:
+    """Solve for the eight numbers, with a weak belief that they are those of no motion."""
+    both = np.concatenate((weights, weights)) / _POINT_NOISE**2
+    weighted = rows * both[:, None]
+    belief = np.diag(_SPREADS**-2.0)
+    right = weighted.T @ b.T.ravel() + belief @ _PLAIN
+    return np.asarray(np.linalg.solve(rows.T @ weighted + belief, right))
+
+
+def _image(h: Floats, a: Floats) -> Floats:
+    """Give where the homography takes points."""
+    x, y = a.T
+    depth = np.maximum(h[6] * x + h[7] * y + 1.0, 1e-3)
+    there = h[0] * x + h[1] * y + h[2], h[3] * x + h[4] * y + h[5]
+    out: Floats = np.column_stack(there) / depth[:, None]
+    return out
+
+
+def _noise(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
+    """Give the standard deviation along one axis: half of such lengths are below 1.18 of it."""
+    return max(_LEAST_NOISE_PX, middle(errors[mask]) / 1.177)
+
+
+def _spread(points: Floats, shape: tuple[int, ...]) -> bool:
+    """Tell whether points lie all over a picture of (height, width)."""
+    cells = np.floor(points / (shape[1], shape[0]) * _CELLS)
+    return len(np.unique(cells[:, 0] * _CELLS[1] + cells[:, 1])) >= _LEAST_CELLS
+
+
+def _inverse(H: Floats) -> Floats:
+    return np.asarray(np.linalg.inv(H), dtype=np.float64)
+
+
+def _way(H: Floats, points: Floats) -> float:
+    """Give how far a homography moves points, median."""
+    return float(np.median(np.hypot(*(moved(H, points) - points).T)))
+
+
+def turn_rad(ego: Ego, grey: Grey, K: Floats) -> float:
+    """Give by how much the middle of the picture turned away, as an angle."""
+    height, width = grey.shape
+    middle = np.array([[0.5 * (width - 1), 0.5 * (height - 1)]])
+    rays = (np.concatenate((middle, moved(ego.total, middle))) - K[:2, 2]) / K[[0, 1], [0, 1]]
+    a, b = np.column_stack((rays, np.ones(2)))
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))

@@ -1,0 +1,122 @@
+"""Optical flow between two pictures, of which the older is first turned as the camera was.
+
+Dense inverse search (Kroeger et al. 2016) finds motions of some 20 px; a head turns by
+more between two pictures. What is known of the turn is taken out before the search, so
+that only what the joints do not know is left to it. The flow stands at the pixels of the
+newer picture: where a thing is counts now, not where it was.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.vision.motion.image import Floats, Grey, Plane, SmallPicture
+
+Mask = NDArray[np.bool_]
+Flow = NDArray[np.float32]
+"""(height, width, 2): x right, y down, pixels."""
+
+# Below 8 px at the finest level of its pyramid, a quarter of the picture, DIS reads
+# outside its memory; how it counts its levels has changed with the versions of OpenCV.
+_LEAST_SIDE_PX, _LARGEST_ASPECT = 48, 4.0
+_PRESETS = {
+    "ultrafast": cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST,
+    "fast": cv2.DISOPTICAL_FLOW_PRESET_FAST,
+    "medium": cv2.DISOPTICAL_FLOW_PRESET_MEDIUM,
+}
+_STILL_PX = 0.02
+"""A turn that moves no corner by more is none."""
+
+
+class Compared(NamedTuple):
+    """Two pictures, laid over each other as far as the joints know how.
+
+    now: the newer picture
+    before: the older one, turned as predicted
+    known: where it shows anything, and the flow does not lead out of it
+    flow: what is at x in ``now`` is at x + flow in ``before``
+    H: (3, 3) pixels of the older picture to those of ``before``
+    shift: (h, w, 2) part of the flow that still things have by their distance; None for none
+    """
+
+    now: Grey
+    before: Grey
+    known: Mask
+    flow: Flow
+    H: Floats
+    shift: Flow | None = None
+
+
+class FlowSearch:
+    """DIS with its memory, for pictures of any size that it can bear."""
+
+    def __init__(self, preset: str, finest_level: int) -> None:
+        """Take the preset ("ultrafast", "fast" or "medium") and the level the search ends at."""
+        self._dis = cv2.DISOpticalFlow.create(_PRESETS[preset])
+        self._dis.setFinestScale(finest_level)
+
+    def compare(self, now: SmallPicture, before: SmallPicture, H: Floats) -> Compared:
+        """Find what moved, the older picture being turned by ``H`` first."""
+        grey, known = _turned(before.grey, H)
+        flow: Flow = np.zeros((*grey.shape, 2), dtype=np.float32)  # the guess, then the answer
+        self._dis.calc(now.grey, grey, flow)
+        known &= _inside(flow)
+        return Compared(now.grey, grey, known, flow, H)
+
+
+def searchable(grey: Grey) -> bool:
+    """Tell whether a picture is large enough, and shaped so, that flow can be found in it."""
+    short, long = sorted(grey.shape)
+    return bool(short >= _LEAST_SIDE_PX and long <= _LARGEST_ASPECT * short)
+
+
+def turn_homography(R_now_before: Floats | None, now: SmallPicture, before: SmallPicture) -> Floats:
+    """Give how pixels move when the camera turns about its lens: K R K^-1.
+
+    R_now_before: (3, 3) turns directions from the older camera's axes into the newer's;
+        None, or what is no number, counts as no turn
+    """
+    if R_now_before is None or not np.isfinite(R_now_before).all():
+        return np.eye(3)
+    H: Floats = now.K @ np.asarray(R_now_before, dtype=np.float64) @ np.linalg.inv(before.K)
+    return H
+
+
+def moved(H: Floats, points_px: Floats) -> Floats:
+    """Give where a homography takes (n, 2) points; infinite where it takes them behind us."""
+    homogeneous = points_px @ H[:, :2].T + H[:, 2]
+    depth = homogeneous[:, 2:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        out: Floats = np.where(depth > 1e-6, homogeneous[:, :2] / depth, np.inf)
+    return out
+
+
+def corners(shape: tuple[int, ...]) -> Floats:
+    """Give the middles of a picture's four corner pixels, (4, 2)."""
+    height, width = shape[:2]
+    return np.array([(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)], float)
+
+
+def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
+    """Turn a picture, and tell which of its pixels are known afterwards."""
+    at = corners(grey.shape)
+    height, width = grey.shape
+    if np.abs(moved(H, at) - at).max() < _STILL_PX:
+        return grey, np.ones(grey.shape, dtype=np.bool_)
+    # The edge is continued: what is not known must not look like an edge to the search.
+    turned = cv2.warpPerspective(grey, H, (width, height), borderMode=cv2.BORDER_REPLICATE)
+    white = np.full(grey.shape, 255, dtype=np.uint8)
+    known = cv2.warpPerspective(white, H, (width, height)) == 255
+    return np.asarray(turned, dtype=np.uint8), known
+
+
+def _inside(flow: Flow) -> Mask:
+    """Tell which pixels the flow leads to a pixel of the other picture."""
+    height, width = flow.shape[:2]
+    x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
+    at_x: Plane = flow[..., 0] + x
+    at_y: Plane = flow[..., 1] + y
+    out: Mask = (at_x >= 0) & (at_x <= width - 1) & (at_y >= 0) & (at_y <= height - 1)
+    return out

@@ -1,0 +1,108 @@
+"""Which pixels move on their own: what is left of the flow, where the pictures bear it out.
+
+Flow is found everywhere, in plain walls too, where it means nothing. A pixel counts when
+its flow differs from the camera's, when the camera's own motion does not explain the newer
+picture there, and when the flow does. Light that flickers, shadows' edges apart, changes the
+picture and is no better explained by any flow.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from drivers.vision.motion.ego_motion import Ego
+from drivers.vision.motion.image import Plane
+from drivers.vision.motion.optical_flow import Compared, Flow, Mask
+from drivers.vision.motion.params import MotionParams
+
+# Where brightness is compared: wide enough to average noise, narrow enough for a hand.
+_WINDOW_PX = 7
+# Wider changes than this are light, not things.
+_LIGHT_PX, _LIGHT_STEP = 41, 8.0
+# Of the change that the camera does not explain, what the flow may leave.
+_LEFT_SHARE = 0.5
+# How far above the noise a change must be (variances), and a grey level for rounding.
+_NOISE_RATIO, _ROUNDING = 2.5, 1.0
+# How far flow smears over an edge.
+_SMEAR_PX = 17
+_ONE_MAP: Plane = np.empty(0, dtype=np.float32)
+_EDGE = cv2.BORDER_REPLICATE
+
+
+class Things(NamedTuple):
+    """What moves on its own.
+
+    flow: (h, w, 2) motion from the older picture to the newer, the camera's taken out, pixels
+    mask: (h, w) where that is believed
+    threshold_px: least motion that was believed
+    """
+
+    flow: Flow
+    mask: Mask
+    threshold_px: float
+
+
+def what_moves(pair: Compared, ego: Ego, params: MotionParams) -> Things:
+    """Take the camera's own motion out of the flow and keep what the pictures bear out."""
+    there = _background(ego, pair.now.shape)
+    if pair.shift is not None:
+        there += pair.shift
+    rest = there - _added(pair.flow, 1.0)
+    least = max(params.min_flow_px, params.noise_factor * ego.noise_px)
+    threshold = least + params.parallax_share * ego.way_px
+    mask = cv2.magnitude(rest[..., 0], rest[..., 1]) > threshold + _jumps(pair.shift)
+    mask &= pair.known
+    if mask.any():
+        mask &= _borne_out(pair, there, rest)
+    return Things(rest, mask, threshold)
+
+
+def _jumps(shift: Flow | None) -> Plane | float:
+    """Give by how much still neighbours part, (h, w): flow there may be the other's."""
+    if shift is None:
+        return 0.0
+    ends = cv2.morphologyEx(shift, cv2.MORPH_GRADIENT, np.ones((_SMEAR_PX, _SMEAR_PX), np.uint8))
+    return np.asarray(ends.sum(axis=2), dtype=np.float32)
+
+
+def _background(ego: Ego, shape: tuple[int, ...]) -> Flow:
+    """Give where the still room's pixels lie in the older picture, (h, w, 2)."""
+    height, width = shape
+    x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
+    (a, b, c), (d, e, f), (g, h, i) = ego.B.astype(np.float32)
+    depth = np.maximum(g * x + h * y + i, np.float32(1e-3))
+    return np.dstack(((a * x + b * y + c) / depth, (d * x + e * y + f) / depth))
+
+
+def _borne_out(pair: Compared, there: Flow, rest: Flow) -> Mask:
+    """Tell where the flow explains the newer picture and the camera's motion does not.
+
+    Ground that a thing has left changed too, and plain ground is explained by any flow; but
+    it "came" from where nothing has changed, while a thing has left where it came from.
+    """
+    now = pair.now.astype(np.float32)
+    still = _unlike(now, pair, there)
+    moving = _unlike(now, pair, _added(pair.flow, 1.0))
+    left = cv2.remap(still, _added(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
+    noise = _ROUNDING + float(np.quantile(still[::4, ::4], 0.3))
+    out: Mask = np.minimum(still, left) > _NOISE_RATIO * noise
+    out &= moving < _LEFT_SHARE * (still - noise) + noise
+    return out
+
+
+def _added(flow: Flow, sign: float) -> Flow:
+    """Give each pixel's own place with its flow added, or taken away."""
+    out: Flow = np.float32(sign) * flow
+    out[..., 0] += np.arange(out.shape[1], dtype=np.float32)
+    out[..., 1] += np.arange(out.shape[0], dtype=np.float32)[:, None]
+    return out
+
+
+def _unlike(now: Plane, pair: Compared, there: Flow) -> Plane:
+    """Give how unlike the older picture is, seen through a map: a local mean of squares."""
+    seen = cv2.remap(pair.before, there, _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
+    off = now - seen
+    # Clipped, or a dark coat would darken all around it.
+    off -= cv2.blur(np.clip(off, -_LIGHT_STEP, _LIGHT_STEP), (_LIGHT_PX, _LIGHT_PX))
+    return np.asarray(cv2.blur(off * off, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)

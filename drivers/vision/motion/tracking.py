@@ -1,0 +1,124 @@
+"""Which moving patch is which from picture to picture, in the picture alone.
+
+Each is looked for where its last motion, and the camera's, should have taken it. Nearest
+pairs are joined first; a thing must be seen in a few pictures in a row before it is told.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.vision.motion.image import Floats
+from drivers.vision.motion.optical_flow import moved
+from drivers.vision.motion.params import MotionParams
+
+# Farthest from its expected place, in sizes (the root of box width by height).
+_GATE_SIZES = 0.75
+_LEAST_GATE_PX = 8.0
+# Two that are joined may differ so much in the root of their area: a thing shows more or
+# less of itself, a person does not become a hand.
+_LARGEST_GROWTH = 3.0
+
+
+@dataclass(slots=True)
+class Follow:
+    """One patch through time, in pixels of the small picture.
+
+    centre: (2,); velocity_px_s: (2,)
+    offset: (2,) from there to the point of it that was told last
+    size_px: root of the box's area
+    seen: pictures in a row
+    """
+
+    id: int
+    centre: Floats
+    velocity_px_s: Floats
+    size_px: float
+    seen_s: float
+    seen: int
+    offset: Floats
+
+
+class MotionTracks:
+    """Numbers for moving patches that last from picture to picture."""
+
+    def __init__(self, params: MotionParams) -> None:
+        """Take the times."""
+        self._params = params
+        self._follows: list[Follow] = []
+        self._next_id = 1
+
+    def retune(self, params: MotionParams) -> None:
+        """Take other times; what is followed stays."""
+        self._params = params
+
+    def step(
+        self,
+        centres: list[Floats],
+        velocities_px_s: list[Floats],
+        sizes_px: list[float],
+        total: Floats,
+        t_s: float,
+        dt_s: float,
+    ) -> list[Follow]:
+        """Join one picture's patches to those followed: one for each, in their order.
+
+        total: (3, 3) homography of the camera's own motion, older picture to newer
+        """
+        self.pass_over(total, t_s, dt_s)
+        found: dict[int, Follow] = {}
+        taken: set[int] = set()
+        for _, i, j in sorted(self._pairs(centres, sizes_px)):
+            follow = self._follows[i]
+            if follow.id in taken or j in found:
+                continue
+            taken.add(follow.id)
+            found[j] = follow
+        for j, centre in enumerate(centres):
+            if j not in found:
+                found[j] = self._begun(centre, t_s)
+            follow = found[j]
+            follow.centre, follow.velocity_px_s = centre, velocities_px_s[j]
+            follow.size_px, follow.seen_s = sizes_px[j], t_s
+            follow.seen += 1
+        seen_now = {follow.id for follow in found.values()}
+        for follow in self._follows:
+            if follow.id not in seen_now and follow.seen < self._params.confirm_pictures:
+                follow.seen = 0  # a flicker, not a thing: it starts again
+        return [found[j] for j in range(len(centres))]
+
+    def pass_over(self, total: Floats, t_s: float, dt_s: float) -> None:
+        """Take everything where it should be by now, and forget what is long unseen."""
+        forget_s = self._params.forget_ms / 1e3
+        self._follows = [f for f in self._follows if t_s - f.seen_s <= forget_s]
+        for follow in self._follows:
+            at = moved(total, follow.centre[None, :])[0] + follow.velocity_px_s * dt_s
+            if np.isfinite(at).all():
+                follow.centre = at
+
+    def forget(self) -> None:
+        """Forget everything; numbers are not used again."""
+        self._follows = []
+
+    def told(self, follow: Follow) -> bool:
+        """Tell whether a patch has been seen often enough."""
+        return follow.seen >= self._params.confirm_pictures
+
+    def _begun(self, centre: Floats, t_s: float) -> Follow:
+        """Begin to follow something new."""
+        follow = Follow(self._next_id, centre, np.zeros(2), 1.0, t_s, 0, np.zeros(2))
+        self._next_id += 1
+        self._follows.append(follow)
+        return follow
+
+    def _pairs(self, centres: list[Floats], sizes_px: list[float]) -> list[tuple[float, int, int]]:
+        """List who may be who, with their distance as a share of the gate."""
+        pairs = []
+        for i, follow in enumerate(self._follows):
+            for j, centre in enumerate(centres):
+                gate = max(_LEAST_GATE_PX, _GATE_SIZES * max(follow.size_px, sizes_px[j]))
+                apart = float(np.hypot(*(centre - follow.centre))) / gate
+                ratio = max(follow.size_px, 1.0) / max(sizes_px[j], 1.0)
+                if apart <= 1.0 and 1.0 / _LARGEST_GROWTH <= ratio <= _LARGEST_GROWTH:
+                    pairs.append((apart, i, j))
+        return pairs

@@ -1,0 +1,125 @@
+"""The board before an emulated head: held by somebody at first, hanging still after that.
+
+Whoever holds it brings it everywhere, near and far, and tilts it to all sides, as a
+person does who follows what the calibration asks for. The camera's true lens and mount
+are a little off those of the rig file, so that there is something to find.
+"""
+
+from dataclasses import replace
+from math import cos, pi, radians, sin
+
+import cv2
+import numpy as np
+
+from drivers.camera.source import Shot
+from gaze.angles import add, compose, rotate, rotate_back, sub
+from gaze.types import Angles3, HeadGeometry, Mat3, Vec3
+from robot.calibrate.charuco_board import CharucoBoard
+from robot.frames import CameraMount, CameraParams
+from robot.seeing.intrinsics import Intrinsics, intrinsics_of_lens, rays
+from sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
+
+# The board's own axes are optical ones, so this is a board that hangs upright before a
+# head that looks along the world's x axis.
+_R_WORLD_BOARD: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
+_AWAY_M = 0.7
+# By how much the camera sits elsewhere than the rig file says.
+_OFF_MM: Vec3 = (6.0, -4.0, 5.0)
+_OFF_DEG: Angles3 = (2.0, -3.0, 1.5)
+
+
+class BoardScene:
+    """Pictures of the board, taken when they are asked for.
+
+    head_rad: where the emulated head is; whoever moves it keeps this true
+    mount, lens: the camera as it truly is
+    """
+
+    def __init__(
+        self,
+        camera: CameraParams,
+        board: CharucoBoard,
+        geometry: HeadGeometry,
+        rng: np.random.Generator,
+        params: BoardCameraParams | None = None,
+    ) -> None:
+        """Take the camera as the rig file has it, the head's build and the dice of the noise."""
+        par = params if params is not None else BoardCameraParams()
+        self.mount, self.lens = elsewhere(camera), _lens(camera, par)
+        self.head_rad: Angles3 = (0.0, 0.0, 0.0)
+        self._camera = BoardCamera(par, self.lens, board, rng)
+        self._where = CameraMount(self.mount)
+        self._geometry = geometry
+        wide, high = board.size_m
+        _, head = geometry.head_pose((0.0, 0.0, 0.0))
+        centre = add(head, (_AWAY_M, 0.02, 0.01))
+        self.p_world_board_m = sub(centre, rotate(_R_WORLD_BOARD, (wide / 2, high / 2, 0.0)))
+        self.R_world_board = _R_WORLD_BOARD
+        self._hanging = False
+        self._number = 0
+
+    def hang(self) -> None:
+        """Hang the board up, upright and 0.7 m before the head."""
+        self._hanging = True
+
+    def look(self, now_s: float) -> Shot:
+        """Take the next picture."""
+        self._number += 1
+        if self._hanging:
+            pose = self.seen_pose(self.head_rad)
+        else:
+            pose = held_pose(self._number - 1, self._camera.params, self.lens, self._camera.board)
+        return Shot(now_s, self._number, self._camera.picture(*pose))
+
+    def seen_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
+        """Give R_camera_board and p_camera_board_m of the hanging board for neck angles."""
+        R, p = self._where.pose(*self._geometry.head_pose(head_rad))
+        a, b, c = R
+        back: Mat3 = ((a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2]))
+        return compose(back, self.R_world_board), rotate_back(R, sub(self.p_world_board_m, p))
+
+
+def elsewhere(camera: CameraParams) -> CameraParams:
+    """Give a mount a little off the one of the rig file."""
+    x, y, z = (mm + off for mm, off in zip(camera.position_mm, _OFF_MM, strict=True))
+    return replace(
+        camera,
+        position_mm=(x, y, z),
+        yaw_deg=camera.yaw_deg + _OFF_DEG[0],
+        pitch_deg=camera.pitch_deg + _OFF_DEG[1],
+        roll_deg=camera.roll_deg + _OFF_DEG[2],
+    )
+
+
+def held_pose(
+    number: int, params: BoardCameraParams, lens: Intrinsics, board: CharucoBoard
+) -> tuple[Mat3, Vec3]:
+    """Give R_camera_board and p_camera_board_m of the number-th way to hold the board, from 0.
+
+    Everywhere in the picture, near and far, tilted to all sides; no two alike.
+    """
+    # Golden ratios spread any count of samples evenly.
+    a, b, c = ((number + 0.5) * g % 1.0 for g in (0.7548776662, 0.5698402910, 0.6180339887))
+    fills = 0.38 + 0.34 * c
+    tilt, about = radians(12.0 + 26.0 * ((number * 0.41) % 1.0)), 2.0 * pi * c + number * pi / 2
+    turn, _ = cv2.Rodrigues(tilt * np.array((cos(about), sin(about), 0.0)))
+    spin, _ = cv2.Rodrigues(np.array((0.0, 0.0, radians(15.0) * (2.0 * b - 1.0))))
+    R = turn @ spin
+    wide, high = board.size_m
+    away = lens.fx_px * wide / (fills * params.width_px)
+    # Now and then a part of it is out of the picture.
+    fills_height = fills * (params.width_px / params.height_px) * high / wide
+    u = params.width_px * (0.5 + (0.5 - 0.4 * fills) * (2.0 * a - 1.0))
+    v = params.height_px * (0.5 + (0.5 - 0.4 * fills_height) * (2.0 * b - 1.0))
+    centre = away * rays(np.array([(u, v)]), lens)[0]
+    p = centre - R @ (wide / 2, high / 2, 0.0)
+    rows = [(row[0], row[1], row[2]) for row in R.tolist()]
+    return (rows[0], rows[1], rows[2]), (float(p[0]), float(p[1]), float(p[2]))
+
+
+def _lens(camera: CameraParams, params: BoardCameraParams) -> Intrinsics:
+    """Take the lens that was measured, or one that is a little off its field of view."""
+    size = (params.width_px, params.height_px)
+    if camera.lens is None:
+        return true_lens(*size, camera.horizontal_field_deg)
+    return intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), *size)

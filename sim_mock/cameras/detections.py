@@ -1,0 +1,157 @@
+"""A camera that looks into a simulated scene from where the emulated head is.
+
+It gives what a detector would find, not pixels: landmarks with noise, hands and things
+with a place in depth; late by its latency, at its own rate, inside its own field, and
+now and then nothing. Not modelled: motion blur, light, occlusion, false detections.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import radians
+
+import numpy as np
+
+from drivers.types import DetectedFace, Detections, MovingBlob
+from gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
+from gaze.types import Mat3, Vec3
+from robot.frames import CameraMount
+from robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
+from sim_mock.scenes.scene import Person, Scene, Thing
+
+_FARTHEST_FACE_M = 4.0
+_HAND_RADIUS_M = 0.07
+_FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
+_FACE_BOX_M = 0.17
+
+
+@dataclass(frozen=True)
+class SceneCameraParams:
+    """How good the camera and its detector are."""
+
+    width_px: int = field(default=640, metadata={"low": 32, "high": 4096, "unit": "px"})
+    height_px: int = field(default=400, metadata={"low": 32, "high": 4096, "unit": "px"})
+    horizontal_field_deg: float = field(
+        default=69.0, metadata={"low": 10.0, "high": 150.0, "unit": "deg"}
+    )
+    rate_hz: float = field(default=30.0, metadata={"low": 1.0, "high": 240.0, "unit": "Hz"})
+    latency_ms: float = field(default=60.0, metadata={"low": 0.0, "high": 1000.0, "unit": "ms"})
+    landmark_noise_px: float = field(default=0.5, metadata={"low": 0.0, "high": 20.0, "unit": "px"})
+    depth_noise_mm: float = field(default=5.0, metadata={"low": 0.0, "high": 500.0, "unit": "mm"})
+    missed_share: float = field(default=0.03, metadata={"low": 0.0, "high": 1.0, "unit": ""})
+
+
+class SceneCamera:
+    """A drivers.types.Camera on a scene; everything happens when it is looked at."""
+
+    def __init__(
+        self,
+        params: SceneCameraParams,
+        scene: Scene,
+        mount: CameraMount,
+        head_pose: Callable[[float], tuple[Mat3, Vec3]],
+        rng: np.random.Generator,
+    ) -> None:
+        """Take the scene, where the camera sits, where the head really is, and the dice."""
+        self._params = params
+        self._scene = scene
+        self._mount = mount
+        self._head_pose = head_pose
+        self._rng = rng
+        self._lens = intrinsics_of_view(
+            radians(params.horizontal_field_deg), params.width_px, params.height_px
+        )
+
+    def open(self) -> None:
+        """Start: the first picture is taken at the first look."""
+        self._on_the_way: deque[Detections] = deque()
+        self._arrived: Detections | None = None
+        self._start_s: float | None = None
+        self._number = 0
+
+    def latest(self, now_s: float) -> Detections | None:
+        """Give the newest detections that have arrived by ``now_s``."""
+        if self._start_s is None:
+            self._start_s = now_s
+        if now_s >= self._start_s + self._number / self._params.rate_hz - 1e-9:
+            # A late look skips the pictures it missed, as a real camera's slot does.
+            due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
+            self._number = max(self._number, due) + 1
+            self._on_the_way.append(self._expose(now_s))
+        while (
+            self._on_the_way
+            and now_s >= self._on_the_way[0].captured_s + self._params.latency_ms / 1e3 - 1e-9
+        ):
+            self._arrived = self._on_the_way.popleft()
+        return self._arrived
+
+    def events(self) -> tuple[str, ...]:
+        """Have nothing to tell."""
+        return ()
+
+    def close(self) -> None:
+        """Stop; nothing is held."""
+
+    def _expose(self, t_s: float) -> Detections:
+        """Take one picture from where the camera is."""
+        assert self._start_s is not None
+        R, p = self._mount.pose(*self._head_pose(t_s))
+        faces: list[DetectedFace] = []
+        blobs: list[MovingBlob] = []
+        scene_s = t_s - self._start_s
+        for index, person in enumerate(self._scene.people(scene_s)):
+            face = self._face(person, R, p)
+            if face is not None:
+                faces.append(face)
+            if person.hand is not None:
+                hand = Thing(index, "hand", person.hand, _HAND_RADIUS_M)
+                blobs.extend(self._blob(hand, R, p))
+        for thing in self._scene.things(scene_s):
+            blobs.extend(self._blob(thing._replace(id=_FIRST_THING_ID + thing.id), R, p))
+        faces.sort(key=lambda face: -face.box_px[2])
+        par = self._params
+        return Detections(
+            t_s, self._number, par.width_px, par.height_px, tuple(faces), tuple(blobs)
+        )
+
+    def _face(self, person: Person, R: Mat3, p: Vec3) -> DetectedFace | None:
+        """Project the landmarks; no detector finds what is cut off, far or turned away."""
+        noise = self._rng.normal(0.0, self._params.landmark_noise_px, (5, 2))
+        missed = self._rng.random() < self._params.missed_share
+        yaw, pitch = person.face_yaw_pitch_rad
+        R_world_face = rotation((yaw, pitch, 0.0))
+        to_camera = sub(p, person.p_world_face_m)
+        outwards = rotate(R_world_face, (1.0, 0.0, 0.0))
+        turned_away = dot(unit(to_camera), outwards) < np.cos(radians(60.0))
+        if missed or turned_away or norm(to_camera) > _FARTHEST_FACE_M:
+            return None
+        points = []
+        for x, y, z in LANDMARKS_FACE_M.tolist():
+            q = rotate(R_world_face, (x, y, z))
+            world = tuple(a + b for a, b in zip(person.p_world_face_m, q, strict=True))
+            points.append(rotate_back(R, sub((world[0], world[1], world[2]), p)))
+        if min(point[2] for point in points) < 0.1:
+            return None
+        px = project(np.array(points), self._lens)
+        size = self._lens.fx_px * _FACE_BOX_M / points[2][2]
+        x, y = px[2].tolist()
+        box = (x - size / 2, y - size / 2, size, size)
+        if not self._inside(x, y, size / 2):
+            return None
+        return DetectedFace(box, px + noise, 0.98)
+
+    def _blob(self, thing: Thing, R: Mat3, p: Vec3) -> tuple[MovingBlob, ...]:
+        """Place a hand or thing by depth; nothing where it is behind or outside the picture."""
+        noise = self._rng.normal(0.0, self._params.depth_noise_mm / 1e3)
+        point = rotate_back(R, sub(thing.p_world_m, p))
+        if point[2] < 0.1:
+            return ()
+        x, y = project(np.array([point]), self._lens)[0].tolist()
+        if not self._inside(x, y, 0.0):
+            return ()
+        place = scale(point, 1.0 + noise / norm(point))
+        return (MovingBlob(thing.id, thing.kind, place, thing.radius_m),)
+
+    def _inside(self, x: float, y: float, margin: float) -> bool:
+        par = self._params
+        return margin <= x <= par.width_px - margin and margin <= y <= par.height_px - margin

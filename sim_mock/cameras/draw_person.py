@@ -1,0 +1,249 @@
+"""A person as a camera sees one: a drawn face of true size and pose, and a body below it.
+
+The face is that of robot.seeing.face_pose: its eyes, nose and mouth lie where the landmarks are, in
+three dimensions, so that a face detector that was made for people finds them there. Not
+drawn: arms, expression, blinks; the eyes look straight ahead.
+"""
+
+from functools import lru_cache
+from math import pi
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from gaze.angles import rotation
+from gaze.types import Vec3
+from robot.seeing.face_pose import LANDMARKS_FACE_M
+from sim_mock.cameras.canvas import Bytes, Colour, Floats, Picture3d, Sheet
+from sim_mock.scenes.scene import Person, Thing
+
+
+class Looks(NamedTuple):
+    """Colours of a person."""
+
+    skin: Colour
+    hair: Colour
+    shirt: Colour
+
+
+LOOKS = (
+    Looks((150, 180, 225), (35, 50, 70), (140, 90, 60)),
+    Looks((135, 165, 210), (25, 30, 35), (70, 80, 160)),
+    Looks((165, 195, 235), (70, 120, 165), (90, 130, 80)),
+)
+
+_RIGHT_EYE, _LEFT_EYE, _, _MOUTH_RIGHT, _MOUTH_LEFT = LANDMARKS_FACE_M
+# Head as an ellipsoid: its middle and half axes in the face frame.
+HEAD_MIDDLE_M: Vec3 = (-0.103, 0.0, 0.0)
+HEAD_HALF_M: Vec3 = (0.088, 0.074, 0.112)
+_HAIR_MIDDLE_M: Vec3 = (-0.118, 0.0, 0.018)
+_HAIR_HALF_M: Vec3 = (0.098, 0.083, 0.124)
+_AROUND = np.linspace(0.0, 2.0 * pi, 40, endpoint=False)
+_TORSO_TOP_M, _TORSO_HEIGHT_M, _TORSO_WIDTH_M, _TORSO_BEHIND_M = -0.075, 0.80, 0.46, 0.10
+
+
+def draw_person(canvas: Picture3d, person: Person, number: int) -> None:
+    """Draw a person; people with the same number look the same."""
+    looks = LOOKS[number % len(LOOKS)]
+    yaw, pitch = person.face_yaw_pitch_rad
+    R = np.array(rotation((yaw, pitch, 0.0)))
+    draw_body(canvas, person.p_world_face_m, looks, number)
+    draw_head(canvas, person.p_world_face_m, R, looks)
+
+
+def draw_head(canvas: Picture3d, p_world_face_m: Vec3, R_world_face: Floats, looks: Looks) -> None:
+    """Draw head and face with the face's axes at the tip of the nose."""
+
+    def world(points_face_m: Floats) -> Floats:
+        out: Floats = points_face_m @ R_world_face.T + np.array(p_world_face_m)
+        return out
+
+    back = world(_ellipsoid(_HAIR_MIDDLE_M, _HAIR_HALF_M))
+    if canvas.seen(back)[:, 2].min() < 0.05:
+        return
+    _hull(canvas, back, looks.hair)
+    to_camera = (canvas.p_m - np.array(p_world_face_m)) @ R_world_face
+    if to_camera[0] > 0.0:
+        for outline, colour in _features(looks):
+            canvas.polygon(world(outline), colour)
+    middle = world(np.array([HEAD_MIDDLE_M]))[0]
+    canvas.ellipsoid_depth((middle[0], middle[1], middle[2]), R_world_face, HEAD_HALF_M)
+
+
+def draw_body(canvas: Picture3d, p_world_face_m: Vec3, looks: Looks, number: int) -> None:
+    """Draw shoulders and trunk, turned to the camera."""
+    x, y, z = p_world_face_m
+    away = np.array((x - canvas.p_m[0], y - canvas.p_m[1]))
+    away /= max(1e-6, float(np.linalg.norm(away)))
+    aside = np.array((away[1], -away[0], 0.0)) * _TORSO_WIDTH_M
+    middle = np.array((x, y, z + _TORSO_TOP_M)) + (*(away * _TORSO_BEHIND_M), 0.0)
+    corner = middle - 0.5 * aside
+    canvas.sheet(
+        Sheet(_vec(corner), _vec(aside), (0.0, 0.0, -_TORSO_HEIGHT_M), _trunk(looks, number))
+    )
+
+
+def draw_thing(canvas: Picture3d, thing: Thing) -> None:
+    """Draw a thing as a patterned ball; of hands, the colour of skin."""
+    way = np.array(thing.p_world_m) - canvas.p_m
+    aside = np.cross(way, (0.0, 0.0, 1.0))
+    aside /= max(1e-6, float(np.linalg.norm(aside)))
+    up = np.cross(aside, way / max(1e-6, float(np.linalg.norm(way))))
+    r = thing.radius_m
+    corner = np.array(thing.p_world_m) - r * aside + r * up
+    texture = _ball(thing.kind == "hand", thing.id)
+    canvas.sheet(Sheet(_vec(corner), _vec(2 * r * aside), _vec(-2 * r * up), texture))
+
+
+def _hull(canvas: Picture3d, points_world_m: Floats, colour: Colour) -> None:
+    """Fill the outline of a round body given by points on it."""
+    seen = canvas.seen(points_world_m)
+    flat = (seen[:, :2] / seen[:, 2:]).astype(np.float32)
+    order = cv2.convexHull(flat, returnPoints=False)[:, 0]
+    canvas.polygon(points_world_m[order], colour)
+
+
+def _ellipsoid(middle_m: Vec3, half_m: Vec3) -> Floats:
+    """Give points all over an ellipsoid."""
+    up = np.linspace(-1.0, 1.0, 13)[:, None]
+    level = np.sqrt(1.0 - up * up)
+    x, y = level * np.cos(_AROUND), level * np.sin(_AROUND)
+    points = np.stack((x, y, np.broadcast_to(up, x.shape)), axis=2).reshape(-1, 3)
+    return np.asarray(points * half_m + middle_m, dtype=np.float64)
+
+
+@lru_cache(maxsize=8)
+def _features(looks: Looks) -> tuple[tuple[Floats, Colour], ...]:
+    """Give the outlines of a face's features, in the order in which they are drawn."""
+    skin = looks.skin
+    shade, deep = _darker(skin, 0.86), _darker(skin, 0.68)
+    drawn: list[tuple[Floats, Colour]] = [
+        (_on_head(0.066 * np.cos(_AROUND), -0.008 + 0.098 * np.sin(_AROUND)), skin),
+    ]
+    for eye, side in ((_RIGHT_EYE, -1.0), (_LEFT_EYE, 1.0)):
+        x, y, z = eye.tolist()
+        drawn += [
+            (_ellipse((x, y, z + 0.002), 0.019, 0.012), shade),
+            (_ellipse((x, y, z), 0.0145, 0.0068), (238, 240, 242)),
+            (_ellipse((x, y, z), 0.0062, 0.0062), (40, 50, 60)),
+            (_arc((x, y, z + 0.0062), 0.016, 0.003, 0.0030), (30, 35, 45)),
+            (_arc((x + 0.006, y + 0.002 * side, z + 0.018), 0.019, 0.005, 0.0055), looks.hair),
+        ]
+    drawn += [
+        (
+            np.array(
+                [(-0.022, -0.006, 0.028), (-0.004, -0.014, -0.008), (0, 0, -0.010), (0, 0, 0.0)]
+            ),
+            shade,
+        ),
+        (
+            np.array(
+                [(-0.022, 0.006, 0.028), (-0.004, 0.014, -0.008), (0, 0, -0.010), (0, 0, 0.0)]
+            ),
+            skin,
+        ),
+        (_ellipse((-0.004, 0.0, -0.010), 0.014, 0.0045), deep),
+        (_ellipse((-0.006, -0.0065, -0.011), 0.0035, 0.0025), (45, 50, 70)),
+        (_ellipse((-0.006, 0.0065, -0.011), 0.0035, 0.0025), (45, 50, 70)),
+        (_mouth(0.0075, 0.0085), (95, 95, 175)),
+        (_mouth(0.0012, 0.0012), (55, 50, 95)),
+        (_arc((-0.020, 0.0, -0.056), 0.012, -0.002, 0.0025), shade),
+    ]
+    return tuple(drawn)
+
+
+def _nose_side(side: float) -> Floats:
+    """Give the flank of the nose on the owner's left (1) or right (-1)."""
+    root, wing = (-0.022, 0.006 * side, 0.028), (-0.004, 0.014 * side, -0.008)
+    return np.array([root, wing, (0.0, 0.0, -0.010), (0.0, 0.0, 0.0)])
+
+
+def _mouth(above_m: float, below_m: float) -> Floats:
+    """Give lips between the corners of the mouth, so far above and below their line."""
+    a, b = _MOUTH_RIGHT, _MOUTH_LEFT
+    share = np.linspace(0.0, 1.0, 13)[:, None]
+    line = a + share * (b - a)
+    bulge = np.sin(pi * share[:, 0])
+    line[:, 0] += 0.012 * bulge
+    upper, lower = line.copy(), line.copy()
+    upper[:, 2] += above_m * bulge
+    lower[:, 2] -= below_m * bulge
+    return np.concatenate((upper, lower[::-1]))
+
+
+def _ellipse(middle: tuple[float, float, float], half_y: float, half_z: float) -> Floats:
+    """Give an upright ellipse at a place."""
+    x, y, z = middle
+    t = _AROUND[::2]
+    return np.stack((np.full(len(t), x), y + half_y * np.cos(t), z + half_z * np.sin(t)), axis=1)
+
+
+def _arc(
+    middle: tuple[float, float, float], half_y: float, rise_m: float, thick_m: float
+) -> Floats:
+    """Give a band that bends down by ``rise_m`` to its ends, thinner there."""
+    x, y, z = middle
+    share = np.linspace(-1.0, 1.0, 9)
+    base = z - rise_m * share * share
+    half = 0.5 * thick_m * (1.0 - 0.6 * share * share)
+    ys, xs = y + half_y * share, np.full(9, x)
+    top = np.stack((xs, ys, base + half), axis=1)
+    bottom = np.stack((xs, ys, base - half), axis=1)
+    return np.concatenate((top, bottom[::-1]))
+
+
+def _on_head(y: Floats, z: Floats) -> Floats:
+    """Give points of the head's front above given places of the face's plane."""
+    cx, cy, cz = HEAD_MIDDLE_M
+    a, b, c = HEAD_HALF_M
+    inside = np.maximum(0.0, 1.0 - ((y - cy) / b) ** 2 - ((z - cz) / c) ** 2)
+    return np.stack((cx + a * np.sqrt(inside), y, z), axis=1)
+
+
+@lru_cache(maxsize=8)
+def _trunk(looks: Looks, number: int) -> Bytes:
+    """Give a neck, sloping shoulders and a checked shirt: (h, w, 4), opaque where they are."""
+    width, height = 138, 225
+    shirt = np.zeros((height, width, 4), np.uint8)
+    rng = np.random.default_rng(1000 + number)
+    checks = cv2.resize(
+        rng.uniform(-45.0, 45.0, (26, 16)), (width, height), interpolation=cv2.INTER_LINEAR
+    )
+    shirt[:, :, :3] = np.clip(checks[:, :, None] + np.array(looks.shirt), 0.0, 255.0)
+    neck = np.zeros((height, width), np.uint8)
+    cv2.rectangle(neck, (52, 0), (86, 36), 255, -1)
+    cv2.ellipse(neck, (69, 36), (17, 10), 0.0, 0.0, 360.0, 255, -1)
+    outline = np.array(
+        [(52, 22), (86, 22), (120, 34), (137, 60), (137, 224), (0, 224), (0, 60), (18, 34)]
+    )
+    body = np.zeros((height, width), np.uint8)
+    cv2.fillPoly(body, [outline], 255, cv2.LINE_AA)
+    shirt[neck > 0, :3] = _darker(looks.skin, 0.85)
+    shirt[:, :, 3] = np.maximum(body, neck)
+    return shirt
+
+
+@lru_cache(maxsize=32)
+def _ball(hand: bool, number: int) -> Bytes:
+    """Give a round patterned patch: (64, 64, 4)."""
+    rng = np.random.default_rng(2000 + number)
+    spread = 25.0 if hand else 90.0
+    colour = np.array(LOOKS[0].skin if hand else rng.uniform(60.0, 200.0, 3))
+    cells = rng.uniform(-spread, spread, (6, 6))
+    pattern = cv2.resize(cells, (64, 64), interpolation=cv2.INTER_CUBIC)
+    ball = np.zeros((64, 64, 4), np.uint8)
+    ball[:, :, :3] = np.clip(colour + pattern[:, :, None], 0.0, 255.0)
+    opaque = np.zeros((64, 64), np.uint8)
+    cv2.circle(opaque, (32, 32), 31, 255, -1, cv2.LINE_AA)
+    ball[:, :, 3] = opaque
+    return ball
+
+
+def _darker(colour: Colour, share: float) -> Colour:
+    b, g, r = colour
+    return round(b * share), round(g * share), round(r * share)
+
+
+def _vec(row: Floats) -> Vec3:
+    return float(row[0]), float(row[1]), float(row[2])

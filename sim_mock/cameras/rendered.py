@@ -1,0 +1,256 @@
+"""A camera that draws what it would see from where the emulated head is, and really looks at it.
+
+Where scene_camera gives what a detector would find, this one gives pixels, and the real
+detectors find what they find: a room with texture, people with faces, things, distances.
+Pictures come late, at their own rate, noisy, and smeared by the camera's turn during the
+exposure; a depth picture has the noise of stereo and holes at edges. Not modelled: lens
+distortion, rolling shutter, light, the smear of things that move themselves.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import hypot, radians
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.types import Detections, FaceDetector, MovingBlob, Picture
+from gaze.angles import norm, sub
+from gaze.types import Mat3, Vec3
+from robot.frames import CameraMount
+from robot.seeing.intrinsics import Intrinsics, intrinsics_of_view
+from sim_mock.cameras.canvas import Picture3d
+from sim_mock.cameras.draw_person import draw_person, draw_thing
+from sim_mock.cameras.draw_room import draw_room
+from sim_mock.scenes.scene import Scene, Thing
+
+_HAND_RADIUS_M = 0.07
+_FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
+# A second of noise would cost more than the drawing; a piece of one stock is as good.
+_NOISE_STOCK = 1 << 21
+# Stereo is blind beside edges: over so many pixels, where the distance jumps by this share.
+_BLIND_PX, _JUMP = 5, 0.08
+
+
+class Exposure(NamedTuple):
+    """One picture as taken.
+
+    picture: (h, w, 3) BGR; depth_m: (h, w) metres along the axis, NaN in holes, None without
+    R_world_camera, p_world_camera_m: where the camera truly was
+    """
+
+    captured_s: float
+    number: int
+    picture: Picture
+    depth_m: NDArray[np.float32] | None
+    R_world_camera: Mat3
+    p_world_camera_m: Vec3
+
+
+FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
+"""Finds what moves since the exposure before."""
+
+
+@dataclass(frozen=True)
+class PixelCameraParams:
+    """How good the camera is."""
+
+    width_px: int = field(default=640, metadata={"low": 32, "high": 4096, "unit": "px"})
+    height_px: int = field(default=400, metadata={"low": 32, "high": 4096, "unit": "px"})
+    horizontal_field_deg: float = field(
+        default=69.0, metadata={"low": 10.0, "high": 150.0, "unit": "deg"}
+    )
+    rate_hz: float = field(default=30.0, metadata={"low": 1.0, "high": 240.0, "unit": "Hz"})
+    latency_ms: float = field(default=60.0, metadata={"low": 0.0, "high": 1000.0, "unit": "ms"})
+    exposure_ms: float = field(default=8.0, metadata={"low": 0.0, "high": 100.0, "unit": "ms"})
+    noise_grey: float = field(default=3.0, metadata={"low": 0.0, "high": 60.0, "unit": ""})
+    depth: bool = field(default=False, metadata={"unit": "", "says": "it measures depth, too"})
+    depth_noise_1_m: float = field(default=0.004, metadata={"low": 0.0, "high": 0.2, "unit": "1/m"})
+    room_seed: int = field(default=0, metadata={"low": 0, "high": 1 << 30, "unit": ""})
+
+
+class PixelCamera:
+    """A drivers.types.Camera on a drawn scene; everything happens when it is looked at."""
+
+    def __init__(
+        self,
+        params: PixelCameraParams,
+        scene: Scene,
+        mount: CameraMount,
+        head_pose: Callable[[float], tuple[Mat3, Vec3]],
+        detector: FaceDetector,
+        rng: np.random.Generator,
+        find_motion: FindMotion | None = None,
+    ) -> None:
+        """Take the scene, where the camera sits, where the head really is, and what looks.
+
+        find_motion: finds what moves, besides the faces
+        """
+        self._params = params
+        self._scene = scene
+        self._mount = mount
+        self._head_pose = head_pose
+        self._detector = detector
+        self._rng = rng
+        self._find_motion = find_motion
+        self.lens = intrinsics_of_view(
+            radians(params.horizontal_field_deg), params.width_px, params.height_px
+        )
+        self._noise = rng.standard_normal(_NOISE_STOCK, dtype=np.float32) * params.noise_grey
+        self.open()
+
+    def open(self) -> None:
+        """Start: the first picture is taken at the first look."""
+        self._on_the_way: deque[Detections] = deque()
+        self._arrived: Detections | None = None
+        self._start_s: float | None = None
+        self._number = 0
+        self._before: tuple[float, Mat3] | None = None
+
+    def latest(self, now_s: float) -> Detections | None:
+        """Give the newest detections that have arrived by ``now_s``."""
+        if self._start_s is None:
+            self._start_s = now_s
+        R, p = self._mount.pose(*self._head_pose(now_s))
+        if now_s >= self._start_s + self._number / self._params.rate_hz - 1e-9:
+            # A late look skips the pictures it missed, as a real camera's slot does.
+            due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
+            self._number = max(self._number, due) + 1
+            self._on_the_way.append(self._looked_at(self._expose(now_s, R, p)))
+        self._before = now_s, R
+        late_s = self._params.latency_ms / 1e3
+        while self._on_the_way and now_s >= self._on_the_way[0].captured_s + late_s - 1e-9:
+            self._arrived = self._on_the_way.popleft()
+        return self._arrived
+
+    def retune(
+        self,
+        detector: Callable[[], FaceDetector] | None,
+        motion: Callable[[FindMotion | None], FindMotion | None] | None,
+    ) -> bool:
+        """Look otherwise from the next picture on; always possible.
+
+        detector: makes another one; motion: gives what finds motion from what did; None: as is
+
+        Raises:
+            drivers.errors.SetupError: the detector cannot be made; the old one goes on.
+        """
+        if motion is not None:
+            self._find_motion = motion(self._find_motion)
+        if detector is not None:
+            self._detector = detector()
+        return True
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call: nothing ever does."""
+        return ()
+
+    def close(self) -> None:
+        """Stop; nothing is held."""
+
+    def _looked_at(self, shot: Exposure) -> Detections:
+        """Let the detectors look at a picture."""
+        blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
+        height, width = shot.picture.shape[:2]
+        return Detections(
+            shot.captured_s,
+            shot.number,
+            width,
+            height,
+            self._detector.find(shot.picture),
+            blobs,
+            picture=shot.picture,
+            depth_m=shot.depth_m,
+        )
+
+    def _expose(self, t_s: float, R: Mat3, p: Vec3) -> Exposure:
+        """Take one picture from where the camera is; its time is the middle of the exposure."""
+        assert self._start_s is not None
+        par = self._params
+        canvas = Picture3d(par.width_px, par.height_px, self.lens, R, p)
+        draw_scene(canvas, self._scene, t_s - self._start_s, par.room_seed)
+        picture = self._noisy(smeared(canvas.picture, self._smear_px(t_s, R)))
+        depth = self._stereo(canvas.depth_m) if par.depth else None
+        return Exposure(t_s, self._number, picture, depth, R, p)
+
+    def _smear_px(self, t_s: float, R: Mat3) -> tuple[float, float]:
+        """Give how far the picture's middle moves during the exposure."""
+        if self._before is None or t_s <= self._before[0]:
+            return 0.0, 0.0
+        before_s, R_before = self._before
+        ahead = np.array(R_before).T @ np.array(R)[:, 2]
+        share = self._params.exposure_ms / 1e3 / (t_s - before_s)
+        lens = self.lens
+        return (
+            float(-ahead[0] / ahead[2]) * lens.fx_px * share,
+            float(-ahead[1] / ahead[2]) * lens.fy_px * share,
+        )
+
+    def _noisy(self, picture: NDArray[np.uint8]) -> Picture:
+        """Add the sensor's noise."""
+        if self._params.noise_grey <= 0.0:
+            return picture
+        noise = self._piece(picture.size).reshape(picture.shape)
+        out: Picture = cv2.add(picture, noise, dtype=cv2.CV_8U).astype(np.uint8, copy=False)
+        return out
+
+    def _stereo(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Give distances as stereo measures them: error with the square, blind beside edges."""
+        noise = self._piece(depth_m.size).reshape(depth_m.shape)
+        noise = noise * (self._params.depth_noise_1_m / max(self._params.noise_grey, 1e-9))
+        seen = depth_m * (1.0 + depth_m * noise)
+        kernel = np.ones((_BLIND_PX, _BLIND_PX), np.uint8)
+        step = cv2.dilate(depth_m, kernel) - cv2.erode(depth_m, kernel)
+        blind = ~(step < _JUMP * depth_m)
+        out: NDArray[np.float32] = np.where(blind, np.float32(np.nan), seen).astype(np.float32)
+        return out
+
+    def _piece(self, size: int) -> NDArray[np.float32]:
+        """Give a piece of the stock of noise, another each time."""
+        start = int(self._rng.integers(0, _NOISE_STOCK))
+        return np.take(self._noise, np.arange(start, start + size), mode="wrap")
+
+
+def draw_scene(canvas: Picture3d, scene: Scene, scene_s: float, room_seed: int = 0) -> None:
+    """Draw a room and who and what is in it, the farthest first."""
+    draw_room(canvas, room_seed)
+    eye = (float(canvas.p_m[0]), float(canvas.p_m[1]), float(canvas.p_m[2]))
+    drawn: list[tuple[float, Callable[[], None]]] = []
+    for number, person in enumerate(scene.people(scene_s)):
+        away = norm(sub(person.p_world_face_m, eye))
+        drawn.append((away, _later(draw_person, canvas, person, number)))
+        if person.hand is not None:
+            hand = Thing(number, "hand", person.hand, _HAND_RADIUS_M)
+            drawn.append((norm(sub(person.hand, eye)), _later(draw_thing, canvas, hand)))
+    for thing in scene.things(scene_s):
+        other = thing._replace(id=_FIRST_THING_ID + thing.id)
+        drawn.append((norm(sub(thing.p_world_m, eye)), _later(draw_thing, canvas, other)))
+    for _, draw in sorted(drawn, key=lambda item: -item[0]):
+        draw()
+
+
+def smeared(picture: NDArray[np.uint8], way_px: tuple[float, float]) -> NDArray[np.uint8]:
+    """Smear a picture evenly along a way (x, y) through each pixel's place."""
+    length = hypot(*way_px)
+    if length < 1.0:
+        return picture
+    half = int(np.ceil(0.5 * length))
+    kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
+    # Looks spread evenly over the way, each shared among the four pixels around it.
+    for share in np.linspace(-0.5, 0.5, 4 * half + 1).tolist():
+        x, y = half + share * way_px[0], half + share * way_px[1]
+        i, j = min(int(x), 2 * half - 1), min(int(y), 2 * half - 1)
+        u, v = x - i, y - j
+        kernel[j : j + 2, i : i + 2] += np.outer((1.0 - v, v), (1.0 - u, u))
+    out: NDArray[np.uint8] = cv2.filter2D(
+        picture, -1, kernel / kernel.sum(), borderType=cv2.BORDER_REPLICATE
+    ).astype(np.uint8, copy=False)
+    return out
+
+
+def _later(draw: Callable[..., None], *what: Any) -> Callable[[], None]:
+    """Keep a call for later."""
+    return lambda: draw(*what)

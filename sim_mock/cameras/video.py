@@ -1,0 +1,129 @@
+"""A film seen as a camera in simulated time: the same calls give the same detections.
+
+It does not blur, distort, drop or reorder pictures, and its delay is constant.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from drivers.camera.frame_analysis import Motion, look
+from drivers.camera.source import Shot
+from drivers.types import Detections, FaceDetector
+
+
+class Film(Protocol):
+    """Pictures by number from 1, each due at a film time; without end."""
+
+    def open(self) -> None:
+        """Open at film time 0."""
+        ...
+
+    def due_s(self, number: int) -> float:
+        """Give the film time at which a picture is due."""
+        ...
+
+    def shot(self, number: int) -> Shot:
+        """Read a picture with what belongs to it; numbers never run back."""
+        ...
+
+    def events(self) -> tuple[str, ...]:
+        """Say once what a person should know of the film."""
+        ...
+
+    def close(self) -> None:
+        """Free the file."""
+        ...
+
+
+class FilmCamera:
+    """A film that starts at a simulated time and is watched for faces.
+
+    Every picture is looked at exactly once and in order, however far time jumps, so that
+    the counts are those of any other run to the same time.
+
+    pictures, pictures_with_face: counts of pictures looked at since open
+    """
+
+    def __init__(
+        self,
+        video: Film,
+        detector: FaceDetector,
+        delay_s: float,
+        start_s: float = 0.0,
+        motion: Motion | None = None,
+    ) -> None:
+        """Take the film, what finds faces, and the time from exposure to detections.
+
+        start_s: simulated time of the first exposure; motion: finds what moves
+
+        Raises:
+            ValueError: the delay is negative.
+        """
+        if not delay_s >= 0.0:
+            raise ValueError(f"detections cannot come before their picture: delay {delay_s} s")
+        self._video = video
+        self._detector = detector
+        self._delay_s = delay_s
+        self._start_s = start_s
+        self._motion = motion
+        self._newest: Detections | None = None
+        self.pictures = 0
+        self.pictures_with_face = 0
+
+    def open(self) -> None:
+        """Open the film at its first picture.
+
+        Raises:
+            drivers.errors.CameraError: the film cannot be opened.
+        """
+        self._video.open()
+        self._newest = None
+        self.pictures = self.pictures_with_face = 0
+
+    def latest(self, now_s: float) -> Detections | None:
+        """Give the newest detections that have come through by ``now_s``.
+
+        Raises:
+            drivers.errors.CameraError: the film cannot be read any more.
+        """
+        while self._captured_s(self.pictures + 1) + self._delay_s <= now_s:
+            self._look(self.pictures + 1)
+        return self._newest
+
+    def retune(
+        self,
+        detector: Callable[[], FaceDetector] | None,
+        motion: Callable[[Motion | None], Motion | None] | None,
+    ) -> bool:
+        """Look otherwise from the next picture on; always possible.
+
+        detector: makes another one; motion: gives what finds motion from what did; None: as is
+
+        Raises:
+            drivers.errors.SetupError: the detector cannot be made; the old one goes on.
+        """
+        if motion is not None:
+            self._motion = motion(self._motion)
+        if detector is not None:
+            self._detector = detector()
+        return True
+
+    def events(self) -> tuple[str, ...]:
+        """Say what the film had to be assumed to be."""
+        return self._video.events()
+
+    def close(self) -> None:
+        """Free the film; safe to call twice."""
+        self._video.close()
+
+    def _captured_s(self, number: int) -> float:
+        """Give the simulated time of a picture's exposure."""
+        return self._start_s + self._video.due_s(number)
+
+    def _look(self, number: int) -> None:
+        """Find the faces of one picture, and what moves in it."""
+        shot = self._video.shot(number)._replace(captured_s=self._captured_s(number))
+        found = look(shot, self._detector, self._motion)
+        self.pictures += 1
+        self.pictures_with_face += bool(found.faces)
+        self._newest = found

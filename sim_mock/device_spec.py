@@ -1,0 +1,86 @@
+"""Servos as words: ``1-6:xl330-m077,7:xc330-m288@1024``, ids, model and where they start."""
+
+import re
+from collections.abc import Iterable
+
+from drivers.errors import SetupError
+from drivers.servo_models import SERVOS, BusKind
+from sim_mock.devices import DynamixelLine, StsLine
+from sim_mock.smart_servo.physics import ServoSpec
+
+EXAMPLE = "1-6:xl330-m077,7-9:xc330-m288"
+MIDDLE = 2048
+DEFAULT_FIRMWARE = ServoSpec(1, "").firmware
+
+_PART = re.compile(r"(\d+)(?:-(\d+))?:([^@]+)(?:@(\d+))?")
+_LINES: dict[BusKind, type[DynamixelLine | StsLine]] = {
+    "dynamixel": DynamixelLine,
+    "feetech": StsLine,
+}
+_SPEECH: dict[BusKind, str] = {"dynamixel": "speaks Dynamixel's", "feetech": "speaks Feetech's"}
+_HIGHEST_ID: dict[BusKind, int] = {"dynamixel": 252, "feetech": 253}
+_MODELS = [name for name, facts in SERVOS.items() if facts.bus in _LINES]
+
+
+def line_of(text: str, firmware: int | None, baud: int) -> DynamixelLine | StsLine:
+    """Read the servos of one line; ``firmware``: of all of them, None: as from the shop.
+
+    Raises:
+        drivers.errors.SetupError: names the part that is wrong and what would be right.
+    """
+    specs = parse_servos(text, DEFAULT_FIRMWARE if firmware is None else firmware)
+    return _LINES[SERVOS[specs[0].model].bus](specs, baud)
+
+
+def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
+    """Read servos such as ``1-6:sts3215`` or ``7:xc330-m288@1024`` (@: start in steps).
+
+    Raises:
+        drivers.errors.SetupError: names the part that is wrong and what would be right.
+    """
+    specs: dict[int, ServoSpec] = {}
+    for part in text.split(","):
+        ids, model, start = _read(part)
+        for servo_id in ids:
+            if servo_id in specs:
+                raise SetupError(
+                    f"--servos {part!r}: id {servo_id} is taken by a {specs[servo_id].model}; "
+                    "ids must differ (the command `collide` makes a collision)"
+                )
+            specs[servo_id] = ServoSpec(servo_id, model, start, firmware)
+    _see_one_kind(specs.values())
+    return tuple(specs.values())
+
+
+def _read(part: str) -> tuple[range, str, int]:
+    """Give the ids, the model and the start of one part."""
+    found = _PART.fullmatch(part.strip())
+    if found is None:
+        raise SetupError(f"--servos {part!r}: not IDS:MODEL, for example {EXAMPLE}")
+    first, last = int(found[1]), int(found[2] or found[1])
+    model, start = found[3].lower(), int(found[4] or MIDDLE)
+    if model in SERVOS and SERVOS[model].bus == "maestro":
+        raise SetupError(f"--servos {part!r}: a hobby servo hangs on a board: --maestro 12")
+    highest = _HIGHEST_ID[SERVOS[model].bus] if model in SERVOS else min(_HIGHEST_ID.values())
+    if not first <= last <= highest:
+        raise SetupError(f"--servos {part!r}: ids run upwards, from 0 to {highest}")
+    if model not in SERVOS:
+        raise SetupError(f"--servos {part!r}: unknown model; there is {', '.join(_MODELS)}")
+    return range(first, last + 1), model, start
+
+
+def _see_one_kind(specs: Iterable[ServoSpec]) -> None:
+    """Refuse servos that do not speak one language.
+
+    Raises:
+        drivers.errors.SetupError: names one of each kind.
+    """
+    one: dict[BusKind, ServoSpec] = {}
+    for spec in specs:
+        one.setdefault(SERVOS[spec.model].bus, spec)
+    if len(one) > 1:
+        told = [f"{s.model} (id {s.id}) {_SPEECH[kind]}" for kind, s in one.items()]
+        raise SetupError(
+            f"--servos: {' and '.join(told)}; one line carries one protocol: "
+            "start a second `gazerig emulate`"
+        )

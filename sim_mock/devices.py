@@ -1,0 +1,123 @@
+"""What can be emulated, as plain data that travels to another process, and how it is built."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any, ClassVar
+
+from drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
+from drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
+from drivers.maestro.params import MaestroParams
+from drivers.servo_models import BusKind
+from sim_mock.device import Device
+from sim_mock.feetech import quirks as sts_habits
+from sim_mock.feetech.chain import build_sts
+from sim_mock.hobby_servo import HobbySpec
+from sim_mock.maestro import settings as maestro_settings
+from sim_mock.maestro.board import build_board
+from sim_mock.smart_servo import quirks as servo_habits
+from sim_mock.smart_servo.chain import build_chain
+from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
+
+CASES: dict[BusKind, dict[str, str]] = {
+    "dynamixel": servo_habits.cases(),
+    "feetech": sts_habits.cases(),
+    "maestro": maestro_settings.cases(),
+}
+"""What can be chosen of each kind, and the values as they are typed."""
+
+_BOARD = {f.name: f.metadata for f in fields(MaestroParams)}
+BAUDS: dict[BusKind, tuple[int, ...]] = {
+    "dynamixel": DYNAMIXEL_BAUDS,
+    "feetech": FEETECH_BAUDS,
+    "maestro": _BOARD["baud"]["choices"],
+}
+"""Bit/s that each kind can be set to."""
+CHANNELS: tuple[int, ...] = _BOARD["channels"]["choices"]
+"""Sizes of a Maestro."""
+
+
+@dataclass(frozen=True, slots=True)
+class DynamixelLine:
+    """Dynamixel servos on one line.
+
+    baud: the servos' rate, clients at another are not heard; None: every client is
+    """
+
+    servos: tuple[ServoSpec, ...]
+    baud: int | None = None
+    kind: ClassVar[BusKind] = "dynamixel"
+    listens: ClassVar[str] = "the servos listen"
+
+
+@dataclass(frozen=True, slots=True)
+class StsLine:
+    """Feetech STS servos on one line; the rest as for Dynamixel servos."""
+
+    servos: tuple[ServoSpec, ...]
+    baud: int | None = None
+    kind: ClassVar[BusKind] = "feetech"
+    listens: ClassVar[str] = "the servos listen"
+
+
+@dataclass(frozen=True, slots=True)
+class MaestroLine:
+    """A Pololu Maestro and the servos behind it.
+
+    channels: 6, 12, 18 or 24; device: its number in the Pololu protocol
+    crc: it expects a CRC behind every command
+    servos: those that are not as they come from the shop, by their channel
+    baud: rate of its serial pins; None: its USB port, where every client is heard
+    """
+
+    channels: int = 12
+    device: int = 12
+    crc: bool = False
+    servos: tuple[HobbySpec, ...] = ()
+    baud: int | None = None
+    kind: ClassVar[BusKind] = "maestro"
+    listens: ClassVar[str] = "the board listens"
+
+
+Emulated = DynamixelLine | StsLine | MaestroLine
+_KINDS: dict[str, type[Emulated]] = {one.kind: one for one in (DynamixelLine, StsLine, MaestroLine)}
+
+
+def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
+    """Build a device on a clock; ``seed``: of the dice that its faults throw.
+
+    Raises:
+        ValueError: it cannot exist; names what is wrong and what would be right.
+    """
+    if isinstance(what, MaestroLine):
+        return build_board(
+            what.channels, now_s, what.device, what.crc, what.baud, seed, what.servos
+        )
+    if isinstance(what, StsLine):
+        return build_sts(what.servos, now_s, what.baud, seed)
+    return build_chain(what.servos, now_s, baud=what.baud, seed=seed)
+
+
+def packed(what: Emulated) -> dict[str, object]:
+    """Give a device as what JSON can carry."""
+    return {"kind": what.kind, **asdict(what)}
+
+
+def unpacked(told: Mapping[str, Any]) -> Emulated:
+    """Give the device that ``packed`` was given; servos may be as short as [1, "xl330-m077"].
+
+    Raises:
+        ValueError: there is no such kind of device.
+        TypeError: it has no such setting.
+    """
+    settings = dict(told)
+    kind = settings.pop("kind", None)
+    if kind not in _KINDS:
+        raise ValueError(f"no device of kind {kind!r}: there is {', '.join(_KINDS)}")
+    read = HobbySpec._make if kind == "maestro" else _servo
+    settings["servos"] = tuple(read(spec) for spec in settings.get("servos", ()))
+    return _KINDS[kind](**settings)
+
+
+def _servo(told: Any) -> ServoSpec:
+    spec = ServoSpec(*told)
+    return spec._replace(physics=Physics(*spec.physics), quirks=Quirks(*spec.quirks))

@@ -1,0 +1,288 @@
+"""The drive of an emulated servo: modes, goals and origin between registers and shaft.
+
+Reads the control table and never refuses anything: what may be written is decided in
+sim_mock.smart_servo.servo. The registers' position is ``side * shaft.x + shift``.
+"""
+
+from typing import NamedTuple
+
+from drivers.dynamixel.control_table import (
+    ACCELERATION_UNIT_STEPS_S2,
+    GAINS,
+    PWM_FULL,
+    STEPS_PER_TURN,
+    VELOCITY_UNIT_STEPS_S,
+    Model,
+)
+from sim_mock.dynamixel.live_registers import (
+    ARRIVED,
+    ASTRAY,
+    FOLLOWING_STEPS,
+    IN_POSITION_STEPS,
+    RUNNING,
+    Live,
+    flicker,
+)
+from sim_mock.dynamixel.modes import (
+    BY_TIME,
+    BY_TIME_SINCE,
+    DRIVEN_BY,
+    POSITION,
+    POSITION_MODES,
+    REVERSE,
+    VELOCITY,
+    loop_of,
+)
+from sim_mock.dynamixel.motor import LIMP, Shaft
+from sim_mock.dynamixel.profile import Profile, SpeedProfile
+from sim_mock.smart_servo.memory import Memory
+from sim_mock.smart_servo.physics import Physics, Quirks
+
+TRIPPED = 255
+"""Bus Watchdog (98) reads so after it has stopped the servo."""
+
+HOMING_ACTS_STEPS = 1024
+"""Part of the homing offset that counts in position mode."""
+
+LARGEST = 32767
+"""Largest number that Present Current can hold."""
+
+_WATCHDOG_AT = 98
+_SPEED_UNIT = VELOCITY_UNIT_STEPS_S / 1000.0
+_RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
+
+
+class Noise(NamedTuple):
+    """Seed and largest flicker of current and velocity, in register units."""
+
+    seed: int
+    current: int
+    velocity: int
+
+
+class Drive:
+    """What turns the shaft.
+
+    torque: whether it is switched on
+    mode: operating mode
+    follows: whether a goal position is followed at once
+    """
+
+    def __init__(
+        self,
+        memory: Memory,
+        model: Model,
+        physics: Physics,
+        quirks: Quirks,
+        start_steps: float,
+        seed: int,
+    ) -> None:
+        self.memory = memory
+        self.model = model
+        self.shaft = Shaft(model, physics, start_steps)
+        self._quirks = quirks
+        self._noise = Noise(seed, physics.noise_current, physics.noise_velocity)
+        unit = model.current_unit_ma
+        # Models without a current sensor report load in 0.1 %.
+        self._current_full = model.stall_current_a * 1000.0 / unit if unit else 1000.0
+        self._most = LARGEST if unit else 1000
+        self.boot()
+
+    def boot(self) -> None:
+        """Begin without torque, within one turn, with goals where a mode begins."""
+        self.torque = False
+        self.shaft.let_go()
+        self.mode = self.memory.get("operating_mode")
+        self.locate()
+        self.reset_goals()
+        self.settle()
+
+    # --- readings
+
+    @property
+    def position_steps(self) -> float:
+        """Give the true position of the shaft in the registers' terms, finer than they are."""
+        return self._side * self.shaft.x + self._shift
+
+    @property
+    def joint_steps(self) -> float:
+        """Give the position of the joint behind the play, in the registers' terms."""
+        return self._side * self.shaft.joint + self._shift
+
+    def sensed(self, now_ms: int) -> tuple[int, int, int]:
+        """Give present current, velocity and position in register units."""
+        shaft, side = self.shaft, self._side
+        at = round(side * shaft.x + self._shift)
+        current = side * shaft.effort * self._current_full
+        if shaft.v:
+            return round(current), round(side * shaft.v / _SPEED_UNIT), at
+        if not self.torque:
+            return 0, 0, at
+        amps, speed = flicker(now_ms, *self._noise)
+        amps += round(current)
+        return max(-self._most, min(self._most, amps)), speed, at
+
+    def voltage(self) -> int:
+        """Give the voltage at the servo in register units."""
+        return round(self.shaft.volts * self.model.rated_v * 10.0)
+
+    def live(self, tick_ms: int, now_ms: int, temperature: int) -> Live:
+        """Give everything that lives."""
+        shaft, side, sensed = self.shaft, self._side, self.sensed(now_ms)
+        profile = shaft.profile
+        running = self.torque and profile.running and profile.v != profile.goal
+        status = running * RUNNING | profile.kind << 4
+        if self.torque and self.mode in POSITION_MODES:
+            goal = self.memory.get("goal_position")
+            status |= (not running and abs(goal - sensed[2]) <= IN_POSITION_STEPS) * ARRIVED
+            status |= (abs(profile.r - shaft.x) > FOLLOWING_STEPS) * ASTRAY
+        place = shaft.x if isinstance(profile, SpeedProfile) else profile.r
+        return Live(
+            tick_ms=tick_ms,
+            moving=running or abs(sensed[1]) > self.memory.get("moving_threshold"),
+            status=status,
+            pwm=round(side * shaft.u * PWM_FULL),
+            sensed=sensed,
+            velocity_asked=round(side * profile.v / _SPEED_UNIT),
+            position_asked=round(side * place + self._shift),
+            voltage=self.voltage(),
+            temperature=temperature,
+        )
+
+    # --- goals
+
+    def aim(self, goal: int) -> None:
+        """Lead the profile to a goal position; the same goal again changes nothing."""
+        shaft = self.shaft
+        profile, to = shaft.profile, float(self._side * (goal - self._shift))
+        if isinstance(profile, Profile) and to != profile.goal:
+            if self._by_time:
+                profile.by_time(to, self._speed, self._ramp)
+            else:
+                profile.by_velocity(to, self._speed * _SPEED_UNIT, self._ramp * _RAMP_UNIT)
+            shaft.wake()
+
+    def spin(self, speed: int) -> None:
+        """Lead the profile to a goal velocity."""
+        profile = self.shaft.profile
+        if isinstance(profile, SpeedProfile):
+            ramp = 0.0 if self._by_time else self._ramp * _RAMP_UNIT
+            profile.aim(self._side * speed * _SPEED_UNIT, ramp)
+            self.shaft.wake()
+
+    def halt(self) -> None:
+        """Stand still under torque, here and now, until a new goal comes."""
+        shaft = self.shaft
+        if isinstance(shaft.profile, SpeedProfile):
+            shaft.profile.aim(0.0, 0.0)
+        else:
+            shaft.profile.rest(shaft.x)
+        self.settle()
+        shaft.wake()
+
+    # --- torque and mode
+
+    def switch(self, on: bool) -> None:
+        """Switch the torque; a goal that was kept is followed at once."""
+        was, self.torque = self.torque, on
+        if on and not was:
+            self._start()
+        elif not on and was:
+            self.shaft.let_go()
+        self.settle()
+
+    def _start(self) -> None:
+        """Let the profile begin where the shaft is, and follow the goal there is."""
+        shaft = self.shaft
+        if self.mode == VELOCITY:
+            shaft.start(SpeedProfile(shaft.x, shaft.v))
+        else:
+            shaft.start(Profile(shaft.x))
+        self._wrap_by_itself()
+        if self._quirks.goal_at_torque_on:
+            self.memory.set("goal_position", round(self.position_steps))
+        self.settle()
+        if self.mode in POSITION_MODES:
+            self.aim(self.memory.get("goal_position"))
+        elif self.mode == VELOCITY:
+            self.spin(self.memory.get("goal_velocity"))
+
+    def _wrap_by_itself(self) -> None:
+        """Let the position jump by a turn, as some firmware does with a homing offset."""
+        if self._quirks.wrap_at_torque_on and self.mode == POSITION and self._offset:
+            self._shift -= int(self.position_steps // STEPS_PER_TURN) * STEPS_PER_TURN
+
+    def change_mode(self, mode: int) -> None:
+        """Set profile, gains and goals as a mode begins with; the position is within one turn."""
+        if mode == self.mode:
+            return
+        self.mode = mode
+        for name in ("profile_acceleration", "profile_velocity"):
+            self.memory.set(name, 0)
+        for name, gain in zip(GAINS, self.model.gains, strict=True):
+            self.memory.set(name, gain)
+        for name in ("feedforward_1st_gain", "feedforward_2nd_gain"):
+            self.memory.set(name, 0)
+        self.locate()
+        self.reset_goals()
+
+    def reset_goals(self) -> None:
+        """Set the goals to the limits, the goal position to where it is.
+
+        The goal that turns the shaft by itself starts at 0: no document tells, and a servo
+        that ran away as its torque comes on would be known for it.
+        """
+        for name in ("goal_pwm", "goal_current", "goal_velocity"):
+            if self.memory.has(name):
+                limit = self.memory.get(name.replace("goal_", "") + "_limit")
+                self.memory.set(name, 0 if DRIVEN_BY.get(self.mode) == name else limit)
+        self.memory.set("goal_position", round(self.position_steps))
+
+    # --- origin
+
+    def locate(self) -> None:
+        """Bring the position into one turn, as power-on and a change of mode do."""
+        self._side = -1 if self.memory.get("drive_mode") & REVERSE else 1
+        self._offset = self._homing()
+        turns = int(self._side * self.shaft.x // STEPS_PER_TURN)
+        self._shift = self._offset - turns * STEPS_PER_TURN
+
+    def shift_origin(self) -> None:
+        """Move the origin with the homing offset, or turn the direction round."""
+        side = -1 if self.memory.get("drive_mode") & REVERSE else 1
+        if side != self._side:
+            self.locate()
+        else:
+            offset = self._homing()
+            self._shift += offset - self._offset
+            self._offset = offset
+
+    def _homing(self) -> int:
+        offset = self.memory.get("homing_offset")
+        if self.mode != POSITION:
+            return offset
+        return max(-HOMING_ACTS_STEPS, min(HOMING_ACTS_STEPS, offset))
+
+    def clear_turns(self) -> bool:
+        """Bring a multi-turn position back into one turn; gives False while moving."""
+        if self.shaft.v or (self.torque and self.shaft.profile.running):
+            return False
+        turns = int(self.position_steps // STEPS_PER_TURN)
+        self._shift -= turns * STEPS_PER_TURN
+        self.memory.set("goal_position", round(self.position_steps))
+        return True
+
+    def turn(self, steps: float) -> None:
+        """Turn the shaft by hand, in the registers' direction."""
+        self.shaft.turn(self._side * steps)
+
+    def settle(self) -> None:
+        """Take over what the registers say now."""
+        get = self.memory.get
+        self.follows = self.torque and self.mode in POSITION_MODES
+        self._speed, self._ramp = get("profile_velocity"), get("profile_acceleration")
+        timed = get("firmware_version") >= BY_TIME_SINCE
+        self._by_time = timed and bool(get("drive_mode") & BY_TIME)
+        halted = self.memory.bytes[_WATCHDOG_AT] == TRIPPED
+        loop = loop_of(get, self.model, self._side) if self.torque else LIMP
+        self.shaft.drive(loop._replace(bias=0.0) if halted else loop)

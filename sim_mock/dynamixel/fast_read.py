@@ -1,0 +1,39 @@
+"""The fast read of every tick in one tight loop: unique ids, nothing spoilt.
+
+Gives the same bytes as sim_mock.replies.fast_pieces, in half the time; a test
+compares the two.
+"""
+
+from collections.abc import Iterable, Mapping
+
+from fastcrc.crc16 import umts
+
+from sim_mock.replies import BROADCAST, CRC, HEAD, HEADER, STATUS
+from sim_mock.smart_servo.memory import ACCESS
+from sim_mock.smart_servo.servo import Servo
+
+
+def fast_reply(
+    servos: Mapping[int, Servo],
+    rows: Iterable[tuple[int, int, int]],
+    length: int,
+    now_ms: int,
+    fed_ms: int,
+) -> bytes:
+    """Give the packet up to the first servo that is silent; nothing where that is the first."""
+    parts = [HEAD.pack(HEADER, BROADCAST, length, STATUS)]
+    crc = umts(parts[0])
+    for servo_id, address, size in rows:
+        servo = servos.get(servo_id)
+        if servo is None or not servo.advance(now_ms, fed_ms):
+            break
+        if not servo.fast_reads or servo.status_level < 1:
+            break
+        data = servo.read(address, size)
+        error = servo.error_flag | (ACCESS if data is None else 0)
+        block = bytes((error, servo_id)) + (data or bytes(size))
+        crc = umts(block, crc)
+        tail = CRC.pack(crc)
+        crc = umts(tail, crc)
+        parts += (block, tail)
+    return b"".join(parts) if len(parts) > 1 else b""

@@ -1,0 +1,81 @@
+"""Operating modes of an emulated servo: from registers to what its controller does.
+
+Gains are divided as the ROBOTIS e-Manual says (P 128, D 16, I 65536, feed-forward 4). On
+what they act it does not tell; assumed here: positions in steps, speeds in steps/ms,
+accelerations in steps/ms2, sums per ms, in the velocity mode units of 0.229 rev/min; what
+comes out is in units of PWM (885 are 100 %).
+"""
+
+from collections.abc import Callable
+from math import inf
+
+from drivers.dynamixel.control_table import PWM_FULL, VELOCITY_UNIT_STEPS_S, Model
+from sim_mock.dynamixel.motor import Loop
+
+CURRENT, VELOCITY, POSITION, EXTENDED, CURRENT_POSITION, PWM = 0, 1, 3, 4, 5, 16
+POSITION_MODES = (POSITION, EXTENDED, CURRENT_POSITION)
+MODES = (CURRENT, VELOCITY, POSITION, EXTENDED, CURRENT_POSITION, PWM)
+MODES_WITHOUT_CURRENT = (VELOCITY, POSITION, EXTENDED, PWM)
+
+DRIVEN_BY = {CURRENT: "goal_current", VELOCITY: "goal_velocity", PWM: "goal_pwm"}
+"""Goal that turns the shaft in the modes without a position."""
+
+REVERSE, BY_TIME, TORQUE_ON_BY_GOAL = 1, 4, 8
+"""Bits of Drive Mode (10)."""
+
+BY_TIME_SINCE = 42
+"""First firmware with the time-based profile."""
+
+PWM_SLOPE_V_MS = 0.001977, 0.003955
+"""Unit of PWM Slope (62) of the models for 5 V and for 12 V."""
+
+FAR_BEYOND = 2.0
+"""More than full PWM: the current limit decides."""
+
+Get = Callable[[str], int]
+
+
+def modes_of(model: Model) -> tuple[int, ...]:
+    """List the operating modes a model has."""
+    return MODES_WITHOUT_CURRENT if model.current_limit is None else MODES
+
+
+def loop_of(get: Get, model: Model, side: int) -> Loop:
+    """Give the controller that the registers describe; ``side`` is -1 in reverse mode."""
+    mode = get("operating_mode")
+    slew = inf
+    if model.family == "x330":
+        slew = get("pwm_slope") * PWM_SLOPE_V_MS[model.rated_v > 5.0] / model.rated_v
+    limit = get("pwm_limit") / PWM_FULL
+    if mode == PWM:
+        return Loop(bias=side * get("goal_pwm") / PWM_FULL, u_most=limit, slew=slew)
+    limit = min(limit, abs(get("goal_pwm")) / PWM_FULL)
+    t_most = _torque_limit(get, model) if mode in (CURRENT, CURRENT_POSITION) else inf
+    if mode == CURRENT:
+        goal = side * get("goal_current")
+        bias = FAR_BEYOND if goal > 0 else -FAR_BEYOND if goal < 0 else 0.0
+        return Loop(bias=bias, u_most=limit, t_most=t_most, slew=slew)
+    if mode == VELOCITY:
+        per_step_ms = 1000.0 / VELOCITY_UNIT_STEPS_S / PWM_FULL
+        return Loop(
+            d=get("velocity_p_gain") / 128.0 * per_step_ms,
+            vi=get("velocity_i_gain") / 65536.0 * per_step_ms,
+            u_most=limit,
+            slew=slew,
+        )
+    return Loop(
+        p=get("position_p_gain") / 128.0 / PWM_FULL,
+        i=get("position_i_gain") / 65536.0 / PWM_FULL,
+        d=get("position_d_gain") / 16.0 / PWM_FULL,
+        f1=get("feedforward_1st_gain") / 4.0 / PWM_FULL,
+        f2=get("feedforward_2nd_gain") / 4.0 / PWM_FULL,
+        u_most=limit,
+        t_most=t_most,
+        slew=slew,
+    )
+
+
+def _torque_limit(get: Get, model: Model) -> float:
+    """Give the torque that the goal current and its limit allow, as a share of stall."""
+    units = min(abs(get("goal_current")), get("current_limit"))
+    return units * model.current_unit_ma / 1000.0 / model.stall_current_a

@@ -1,0 +1,305 @@
+"""The shaft of an emulated servo: controller, motor, friction, stops, play, in steps of 1 ms.
+
+Inside: steps (4096 a turn) and milliseconds; torque as a share of the stall torque at the
+rated voltage, PWM as a share of full. One step is an implicit one: P and D act on position
+and speed at its end, as the real loop, much faster than 1 kHz, would make them act on the
+way. So no gain the registers allow can shake the numbers to infinity. What
+is read does not depend on how often it is read.
+"""
+
+from math import inf, pi, sin
+from typing import NamedTuple, Protocol
+
+from drivers.dynamixel.control_table import STEPS_PER_TURN
+from sim_mock.dynamixel.profile import Profile, SpeedProfile
+from sim_mock.smart_servo.physics import Physics
+
+STEPS_PER_RAD = STEPS_PER_TURN / (2.0 * pi)
+MS_S = 0.001
+SAG_MOST = 0.5
+"""Share of the voltage that the supply may lose at stall; more would hunt."""
+
+SMOOTHING = 0.25
+"""Share of the profile's new speed that D and feed-forward take over in 1 ms: what differs from
+one millisecond to the next must be smoothed in any servo, the time of 4 ms is assumed."""
+
+SLOWEST = 1e-4
+"""Speeds below, in steps/ms, are none."""
+
+RESOLUTION = 0.5
+"""The encoder sees no smaller error: the I part rests inside it, in steps."""
+
+
+class Motor(Protocol):
+    """What the shaft must know of a servo's motor and gear."""
+
+    @property
+    def stall_torque_nm(self) -> float:
+        """Give the torque that holds it still."""
+        ...
+
+    @property
+    def stall_current_a(self) -> float:
+        """Give the current it draws then."""
+        ...
+
+    @property
+    def no_load_rpm(self) -> float:
+        """Give the speed without load."""
+        ...
+
+    @property
+    def rated_v(self) -> float:
+        """Give the voltage that all this is for."""
+        ...
+
+
+class Loop(NamedTuple):
+    """What the controller makes of errors: shares of full PWM per step, per step/ms and so on.
+
+    p, d, f1, f2: on position error, speed error, profile speed, profile acceleration
+    i: per ms on position error; vi: per ms on speed error (velocity mode)
+    bias: constant part, in the modes without feedback
+    u_most: PWM limit; t_most: torque (current) limit; slew: most change of PWM per ms
+    """
+
+    p: float = 0.0
+    i: float = 0.0
+    d: float = 0.0
+    vi: float = 0.0
+    f1: float = 0.0
+    f2: float = 0.0
+    bias: float = 0.0
+    u_most: float = 1.0
+    t_most: float = inf
+    slew: float = inf
+
+
+LIMP = Loop(u_most=0.0, t_most=0.0)
+
+PAUSE_MS = 10_000
+"""A time without any packet that is longer is not lived through millisecond by millisecond."""
+_BEFORE_MS, _AFTER_MS = 3_000, 1_000
+"""Of such a pause these are: whatever was begun ends, and what is asked then is in motion."""
+
+
+def long_pause(now_ms: int, until_ms: int, unit_ms: int) -> tuple[int, int]:
+    """Return from when and how long a time is passed at once; (until, 0) where it is short.
+
+    unit_ms: The time passed at once is a whole number of these.
+    """
+    if until_ms - now_ms <= PAUSE_MS:
+        return until_ms, 0
+    between_ms = until_ms - now_ms - _BEFORE_MS - _AFTER_MS
+    return now_ms + _BEFORE_MS, between_ms // unit_ms * unit_ms
+
+
+class Shaft:
+    """Position and speed of one output shaft, advanced in whole milliseconds.
+
+    x, v: position in steps and speed in steps/ms, as the encoder would see them, unrounded
+    joint: position of the joint behind the play
+    u, effort: PWM and torque (which is current) as shares
+    supply: open-circuit voltage, and
+    volts: present voltage, both as shares of the rated one
+    quiet: nothing will change until something is written or someone pushes
+    """
+
+    __slots__ = (
+        "_accel", "_drag", "_dry", "_free", "_gravity", "_held", "_high", "_integral", "_load",
+        "_loop", "_low", "_low_high", "_play", "_rate", "_rv", "_sag", "_upright",
+        "effort", "joint", "profile", "quiet", "supply", "u", "v", "volts", "x",
+    )  # fmt: skip
+
+    def __init__(self, model: Motor, physics: Physics, position_steps: float) -> None:
+        stall_nm = model.stall_torque_nm
+        top_rad_s = model.no_load_rpm * pi / 30.0
+        inertia = physics.rotor_s * stall_nm / top_rad_s + physics.load_kg_m2
+        # Speed in steps/ms that the stall torque adds in 1 ms.
+        self._accel = accel = stall_nm / inertia * STEPS_PER_RAD * MS_S * MS_S
+        top = model.no_load_rpm / 60.0 * STEPS_PER_TURN * MS_S
+        # Friction is part of the data sheet's no-load speed: the motor alone would be faster.
+        self._rate = (1.0 - physics.coulomb_share - physics.viscous_share) / top
+        viscous = physics.viscous_share / top
+        self._drag = 1.0 + accel * (self._rate + viscous)
+        self._free = 1.0 + accel * viscous
+        self._dry = accel * physics.coulomb_share
+        self._load = accel * physics.load_nm / stall_nm
+        self._gravity = accel * physics.gravity_nm / stall_nm
+        self._upright = physics.upright_steps
+        self._low_high = physics.stop_low_steps, physics.stop_high_steps
+        self._low, self._high = self._low_high
+        self._play = physics.play_deg * STEPS_PER_TURN / 720.0
+        self._sag = min(SAG_MOST, physics.supply_ohm * model.stall_current_a / model.rated_v)
+        self.supply = self.volts = (physics.supply_v or model.rated_v) / model.rated_v
+        self._loop = LIMP
+        self._held = False
+        self.profile: Profile | SpeedProfile = Profile(position_steps)
+        self.place(position_steps)
+
+    # --- from outside
+
+    def place(self, position_steps: float) -> None:
+        """Put the shaft somewhere at rest, between its stops; what drives it goes on from there."""
+        x = min(max(float(position_steps), self._low_high[0]), self._low_high[1])
+        self.x = self.joint = x
+        self.v = self._rv = self.u = self.effort = self._integral = 0.0
+        if isinstance(self.profile, Profile):
+            self.profile.rest(x)
+        if self._held:
+            self.hold_fast(True)
+        self.quiet = False
+
+    def turn(self, steps: float) -> None:
+        """Push the shaft by hand so far, as far as its stops let it; the controller fights on."""
+        self.x = min(max(self.x + steps, self._low), self._high)
+        self.quiet = False
+
+    def hold_fast(self, stuck: bool) -> None:
+        """Jam the joint where it is, or free it."""
+        self._held = stuck
+        self._low, self._high = (self.x, self.x) if stuck else self._low_high
+        self.quiet = False
+
+    def pull(self, share: float) -> None:
+        """Set the constant torque on the joint as a share of the stall torque."""
+        self._load = self._accel * share
+        self.quiet = False
+
+    def feed(self, supply: float) -> None:
+        """Set the open-circuit voltage as a share of the rated one."""
+        self.supply = self.volts = supply
+        self.quiet = False
+
+    # --- from the servo
+
+    def drive(self, loop: Loop) -> None:
+        """Take over what the controller is set to."""
+        if loop != self._loop:
+            self._loop = loop
+            self._integral = max(-loop.u_most, min(loop.u_most, self._integral))
+            self.quiet = False
+
+    def wake(self) -> None:
+        """Go on after the profile was given something new."""
+        self.quiet = False
+
+    def start(self, profile: Profile | SpeedProfile) -> None:
+        """Switch on: no memory of earlier errors; ``profile`` leads."""
+        self.profile = profile
+        self._rv = self._integral = 0.0
+        self.quiet = False
+
+    def let_go(self) -> None:
+        """Switch off: the motor has no current and does not brake."""
+        self.drive(LIMP)
+        self.profile = Profile(self.x)
+        self.u = self.effort = self._integral = 0.0
+        self.quiet = False
+
+    def run(self, ticks: int) -> None:
+        """Move on by so many milliseconds."""
+        if self.quiet or ticks <= 0:
+            return
+        loop, profile = self._loop, self.profile
+        kp, ki, kd, vi, f1, kf2, bias, u_most, t_most, slew = loop
+        x, v, u, t, i, joint = self.x, self.v, self.u, self.effort, self._integral, self.joint
+        was = x, u, i, joint, self.volts
+        accel, drag, free, dry, rate = self._accel, self._drag, self._free, self._dry, self._rate
+        load, gravity, play = self._load, self._gravity, self._play
+        low, high, supply, sag, volts = self._low, self._high, self.supply, self._sag, self.volts
+        before, rv = profile.r, self._rv
+        u_least = -u_most
+        integrating = ki != 0.0 or vi != 0.0
+        path = profile.ahead(ticks)
+        # Where there is no speed to follow, D brakes only.
+        kr = 0.0 if profile.jumps else kd + f1
+        k = kp + kd
+        for r in path:
+            last = rv
+            rv += (r - before - rv) * SMOOTHING
+            if -SLOWEST < rv < SLOWEST:
+                rv = 0.0
+            before = r
+            c = kp * (r - x) + kr * rv + i + bias
+            if kf2:
+                c += kf2 * (rv - last)
+            if gravity:
+                load = self._load + gravity * sin((x - self._upright) / STEPS_PER_RAD)
+            pull = v + load
+            push = accel * volts
+            w = pull + push * c
+            # Dry friction stops what the torque of 1 ms cannot move.
+            if w > dry:
+                v = (w - dry) / (drag + push * k)
+            elif w < -dry:
+                v = (w + dry) / (drag + push * k)
+            else:
+                v = 0.0
+            earlier = u
+            u = c - k * v
+            clipped = not (u_least <= u <= u_most and -slew <= u - earlier <= slew)
+            if clipped:
+                if u > earlier:
+                    u = earlier + slew if u > earlier + slew else u
+                else:
+                    u = earlier - slew if u < earlier - slew else u
+                u = u_most if u > u_most else u_least if u < u_least else u
+                w = pull + push * u
+                v = (w - dry) / drag if w > dry else (w + dry) / drag if w < -dry else 0.0
+            t = u * volts - v * rate
+            if not -t_most <= t <= t_most:
+                clipped = True
+                t = t_most if t > t_most else -t_most
+                w = pull + accel * t
+                v = (w - dry) / free if w > dry else (w + dry) / free if w < -dry else 0.0
+                u = (t + v * rate) / volts if volts > 0.0 and t_most > 0.0 else 0.0
+            x += v
+            if not low <= x <= high:
+                x = high if x > high else low
+                v = 0.0
+                u = min(max(c, earlier - slew, u_least), earlier + slew, u_most)
+                t = u * volts
+                if t > t_most or t < -t_most:
+                    t = t_most if t > t_most else -t_most
+                    u = t / volts if volts > 0.0 and t_most > 0.0 else 0.0
+            power = u * t
+            volts = supply - sag * power if power > 0.0 else supply
+            if integrating and not clipped:
+                if vi:
+                    i += vi * (rv - v)
+                elif r - x > RESOLUTION or x - r > RESOLUTION:
+                    i += ki * (r - x)
+                if i > u_most:
+                    i = u_most
+                elif i < -u_most:
+                    i = -u_most
+            if not -play <= x - joint <= play:
+                joint = x - play if x > joint else x + play
+        self._rv = rv
+        self.x, self.v, self.u, self.effort, self._integral = x, v, u, t, i
+        self.joint, self.volts = joint, volts
+        self.quiet = (
+            v == 0.0 and rv == 0.0 and not profile.running and was == (x, u, i, joint, volts)
+        )
+
+    def skip(self, ticks: int) -> None:
+        """Let a long time pass at once: the shaft goes where its profile goes, between its stops.
+
+        What is not at rest after seconds of nobody asking is led by a slow profile, turns
+        for ever, or hunts around its goal; the last stays as it is.
+        """
+        if self.quiet or ticks <= 0:
+            return
+        before = self.profile.r
+        self.profile.skip(ticks)
+        moved = self.profile.r - before
+        if self._loop.bias:  # without feedback: on at the speed it has
+            moved = self.v * ticks
+        self.x = min(max(self.x + moved, self._low), self._high)
+        self.joint = min(max(self.joint, self.x - self._play), self.x + self._play)
+
+    @property
+    def speed_steps_s(self) -> float:
+        """Give the speed of the shaft."""
+        return self.v / MS_S

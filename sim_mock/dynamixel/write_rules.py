@@ -1,0 +1,64 @@
+"""What an emulated servo lets be written now: EEPROM lock, modes, limits, tripped watchdog."""
+
+from drivers.dynamixel.control_table import EEPROM_END, Model, Register
+from sim_mock.dynamixel.drive import TRIPPED, Drive
+from sim_mock.dynamixel.modes import POSITION, modes_of
+from sim_mock.smart_servo.memory import ACCESS, DATA_LIMIT, DATA_RANGE, Fields, Memory
+
+GOALS = ("goal_pwm", "goal_current", "goal_velocity", "goal_position")
+MULTI_TURN_STEPS = 1_048_575
+WATCHDOG_AT = 98
+
+
+class Rules:
+    """Judges writes by table and state; changes nothing.
+
+    goal_range: positions that a goal may have now
+    """
+
+    def __init__(self, memory: Memory, model: Model, drive: Drive) -> None:
+        self._memory = memory
+        self._modes = modes_of(model)
+        self._drive = drive
+        self.goal_range = (0, 0)
+
+    def settle(self) -> None:
+        """Take over what the registers say now."""
+        get = self._memory.get
+        self.goal_range = -MULTI_TURN_STEPS, MULTI_TURN_STEPS
+        if self._drive.mode == POSITION:
+            self.goal_range = get("min_position_limit"), get("max_position_limit")
+
+    def permitted(self, address: int, data: bytes) -> Fields | int:
+        """Give the registers that bytes would be written to, or the error number."""
+        fields = self._memory.fields(address, data)
+        if isinstance(fields, int):
+            return fields
+        for register, value in fields:
+            error = self._refusal(register, value)
+            if error:
+                return error
+        return fields
+
+    def goal_error(self, goal: int) -> int:
+        """Give the error number for a goal position, 0 where it may be written."""
+        if self._memory.bytes[WATCHDOG_AT] == TRIPPED:
+            return DATA_RANGE
+        low, high = self.goal_range
+        return 0 if low <= goal <= high else DATA_LIMIT
+
+    def _refusal(self, register: Register, value: int) -> int:
+        name = register.name
+        if register.address < EEPROM_END:
+            if self._drive.torque:
+                return ACCESS
+            unknown = name == "operating_mode" and value not in self._modes
+            return DATA_RANGE if unknown else 0
+        if name == "goal_position":
+            return self.goal_error(value)
+        if name in GOALS:
+            if self._memory.bytes[WATCHDOG_AT] == TRIPPED:
+                return DATA_RANGE
+            limit = self._memory.get(name.replace("goal_", "") + "_limit")
+            return 0 if -limit <= value <= limit else DATA_LIMIT
+        return 0

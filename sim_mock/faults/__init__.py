@@ -1,0 +1,1 @@
+"""Faults of emulated lines and servos."""

@@ -1,0 +1,223 @@
+"""What faults do to the bytes between servos and host. Values in, values out.
+
+A ``Fault`` lasts for a number of answers, for a time, or until it is cleared.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log
+from random import Random
+
+from sim_mock.replies import HEADER, Answer, Piece
+
+NOBODY = -1
+"""Id of pieces that no servo sent: noise, echo, babble."""
+
+BABBLE_BYTES_S = 20_000
+BABBLE_MOST = 2000
+"""A babbling node fills no more than so many bytes at once, however long nobody looked."""
+
+
+@dataclass
+class Fault:
+    """One thing that goes wrong.
+
+    servo_id: whose answers, None for everybody's
+    numbers, data: what the kind needs (milliseconds, byte counts, ids; noise bytes)
+    left: for so many answers, until_s: until then; None for no such end
+    """
+
+    kind: str
+    servo_id: int | None = None
+    numbers: tuple[float, ...] = ()
+    data: bytes | None = None
+    left: int | None = None
+    until_s: float | None = None
+
+    def lasts(self, now_s: float) -> bool:
+        """Tell whether it is not over."""
+        return self.left != 0 and (self.until_s is None or now_s < self.until_s)
+
+
+class ActiveFaults:
+    """The faults in force, and what they do to answers and bytes.
+
+    ``any`` is False while nothing is wrong: then nobody needs to ask.
+    header: what packets on this line begin with
+    """
+
+    def __init__(self, seed: int, header: bytes = HEADER) -> None:
+        self._header = header
+        self._faults: list[Fault] = []
+        self._dice = Random(seed)
+        self._babbled_s = 0.0
+        self.any = False
+
+    def add(self, fault: Fault) -> None:
+        """Let a fault begin."""
+        self._faults.append(fault)
+        self.any = True
+
+    def remove(self, kind: str | None = None, servo_id: int | None = None) -> int:
+        """End faults of a kind (None: all kinds) and servo (None: all); gives how many."""
+        before = len(self._faults)
+        self._faults = [
+            fault
+            for fault in self._faults
+            if (kind is not None and fault.kind != kind)
+            or (servo_id is not None and fault.servo_id != servo_id)
+        ]
+        self.any = bool(self._faults)
+        return before - len(self._faults)
+
+    def listed(self, now_s: float) -> tuple[Fault, ...]:
+        """Give the faults in force, oldest first."""
+        self._forget(now_s)
+        return tuple(self._faults)
+
+    def on(self, kind: str, now_s: float) -> bool:
+        """Tell whether a fault of this kind is in force."""
+        return self.any and any(f.kind == kind and f.lasts(now_s) for f in self._faults)
+
+    def take(self, kind: str, servo_id: int | None, now_s: float) -> Fault | None:
+        """Find a fault that hits this servo now and count it as used once."""
+        for fault in self._faults:
+            if fault.kind != kind or fault.servo_id not in (None, servo_id):
+                continue
+            if fault.lasts(now_s):
+                if fault.left is not None:
+                    fault.left -= 1
+                return fault
+        self._forget(now_s)
+        return None
+
+    def _forget(self, now_s: float) -> None:
+        self._faults = [fault for fault in self._faults if fault.lasts(now_s)]
+        self.any = bool(self._faults)
+
+    # --- electrical noise, in both directions
+
+    def roughened(self, data: bytes, now_s: float) -> bytes:
+        """Give bytes as they arrive over a noisy line: some changed, lost or added.
+
+        The share of bytes that are hit is the fault's number; of four that are hit two are
+        changed, one is lost, and one has another put before it.
+        """
+        noise = next((f for f in self._faults if f.kind == "static" and f.lasts(now_s)), None)
+        if noise is None:
+            return data
+        rng, out, share, at = self._dice, bytearray(), noise.numbers[0], 0
+        while True:
+            # The distance to the next byte hit, instead of dice for each byte.
+            ahead = int(log(1.0 - rng.random()) / log(1.0 - share)) if share < 1.0 else 0
+            out += data[at : at + ahead]
+            at += ahead
+            if at >= len(data):
+                return bytes(out)
+            how = rng.randrange(4)
+            if how < 2:
+                out.append(data[at] ^ rng.randrange(1, 256))
+            elif how == 3:
+                out += bytes((rng.randrange(256), data[at]))
+            at += 1
+
+    # --- what the servos say
+
+    def spoil_answers(self, answers: Sequence[Answer], fast: bool, now_s: float) -> list[Answer]:
+        """Change what is said: ids, errors, lengths and order; every CRC will be right."""
+        said = [self._misspoken(answer, fast, now_s) for answer in answers]
+        if len(said) > 1 and self.take("reorder", None, now_s):
+            said.reverse()
+        return said
+
+    def _misspoken(self, answer: Answer, fast: bool, now_s: float) -> Answer:
+        servo_id, params = answer.servo_id, answer.params
+        refused = self.take("refuse", servo_id, now_s)
+        if refused is not None:
+            error = answer.error | int(refused.numbers[0])
+            # A block of a fast reply keeps its place: it is filled with zeros.
+            answer = answer._replace(error=error, params=bytes(len(params)) if fast else b"")
+        short = self.take("short", servo_id, now_s)
+        if short is not None:
+            answer = answer._replace(params=params[: max(0, len(params) - int(short.numbers[0]))])
+        long = self.take("long", servo_id, now_s)
+        if long is not None:
+            answer = answer._replace(params=params + bytes(int(long.numbers[0])))
+        other = self.take("wrong_id", servo_id, now_s)
+        return answer if other is None else answer._replace(servo_id=int(other.numbers[0]))
+
+    # --- what arrives
+
+    def spoil_pieces(self, pieces: Sequence[Piece], fast: bool, now_s: float) -> list[Piece]:
+        """Change what arrives; ``fast``: the pieces are blocks of one packet."""
+        out: list[Piece] = []
+        repeat = False
+        for piece in pieces:
+            hurt, cut = self._damaged(piece, now_s)
+            out += self._late(hurt, now_s)
+            again = self.take("duplicate", piece.servo_id, now_s) is not None
+            if again and not fast:
+                out.append(Piece(NOBODY, hurt.data))
+            repeat = repeat or again
+            if cut and fast:
+                break
+        if fast and repeat:
+            out += [Piece(NOBODY, piece.data) for piece in out]
+        return self._amid_noise(out, pieces, now_s)
+
+    def _damaged(self, piece: Piece, now_s: float) -> tuple[Piece, bool]:
+        """Give a piece as it arrives and whether its end is missing."""
+        servo_id, data = piece.servo_id, bytearray(piece.data)
+        flip = self.take("corrupt", servo_id, now_s)
+        if flip is not None and data:
+            bit = int(flip.numbers[0]) if flip.numbers else self._dice.randrange(len(data) * 8)
+            bit %= len(data) * 8
+            data[bit // 8] ^= 1 << bit % 8
+        drop = self.take("drop", servo_id, now_s)
+        if drop is not None and data:
+            del data[int(drop.numbers[0]) % len(data)]
+        cut = self.take("truncate", servo_id, now_s)
+        if cut is not None:
+            del data[int(cut.numbers[0]) :]
+        return piece._replace(data=bytes(data)), cut is not None
+
+    def _late(self, piece: Piece, now_s: float) -> list[Piece]:
+        """Give a piece later than it should be, or in two halves with a gap."""
+        late = self.take("delay", piece.servo_id, now_s)
+        if late is not None:
+            piece = piece._replace(late_s=piece.late_s + late.numbers[0] / 1000.0)
+        gap = self.take("stall", piece.servo_id, now_s)
+        if gap is None:
+            return [piece]
+        half = len(piece.data) // 2
+        rest = Piece(piece.servo_id, piece.data[half:], 0.0, gap.numbers[0] / 1000.0)
+        return [piece._replace(data=piece.data[:half]), rest]
+
+    def _amid_noise(self, out: list[Piece], pieces: Sequence[Piece], now_s: float) -> list[Piece]:
+        """Put noise, pieces of headers and a babbling node around what arrives."""
+        if not pieces:
+            return out
+        if self.take("fragment", pieces[0].servo_id, now_s):
+            out.insert(0, Piece(NOBODY, self._header))
+        before = self.take("noise_before", None, now_s)
+        if before is not None:
+            out.insert(0, Piece(NOBODY, self._noise(before)))
+        after = self.take("noise_after", None, now_s)
+        if after is not None:
+            out.append(Piece(NOBODY, self._noise(after)))
+        return out
+
+    def _noise(self, fault: Fault) -> bytes:
+        return self._dice.randbytes(8) if fault.data is None else fault.data
+
+    def babble(self, now_s: float) -> bytes:
+        """Give what a babbling node has sent since the last look: headers and noise."""
+        if not self.on("babble", now_s):
+            self._babbled_s = now_s
+            return b""
+        length = min(BABBLE_MOST, int((now_s - self._babbled_s) * BABBLE_BYTES_S))
+        if length > 0:
+            self._babbled_s = now_s
+        size = len(self._header) + 4
+        words = (self._header + self._dice.randbytes(4) for _ in range(length // size + 1))
+        return b"".join(words)[:length]

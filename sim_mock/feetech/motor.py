@@ -1,0 +1,271 @@
+"""What turns the shaft of an emulated STS servo: modes, goals and origin between registers and it.
+
+Reads the memory and never refuses anything. The registers' position is ``shaft.x + shift``;
+where turns are not counted it is told within one turn. Shaft and motor are those of
+sim_mock.dynamixel.motor. What no document tells of the controller is assumed, so that a
+servo with factory gains needs all its duty at 50 steps of error and does not overshoot:
+owners measure 20-30 steps at half the stall torque. Left out: the starting force (24) and the
+dead zones (26, 27), so that friction keeps it up to 2 steps from its goal, as it does in fact.
+"""
+
+import struct
+from typing import NamedTuple
+
+from drivers.feetech.memory_table import ACCELERATION_UNIT_STEPS_S2, CURRENT_UNIT_MA, FeetechModel
+from drivers.feetech.memory_table import STEPS_PER_TURN as TURN
+from drivers.feetech.memory_table import TORQUE_FULL as FULL
+from sim_mock.dynamixel.live_registers import flicker
+from sim_mock.dynamixel.motor import LIMP, Loop, Shaft
+from sim_mock.dynamixel.profile import Profile, SpeedProfile
+from sim_mock.feetech.memory import PWM, SERVO, STEP, WHEEL, StsMemory
+from sim_mock.feetech.packets import signed, unsigned
+from sim_mock.smart_servo.physics import Physics
+
+CURRENT_UNIT_A = CURRENT_UNIT_MA / 1000.0
+RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
+"""Unit of Acceleration (41) in steps/ms2."""
+
+FINE_SPEED, ZERO_IS_FASTEST, COUNTS_TURNS = 4, 8, 16
+"""Bits of Phase (18)."""
+COARSE_STEPS_S = 50
+
+GOALS_AT, GOALS = 41, struct.Struct("<BHHH")
+"""Acceleration, goal position, goal time, goal speed: written together ever again."""
+
+DAMPED = 2
+"""Torque (40): the windings are shorted, which brakes."""
+
+BRAKED = Loop(u_most=0.0)
+P_SHARE, I_SHARE, D_SHARE = 1 / 1600, 1 / 1.6e6, 1 / 64
+SPEED_P_SHARE, SPEED_I_SHARE = 1 / 50, 1 / 40_000
+"""What a unit of each gain makes of steps, steps times ms, and steps/ms: shares of full duty."""
+
+
+class Sensed(NamedTuple):
+    """What the servo tells of its motion, in register units with their signs."""
+
+    position: int
+    speed: int
+    load: int
+    current: int
+
+
+class StsDrive:
+    """What turns the shaft.
+
+    torque: whether it is switched on
+    most: share of the duty that a protection leaves
+    """
+
+    def __init__(
+        self,
+        memory: StsMemory,
+        model: FeetechModel,
+        physics: Physics,
+        start_steps: float,
+        seed: int,
+    ) -> None:
+        self.memory = memory
+        self.shaft = Shaft(model, physics, start_steps)
+        self._top = model.no_load_rpm / 60.0 * TURN / 1000.0
+        self._current_full = model.stall_current_a / CURRENT_UNIT_A
+        self._noise = seed, physics.noise_current, physics.noise_velocity
+        self._timed = True
+        self.boot()
+
+    def boot(self) -> None:
+        """Begin without torque, within one turn."""
+        self.torque = self.damped = False
+        self.most = 1.0
+        self.mode = self.memory.get("mode")
+        self._asked: tuple[int, ...] = ()
+        self._offset = self.memory.get("offset")
+        self.shaft.let_go()
+        self._locate()
+        self.settle()
+
+    # --- readings
+
+    @property
+    def position_steps(self) -> float:
+        """Give the true position in the registers' terms, finer than they are."""
+        at = self.shaft.x + self._shift
+        return at if self.counts_turns or self.torque else at % TURN
+
+    def sensed(self, now_ms: int) -> Sensed:
+        """Give position, speed, load and current."""
+        shaft = self.shaft
+        at = round(shaft.x + self._shift)
+        if not self.counts_turns:
+            at %= TURN
+        speed = round(shaft.v * 1000.0 / self._speed_unit)
+        load, current = round(shaft.u * FULL), round(shaft.effort * self._current_full)
+        if self.torque and not shaft.v:
+            more, speed = flicker(now_ms, *self._noise)
+            current += more
+        return Sensed(at, speed, load, current)
+
+    @property
+    def moving(self) -> bool:
+        """Tell whether it is on its way, or turned."""
+        profile = self.shaft.profile
+        led = self.torque and isinstance(profile, Profile) and profile.running
+        return led or abs(self.shaft.v * 1000.0 / self._speed_unit) > self._threshold
+
+    def target(self) -> int:
+        """Give the position it is led to, in the registers' terms."""
+        profile = self.shaft.profile
+        if self.torque and isinstance(profile, Profile):
+            return round(profile.goal + self._shift)
+        return self.memory.get("goal_position")
+
+    # --- settings
+
+    def settle(self) -> None:
+        """Take over what the registers say now."""
+        get = self.memory.get
+        phase, low, high = get("phase"), get("min_angle"), get("max_angle")
+        endless = low == 0 and high == 0
+        self.counts_turns = endless or bool(phase & COUNTS_TURNS)
+        self._range = None if endless else (min(low, high), max(low, high))
+        self._speed_unit = 1 if phase & FINE_SPEED else COARSE_STEPS_S
+        self._stops_at_zero = not phase & ZERO_IS_FASTEST
+        self._threshold = get("moving_threshold")
+        offset = get("offset")
+        if offset != self._offset:
+            self._shift += self._offset - offset
+            self._offset = offset
+            if not self.counts_turns:
+                self._locate()
+        if get("mode") != self.mode:
+            self._change_mode(get("mode"))
+        self.tune()
+
+    def tune(self) -> None:
+        """Take over gains, torque limit and, in mode PWM, the duty."""
+        self.shaft.drive(self._loop() if self.torque else BRAKED if self.damped else LIMP)
+
+    def _loop(self) -> Loop:
+        get = self.memory.get
+        most = min(get("torque_limit") / FULL, self.most, 1.0)
+        if self.mode == PWM:
+            return Loop(bias=signed(get("goal_time"), 10) / FULL, u_most=most)
+        if self.mode == WHEEL:
+            damping, sum_up = (
+                SPEED_P_SHARE * get("speed_p_gain"),
+                SPEED_I_SHARE * get("speed_i_gain"),
+            )
+            return Loop(d=damping, vi=sum_up, u_most=most)
+        return Loop(
+            p=P_SHARE * get("p_gain"),
+            i=I_SHARE * get("i_gain"),
+            d=D_SHARE * get("d_gain"),
+            u_most=most,
+        )
+
+    def _change_mode(self, mode: int) -> None:
+        """Begin a mode where the shaft is."""
+        self.mode = mode
+        self._goal_here()
+        if self.torque:
+            self._begin()
+
+    # --- torque
+
+    def switch(self, value: int, from_here: bool) -> None:
+        """Switch the torque: 0 off, 1 on, 2 off and braked; ``from_here``: without an old goal."""
+        was, self.torque = self.torque, value not in (0, DAMPED)
+        self.damped = value == DAMPED
+        if self.torque and not was:
+            if not self.counts_turns:
+                self._locate()
+            if from_here:
+                self._goal_here()
+            self._begin()
+        elif was and not self.torque:
+            self.shaft.let_go()
+        self.tune()
+
+    def _begin(self) -> None:
+        """Let a profile begin where the shaft is."""
+        shaft = self.shaft
+        self._asked = ()
+        wheel = self.mode == WHEEL
+        shaft.start(SpeedProfile(shaft.x, shaft.v) if wheel else Profile(shaft.x))
+        self.tune()
+        if self.mode != STEP:
+            self.follow()
+
+    # --- goals
+
+    def timed(self, obeyed: bool) -> None:
+        """Choose whether Goal Time means anything."""
+        self._timed = obeyed
+
+    def follow(self, new_goal: bool = False) -> None:
+        """Follow the goal registers; ``new_goal``: the goal position was written just now."""
+        if not self.torque:
+            return
+        asked = GOALS.unpack_from(self.memory.bytes, GOALS_AT)
+        profile = self.shaft.profile
+        if isinstance(profile, SpeedProfile):
+            speed = signed(asked[3], 15) * self._speed_unit / 1000.0
+            profile.aim(max(-self._top, min(self._top, speed)), asked[0] * RAMP_UNIT)
+            self.shaft.wake()
+        elif self.mode == PWM:
+            self.tune()
+        elif self.mode == SERVO:
+            place = self._place(signed(asked[1], 15))
+            if asked != self._asked or place != profile.goal:
+                self._asked = asked
+                self._lead(profile, place, asked)
+        elif self.mode == STEP and new_goal:
+            self._lead(profile, profile.goal + signed(asked[1], 15), asked)
+
+    def _place(self, goal: int) -> float:
+        """Give where a goal position is, within the limits."""
+        if self._range is not None:
+            goal = max(self._range[0], min(self._range[1], goal))
+        return float(goal - self._shift)
+
+    def _lead(self, profile: Profile, to: float, asked: tuple[int, ...]) -> None:
+        """Lead the profile to a place, in a time or at goal speed and acceleration."""
+        ramp, _, time_ms, speed = asked
+        cruise = abs(signed(speed, 15)) * self._speed_unit / 1000.0
+        if cruise == 0.0 and self._stops_at_zero:
+            return
+        if time_ms and self._timed and self.mode == SERVO:
+            profile.by_time(to, time_ms, 0.0)
+        else:
+            profile.by_velocity(to, min(cruise or self._top, self._top), ramp * RAMP_UNIT)
+        self.shaft.wake()
+
+    def _goal_here(self) -> None:
+        """Make the goal position the present one."""
+        here = round(self.position_steps)
+        self.memory.set("goal_position", unsigned(here, 15))
+
+    # --- origin
+
+    def _locate(self) -> None:
+        """Bring the position into one turn, as power-on does."""
+        turns = (self.shaft.x - self._offset) // TURN
+        self._shift = -self._offset - int(turns) * TURN
+
+    def calibrate(self, to: int) -> None:
+        """Make the present position ``to``; the offset is kept without power."""
+        offset = (round(self.shaft.x) - to + TURN // 2) % TURN - TURN // 2
+        self.memory.keep("offset", unsigned(offset, 11))
+        self.settle()
+        self._goal_here()
+
+    def forget_turns(self) -> None:
+        """Begin to count turns anew; under torque it stays where it is."""
+        self._locate()
+        self._goal_here()
+        if self.torque:
+            self._begin()
+
+    def turn(self, steps: float) -> None:
+        """Turn the shaft by hand."""
+        self.shaft.turn(steps)

@@ -1,0 +1,191 @@
+"""A serial port without a wire: over an emulated device in this process.
+
+Drivers use it as a drivers.serial.port.BusPort, ROBOTIS' SDK as its PortHandler. Time is
+the device's: an answer that does not come costs none. Where the line has wire time or
+faults make answers late, they arrive when the device's clock gets there; ``sleep_until``
+lets waiting move that clock. Baud rate: that of ``setBaudRate``.
+"""
+
+import errno
+import os
+from collections.abc import Callable
+
+from dynamixel_sdk import PortHandler
+
+from drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
+from drivers.errors import BusLost, PortError
+from drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
+from sim_mock.device import Device
+from sim_mock.wire import ServoLine
+
+KNOWN_BAUDS = frozenset((*DYNAMIXEL_BAUDS, *FEETECH_BAUDS))
+"""Rates of servos, beside those that the SDK knows of adapters."""
+
+BITS_PER_BYTE = 10
+WRITE_S = 0.25
+"""A write to an adapter that takes nothing gives up after so long."""
+
+
+class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
+    """The host's end of an emulated device.
+
+    Args:
+        chain: a chain of servos, or a board; its clock is the port's clock.
+        tap: gets every byte string the host sends.
+        sleep_until: moves that clock on, for waiting; without it nobody waits.
+        wire_time: bytes take their time on the line, return delays count.
+    """
+
+    def __init__(
+        self,
+        chain: Device,
+        tap: Callable[[bytes], None] | None = None,
+        name: str = "emulated servos",
+        sleep_until: Callable[[float], None] | None = None,
+        wire_time: bool = False,
+        turnaround_s: float = 0.0,
+    ) -> None:
+        super().__init__(name)
+        self.chain = chain
+        self.faults = chain.faults
+        self.line = ServoLine(chain, wire_time, turnaround_s)
+        self.now_s = chain.now_s
+        self._tap = tap
+        self._sleep_until = sleep_until
+        self._waiting = b""
+        self._lost = False
+        self._give_up_s = 0.0
+
+    # --- what a driver's control loop uses
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; what is answered waits to be read.
+
+        Raises:
+            drivers.errors.BusLost: unplugged, or the adapter takes nothing.
+        """
+        self._see()
+        if self._tap is not None:
+            self._tap(data)
+        if self.faults.wire.any and self.faults.on("block"):
+            self._wait(self.now_s() + WRITE_S)
+            raise BusLost(f"{self.port_name} takes no bytes: replug the adapter")
+        self._waiting += self.line.send(data, self.baudrate)
+
+    def read_until(self, length: int, deadline_s: float) -> bytes:
+        """Give up to ``length`` bytes; fewer where no more will come before the deadline.
+
+        Raises:
+            drivers.errors.BusLost: unplugged.
+        """
+        self._see()
+        while len(self._waiting) < length and self._sleep_until is not None:
+            due_s = self.line.next_due_s()
+            if due_s is None or due_s > deadline_s:
+                self._wait(deadline_s)
+                break
+            self._wait(due_s)
+        taken, self._waiting = self._waiting[:length], self._waiting[length:]
+        return taken
+
+    def drain(self) -> int:
+        """Throw away what waits; gives the number of bytes."""
+        self._see()
+        dropped = len(self._waiting)
+        self._waiting = b""
+        return dropped
+
+    def _see(self) -> None:
+        """Take in what has arrived by now.
+
+        Raises:
+            drivers.errors.BusLost: unplugged since it was opened.
+        """
+        if self.faults.wire.any and self.faults.on("unplug"):
+            self._lost = True
+        if self._lost:
+            self._waiting = b""
+            self.line.forget()
+            raise BusLost(f"{self.port_name} is gone: plug the adapter in")
+        if self.line.busy:
+            self._waiting += self.line.arrived()
+
+    def _wait(self, until_s: float) -> None:
+        """Let the device's clock reach a time, where somebody can move it."""
+        if self._sleep_until is not None and until_s > self.now_s():
+            self._sleep_until(until_s)
+        self._see()
+
+    # --- what the SDK uses
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Open at a baud rate; False where neither adapters nor any device know it."""
+        known = baudrate in KNOWN_BAUDS or self.getCFlagBaud(baudrate) > 0
+        return known and self.setupPort(baudrate)
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """Open at a baud rate.
+
+        Raises:
+            drivers.errors.PortError: unplugged, or opening is forbidden.
+        """
+        for fault, code in (("unplug", errno.ENOENT), ("deny", errno.EACCES)):
+            if self.faults.on(fault):
+                raise PortError(f"cannot open {self.port_name}: {os.strerror(code)}")
+        self.is_open = True
+        self.is_using = False
+        self.baudrate = cflag_baud
+        self.tx_time_per_byte = 1000.0 * BITS_PER_BYTE / self.baudrate
+        self._lost = False
+        self._waiting = b""
+        self.line.forget()
+        return True
+
+    def closePort(self) -> None:
+        """Close; safe to call twice."""
+        self.is_open = False
+
+    def clearPort(self) -> None:
+        """Throw away what waits."""
+        self.drain()
+
+    def getBytesAvailable(self) -> int:
+        """Count the bytes that wait."""
+        self._see()
+        return len(self._waiting)
+
+    def readPort(self, length: int) -> bytes:
+        """Give up to ``length`` bytes."""
+        return self.read_until(length, self.now_s())
+
+    def writePort(self, packet: bytes | list[int]) -> int:
+        """Send bytes; gives their number."""
+        data = bytes(packet)
+        self.write(data)
+        return len(data)
+
+    def getCurrentTime(self) -> float:
+        """Give the device's time in milliseconds."""
+        return self.now_s() * 1000.0
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Set how long the SDK waits, from the length of the packet."""
+        self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + 34.0)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """Set how long the SDK waits."""
+        self._give_up_s = self.now_s() + msec / 1000.0
+
+    def isPacketTimeout(self) -> bool:
+        """Tell that waiting longer is of no use: every answer that will come is here.
+
+        Where the clock can be moved on, it is, to the next bytes or the end of patience.
+        """
+        if self._sleep_until is None or self._waiting:
+            return not self.line.busy
+        due_s = self.line.next_due_s()
+        if due_s is None or due_s > self._give_up_s:
+            self._wait(self._give_up_s)
+            return True
+        self._wait(due_s)
+        return False

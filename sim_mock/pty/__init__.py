@@ -1,0 +1,1 @@
+"""Emulated buses on pseudo-terminals."""

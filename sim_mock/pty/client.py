@@ -1,0 +1,161 @@
+"""The client's side of emulated buses on pseudo-terminals: starts, commands and ends them."""
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from sim_mock.devices import DynamixelLine, Emulated, packed
+from sim_mock.smart_servo.physics import ServoSpec
+
+STOP_S = 2.0
+ROOT = Path(__file__).parents[2]
+
+
+class _Served:
+    """A server process of ``sim_mock.pty.server``."""
+
+    def __init__(self) -> None:
+        self._server: subprocess.Popen[bytes] | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+
+    def _start(self, buses: Sequence[Mapping[str, object]]) -> list[str]:
+        """Start it for these settings of buses; gives the path of each."""
+        self._folder = tempfile.TemporaryDirectory(prefix="servo-bus-")
+        links = [str(Path(self._folder.name) / f"tty{k or ''}") for k in range(len(buses))]
+        linked = [{**bus, "link": link} for bus, link in zip(buses, links, strict=True)]
+        settings = json.dumps({"buses": linked, "until_eof": True})
+        self._server = subprocess.Popen(
+            [sys.executable, "-m", "sim_mock.pty.server", settings],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            # Ctrl-C and timeouts go to a whole group: the servos must outlive their client's
+            # way out. They end when their standard input does.
+            start_new_session=True,
+        )
+        told = [self._hear() for _ in buses]
+        if not all(told):
+            self.stop()
+            raise RuntimeError("the emulated bus did not start: its message is above")
+        return [str(json.loads(line)["path"]) for line in told]
+
+    @property
+    def pid(self) -> int:
+        """Give the server's process id."""
+        if self._server is None:
+            raise RuntimeError("the emulated bus is not running: start it first")
+        return self._server.pid
+
+    def command(self, text: str, bus: str = "") -> str:
+        """Carry out a fault command in the server, on the bus of this name; gives what it did.
+
+        Raises:
+            ValueError: names the word that is wrong and what would be right.
+            RuntimeError: the server is not running.
+        """
+        if self._server is None or self._server.stdin is None:
+            raise RuntimeError("the emulated bus is not running: start it first")
+        line = f"{bus}: {text}" if bus else text
+        self._server.stdin.write(line.replace("\n", " ").encode() + b"\n")
+        self._server.stdin.flush()
+        answer = json.loads(self._hear() or '{"error": "the emulated bus has ended"}')
+        if "error" in answer:
+            raise ValueError(answer["error"])
+        answer.pop("bus", None)
+        return json.dumps(answer) if len(answer) > 1 else str(answer["ok"])
+
+    def _hear(self) -> bytes:
+        assert self._server is not None and self._server.stdout is not None
+        return self._server.stdout.readline()
+
+    def stop(self) -> None:
+        """End the server; safe to call twice."""
+        if self._server is not None:
+            server, self._server = self._server, None
+            for pipe in (server.stdin, server.stdout):
+                if pipe is not None:
+                    pipe.close()
+            try:
+                server.wait(STOP_S)
+            except subprocess.TimeoutExpired:
+                server.kill()
+                server.wait()
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
+    def __enter__(self) -> Self:
+        """Nothing is started before ``start``."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End the server."""
+        self.stop()
+
+
+class PtyBus(_Served):
+    """One emulated bus in a process of its own, and the terminal it is on."""
+
+    def start(
+        self,
+        specs: Sequence[ServoSpec | tuple[int, str, float]],
+        baud: int | None = None,
+        wire_time: bool = False,
+        turnaround_us: float = 0.0,
+        choices: Mapping[str, str] | None = None,
+    ) -> str:
+        """Start a server for Dynamixel servos; gives the path to open as a serial port.
+
+        The rest as for ``start_device``.
+        """
+        line = DynamixelLine(tuple(ServoSpec(*spec) for spec in specs), baud)
+        return self.start_device(line, wire_time, turnaround_us, choices)
+
+    def start_device(
+        self,
+        device: Emulated,
+        wire_time: bool = False,
+        turnaround_us: float = 0.0,
+        choices: Mapping[str, str] | None = None,
+        seed: int = 0,
+    ) -> str:
+        """Start a server for servos or a board; gives the path to open as a serial port.
+
+        The path stays the same over ``unplug`` and ``plug``. The rest as in
+        sim_mock.pty.line.BusSettings.
+
+        Raises:
+            RuntimeError: the server did not start; its message is on standard error.
+        """
+        bus: dict[str, object] = {
+            "device": packed(device),
+            "wire_time": wire_time,
+            "turnaround_us": turnaround_us,
+            "choices": dict(choices or {}),
+            "seed": seed,
+        }
+        (path,) = self._start([bus])
+        return path
+
+
+class PtyBuses(_Served):
+    """All emulated buses of a rig in one process of their own, each on its terminal."""
+
+    def start(self, devices: Mapping[str, Emulated]) -> dict[str, str]:
+        """Start a server for what is on every bus; gives the path of each, by the same names.
+
+        Raises:
+            RuntimeError: the server did not start; its message is on standard error.
+        """
+        buses = [{"name": name, "device": packed(device)} for name, device in devices.items()]
+        return dict(zip(devices, self._start(buses), strict=True))

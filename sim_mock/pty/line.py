@@ -1,0 +1,196 @@
+"""One emulated device on a pseudo-terminal: passes bytes to and fro until it is closed."""
+
+import json
+import os
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sim_mock.devices import CASES, Emulated, build
+from sim_mock.pty.terminal import Terminal
+from sim_mock.wire import ServoLine
+
+PACKET_GAP, GAP_MS = "packet-gap-ms", 50.0
+"""On a real line 1.5 ms; here the host's scheduler may tear a packet apart for longer."""
+
+SPIN_S = 0.0001
+"""The kernel wakes a sleeper up to so late: the rest until bytes are due is spun away."""
+
+IDLE_S = 0.5
+"""So often it is looked whether a signal came, while nothing else happens."""
+LOOK_S = 0.005
+"""How often faults that end by themselves are looked at."""
+
+
+@dataclass(frozen=True)
+class BusSettings:
+    """What to emulate on one terminal.
+
+    device: what it is; clients at another baud rate than its own are not heard
+    name: tells several buses of one process apart; None: it is the only one
+    wire_time, turnaround_us: as in sim_mock.wire
+    link: name under which the terminal can be opened, also after it was unplugged
+    choices: cases of the device by name
+    seed: of the dice that faults throw
+    """
+
+    device: Emulated
+    name: str | None = None
+    wire_time: bool = False
+    turnaround_us: float = 0.0
+    link: str | None = None
+    choices: Mapping[str, str] = field(default_factory=dict)
+    seed: int = 0
+
+
+class TerminalLine:
+    """Passes bytes between a terminal and a device.
+
+    Args:
+        settings: what to emulate, and how.
+        now_s: the clock of device and line.
+        say: gets the bus's new path as JSON when it was plugged in again without a link.
+        warn: told once for each wrong baud rate at which a client speaks.
+
+    Raises:
+        ValueError, OSError: the settings cannot be met.
+    """
+
+    def __init__(
+        self,
+        settings: BusSettings,
+        now_s: Callable[[], float],
+        say: Callable[[str], None],
+        warn: Callable[[str], None] | None = None,
+    ) -> None:
+        self.settings = settings
+        self._now_s, self._say, self._warn = now_s, say, warn
+        self.device = build(settings.device, now_s, settings.seed)
+        for case, value in {**_patience(settings.device), **settings.choices}.items():
+            self.device.choose(case, value)
+        self.line = ServoLine(self.device, settings.wire_time, settings.turnaround_us * 1e-6)
+        link = None if settings.link is None else Path(os.path.abspath(settings.link))
+        self.terminal = Terminal(link, settings.device.baud)
+        self._held = self._forbidden = False
+        self._warned: int | None = None
+
+    def where(self) -> str:
+        """Give as JSON the path to open, the baud rate, and the name where there is one."""
+        return self.labelled({"path": self.terminal.path, "baud": self.settings.device.baud})
+
+    def labelled(self, told: Mapping[str, object]) -> str:
+        """Give as JSON what is told of this bus."""
+        name = self.settings.name
+        return json.dumps(told if name is None else {"bus": name, **told})
+
+    def close(self) -> None:
+        """Take link and terminal away; safe to call twice."""
+        self.terminal.unplug()
+
+    # --- bytes
+
+    def watched(self) -> list[int]:
+        """List the files that become readable when there is something to do."""
+        watch = self.terminal.watch
+        return [fd for fd in (self.terminal.master, -1 if watch is None else watch.fd) if fd >= 0]
+
+    def patience_s(self) -> float:
+        """Give how long nothing needs to be done but for what arrives."""
+        due_s = self.line.next_due_s()
+        if due_s is not None:
+            return max(0.0, due_s - SPIN_S - self._now_s())
+        return LOOK_S if self.device.faults.wire.any else IDLE_S
+
+    def serve(self, ready: Collection[int], now_s: float) -> None:
+        """Do what there is to do; ``ready``: the files that are readable since ``now_s``."""
+        watch = self.terminal.watch
+        if watch is not None and watch.fd in ready and watch.look():
+            self.terminal.release()
+        if self.terminal.master in ready:
+            self._take_bytes(now_s)
+        if self.line.busy:
+            self._deliver()
+        if self.device.faults.wire.any or self._held or self._forbidden:
+            self._follow_faults()
+        elif not self.terminal.plugged:
+            self._plug()
+
+    def _take_bytes(self, now_s: float) -> None:
+        """Give the client's bytes to the line, and back what is answered at once."""
+        data = self.terminal.read()
+        careful = self.device.heed_baud or self.line.wire_time
+        baud = self.terminal.client_baud() if careful else 0
+        answer = self.line.send(data, baud or 1, now_s)
+        if answer:
+            self.terminal.write(answer)
+        if self.device.heed_baud and self._warn is not None and data:
+            self._warn_of(baud, self._warn)
+
+    def _deliver(self) -> None:
+        """Hand over what is due; the last moment before that is waited for exactly."""
+        due_s = self.line.next_due_s()
+        if due_s is not None:
+            if due_s - self._now_s() > SPIN_S:
+                return
+            while self._now_s() < due_s:
+                pass
+        data = self.line.arrived()
+        if data and self.terminal.plugged:
+            self.terminal.write(data)
+
+    def _warn_of(self, baud: int, warn: Callable[[str], None]) -> None:
+        """Tell a person, once for each rate, that a client speaks at the wrong one."""
+        if baud == self._warned or self.device.hears(baud):
+            return
+        self._warned = baud
+        device = self.settings.device
+        rate = "another rate" if device.baud is None else device.baud
+        warn(f"a client speaks at {baud} bit/s; {device.listens} at {rate}")
+
+    # --- faults of the adapter
+
+    def _follow_faults(self) -> None:
+        """Make the terminal as the faults in force say."""
+        faults = self.device.faults
+        if faults.on("unplug") == self.terminal.plugged:
+            if self.terminal.plugged:
+                self._unplug()
+            else:
+                self._plug()
+        if not self.terminal.plugged:
+            return
+        if faults.on("block") != self._held:
+            self._held = not self._held
+            self.terminal.hold(self._held)
+        if faults.on("deny") != self._forbidden:
+            self._forbidden = not self._forbidden
+            self.terminal.forbid(self._forbidden)
+
+    def _unplug(self) -> None:
+        self.terminal.unplug()
+        self.line.forget()
+        self._held = self._forbidden = False
+
+    def _plug(self) -> None:
+        before = self.terminal.path
+        self.terminal.plug()
+        if self.terminal.path != before:
+            self._say(self.labelled({"path": self.terminal.path}))
+
+    # --- commands
+
+    def obey(self, text: str) -> str:
+        """Carry out a fault command; gives {"ok": ...} or {"error": ...} as JSON."""
+        try:
+            done = self.device.faults.command(text)
+        except ValueError as error:
+            return self.labelled({"error": str(error)})
+        self._follow_faults()
+        if done.startswith("{"):
+            return self.labelled({"ok": "status", **json.loads(done)})
+        return self.labelled({"ok": done})
+
+
+def _patience(device: Emulated) -> dict[str, str]:
+    """Give the choice that lets a device wait for the rest of a torn packet."""
+    return {PACKET_GAP: str(GAP_MS)} if PACKET_GAP in CASES[device.kind] else {}

@@ -1,0 +1,137 @@
+"""A pseudo-terminal that stands for a serial adapter: Linux only.
+
+The link to it keeps its name over unplugging and plugging; the terminal behind it gets a
+new number each time. The slave side is kept open here, raw, else it would echo and fail
+between two clients.
+"""
+
+import errno
+import fcntl
+import os
+import pty
+import struct
+import termios
+import tty
+from pathlib import Path
+
+from sim_mock.pty.watch import Watch
+
+# struct termios2 of asm-generic/termbits.h: 4 flag words, line, 19 control characters, 2 speeds
+_TERMIOS2 = struct.Struct("<4I20s2I")
+_TCGETS2, _TCSETS2 = 0x802C542A, 0x402C542B
+_ANY_BAUD, _BAUD_MASK = 0o010000, 0o010017
+_INPUT_SHIFT = 16
+
+
+class Terminal:
+    """The master's side.
+
+    Args:
+        link: a symbolic link to the terminal; one that is left over is replaced.
+        baud: the speed it is set to until a client sets another.
+
+    Raises:
+        FileExistsError: there is something else under the name of the link.
+        FileNotFoundError: its folder does not exist.
+    """
+
+    def __init__(self, link: Path | None = None, baud: int | None = None) -> None:
+        self._link = link
+        self._baud = baud
+        self.master = self._slave = -1
+        self.path = ""
+        self.watch: Watch | None = None
+        self.plug()
+
+    @property
+    def plugged(self) -> bool:
+        """Tell whether the terminal is there."""
+        return self.master >= 0
+
+    def plug(self) -> None:
+        """Make the terminal and the link to it."""
+        self.master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self.master, False)
+        self.path = os.ttyname(self._slave)
+        if self._baud is not None:
+            self._set_baud(self._baud)
+        self.watch = Watch(self.path)
+        if self._link is not None:
+            try:
+                _point(self._link, self.path)
+            except OSError:
+                self._link = None
+                self.unplug()
+                raise
+            self.path = str(self._link)
+
+    def unplug(self) -> None:
+        """Take link and terminal away: a client gets an I/O error or a hang-up."""
+        if not self.plugged:
+            return
+        if self._link is not None and _leads_to(self._link, os.ttyname(self._slave)):
+            self._link.unlink()
+        if self.watch is not None:
+            self.watch.close()
+        os.close(self._slave)
+        os.close(self.master)
+        self.master = self._slave = -1
+
+    def read(self) -> bytes:
+        """Give what the client has sent, nothing where that was nothing."""
+        try:
+            return os.read(self.master, 4096)
+        except BlockingIOError:
+            return b""
+
+    def write(self, data: bytes) -> None:
+        """Send to the client; what a full terminal does not take is lost, as on a wire."""
+        try:
+            os.write(self.master, data)
+        except BlockingIOError:
+            return
+
+    def client_baud(self) -> int:
+        """Give the baud rate the client has set."""
+        words = fcntl.ioctl(self.master, _TCGETS2, bytes(_TERMIOS2.size))
+        return int(_TERMIOS2.unpack(words)[-1])
+
+    def _set_baud(self, baud: int) -> None:
+        words = list(_TERMIOS2.unpack(fcntl.ioctl(self._slave, _TCGETS2, bytes(_TERMIOS2.size))))
+        words[2] &= ~(_BAUD_MASK | _BAUD_MASK << _INPUT_SHIFT)
+        words[2] |= _ANY_BAUD | _ANY_BAUD << _INPUT_SHIFT
+        words[5] = words[6] = baud
+        fcntl.ioctl(self._slave, _TCSETS2, _TERMIOS2.pack(*words))
+
+    def hold(self, held: bool) -> None:
+        """Take no more bytes from the client, as an adapter with a full buffer, or do again."""
+        termios.tcflow(self._slave, termios.TCOOFF if held else termios.TCOON)
+
+    def forbid(self, forbidden: bool) -> None:
+        """Forbid opening, or allow it again; the superuser may open it all the same."""
+        os.chmod(self._slave, 0 if forbidden else 0o620)
+
+    def release(self) -> None:
+        """Forget what the last client has left: answers not read, and its lock if it was killed."""
+        termios.tcflush(self._slave, termios.TCIFLUSH)
+        fcntl.ioctl(self._slave, termios.TIOCNXCL)
+
+
+def _point(link: Path, target: str) -> None:
+    """Make a link; one to a terminal or to nothing is left over and replaced."""
+    if link.is_symlink():
+        old = os.readlink(link)
+        if not old.startswith("/dev/pts/") and os.path.exists(old):
+            raise FileExistsError(errno.EEXIST, f"a link to {old} is in the way", str(link))
+        link.unlink()
+    elif link.exists():
+        raise FileExistsError(errno.EEXIST, "something else has this name", str(link))
+    try:
+        link.symlink_to(target)
+    except OSError as error:
+        raise OSError(error.errno, os.strerror(error.errno or 0), str(link)) from None
+
+
+def _leads_to(link: Path, target: str) -> bool:
+    return link.is_symlink() and os.readlink(link) == target

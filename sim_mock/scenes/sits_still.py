@@ -1,0 +1,40 @@
+"""The scene ``sits-still``: a person who sits before the robot, faces it and does not move.
+
+For everything that a person does with the robot and not before it. Nobody real sits as
+still: no sway, no glance aside, no blink.
+"""
+
+from math import atan2, hypot
+
+from gaze.types import Vec3
+from sim_mock.scenes.scene import Event, Person, Thing
+
+HEAD_M: Vec3 = (0.04, 0.0, 0.13)
+FACE_M: Vec3 = (0.95, 0.06, 0.24)
+
+_ROUND_S = 10.0
+
+
+class SitsStill:
+    """The scene ``sits-still``."""
+
+    name = "sits-still"
+    round_s = _ROUND_S
+    behaviours: tuple[str, ...] = ()
+
+    def people(self, t_s: float) -> tuple[Person, ...]:
+        """Give the one person."""
+        x, y, z = (a - b for a, b in zip(HEAD_M, FACE_M, strict=True))
+        return (Person(FACE_M, (atan2(y, x), atan2(z, hypot(x, y))), None),)
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        """Give nothing."""
+        return ()
+
+    def behaviour(self, t_s: float) -> str | None:
+        """Leave the behaviour to the rig."""
+        return None
+
+    def events(self) -> tuple[Event, ...]:
+        """Ask for the face, all the time."""
+        return (Event("face", "look", "face", 0.0, _ROUND_S, FACE_M, 0.3),)

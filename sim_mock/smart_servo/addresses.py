@@ -1,0 +1,42 @@
+"""Who listens on a bus: servos by id, those that share one, secondary ids, baud rates."""
+
+from collections.abc import Iterable
+
+from sim_mock.smart_servo.servo import Servo
+
+
+class Roster:
+    """The servos that hear one client.
+
+    by_id: the first servo of each id; twins: further ones with the same id
+    shadows: servos by secondary id: they obey and never answer
+    delay_s: return delay by id
+    """
+
+    def __init__(self, servos: Iterable[Servo], client_baud: int | None) -> None:
+        self.by_id: dict[int, Servo] = {}
+        self.twins: dict[int, list[Servo]] = {}
+        self.shadows: dict[int, list[Servo]] = {}
+        self.delay_s: dict[int, float] = {}
+        for servo in servos:
+            if hears(servo, client_baud):
+                self._enter(servo)
+
+    def _enter(self, servo: Servo) -> None:
+        if servo.id in self.by_id:
+            self.twins.setdefault(servo.id, []).append(servo)
+        else:
+            self.by_id[servo.id] = servo
+            self.delay_s[servo.id] = servo.return_delay_s
+        shadow = servo.shadow_id
+        if shadow is not None and shadow != servo.id:
+            self.shadows.setdefault(shadow, []).append(servo)
+
+    def everyone(self) -> list[Servo]:
+        """List all servos that hear the client."""
+        return [*self.by_id.values(), *(twin for pair in self.twins.values() for twin in pair)]
+
+
+def hears(servo: Servo, client_baud: int | None) -> bool:
+    """Tell whether a servo and a client at this baud rate (None: any) understand each other."""
+    return client_baud is None or servo.baud == client_baud

@@ -1,0 +1,203 @@
+"""The control table of an emulated servo as bytes: access, ranges, indirect windows.
+
+Knows the rules that follow from the table alone; what needs the servo's state (EEPROM
+lock, limit registers, watchdog) is asked by sim_mock.smart_servo.servo.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from drivers.dynamixel.control_table import (
+    EEPROM_END,
+    IndirectBlock,
+    Model,
+    Register,
+    indirect_blocks,
+    registers_of,
+)
+from sim_mock.dynamixel.live_registers import PROFILED
+
+# Numbers of the status error byte (Protocol 2.0).
+RESULT_FAIL = 1
+INSTRUCTION_ERROR = 2
+DATA_RANGE = 4
+DATA_LENGTH = 5
+DATA_LIMIT = 6
+ACCESS = 7
+
+Fields = tuple[tuple[Register, int], ...]
+"""Registers with the values to be written to them."""
+
+
+class Gather(NamedTuple):
+    """The runs of real addresses behind a range, and whether any of them tells of the profile."""
+
+    runs: tuple[slice, ...]
+    profiled: bool
+
+
+class Memory:
+    """One servo's control table."""
+
+    def __init__(self, model: Model, firmware: int) -> None:
+        blocks = indirect_blocks(model, firmware)
+        registers = registers_of(model) + tuple(_window_registers(blocks))
+        self._by_address = {register.address: register for register in registers}
+        self._by_name = {register.name: register for register in registers}
+        self._layouts: dict[tuple[int, int], tuple[Register, ...] | int] = {}
+        self._windows = [(b.data_base, b.data_base + b.entries, b.address_base) for b in blocks]
+        self._window_low = min(low for low, _, _ in self._windows)
+        self._pointers_low = min(pointers for _, _, pointers in self._windows)
+        self._gathers: dict[tuple[int, int], Gather] = {}
+        size = max(register.address + register.size for register in registers)
+        self.bytes = bytearray(size)
+        self._defined = bytearray(size)
+        for register in registers:
+            end = register.address + register.size
+            self._defined[register.address : end] = b"\x01" * register.size
+        self.restore(lambda register: True)
+
+    def restore(self, chosen: Callable[[Register], bool]) -> None:
+        """Put the initial values back into the chosen registers."""
+        for register in self._by_address.values():
+            if register.initial is not None and chosen(register):
+                self.put(register, register.initial)
+
+    def get(self, name: str) -> int:
+        """Give a register's value."""
+        register = self._by_name[name]
+        end = register.address + register.size
+        return int.from_bytes(self.bytes[register.address : end], "little", signed=register.signed)
+
+    def set(self, name: str, value: int) -> None:
+        """Set a register whatever its access."""
+        self.put(self._by_name[name], value)
+
+    def has(self, name: str) -> bool:
+        """Tell whether this model has a register."""
+        return name in self._by_name
+
+    def named(self, name: str) -> Register:
+        """Give a register by its name."""
+        return self._by_name[name]
+
+    def writable(self) -> Iterator[Register]:
+        """List the registers that may be written; through a window one writes to others."""
+        for register in self._by_address.values():
+            if register.access == "rw" and not register.name.startswith("indirect_data"):
+                yield register
+
+    def put(self, register: Register, value: int) -> None:
+        """Store a value, two's complement where it is negative."""
+        size = register.size
+        raw = (value & ((1 << 8 * size) - 1)).to_bytes(size, "little")
+        self.bytes[register.address : register.address + size] = raw
+        if register.address >= self._pointers_low:
+            self._gathers.clear()
+
+    def read(self, address: int, length: int) -> bytes | None:
+        """Give bytes as they are on the wire, None where an address is not defined."""
+        end = address + length
+        defined = self._defined[address:end]
+        if length == 0 or len(defined) != length or 0 in defined:
+            return None
+        if end <= self._window_low:
+            return bytes(self.bytes[address:end])
+        content = self.bytes
+        return b"".join([content[run] for run in self.gather(address, length).runs])
+
+    def gather(self, address: int, length: int) -> Gather:
+        """Give what stands behind a range; kept, as a control loop reads the same ever again."""
+        found = self._gathers.get((address, length))
+        if found is None:
+            found = self._gathers[address, length] = self._gather(address, address + length)
+        return found
+
+    def _gather(self, address: int, end: int) -> Gather:
+        """Join neighbouring real addresses to runs."""
+        runs: list[list[int]] = []
+        for real in map(self.real, range(address, end)):
+            if runs and runs[-1][1] == real:
+                runs[-1][1] = real + 1
+            else:
+                runs.append([real, real + 1])
+        profiled = any(low < end and high > at for low, high in runs for at, end in PROFILED)
+        return Gather(tuple(slice(low, high) for low, high in runs), profiled)
+
+    def real(self, address: int) -> int:
+        """Give the address an indirect data byte stands for, others unchanged."""
+        for low, high, pointers in self._windows:
+            if low <= address < high:
+                at = pointers + 2 * (address - low)
+                return int.from_bytes(self.bytes[at : at + 2], "little")
+        return address
+
+    def fields(self, address: int, data: bytes) -> Fields | int:
+        """Split bytes to be written into registers, or give the error number."""
+        if address + len(data) > self._window_low and any(
+            self.real(a) != a for a in range(address, address + len(data))
+        ):
+            return self._indirect_fields(address, data)
+        layout = self._layout(address, len(data))
+        if isinstance(layout, int):
+            return layout
+        out = []
+        for register in layout:
+            at = register.address - address
+            raw = data[at : at + register.size]
+            value = int.from_bytes(raw, "little", signed=register.signed)
+            low, high = register.low, register.high
+            if (low is not None and value < low) or (high is not None and value > high):
+                return DATA_RANGE
+            out.append((register, value))
+        return tuple(out)
+
+    def _layout(self, address: int, length: int) -> tuple[Register, ...] | int:
+        """List the registers that a write covers exactly, or give the error number."""
+        key = (address, length)
+        if key not in self._layouts:
+            self._layouts[key] = self._lay_out(address, length)
+        return self._layouts[key]
+
+    def _lay_out(self, address: int, length: int) -> tuple[Register, ...] | int:
+        end, found = address + length, []
+        while address < end:
+            register = self._by_address.get(address)
+            if register is None or register.access == "r":
+                return ACCESS
+            found.append(register)
+            address += register.size
+        return tuple(found) if found and address == end else DATA_LENGTH
+
+    def _indirect_fields(self, address: int, data: bytes) -> Fields | int:
+        """Split a write through a window: runs of neighbouring targets are one write each."""
+        runs: list[tuple[int, bytearray]] = []
+        for offset, byte in enumerate(data):
+            target = self.real(address + offset)
+            if runs and target == runs[-1][0] + len(runs[-1][1]):
+                runs[-1][1].append(byte)
+            else:
+                runs.append((target, bytearray([byte])))
+        out: list[tuple[Register, int]] = []
+        for target, run in runs:
+            part = self.fields(target, bytes(run))
+            if isinstance(part, int):
+                return part
+            out.extend(part)
+        return tuple(out)
+
+
+def _window_registers(blocks: tuple[IndirectBlock, ...]) -> Iterator[Register]:
+    """Make the registers of the indirect windows; an address starts at its own data byte."""
+    for block in blocks:
+        for i in range(block.entries):
+            at, data = block.address_base + 2 * i, block.data_base + i
+            yield Register(
+                f"indirect_address_{at}", at, 2, "rw", data, block.target_low, block.target_high
+            )
+            yield Register(f"indirect_data_{data}", data, 1, "rw", 0, 0, 255)
+
+
+def in_eeprom(register: Register) -> bool:
+    """Tell whether a register is kept without power."""
+    return register.address < EEPROM_END

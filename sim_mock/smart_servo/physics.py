@@ -1,0 +1,130 @@
+"""What an emulated servo is made of and how it is built: every physical number has its place here.
+
+Stall torque, stall current and no-load speed are the model's own and stand in
+drivers.dynamixel.control_table. What no data sheet tells is an assumption, marked [A]; what follows
+from a report of users, [R].
+"""
+
+from collections.abc import Sequence
+from math import inf
+from typing import NamedTuple
+
+
+class Physics(NamedTuple):
+    """The body of a servo, the joint it carries, its supply and its surroundings.
+
+    rotor_s: s; rotor inertia as the time to no-load speed at stall torque. 0.0373 [A] gives an
+        XL330-M077 2.0e-4 kg m2 at its output; the same motor has the same behind any gear.
+    load_kg_m2: kg m2; inertia of what the joint carries, besides the rotor's.
+    coulomb_share: share of the stall torque that dry friction takes. 0.03 lets a P gain of 640
+        stop up to 5 steps short, as XL430 do (4-10) [R].
+    viscous_share: share of the stall torque lost at no-load speed [A]. With both frictions
+        the servo still reaches the no-load speed of its data sheet.
+    load_nm: Nm; constant torque on the joint, e.g. a spring or a cable [A: none].
+    gravity_nm: Nm; weight times lever: the torque is gravity_nm * sin(x - upright_steps), so
+        it drives the joint away from ``upright_steps`` where positive, back to it where negative.
+    upright_steps: steps of the encoder at which gravity has no lever.
+    stop_low_steps, stop_high_steps: steps of the encoder; hard stops of the joint, no bounce.
+    play_deg: deg; dead travel between output shaft and joint, 0.25 as in the data sheets of
+        the X430. The encoder of X servos sits on the output, so what the registers tell
+        has no play; ``Shaft.joint`` has it. Play inside the gear is left out.
+    supply_v: V; open-circuit voltage at the plug; None: the voltage the model is rated at.
+    supply_ohm: ohm; cable and connector, so that load sags the voltage [A]; at most 1.
+    ambient_c: degC inside the head [A].
+    stall_rise_c: K; final rise above ambient at stall current [A].
+    thermal_s: s; time constant of warming and cooling [A].
+    overload_share: share of the stall torque at the present voltage that counts as
+        overload; overload_s: s; how long until it latches [A: no data sheet tells].
+    brown_out_share: share of the rated voltage below which the servo restarts [A].
+    noise_current: units; largest flicker of Present Current while it holds still [R: 1-3].
+    noise_velocity: units; the same of Present Velocity.
+    """
+
+    rotor_s: float = 0.0373
+    load_kg_m2: float = 0.0
+    coulomb_share: float = 0.03
+    viscous_share: float = 0.02
+    load_nm: float = 0.0
+    gravity_nm: float = 0.0
+    upright_steps: float = 2048.0
+    stop_low_steps: float = -inf
+    stop_high_steps: float = inf
+    play_deg: float = 0.25
+    supply_v: float | None = None
+    supply_ohm: float = 0.2
+    ambient_c: float = 30.0
+    stall_rise_c: float = 150.0
+    thermal_s: float = 240.0
+    overload_share: float = 0.8
+    overload_s: float = 2.0
+    brown_out_share: float = 0.5
+    noise_current: int = 2
+    noise_velocity: int = 3
+
+
+class Quirks(NamedTuple):
+    """Behaviour that differs between firmware, or is only reported.
+
+    goal_at_torque_on: True: torque on sets the goal to the present position; False: the old
+        goal is kept and the joint snaps to it, as XL330 do [R].
+    wrap_at_torque_on: a homing offset in position mode makes the position jump by a turn as
+        the torque comes on, where it lies outside one turn [R].
+    mute_reboot: no status is sent for a reboot instruction [R: XL430].
+    """
+
+    goal_at_torque_on: bool = False
+    wrap_at_torque_on: bool = False
+    mute_reboot: bool = False
+
+
+class ServoSpec(NamedTuple):
+    """How to build one servo. The seed is that of its noise; None: its id."""
+
+    id: int
+    model: str
+    start_steps: float = 2048
+    firmware: int = 53
+    physics: Physics | Sequence[float | None] = Physics()
+    quirks: Quirks | Sequence[bool] = Quirks()
+    seed: int | None = None
+
+
+def checked(physics: Physics) -> Physics:
+    """Give the physics if it can exist.
+
+    Raises:
+        ValueError: a number is out of its range, named with the range.
+    """
+    for name, (low, high) in _RANGES.items():
+        value = getattr(physics, name)
+        if value is not None and not low <= value <= high:
+            raise ValueError(f"servo physics: {name} is {value}, not in {low}..{high}")
+    if not physics.stop_low_steps <= physics.stop_high_steps:
+        raise ValueError("servo physics: stop_low_steps is above stop_high_steps")
+    if physics.coulomb_share + physics.viscous_share > 0.9:
+        raise ValueError("servo physics: both frictions together take more than 0.9 of the torque")
+    return physics
+
+
+_RANGES: dict[str, tuple[float, float]] = {
+    "rotor_s": (0.001, 10.0),
+    "load_kg_m2": (0.0, 10.0),
+    "coulomb_share": (0.0, 0.9),
+    "viscous_share": (0.0, 0.9),
+    "load_nm": (-100.0, 100.0),
+    "gravity_nm": (-100.0, 100.0),
+    "upright_steps": (-1e7, 1e7),
+    "stop_low_steps": (-inf, inf),
+    "stop_high_steps": (-inf, inf),
+    "play_deg": (0.0, 10.0),
+    "supply_v": (0.0, 60.0),
+    "supply_ohm": (0.0, 1.0),
+    "ambient_c": (-40.0, 100.0),
+    "stall_rise_c": (0.0, 1000.0),
+    "thermal_s": (1.0, 1e5),
+    "overload_share": (0.05, 1.0),
+    "overload_s": (0.02, 1e4),
+    "brown_out_share": (0.0, 0.9),
+    "noise_current": (0, 20),
+    "noise_velocity": (0, 20),
+}

@@ -1,1 +1,0 @@
-"""The device side of Feetech STS servos: bytes in, bytes out."""

@@ -1,0 +1,134 @@
+"""A line between the host and an emulated device: when which bytes arrive. Pure arithmetic.
+
+With wire time a byte takes 10 bits at the client's baud rate in either direction, every
+status leaves after its servo's return delay (a fast reply only after the first servo's)
+and a turnaround of the electronics, and nothing overtakes. A Maestro, with a wire for each
+direction, hears while it speaks, but sends one answer after another all the same. The
+adapter hands over what has arrived when the line falls silent, and every millisecond at
+the latest, as one with a latency timer of 1 ms does. Without wire time everything is there
+at once, except what a fault makes late. An instruction takes effect when its bytes are
+handed to the line, not when its last bit has passed.
+
+Source of the formula: ROBOTIS e-Manual (8N1; return delay of the X series); the same frame
+of 10 bits in Feetech's and Pololu's manuals. The turnaround, reported as 20..50 us for
+Dynamixel servos, is 0 unless asked for.
+"""
+
+from collections import deque
+
+from sim_mock.device import Device, Reply
+from sim_mock.faults.active import NOBODY
+from sim_mock.replies import Piece
+
+BITS_PER_BYTE = 10
+PACK_S = 0.001
+HEAD = b"\xff\xff"
+"""A status begins so, a later block of a fast reply does not; a Maestro's answers are bare."""
+
+
+class ServoLine:
+    """The line of one device: a chain of servos, or a board.
+
+    Args:
+        wire_time: bytes take time, return delays count.
+        turnaround_s: between the end of an instruction, or of the status before, and the
+            start of a status, beyond the return delay.
+    """
+
+    def __init__(self, device: Device, wire_time: bool = False, turnaround_s: float = 0.0) -> None:
+        self.device = device
+        self.wire_time = wire_time
+        self.turnaround_s = turnaround_s
+        self._late: deque[tuple[float, bytes]] = deque()
+        self._host_free_s = self._line_free_s = 0.0
+        self._said = b""
+
+    @property
+    def busy(self) -> bool:
+        """Tell whether bytes are still on their way, or may come by themselves."""
+        return bool(self._late) or self.device.faults.on("babble")
+
+    def next_due_s(self) -> float | None:
+        """Give when the next bytes arrive, None where none are on their way."""
+        return self._late[0][0] if self._late else None
+
+    def forget(self) -> None:
+        """Drop what is on its way."""
+        self._late.clear()
+        self._host_free_s = self._line_free_s = 0.0
+
+    def arrived(self) -> bytes:
+        """Give the bytes that have arrived by now and were not given before."""
+        now_s = self.device.now_s()
+        out = [self.device.faults.wire.babble(now_s)] if self.device.faults.wire.any else []
+        while self._late and self._late[0][0] <= now_s:
+            out.append(self._late.popleft()[1])
+        return b"".join(out)
+
+    def send(self, data: bytes, baud: int, now_s: float | None = None) -> bytes:
+        """Send the host's bytes now, or at ``now_s``; gives what arrives at once."""
+        faulty = self.device.faults.wire.any
+        if faulty:
+            data = self.device.faults.wire.roughened(data, self.device.now_s())
+        replies = self.device.exchange(data, baud)
+        if faulty:
+            replies = self._disturbed(replies)
+        if self.wire_time:
+            self._on_the_wire(data, replies, baud, self.device.now_s() if now_s is None else now_s)
+            return self.arrived()
+        if not replies:
+            return b""
+        if not self._late and not self.device.faults.wire.any and not self._any_late(replies):
+            return b"".join([piece[1] for reply in replies for piece in reply[1]])
+        self._queue_late(replies, self.device.now_s())
+        return self.arrived()
+
+    def _disturbed(self, replies: list[Reply]) -> list[Reply]:
+        """Let noise strike the answers, and a line with a memory say the last ones again first."""
+        wire, now_s = self.device.faults.wire, self.device.now_s()
+        said = b"".join(piece.data for reply in replies for piece in reply.pieces)
+        before, self._said = self._said, said or self._said
+        replies = [
+            Reply(r.end, [p._replace(data=wire.roughened(p.data, now_s)) for p in r.pieces])
+            for r in replies
+        ]
+        if said and before and wire.take("repeat", None, now_s) is not None:
+            first = replies[0]
+            replies[0] = Reply(first.end, [Piece(NOBODY, before), *first.pieces])
+        return replies
+
+    def _any_late(self, replies: list[Reply]) -> bool:
+        return any(piece.late_s for reply in replies for piece in reply.pieces)
+
+    def _queue_late(self, replies: list[Reply], now_s: float) -> None:
+        """Queue answers that take no time but what they wait beyond the ordinary."""
+        due_s = max(now_s, self._late[-1][0] if self._late else now_s)
+        for reply in replies:
+            for piece in reply.pieces:
+                due_s += piece.late_s
+                self._late.append((due_s, piece.data))
+
+    def _on_the_wire(self, data: bytes, replies: list[Reply], baud: int, now_s: float) -> None:
+        """Queue answers as they pass the line."""
+        byte_s = BITS_PER_BYTE / baud
+        start_s = max(now_s, self._host_free_s)
+        self._host_free_s = start_s + len(data) * byte_s
+        at_s = max(self._line_free_s, now_s)
+        for reply in replies:
+            at_s = max(at_s, start_s + reply.end * byte_s)
+            packed, packed_from_s = b"", at_s
+            bare = not any(piece.data.startswith(HEAD) for piece in reply.pieces)
+            for piece in reply.pieces:
+                pause_s = piece.delay_s + piece.late_s
+                if bare or piece.data.startswith(HEAD):
+                    pause_s += self.turnaround_s
+                    bare = False
+                if packed and (pause_s > 0.0 or at_s - packed_from_s >= PACK_S):
+                    self._late.append((at_s, packed))
+                    packed = b""
+                at_s += pause_s
+                packed_from_s = packed_from_s if packed else at_s
+                packed += piece.data
+                at_s += len(piece.data) * byte_s
+            self._late.append((at_s, packed))
+        self._line_free_s = at_s
