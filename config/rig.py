@@ -5,11 +5,13 @@ Bounds stand with the values, in the rooms; the rules between sections in config
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 
 from drivers.camera.oak_params import OakParams
 from drivers.camera.params import CameraCareParams, WebcamParams
 from drivers.feetech.params import FeetechParams
 from drivers.maestro.params import MaestroParams
+from drivers.pca9685.params import Pca9685Params
 from drivers.servo_bus.bus import DynamixelParams
 from drivers.servo_models import BUS_KINDS
 from drivers.vision.face_params import FaceDetectorParams
@@ -55,7 +57,7 @@ class Ranges:
 class BusConfig:
     """How the servos on one port are reached."""
 
-    port: str = field(metadata={"unit": "", "says": "serial port, e.g. /dev/ttyUSB0"})
+    port: str = field(metadata={"unit": "", "says": "serial port or I2C bus, e.g. /dev/ttyUSB0"})
     kind: str = field(
         default="dynamixel",
         metadata={"choices": BUS_KINDS, "unit": "", "says": "what the servos on it speak"},
@@ -72,13 +74,26 @@ class BusConfig:
         default_factory=MaestroParams,
         metadata={"unit": "", "says": "Pololu Maestro settings, for kind maestro"},
     )
+    pca9685: Pca9685Params = field(
+        default_factory=Pca9685Params,
+        metadata={"unit": "", "says": "PCA9685 settings, for kind pca9685"},
+    )
 
     @property
     def baud(self) -> int:
         """Give the speed of its line in bit/s."""
         if self.kind == "dynamixel":
             return self.dynamixel.baud
+        if self.kind == "pca9685":
+            return self.pca9685.baud
         return self.feetech.baud if self.kind == "feetech" else self.maestro.baud
+
+    @property
+    def channels(self) -> float:
+        """Return how many channels its boards have; inf where servos have ids instead."""
+        if self.kind == "pca9685":
+            return self.pca9685.channels
+        return self.maestro.channels if self.kind == "maestro" else inf
 
 
 @dataclass(frozen=True)

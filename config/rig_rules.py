@@ -56,14 +56,13 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
         if joint.bus and joint.bus not in rig.buses:
             there = ", ".join(rig.buses) or "none"
             yield f"joints.{name}.bus", f"no bus {joint.bus!r} under buses; there is {there}"
-        elif joint.model in SERVOS and SERVOS[joint.model].bus != rig.bus_of(name).kind:
+        elif joint.model in SERVOS and not SERVOS[joint.model].fits(rig.bus_of(name).kind):
             kind = rig.bus_of(name).kind
             yield (
                 f"joints.{name}.model",
                 f"a {joint.model} speaks {SERVOS[joint.model].bus}, and its bus is of kind {kind}",
             )
-        elif rig.bus_of(name).kind == "maestro" and joint.id >= rig.bus_of(name).maestro.channels:
-            channels = rig.bus_of(name).maestro.channels
+        elif joint.id >= (channels := rig.bus_of(name).channels):
             yield f"joints.{name}.id", f"the board has channels 0 to {channels - 1}"
     used = {joint.bus for joint in rig.joints.values()}
     for name in rig.buses:

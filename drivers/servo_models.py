@@ -8,14 +8,16 @@ from drivers.dynamixel.control_table import STEPS_PER_TURN
 from drivers.feetech.memory_table import MODELS as FEETECH
 from drivers.hobby_board.models import HOBBY, US_STEPS
 
-BusKind = Literal["dynamixel", "feetech", "maestro"]
+BusKind = Literal["dynamixel", "feetech", "maestro", "pca9685"]
 BUS_KINDS: tuple[BusKind, ...] = get_args(BusKind)
+HOBBY_KINDS: tuple[BusKind, ...] = ("maestro", "pca9685")
+"""Boards that send pulses to hobby servos: any of them moves any."""
 
 
 class ServoFacts(NamedTuple):
     """What people and joints must know of a servo model.
 
-    bus: kind of bus it is on
+    bus: kind of bus it is on; of a hobby servo one of the boards that move it
     steps_per_turn: of its shaft; lowest, highest: first and last step it can be sent to
     unit, unit_steps: what people measure its place in, "steps" or "us", and how many steps
         that is
@@ -35,6 +37,10 @@ class ServoFacts(NamedTuple):
     hottest_c: float = 70.0
     lowest_v: float = 0.0
     highest_v: float = inf
+
+    def fits(self, kind: str) -> bool:
+        """Return whether it can be on a bus of this kind: any board moves a hobby servo."""
+        return kind == self.bus or (self.bus in HOBBY_KINDS and kind in HOBBY_KINDS)
 
 
 SERVOS: dict[str, ServoFacts] = {

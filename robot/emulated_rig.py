@@ -3,9 +3,10 @@
 from math import pi, radians
 
 from config.schema import Rig
+from drivers.servo_models import HOBBY_KINDS
 from robot.joint import JointParams
 from robot.rig_bus import bus_names, joints_on
-from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, StsLine
+from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, Pca9685Line, StsLine
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.smart_servo.physics import Physics, ServoSpec
 
@@ -37,7 +38,7 @@ def place_of(rig: Rig, joint: str) -> int:
     """Give the place of a joint's servo among the true positions of what it is emulated on."""
     bus, servo_id = rig.joints[joint].bus, rig.joints[joint].id
     # A board tells all its channels, a chain the servos that it was made of.
-    return servo_id if rig.bus_of(joint).kind == "maestro" else joints_on(rig, bus).index(joint)
+    return servo_id if rig.bus_of(joint).kind in HOBBY_KINDS else joints_on(rig, bus).index(joint)
 
 
 def _line(rig: Rig, name: str) -> Emulated:
@@ -46,6 +47,10 @@ def _line(rig: Rig, name: str) -> Emulated:
         board = config.maestro
         servos = tuple(_hobby(rig.joints[joint], joint) for joint in joints)
         return MaestroLine(board.channels, board.device, board.crc, servos)
+    if config.kind == "pca9685":
+        boards = config.pca9685
+        servos = tuple(_hobby(rig.joints[joint], joint) for joint in joints)
+        return Pca9685Line(boards.addresses, boards.oscillator_hz, servos)
     specs = tuple(emulated_servo(rig, joint) for joint in joints)
     return (
         StsLine(specs, config.baud)

@@ -5,9 +5,11 @@ from collections.abc import Mapping
 from config.schema import Rig
 from drivers.errors import SetupError
 from drivers.feetech.bus import FeetechBus
+from drivers.i2c.port import port_of
 from drivers.maestro.bus import MaestroBus
 from drivers.multi_bus import MixedBus, Share
-from drivers.serial.port import BlockingPort, BusPort
+from drivers.pca9685.bus import Pca9685Bus
+from drivers.serial.port import BusPort
 from drivers.servo_bus.bus import DynamixelBus
 from drivers.servo_models import BUS_KINDS
 from drivers.types import ServoBus, ServoSetup
@@ -79,7 +81,7 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
     beat = guardian.beat if guardian is not None else None
     shares = []
     for name in bus_names(rig):
-        share = _share(rig, name, BlockingPort(paths[name], on_traffic=beat))
+        share = _share(rig, name, port_of(paths[name], on_traffic=beat))
         if guardian is not None and name in plans:
             bus = GuardedBus(share.bus, len(share.places), guardian, guarded.index(name))
             share = share._replace(bus=bus)
@@ -113,7 +115,15 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
     (kind,) = (kind for kind in BUS_KINDS if kind == config.kind)
     ids = tuple(rig.joints[joint].id for joint in joints_on(rig, name))
     return ReleasePlan(
-        kind, path, config.baud, ids, board.protocol, board.device, board.crc, board.channels
+        kind,
+        path,
+        config.baud,
+        ids,
+        board.protocol,
+        board.device,
+        board.crc,
+        board.channels,
+        config.pca9685.addresses,
     )
 
 
@@ -136,6 +146,8 @@ def _share(rig: Rig, name: str, port: BusPort) -> Share:
     config = rig.bus_named(name)
     if config.kind == "feetech":
         return Share(name, FeetechBus(port, own, config.feetech), places)
+    if config.kind == "pca9685":
+        return Share(name, Pca9685Bus(port, own, config.pca9685), places)
     if config.kind == "maestro":
         return Share(name, MaestroBus(port, own, config.maestro), places)
     return Share(name, DynamixelBus(port, own, config.dynamixel), places)

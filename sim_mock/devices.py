@@ -7,13 +7,16 @@ from typing import Any, ClassVar
 from drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
 from drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
 from drivers.maestro.params import MaestroParams
-from drivers.servo_models import BusKind
+from drivers.pca9685.params import BRIDGE_BAUD
+from drivers.servo_models import HOBBY_KINDS, BusKind
 from sim_mock.device import Device
 from sim_mock.feetech import quirks as sts_habits
 from sim_mock.feetech.chain import build_sts
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.maestro import settings as maestro_settings
 from sim_mock.maestro.board import build_board
+from sim_mock.pca9685.bridge import build_bridge
+from sim_mock.pca9685.faults import CASES as PCA9685_CASES
 from sim_mock.smart_servo import quirks as servo_habits
 from sim_mock.smart_servo.chain import build_chain
 from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
@@ -22,6 +25,7 @@ CASES: dict[BusKind, dict[str, str]] = {
     "dynamixel": servo_habits.cases(),
     "feetech": sts_habits.cases(),
     "maestro": maestro_settings.cases(),
+    "pca9685": PCA9685_CASES,
 }
 """What can be chosen of each kind, and the values as they are typed."""
 
@@ -30,6 +34,7 @@ BAUDS: dict[BusKind, tuple[int, ...]] = {
     "dynamixel": DYNAMIXEL_BAUDS,
     "feetech": FEETECH_BAUDS,
     "maestro": _BOARD["baud"]["choices"],
+    "pca9685": (BRIDGE_BAUD,),
 }
 """Bit/s that each kind can be set to."""
 CHANNELS: tuple[int, ...] = _BOARD["channels"]["choices"]
@@ -78,8 +83,28 @@ class MaestroLine:
     listens: ClassVar[str] = "the board listens"
 
 
-Emulated = DynamixelLine | StsLine | MaestroLine
-_KINDS: dict[str, type[Emulated]] = {one.kind: one for one in (DynamixelLine, StsLine, MaestroLine)}
+@dataclass(frozen=True, slots=True)
+class Pca9685Line:
+    """PCA9685 boards on an I2C bus behind a bridge, and the servos behind them.
+
+    addresses: of the boards; the channels of the second begin at 16
+    oscillator_hz: of their clocks
+    servos: those that are not as they come from the shop, by their channel
+    baud: of the bridge's line, where nobody asks
+    """
+
+    addresses: tuple[int, ...] = (0x40,)
+    oscillator_hz: float = 25e6
+    servos: tuple[HobbySpec, ...] = ()
+    baud: int | None = None
+    kind: ClassVar[BusKind] = "pca9685"
+    listens: ClassVar[str] = "the boards listen"
+
+
+Emulated = DynamixelLine | StsLine | MaestroLine | Pca9685Line
+_KINDS: dict[str, type[Emulated]] = {
+    one.kind: one for one in (DynamixelLine, StsLine, MaestroLine, Pca9685Line)
+}
 
 
 def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
@@ -92,6 +117,8 @@ def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
         return build_board(
             what.channels, now_s, what.device, what.crc, what.baud, seed, what.servos
         )
+    if isinstance(what, Pca9685Line):
+        return build_bridge(what.addresses, now_s, what.oscillator_hz, seed, what.servos)
     if isinstance(what, StsLine):
         return build_sts(what.servos, now_s, what.baud, seed)
     return build_chain(what.servos, now_s, baud=what.baud, seed=seed)
@@ -113,7 +140,7 @@ def unpacked(told: Mapping[str, Any]) -> Emulated:
     kind = settings.pop("kind", None)
     if kind not in _KINDS:
         raise ValueError(f"no device of kind {kind!r}: there is {', '.join(_KINDS)}")
-    read = HobbySpec._make if kind == "maestro" else _servo
+    read = HobbySpec._make if kind in HOBBY_KINDS else _servo
     settings["servos"] = tuple(read(spec) for spec in settings.get("servos", ()))
     return _KINDS[kind](**settings)
 

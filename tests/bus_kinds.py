@@ -7,14 +7,17 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 from drivers.feetech.bus import FeetechBus, FeetechParams
+from drivers.hobby_board.channel import Channel
 from drivers.maestro.bus import MaestroBus, MaestroParams
 from drivers.maestro.commands import Speech
 from drivers.multi_bus import MixedBus, Share
+from drivers.pca9685.board import Pca9685Board
+from drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from drivers.serial.port import BlockingPort, BusPort
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from sim_mock.device import Device
-from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, StsLine, build
+from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, Pca9685Line, StsLine, build
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.pty.client import PtyBuses
@@ -26,6 +29,7 @@ PLACES: dict[str, dict[str, tuple[int, ...]]] = {
     "dynamixel": {"dynamixel": (0, 1, 2, 3)},
     "feetech": {"feetech": (0, 1, 2, 3)},
     "maestro": {"maestro": (0, 1, 2, 3)},
+    "pca9685": {"pca9685": (0, 1, 2, 3)},
     # Neighbours are on different buses, so that a mistaken place shows.
     "mixed": {"dynamixel": (0, 3), "feetech": (1, 4), "maestro": (2, 5)},
 }
@@ -34,8 +38,17 @@ KINDS = tuple(PLACES)
 IDS = (3, 1, 11, 7)
 SHARES = (0.4, 0.5, 0.65, 0.55)
 """Where servos stand at first, as a share of their range."""
-SPEED_STEPS_S = {"dynamixel": 4000.0, "feetech": 3000.0, "maestro": 12_000.0}
-RANGES = {"dynamixel": (1000, 3000), "feetech": (1000, 3000), "maestro": (4400, 7600)}
+SPEED_STEPS_S = {"dynamixel": 4000.0, "feetech": 3000.0, "maestro": 12_000.0, "pca9685": 12_000.0}
+RANGES = {
+    "dynamixel": (1000, 3000),
+    "feetech": (1000, 3000),
+    "maestro": (4400, 7600),
+    "pca9685": (4400, 7600),
+}
+BOARDS = ("maestro", "pca9685")
+"""Kinds of which nobody measures a servo, and whose board answers for all."""
+GRAIN_STEPS = {"pca9685": 20}
+"""4096 counts a period are 4.9 us each at 50 Hz."""
 NEAR_SHARE = 0.012
 """Friction and dead bands leave a servo so far from its goal at most, in shares of its range."""
 
@@ -80,6 +93,9 @@ class Twin:
         if name == "maestro":
             quick = {"stagger_ms": 0.0, "give_up_s": give_up_s}
             return MaestroBus(port, setups, MaestroParams(**patience, **quick))
+        if name == "pca9685":
+            quick = {"stagger_ms": 0.0, "give_up_s": give_up_s}
+            return Pca9685Bus(port, setups, Pca9685Params(**patience, **quick))
         if self._patient:
             patience["prompt_timeout_ms"] = 200.0
         if name == "feetech":
@@ -116,7 +132,7 @@ class Twin:
     def strike(self, verb: str, place: int) -> None:
         """Let something befall one servo; on a Maestro what befalls the board befalls all."""
         name = self.on[place]
-        board = name == "maestro" and verb == "brown-out"
+        board = name in BOARDS and verb == "brown-out"
         self.command(verb if board else f"{verb} {self.setups[place].id}", name)
 
     def reports(self) -> list[dict[str, object]]:
@@ -141,7 +157,9 @@ class Twin:
         return [bool(one.get("target", one.get("torque"))) for one in self.reports()]
 
     def pulses_on(self) -> None:
-        """Let a Maestro give pulses already, where its servos stand; others know their place."""
+        """Let boards give pulses already, where their servos stand; others know their place."""
+        if "pca9685" in self.buses:
+            self._pca9685_pulses_on()
         if "maestro" not in self.buses:
             return
         port = self.wires.ports["maestro"]
@@ -150,6 +168,19 @@ class Twin:
         speech = Speech("compact", 12, False, 12)
         for place in self.buses["maestro"]:
             port.write(speech.target(self.setups[place].id, targets[place]))
+        self.wait(0.3)
+        port.closePort()
+
+    def _pca9685_pulses_on(self) -> None:
+        port = self.wires.ports["pca9685"]
+        board = Pca9685Board(port, Pca9685Params())
+        assert port.setBaudRate(115_200)
+        targets = self.steps([SHARES[p % 4] for p in range(self.count)])
+        channels = [Channel(self.setups[place]) for place in self.buses["pca9685"]]
+        for place, channel in zip(self.buses["pca9685"], channels, strict=True):
+            channel.start(targets[place], self.now_s())
+        assert board.send_limits(channels, confirmed=True)
+        board.send_goals(channels)
         self.wait(0.3)
         port.closePort()
 
@@ -192,9 +223,14 @@ class Twin:
 
 def _setups(kind: str, name: str) -> dict[int, ServoSetup]:
     """Give the setups of one bus by their place in the whole."""
-    model = {"dynamixel": "xl330-m077", "feetech": "sts3215", "maestro": "hobby"}[name]
+    model = {
+        "dynamixel": "xl330-m077",
+        "feetech": "sts3215",
+        "maestro": "hobby",
+        "pca9685": "hobby",
+    }[name]
     low, high = RANGES[name]
-    rest = (low + high) // 2 if name == "maestro" else None
+    rest = (low + high) // 2 if name in BOARDS else None
     return {
         place: ServoSetup(
             servo_id, model, low, high, SPEED_STEPS_S[name], NAMES[place], rest_steps=rest
@@ -209,6 +245,8 @@ def line(kind: str, name: str) -> Emulated:
     starts = {
         s.id: low + SHARES[place % 4] * (high - low) for place, s in _setups(kind, name).items()
     }
+    if name == "pca9685":
+        return Pca9685Line(servos=tuple(HobbySpec(c, x) for c, x in starts.items()))
     if name == "maestro":
         # The board's own ranges are as wide as such servos go.
         hobby = [HobbySpec(c, x, min_steps=2000, max_steps=10_000) for c, x in starts.items()]

@@ -9,8 +9,10 @@ from dataclasses import replace
 from math import pi, radians, sin
 from typing import NamedTuple
 
-from config.schema import Rig
+from config.rig import BusConfig
+from config.schema import Rig, load_rig
 from drivers.event_log import call
+from drivers.servo_models import HOBBY_KINDS
 from robot.body import Body
 from robot.clock import SimulatedClock
 from robot.emulated_rig import emulated_lines, place_of
@@ -21,6 +23,7 @@ from sim_mock.device import Device
 from sim_mock.devices import build
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.maestro.board import MaestroBoard
+from sim_mock.pca9685.bridge import Bridge
 
 STRUCK_S, PATIENCE_S = 1.0, 3.0
 FAST = 1.3
@@ -115,12 +118,31 @@ BOARD = [
 ]
 """What befalls a Maestro and its servos beside."""
 
+I2C = [
+    *_lasting(
+        "lose-bytes 1", "lose-bytes 7", "lose-bytes 1000 for 1", "nack 1", "nack 40", "nack",
+        "nack for 0.5",
+    ),
+    Case(("stuck on",), ("stuck off",)),
+    Case(("absent on",), ("absent off",)),
+    Case(("foreign on",), ("foreign off",)),
+    Case(("brown-out",)),
+    Case(("nack 3", "brown-out")),
+    Case(("absent on", "brown-out"), ("absent off",)),
+    Case(("lose all", "brown-out")),
+    Case(("unplug", "brown-out"), ("plug",)),
+    Case(("power off",), ("power on",), own_speed=True),
+    Case(("stick {i}",), ("free {i}",), own_speed=True),
+]  # fmt: skip
+"""What befalls a PCA9685 and its servos beside."""
+
 CASES = {
     "dynamixel": [*LINE, *PACKETS, Case(("shock {i}",))],
     "feetech": [*LINE, *PACKETS, Case(("reset {i}",))],
     "maestro": [*LINE, *BOARD],
+    "pca9685": [*LINE, *I2C],
 }
-VOLTS = {"dynamixel": 5.0, "feetech": 7.4, "maestro": 5.0}
+VOLTS = {"dynamixel": 5.0, "feetech": 7.4, "maestro": 5.0, "pca9685": 5.0}
 
 
 class Outcome(NamedTuple):
@@ -214,6 +236,8 @@ class Machine:
         device = self.devices[bus]
         if isinstance(device, MaestroBoard):
             return device.body.channels[place].target or None
+        if isinstance(device, Bridge):
+            return device.body.width_steps(place, self.clock.now_s()) or None
         servo = device.servos[place]  # type: ignore[attr-defined]
         return int(servo.memory.get("goal_position")) if servo.torque else None
 
@@ -293,7 +317,7 @@ class Machine:
         for i, (name, limit) in enumerate(zip(self.names, self.limits, strict=True)):
             goal, setup = self.true_goal(i), self.setups[i]
             moved, took_s = abs(true[i] - self._true[i]), dt_s
-            if self._kinds[i] == "maestro":
+            if self._kinds[i] in HOBBY_KINDS:
                 took_s = max(dt_s, 0.01)  # a board moves its channels so often
             if goal is not None and not setup.min_steps <= goal <= setup.max_steps:
                 raise Broken(f"{name}'s servo has goal {goal}")
@@ -351,8 +375,16 @@ class Machine:
         return "left, named"
 
 
-RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker"}
+RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker", "pca9685": "maker"}
 """The shipped rig of each kind."""
+
+
+def rig_of(kind: str) -> Rig:
+    """Give the shipped rig of a kind, with the other board where its own has none."""
+    rig = load_rig(RIGS[kind])
+    return replace(rig, bus=BusConfig("/dev/i2c-1", kind)) if kind == "pca9685" else rig
+
+
 FEW = ("left_eye_pan", "left_eye_tilt", "neck_yaw")
 
 

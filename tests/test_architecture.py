@@ -68,6 +68,7 @@ OWNERS = {
     ),
     "depthai": ("drivers.camera.oak_sdk",),
     "mcap": ("drivers.camera.recording_", "robot.recording."),
+    "smbus2": ("drivers.i2c.port",),
     "zstandard": ("robot.recording.",),
     "orjson": ("robot.recording.",),
     "matplotlib": ("robot.report.",),
@@ -157,7 +158,7 @@ def test_package_files_hold_a_docstring_and_nothing_else() -> None:
 def test_it_would_catch_a_wrong_arrow() -> None:
     assert not room_allowed("gaze.head", "robot.loop")
     assert not room_allowed("drivers.camera.webcam", "gaze.types")
-    assert not room_allowed("robot.loop", "sim_mock.scenes.visitor")
+    assert not room_allowed("robot.loop", "sim_mock.scenes.registry.visitor")
     assert not room_allowed("robot.loop", "config.schema")
-    assert not room_allowed("sim_mock.scenes.visitor", "robot.loop")
+    assert not room_allowed("sim_mock.scenes.registry.visitor", "robot.loop")
     assert room_allowed("sim_mock.cameras.detections", "robot.frames")

@@ -138,7 +138,7 @@ class Channel:
         self._forget(now_s)
         places = [self.goal_steps, *(goal for _, goal in self._recent)]
         room: float = FINE_STEPS
-        if led_away or now_s < self._settled_s:
+        if led_away or now_s < self._settled_s or self._longest_lead_s < inf:
             places.append(round(self.ramp.pulse_steps))
             room = self.room_steps()
         low, high = self._reached(min(places)), self._reached(max(places))

@@ -182,6 +182,11 @@ class Supervisor:
 
     def _met_end(self, channel: Channel, pulse: int) -> None:
         """Note that a channel stays elsewhere: it meets an end of the board's own range."""
+        if self._board.timing.longest_lead_s < inf:
+            # Boards that are led have no range of their own: what was sent was lost.
+            self._line.errors["other pulse"] += 1
+            channel.found(pulse)
+            return
         if channel.met_end(pulse) and not channel.told:
             channel.told = True
             self._line.errors["other pulse"] += 1

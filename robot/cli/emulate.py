@@ -15,7 +15,7 @@ from drivers.servo_models import BusKind
 from robot.cli.terminal import clear_errors
 from robot.emulated_rig import emulated_lines
 from sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
-from sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine
+from sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine, Pca9685Line
 from sim_mock.pty.line import BusSettings
 from sim_mock.pty.server import Settings, run
 from sim_mock.pty.server import say as say_line
@@ -165,7 +165,7 @@ def _of_rig(name: str, firmware: int | None) -> dict[str, Emulated]:
 
 def _aged(line: Emulated, firmware: int | None) -> Emulated:
     """Give all servos of a line one firmware; None: that which they have."""
-    if firmware is None or isinstance(line, MaestroLine):
+    if firmware is None or isinstance(line, MaestroLine | Pca9685Line):
         return line
     return replace(line, servos=tuple(s._replace(firmware=firmware) for s in line.servos))
 

@@ -20,7 +20,7 @@ import signal
 import sys
 
 from drivers.errors import DriverError
-from drivers.serial.port import BlockingPort
+from drivers.i2c.port import port_of
 from robot.clock import RealClock
 from robot.guardian.hang_detector import HangDetector
 from robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, Heartbeat
@@ -110,7 +110,7 @@ class Guard:
     def _let_go(self, i: int, why: str, exclusive: bool) -> bool:
         """Let go of one plan's servos; return False where the port cannot be used."""
         plan = self._plans[i]
-        port = BlockingPort(plan.port, exclusive)
+        port = port_of(plan.port, exclusive)
         try:
             mute = self._release[i](port)
         except DriverError as error:

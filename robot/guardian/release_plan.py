@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from drivers.maestro.params import Form, MaestroParams
 from drivers.serial.port import BusPort
-from drivers.servo_models import BusKind
+from drivers.servo_models import HOBBY_KINDS, BusKind
 
 
 class ReleasePlan(NamedTuple):
@@ -16,6 +16,7 @@ class ReleasePlan(NamedTuple):
     baud: bit/s
     ids: of the servos; channels of a Maestro
     protocol, device, crc, channels: of a Maestro, as in drivers.maestro.params
+    addresses: of PCA9685 boards
     """
 
     kind: BusKind
@@ -26,6 +27,7 @@ class ReleasePlan(NamedTuple):
     device: int = 12
     crc: bool = False
     channels: int = 12
+    addresses: tuple[int, ...] = ()
 
 
 def encode(plans: tuple[ReleasePlan, ...]) -> str:
@@ -36,7 +38,9 @@ def encode(plans: tuple[ReleasePlan, ...]) -> str:
 def decode(text: str) -> tuple[ReleasePlan, ...]:
     """Return the plans that ``encode`` wrote."""
     plans = [ReleasePlan(*fields) for fields in json.loads(text)]
-    return tuple(plan._replace(ids=tuple(plan.ids)) for plan in plans)
+    return tuple(
+        plan._replace(ids=tuple(plan.ids), addresses=tuple(plan.addresses)) for plan in plans
+    )
 
 
 def releaser(plan: ReleasePlan) -> Callable[[BusPort], tuple[int, ...]]:
@@ -55,6 +59,13 @@ def releaser(plan: ReleasePlan) -> Callable[[BusPort], tuple[int, ...]]:
 
         params = MaestroParams(plan.baud, plan.protocol, plan.device, plan.crc, plan.channels)
         return lambda port: maestro.stop_pulses(port, params, plan.ids)
+    if plan.kind == "pca9685":
+        from drivers.pca9685 import release as pca9685
+        from drivers.pca9685.params import Pca9685Params
+
+        first, *more = plan.addresses
+        boards = Pca9685Params(first, tuple(more))
+        return lambda port: pca9685.stop_pulses(port, boards, plan.ids)
     from drivers.dynamixel import release as dynamixel
 
     return lambda port: dynamixel.disable_torque(port, plan.baud, plan.ids)
@@ -63,6 +74,6 @@ def releaser(plan: ReleasePlan) -> Callable[[BusPort], tuple[int, ...]]:
 def describe(plan: ReleasePlan) -> str:
     """Return what letting go of a plan's servos means, e.g. "pulses off on 6 channels of PORT"."""
     count = len(plan.ids)
-    if plan.kind == "maestro":
+    if plan.kind in HOBBY_KINDS:
         return f"pulses off on {count} channel{'s' * (count != 1)} of {plan.port}"
     return f"torque off on {count} servo{'s' * (count != 1)} of {plan.port}"

@@ -1,0 +1,92 @@
+"""Exchanges on one I2C bus: bounded waiting, every transfer confirmed, counts.
+
+I2C has no check bytes: who acts upon an answer asks twice.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from drivers.i2c.bridge import ASK_STATUS, OUTCOMES
+from drivers.serial.port import BITS_PER_BYTE, BusPort
+
+WAIT_PIECE_S = 0.1
+
+
+class I2cLine:
+    """A port with an I2C bus behind it; every method may raise drivers.errors.BusLost.
+
+    tx_bytes, rx_bytes: counts since it was made
+    errors: counts by kind
+    why: what was wrong with the last exchange; "" where nothing was
+    """
+
+    def __init__(self, port: BusPort, baud: int, reply_timeout_ms: float) -> None:
+        self.port = port
+        self.tx_bytes = self.rx_bytes = 0
+        self.errors: Counter[str] = Counter()
+        self.why = ""
+        self._byte_s = BITS_PER_BYTE / baud
+        self._patience_s = reply_timeout_ms / 1000.0
+        self._late = False
+
+    def send(self, packet: bytes) -> None:
+        """Send transfers that only write; nobody asks how they ended."""
+        self.port.write(packet)
+        self.tx_bytes += len(packet)
+
+    def ask(self, transfers: Sequence[tuple[bytes, int]]) -> list[bytes] | None:
+        """Send transfers and return what each of them read; None where one did not succeed.
+
+        Args:
+            transfers: each with the number of bytes that it reads.
+        """
+        port = self.port
+        if self._late:
+            port.drain()
+        else:
+            port.clearPort()
+        packet = b"".join(transfer + ASK_STATUS for transfer, _ in transfers)
+        wanted = sum(length + 1 for _, length in transfers)
+        self.send(packet)
+        wire_s = (len(packet) + wanted) * self._byte_s
+        answer = port.read_until(wanted, port.now_s() + wire_s + self._patience_s)
+        self.rx_bytes += len(answer)
+        self.why = self._trouble(answer, [length for _, length in transfers])
+        self._late = self.why in ("timeout", "incomplete", "damaged")
+        if self.why:
+            self.errors[self.why] += 1
+            return None
+        found, at = [], 0
+        for _, length in transfers:
+            found.append(answer[at : at + length])
+            at += length + 1
+        return found
+
+    @staticmethod
+    def _trouble(answer: bytes, lengths: Sequence[int]) -> str:
+        """Name what is wrong with an answer; "" where nothing is."""
+        if not answer:
+            return "timeout"
+        if len(answer) < sum(lengths) + len(lengths):
+            # Of a transfer that failed there is a status and nothing else.
+            failed = [OUTCOMES.get(byte, "incomplete") for byte in answer]
+            return next((why for why in failed if why), "incomplete")
+        at = -1
+        for length in lengths:
+            at += length + 1
+            why = OUTCOMES.get(answer[at], "damaged")
+            if why:
+                return why
+        return ""
+
+    def tell(self, *packets: bytes) -> bool:
+        """Send transfers that only write; returns whether all were acknowledged."""
+        return self.ask([(packet, 0) for packet in packets]) is not None
+
+    def wait(self, until_s: float) -> None:
+        """Let time pass; what arrives meanwhile was not asked for."""
+        # In pieces: each is a sign of life to whoever watches this port.
+        while (now_s := self.port.now_s()) < until_s:
+            got = self.port.read_until(1, min(until_s, now_s + WAIT_PIECE_S))
+            if not got and self.port.now_s() <= now_s:
+                return  # an emulated port in simulated time, where waiting takes none

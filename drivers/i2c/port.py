@@ -1,0 +1,223 @@
+"""An I2C bus of the kernel as a port that carries bytes: it does what a bridge chip does.
+
+The commands are those of drivers.i2c.bridge. The kernel itself frees a bus whose data line is
+held down, where its driver can.
+"""
+
+import errno
+import fcntl
+import os
+import re
+import stat
+import time
+from collections.abc import Callable
+from grp import getgrgid
+from pathlib import Path
+from typing import Any
+
+from smbus2 import SMBus, i2c_msg
+
+from drivers.errors import BusLost, PortError
+from drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, Part, commands
+from drivers.serial.port import BlockingPort, BusPort
+
+I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
+"""Requests of the kernel's i2c-dev."""
+TIMEOUT_10_MS = 2
+"""A transfer that hangs ends after 20 ms instead of a second."""
+
+_GONE = (errno.ENODEV, errno.ENOENT, errno.EBADF, errno.ESHUTDOWN)
+_STUCK = (errno.ETIMEDOUT, errno.EAGAIN, errno.EBUSY, errno.EINTR)
+
+OpenBus = Callable[[str], Any]
+"""Opens a bus by its path: smbus2's SMBus, or an emulated one with its methods."""
+
+
+def is_i2c(path: str) -> bool:
+    """Return whether a path is by its name that of an I2C bus."""
+    return re.fullmatch(r"i2c-\d+", os.path.basename(os.path.realpath(path))) is not None
+
+
+def port_of(
+    path: str, exclusive: bool = True, on_traffic: Callable[[], None] | None = None
+) -> BusPort:
+    """Return a port by its path: an I2C bus of the kernel, or else a serial port."""
+    if is_i2c(path):
+        return I2cPort(path, exclusive, on_traffic)
+    return BlockingPort(path, exclusive, on_traffic)
+
+
+class I2cPort:
+    """A real I2C bus by its path; implements drivers.serial.port.BusPort.
+
+    Args:
+        port_name: its path, e.g. /dev/i2c-1.
+        exclusive: no other program of this kind may use it meanwhile; sensors' may.
+        on_traffic: called whenever bytes are sent or waited for, None where nobody asks.
+        open_bus: opens it.
+    """
+
+    def __init__(
+        self,
+        port_name: str,
+        exclusive: bool = True,
+        on_traffic: Callable[[], None] | None = None,
+        open_bus: OpenBus = SMBus,
+    ) -> None:
+        self.port_name = port_name
+        self._exclusive, self._on_traffic, self._open_bus = exclusive, on_traffic, open_bus
+        self._bus: Any = None
+        self._status = OK
+        self._waiting = b""
+        self._checked: set[int] = set()
+
+    def now_s(self) -> float:
+        """Return host monotonic seconds."""
+        return time.monotonic()
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Open it; the rate of an I2C bus is set in the system, not here.
+
+        Raises:
+            drivers.errors.PortError: absent, busy or not permitted.
+        """
+        self.closePort()
+        try:
+            bus = self._open_bus(self.port_name)
+        except OSError as error:
+            raise PortError(explain(self.port_name, error.errno)) from error
+        if bus.fd is not None:
+            try:
+                if self._exclusive:
+                    fcntl.flock(bus.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.ioctl(bus.fd, I2C_TIMEOUT, TIMEOUT_10_MS)
+                fcntl.ioctl(bus.fd, I2C_RETRIES, 1)
+            except OSError as error:
+                bus.close()
+                raise PortError(explain(self.port_name, error.errno)) from error
+        self._bus, self._waiting, self._status = bus, b"", OK
+        self._checked.clear()
+        return True
+
+    def closePort(self) -> None:
+        """Close; safe to call twice."""
+        if self._bus is not None:
+            self._bus.close()
+        self._bus = None
+
+    def write(self, data: bytes) -> None:
+        """Carry out transfers; what they read waits to be taken.
+
+        Raises:
+            drivers.errors.BusLost: the bus is gone.
+        """
+        if self._on_traffic is not None:
+            self._on_traffic()
+        if self._bus is None:
+            raise self._lost("it is closed")
+        for parts in commands(data):
+            if parts:
+                self._transfer(parts)
+            else:
+                self._waiting += bytes((self._status,))
+
+    def _transfer(self, parts: tuple[Part, ...]) -> None:
+        messages = [
+            i2c_msg.write(part.address, part.data)
+            if part.length is None
+            else i2c_msg.read(part.address, part.length)
+            for part in parts
+        ]
+        try:
+            self._see_free(parts[0].address)
+            self._bus.i2c_rdwr(*messages)
+        except OSError as error:
+            if error.errno in _GONE or (self._bus.fd is not None and not self._is_there()):
+                raise self._lost(error) from error
+            self._status = TIMED_OUT if error.errno in _STUCK else NO_ACKNOWLEDGE
+            return
+        self._status = OK
+        for part, message in zip(parts, messages, strict=True):
+            if part.length is not None:
+                self._waiting += bytes(message)
+
+    def _see_free(self, address: int) -> None:
+        """See that no driver of the kernel has taken an address for itself.
+
+        Raises:
+            drivers.errors.BusLost: so it is; the message says how to free it.
+        """
+        if self._bus.fd is None or address in self._checked:
+            return
+        try:
+            fcntl.ioctl(self._bus.fd, I2C_SLAVE, address)
+        except OSError as error:
+            if error.errno == errno.EBUSY:
+                raise BusLost(
+                    f"{self.port_name}: a driver of the kernel has the chip at {address:#x}: take "
+                    "its overlay (pca9685) out of the system's configuration"
+                ) from error
+            raise
+        self._checked.add(address)
+
+    def _is_there(self) -> bool:
+        return os.path.exists(self.port_name)
+
+    def read_until(self, length: int, deadline_s: float) -> bytes:
+        """Return ``length`` bytes or what there is; where there is nothing, wait.
+
+        Raises:
+            drivers.errors.BusLost: the bus is gone.
+        """
+        if self._on_traffic is not None:
+            self._on_traffic()
+        if self._bus is None:
+            raise self._lost("it is closed")
+        # Transfers are over when ``write`` returns: waiting brings no more bytes.
+        if not self._waiting and (left_s := deadline_s - time.monotonic()) > 0.0:
+            time.sleep(left_s)
+        taken, self._waiting = self._waiting[:length], self._waiting[length:]
+        return taken
+
+    def getBytesAvailable(self) -> int:
+        """Return how many bytes wait."""
+        return len(self._waiting)
+
+    def clearPort(self) -> None:
+        """Throw away what waits."""
+        self.drain()
+
+    def drain(self) -> int:
+        """Throw away what waits; returns the number of bytes."""
+        dropped, self._waiting = len(self._waiting), b""
+        return dropped
+
+    def _lost(self, why: object) -> BusLost:
+        return BusLost(f"{self.port_name} is gone ({why}): check the adapter and its cable")
+
+
+def explain(path: str, code: int | None) -> str:
+    """Say in one line why an I2C bus cannot be opened and what helps."""
+    here = ", ".join(sorted(map(str, Path("/dev").glob("i2c-*")))) or "none"
+    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return (
+            f"no I2C bus {path}: switch I2C on (on a Raspberry Pi: sudo raspi-config, Interface "
+            f"Options), or plug the adapter in; buses here: {here}"
+        )
+    if code in (errno.EACCES, errno.EPERM):
+        return (
+            f"no right to open {path}: join its group with "
+            f"'sudo usermod -aG {group_of(path)} $USER' and log in again"
+        )
+    if code in (errno.EBUSY, errno.EAGAIN):
+        return f"{path} is busy: close the other program that moves servos on it"
+    return f"{path} is no I2C bus ({os.strerror(code) if code else 'unknown'}); buses here: {here}"
+
+
+def group_of(path: str) -> str:
+    """Return the group that may use a device, "i2c" where that is not known."""
+    try:
+        status = os.stat(path)
+        return getgrgid(status.st_gid).gr_name if stat.S_ISCHR(status.st_mode) else "i2c"
+    except (OSError, KeyError):
+        return "i2c"

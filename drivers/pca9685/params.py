@@ -1,0 +1,146 @@
+"""How to reach PCA9685 boards: what a rig file may choose."""
+
+from dataclasses import dataclass, field
+
+from drivers.pca9685.registers import CHANNELS, MOST_PRESCALE, prescale_of
+
+BRIDGE_BAUD = 115_200
+"""Rate of the serial line of a bridge; that of an I2C bus is set in the system."""
+
+RESERVED = (0x70, *range(0x78, 0x80))
+"""All boards answer at 70 after power-up; from 78 on addresses mean something else on I2C."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pca9685Params:
+    """How to reach the boards of one I2C bus."""
+
+    address: int = field(
+        default=0x40,
+        metadata={
+            "low": 0x40,
+            "high": 0x77,
+            "unit": "",
+            "says": "Address of the board; 0x40 unless its jumpers are closed.",
+        },
+    )
+    further_addresses: tuple[int, ...] = field(
+        default=(),
+        metadata={
+            "low": 0x40,
+            "high": 0x77,
+            "unit": "",
+            "says": "More boards on the same bus; the first channel of the second is id 16.",
+        },
+    )
+    frequency_hz: float = field(
+        default=50.0,
+        metadata={
+            "low": 40.0,
+            "high": 330.0,
+            "unit": "Hz",
+            "says": "Pulses in a second; analogue servos take 50, many digital ones more.",
+        },
+    )
+    oscillator_hz: float = field(
+        default=25e6,
+        metadata={
+            "low": 22e6,
+            "high": 28e6,
+            "unit": "Hz",
+            "says": "The board's own clock. It differs from board to board by some percent, and "
+            "pulses with it: measure one (gazerig setup).",
+        },
+    )
+    min_pulse_us: float = field(
+        default=500.0,
+        metadata={
+            "low": 100.0,
+            "high": 3000.0,
+            "unit": "us",
+            "says": "No shorter pulse is ever sent.",
+        },
+    )
+    max_pulse_us: float = field(
+        default=2500.0,
+        metadata={
+            "low": 100.0,
+            "high": 3000.0,
+            "unit": "us",
+            "says": "No longer pulse is ever sent.",
+        },
+    )
+    reply_timeout_ms: float = field(
+        default=20.0,
+        metadata={
+            "low": 1.0,
+            "high": 200.0,
+            "unit": "ms",
+            "says": "Patience for an answer beyond the time its bytes take, behind a bridge.",
+        },
+    )
+    watch_ms: float = field(
+        default=0.0,
+        metadata={
+            "low": 0.0,
+            "high": 50.0,
+            "unit": "ms",
+            "says": "Look at the board so often; 0: in every read. More saves time on a slow bus, "
+            "but restarts are noticed later.",
+        },
+    )
+    stagger_ms: float = field(
+        default=100.0,
+        metadata={
+            "low": 0.0,
+            "high": 1000.0,
+            "unit": "ms",
+            "says": "Servos without pulses start so long after one another: all at once pull a "
+            "weak supply down.",
+        },
+    )
+    give_up_s: float = field(
+        default=60.0,
+        metadata={
+            "low": 0.5,
+            "high": 3600.0,
+            "unit": "s",
+            "says": "Wait so long for a bus or board that is gone to come back.",
+        },
+    )
+
+    def __post_init__(self) -> None:
+        """Check that the values fit each other.
+
+        Raises:
+            ValueError: they do not; the message says which.
+        """
+        for address in self.addresses:
+            if address in RESERVED:
+                raise ValueError(f"address {address:#x} is reserved: boards have 0x40 to 0x77")
+        if len(set(self.addresses)) < len(self.addresses):
+            raise ValueError("two boards have the same address: each needs one of its own")
+        if self.min_pulse_us >= self.max_pulse_us:
+            raise ValueError("min_pulse_us must be below max_pulse_us")
+        if not self.max_pulse_us < 0.95e6 / self.frequency_hz:
+            raise ValueError(
+                f"max_pulse_us {self.max_pulse_us:g} does not fit between pulses at "
+                f"{self.frequency_hz:g} Hz: lower frequency_hz"
+            )
+        if prescale_of(self.frequency_hz, self.oscillator_hz) > MOST_PRESCALE:
+            raise ValueError("frequency_hz is too low for this oscillator_hz")
+
+    @property
+    def addresses(self) -> tuple[int, ...]:
+        """Return the addresses of all boards, in their order."""
+        return (self.address, *self.further_addresses)
+
+    @property
+    def channels(self) -> int:
+        """Return the number of channels of all boards."""
+        return CHANNELS * len(self.addresses)
+
+    @property
+    def baud(self) -> int:
+        """Return the rate of a bridge's serial line."""
+        return BRIDGE_BAUD

@@ -1,0 +1,68 @@
+"""Registers of a PCA9685 and what they hold; pure, nothing is sent here.
+
+Source: NXP, PCA9685 data sheet, rev. 4, section 7.3.
+"""
+
+MODE1, MODE2 = 0x00, 0x01
+LED0, ALL_LED, PRESCALE = 0x06, 0xFA, 0xFE
+BYTES = 4
+"""Of one channel: ON low and high, OFF low and high."""
+
+RESTART, EXTCLK, AUTO_INCREMENT, SLEEP = 0x80, 0x40, 0x20, 0x10
+AWAKE = AUTO_INCREMENT
+"""MODE1 while it works: it does not answer at the address of all boards."""
+TOTEM_POLE = 0x04
+"""MODE2: outputs drive both ways, and change at the stop condition, a pulse never in halves."""
+FULL_OFF = 0x10
+"""In the high byte of OFF: no pulses."""
+OFF = bytes((0, 0, 0, FULL_OFF))
+
+CHANNELS, COUNTS = 16, 4096
+LEAST_PRESCALE, MOST_PRESCALE = 3, 255
+START_S = 0.001
+"""The oscillator is steady .5 ms after the end of sleep."""
+
+US_STEPS = 4
+
+
+def prescale_of(frequency_hz: float, oscillator_hz: float) -> int:
+    """Return the prescaler for a frequency."""
+    return max(LEAST_PRESCALE, round(oscillator_hz / (COUNTS * frequency_hz)) - 1)
+
+
+def steps_per_count(prescale: int, oscillator_hz: float) -> float:
+    """Return quarter microseconds of one 4096th of the period."""
+    return (prescale + 1) / oscillator_hz * 1e6 * US_STEPS
+
+
+def output(channel: int) -> int:
+    """Return the first register of a channel."""
+    return LED0 + BYTES * channel
+
+
+def pulse(counts: int) -> bytes:
+    """Return the registers of a channel for a pulse; 0: none."""
+    return bytes((0, 0, counts & 0xFF, counts >> 8)) if counts else OFF
+
+
+def counts_of(registers: bytes) -> int:
+    """Return the pulse that the registers of a channel make; 0: none."""
+    on_low, on_high, off_low, off_high = registers
+    if off_high & FULL_OFF:
+        return 0
+    if on_high & FULL_OFF:
+        return COUNTS
+    return ((off_low | (off_high & 0x0F) << 8) - (on_low | (on_high & 0x0F) << 8)) % COUNTS
+
+
+def plausible(first_six: bytes, outputs: bytes, prescale: int) -> bool:
+    """Return whether registers can be those of a PCA9685: bits that are always 0 are.
+
+    Args:
+        first_six: MODE1 to ALLCALLADR.
+        outputs: of all channels.
+        prescale: the prescaler.
+    """
+    low_bits = any(address & 1 for address in first_six[2:])
+    high_bits = first_six[1] & 0xE0 or any(byte & 0xE0 for byte in outputs[1::2])
+    return not low_bits and not high_bits and prescale >= LEAST_PRESCALE
