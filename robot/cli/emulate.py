@@ -28,6 +28,7 @@ _WHO: dict[BusKind, tuple[str, str]] = {
     "dynamixel": ("Dynamixel servos", "servos know"),
     "feetech": ("STS servos", "STS servos know"),
     "maestro": ("a Maestro", "a Maestro's pins know"),
+    "pca9685": ("PCA9685 boards", "their bridge knows"),
 }
 """Each kind as it is named, and as it stands before its baud rates."""
 
