@@ -115,7 +115,7 @@ def soak(args: argparse.Namespace) -> None:
         if seen_s >= 3600.0 * args.hours:
             break
         kind = dice.choice(tuple(CASES))
-        rig = load_rig({"dynamixel": "desk", "feetech": "feetech", "maestro": "maker"}[kind])
+        rig = struck_rigs.rig_of(kind)
         if dice.random() < 0.7:
             rig = quick(rig)
         machine = Machine(rig, dice.choice((50.0, 100.0, 200.0)), seed=k)
@@ -124,6 +124,7 @@ def soak(args: argparse.Namespace) -> None:
             machine.start()
             for _ in range(20):
                 case = dice.choice(CASES[kind])
+                watch.where = f"{kind} seed {k}: {case.name}"
                 outcome = machine.strike(*pair_of(rig, kind), case)
                 struck += 1
                 ends[outcome.end] += 1
@@ -146,10 +147,13 @@ def soak(args: argparse.Namespace) -> None:
 
 
 class Stale:
-    """Counts readings said to be fresh that are not where the joint was in that tick."""
+    """Counts and prints readings said to be fresh that are not where the joint was in that tick.
+
+    where: what is being done, for what is printed
+    """
 
     def __init__(self, machine: Machine) -> None:
-        self.stale = 0
+        self.stale, self.where = 0, ""
         self._read, self._machine = machine.body.read, machine
         machine.body.read = self.read  # type: ignore[method-assign]
 
@@ -163,7 +167,15 @@ class Stale:
                 continue
             low, high = sorted((before[i], after[i]))
             now = joints.position_rad[i]
-            self.stale += not low - STALE_ROOM_RAD <= now <= high + STALE_ROOM_RAD
+            if low - STALE_ROOM_RAD <= now <= high + STALE_ROOM_RAD:
+                continue
+            self.stale += 1
+            print(
+                f"{self.where}: at {t_s:.3f} s {name} is said to be at {now:.4f} rad, "
+                f"truly {low:.4f} to {high:.4f}; heard {joints.at_s[i] - t_s:+.4f} s, "
+                f"torque {joints.torque[i]}",
+                flush=True,
+            )
         return joints
 
 
