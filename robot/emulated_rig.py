@@ -6,7 +6,7 @@ from config.schema import Rig
 from drivers.servo_models import HOBBY_KINDS
 from robot.joint import JointParams
 from robot.rig_bus import bus_names, joints_on
-from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, Pca9685Line, StsLine
+from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.smart_servo.physics import Physics, ServoSpec
 
@@ -53,7 +53,7 @@ def _line(rig: Rig, name: str) -> Emulated:
         return Pca9685Line(boards.addresses, boards.oscillator_hz, servos)
     specs = tuple(emulated_servo(rig, joint) for joint in joints)
     return (
-        StsLine(specs, config.baud)
+        FeetechLine(specs, config.baud)
         if config.kind == "feetech"
         else DynamixelLine(specs, config.baud)
     )

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from drivers.errors import SetupError
 from drivers.servo_models import SERVOS, BusKind
-from sim_mock.devices import DynamixelLine, StsLine
+from sim_mock.devices import DynamixelLine, FeetechLine
 from sim_mock.smart_servo.physics import ServoSpec
 
 EXAMPLE = "1-6:xl330-m077,7-9:xc330-m288"
@@ -13,16 +13,16 @@ MIDDLE = 2048
 DEFAULT_FIRMWARE = ServoSpec(1, "").firmware
 
 _PART = re.compile(r"(\d+)(?:-(\d+))?:([^@]+)(?:@(\d+))?")
-_LINES: dict[BusKind, type[DynamixelLine | StsLine]] = {
+_LINES: dict[BusKind, type[DynamixelLine | FeetechLine]] = {
     "dynamixel": DynamixelLine,
-    "feetech": StsLine,
+    "feetech": FeetechLine,
 }
 _SPEECH: dict[BusKind, str] = {"dynamixel": "speaks Dynamixel's", "feetech": "speaks Feetech's"}
 _HIGHEST_ID: dict[BusKind, int] = {"dynamixel": 252, "feetech": 253}
 _MODELS = [name for name, facts in SERVOS.items() if facts.bus in _LINES]
 
 
-def line_of(text: str, firmware: int | None, baud: int) -> DynamixelLine | StsLine:
+def line_of(text: str, firmware: int | None, baud: int) -> DynamixelLine | FeetechLine:
     """Read the servos of one line; ``firmware``: of all of them, None: as from the shop.
 
     Raises:

@@ -10,20 +10,20 @@ from drivers.maestro.params import MaestroParams
 from drivers.pca9685.params import BRIDGE_BAUD
 from drivers.servo_models import HOBBY_KINDS, BusKind
 from sim_mock.device import Device
-from sim_mock.feetech import quirks as sts_habits
-from sim_mock.feetech.chain import build_sts
+from sim_mock.dynamixel import quirks as dynamixel_quirks
+from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.feetech import quirks as feetech_quirks
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.maestro import settings as maestro_settings
 from sim_mock.maestro.board import build_board
 from sim_mock.pca9685.bridge import build_bridge
 from sim_mock.pca9685.faults import CASES as PCA9685_CASES
-from sim_mock.smart_servo import quirks as servo_habits
-from sim_mock.smart_servo.chain import build_chain
 from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 CASES: dict[BusKind, dict[str, str]] = {
-    "dynamixel": servo_habits.cases(),
-    "feetech": sts_habits.cases(),
+    "dynamixel": dynamixel_quirks.cases(),
+    "feetech": feetech_quirks.cases(),
     "maestro": maestro_settings.cases(),
     "pca9685": PCA9685_CASES,
 }
@@ -55,7 +55,7 @@ class DynamixelLine:
 
 
 @dataclass(frozen=True, slots=True)
-class StsLine:
+class FeetechLine:
     """Feetech STS servos on one line; the rest as for Dynamixel servos."""
 
     servos: tuple[ServoSpec, ...]
@@ -101,9 +101,9 @@ class Pca9685Line:
     listens: ClassVar[str] = "the boards listen"
 
 
-Emulated = DynamixelLine | StsLine | MaestroLine | Pca9685Line
+Emulated = DynamixelLine | FeetechLine | MaestroLine | Pca9685Line
 _KINDS: dict[str, type[Emulated]] = {
-    one.kind: one for one in (DynamixelLine, StsLine, MaestroLine, Pca9685Line)
+    one.kind: one for one in (DynamixelLine, FeetechLine, MaestroLine, Pca9685Line)
 }
 
 
@@ -119,9 +119,9 @@ def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
         )
     if isinstance(what, Pca9685Line):
         return build_bridge(what.addresses, now_s, what.oscillator_hz, seed, what.servos)
-    if isinstance(what, StsLine):
-        return build_sts(what.servos, now_s, what.baud, seed)
-    return build_chain(what.servos, now_s, baud=what.baud, seed=seed)
+    if isinstance(what, FeetechLine):
+        return build_feetech(what.servos, now_s, what.baud, seed)
+    return build_dynamixel(what.servos, now_s, baud=what.baud, seed=seed)
 
 
 def packed(what: Emulated) -> dict[str, object]:

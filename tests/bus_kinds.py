@@ -17,7 +17,7 @@ from drivers.serial.port import BlockingPort, BusPort
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from sim_mock.device import Device
-from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, Pca9685Line, StsLine, build
+from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line, build
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.pty.client import PtyBuses
@@ -253,7 +253,7 @@ def line(kind: str, name: str) -> Emulated:
         return MaestroLine(12, servos=tuple(hobby))
     model = "sts3215" if name == "feetech" else "xl330-m077"
     specs = tuple(ServoSpec(i, model, round(x)) for i, x in starts.items())
-    return StsLine(specs) if name == "feetech" else DynamixelLine(specs)
+    return FeetechLine(specs) if name == "feetech" else DynamixelLine(specs)
 
 
 class InProcess(NamedTuple):

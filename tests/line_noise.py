@@ -13,7 +13,7 @@ from drivers.maestro.bus import MaestroBus, MaestroParams
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from sim_mock.device import Device
-from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, StsLine, build
+from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.smart_servo.physics import ServoSpec
@@ -106,7 +106,7 @@ class Noisy:
             return MaestroLine(12, servos=tuple(specs))
         model = "sts3215" if self._make == "feetech" else "xl330-m077"
         servos = tuple(ServoSpec(i, model, middle) for i in IDS)
-        return StsLine(servos) if self._make == "feetech" else DynamixelLine(servos)
+        return FeetechLine(servos) if self._make == "feetech" else DynamixelLine(servos)
 
     def _bus(self, kind: str) -> ServoBus:
         model = {"dynamixel": "xl330-m077", "feetech": "sts3215", "maestro": "hobby"}[self._make]

@@ -1,6 +1,6 @@
 """An emulated STS bus on a clock that is set by hand, and packets made apart from it."""
 
-from sim_mock.feetech.chain import build_sts
+from sim_mock.feetech.chain import build_feetech
 
 PING, READ, WRITE, REG_WRITE, ACTION, RESTORE, REBOOT = 1, 2, 3, 4, 5, 6, 8
 RESET_TURNS, CALIBRATE, SYNC_READ, SYNC_WRITE = 10, 11, 0x82, 0x83
@@ -36,7 +36,7 @@ class Bench:
 
     def __init__(self, *specs, **options):
         self.now_s = 0.0
-        self.chain = build_sts(specs or [(1, "sts3215", 2048.0)], lambda: self.now_s, **options)
+        self.chain = build_feetech(specs or [(1, "sts3215", 2048.0)], lambda: self.now_s, **options)
 
     def ask(self, servo_id, code, *params, baud=None):
         """Send an instruction; gives the statuses."""

@@ -4,7 +4,7 @@ from moving_bus import IDS, NAMES, MovingBus
 
 from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.types import ServoSetup
-from sim_mock.feetech.chain import build_sts
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.smart_servo.physics import ServoSpec
 
@@ -19,7 +19,7 @@ class Rig(MovingBus):
     def __init__(self, specs=None, setups=None, baud=None, wire_time=False, **params):
         super().__init__()
         specs = specs or [ServoSpec(i, "sts3215", 2000) for i in IDS]
-        self.chain = build_sts(specs, lambda: self.now_s, baud=baud)
+        self.chain = build_feetech(specs, lambda: self.now_s, baud=baud)
         self.port = InProcessPort(
             self.chain, self.sent.append, sleep_until=self.sleep_until, wire_time=wire_time
         )

@@ -15,7 +15,7 @@ from drivers.servo_bus.registers import Registers
 from robot.cli import bench
 from robot.cli import servos as cli_servos
 from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 SMALL = [ServoSpec(1, "xl330-m077", 2048), ServoSpec(7, "xc330-m288", 2048)]
 

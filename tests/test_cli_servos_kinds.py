@@ -14,9 +14,9 @@ from drivers.serial.port import BlockingPort
 from robot.cli import bench
 from robot.cli import servos as cli_servos
 from robot.emulated_rig import emulated_lines
-from sim_mock.devices import MaestroLine, StsLine
+from sim_mock.devices import FeetechLine, MaestroLine
 from sim_mock.pty.client import PtyBus, PtyBuses
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 
 def gazerig(*words, answers=""):
@@ -70,7 +70,7 @@ def test_scan_of_a_maestro():
 
 def test_scan_of_feetech_servos():
     with PtyBus() as bus:
-        path = bus.start_device(StsLine((ServoSpec(1, "sts3215"), ServoSpec(9, "sts3215"))))
+        path = bus.start_device(FeetechLine((ServoSpec(1, "sts3215"), ServoSpec(9, "sts3215"))))
         code, out, _ = gazerig("scan", "--port", path, "--bauds", "1000000")
         rows = re.findall(r"(\d) +[│|] sts3215 +[│|] (\d+\.\d+) +[│|] (\d+) +[│|] Feetech", out)
         assert code == 0 and rows == [("1", "3.53", "1000000"), ("9", "3.53", "1000000")]
@@ -165,7 +165,7 @@ def test_setup_of_a_feetech_servo_with_answers():
 
 def test_setup_finds_a_feetech_servo_anywhere_and_refuses_two():
     with PtyBus() as bus:
-        path = bus.start_device(StsLine((ServoSpec(77, "sts3215"),), 115_200))
+        path = bus.start_device(FeetechLine((ServoSpec(77, "sts3215"),), 115_200))
         words = ("setup", "feetech", "--port", path, "--joint", "neck_yaw", "--yes")
         code, _, err = gazerig(*words)
         assert code == 0 and "id 77 at 115200 bit/s" in err

@@ -15,9 +15,9 @@ from robot.bringup.scan_report import remarks
 from robot.bringup.searching import Looked
 from robot.bringup.servo_families import DYNAMIXEL
 from robot.bringup.servo_report import grouped, summed_up, together
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 SETUPS = (
@@ -33,7 +33,7 @@ class Rig:
 
     def __init__(self, specs=None):
         specs = specs or [ServoSpec(s.id, s.model, 2048) for s in SETUPS]
-        self.chain = build_chain(specs, lambda: 0.0, baud=BAUD)
+        self.chain = build_dynamixel(specs, lambda: 0.0, baud=BAUD)
         self.port = InProcessPort(self.chain)
         for setup in SETUPS:
             if any(servo.id == setup.id for servo in self.chain.servos):

@@ -11,7 +11,7 @@ from robot.bringup.doctor.feetech_subject import StsPatient
 from robot.bringup.doctor.findings import worst
 from robot.bringup.doctor.run import check, mend
 from robot.bringup.servo_families import FEETECH
-from sim_mock.feetech.chain import build_sts
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.smart_servo.physics import ServoSpec
 
@@ -30,7 +30,7 @@ class Rig:
     def __init__(self, specs=None, baud=BAUD):
         self.now_s = 10.0
         specs = specs or [ServoSpec(s.id, s.model, 2048) for s in SETUPS]
-        self.chain = build_sts(specs, lambda: self.now_s, baud=baud)
+        self.chain = build_feetech(specs, lambda: self.now_s, baud=baud)
         self.port = InProcessPort(self.chain)
         self.port.setBaudRate(baud)
         for setup in SETUPS:

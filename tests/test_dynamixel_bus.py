@@ -12,10 +12,10 @@ from drivers.errors import ServoMissing
 from drivers.serial.port import BlockingPort
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.chain import build_chain
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 SPEED = 6000.0
 REBOOT = 8
@@ -59,7 +59,7 @@ def make_twin(kind: str, specs=SPECS) -> Iterator[Twin]:
         def wait(seconds: float) -> None:
             now[0] += seconds
 
-        yield Twin(InProcessPort(build_chain(specs, lambda: now[0])), wait)
+        yield Twin(InProcessPort(build_dynamixel(specs, lambda: now[0])), wait)
         return
     with PtyBus() as server:
         port = BlockingPort(server.start(specs))

@@ -4,9 +4,9 @@ import pytest
 
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3)
 STARTS = (2001, 2002, 2003)
@@ -18,7 +18,7 @@ class Rig:
     def __init__(self, fast=True, starts=STARTS, **params):
         self.now_s = 100.0
         specs = [ServoSpec(i, "xl330-m077", at) for i, at in zip(IDS, starts, strict=True)]
-        self.chain = build_chain(specs, lambda: self.now_s)
+        self.chain = build_dynamixel(specs, lambda: self.now_s)
         setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
         self.bus = DynamixelBus(
             InProcessPort(self.chain), setups, DynamixelParams(fast_sync_read=fast, **params)

@@ -8,9 +8,9 @@ from drivers.dynamixel.protocol import instruction
 from drivers.errors import BusLost, ServoFault, ServoMissing
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
+from sim_mock.dynamixel.chain import build_dynamixel, status
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain, status
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3)
 GROUP_READS = (0x82, 0x8A)
@@ -41,7 +41,7 @@ class Rig:
         self.now_s = 100.0
         self.sent = []
         specs = [ServoSpec(i, "xl330-m077", 2000 + i) for i in IDS]
-        self.chain = build_chain(specs, lambda: self.now_s)
+        self.chain = build_dynamixel(specs, lambda: self.now_s)
         self.port = UnkindPort(self.chain, self.sent.append)
         setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
         self.bus = DynamixelBus(self.port, setups, DynamixelParams(fast_sync_read=fast, **params))

@@ -7,14 +7,14 @@ import pytest
 from drivers.dynamixel.sync_packets import FastGroup, PlainGroup
 from drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
 from drivers.servo_bus.read_windows import DIRECT, direct_turns
-from sim_mock.smart_servo.chain import build_chain, status
+from sim_mock.dynamixel.chain import build_dynamixel, status
 
 IDS = (4, 1, 9)
 PLACES = {4: 1000, 1: 2000, 9: 3000}
 
 
 def chain():
-    return build_chain([(i, "xl330-m288", PLACES[i]) for i in IDS], lambda: 0.0)
+    return build_dynamixel([(i, "xl330-m288", PLACES[i]) for i in IDS], lambda: 0.0)
 
 
 @pytest.fixture(params=[PlainGroup, FastGroup], ids=["plain", "fast"])

@@ -65,9 +65,9 @@ from drivers.errors import BusLost, PortError, ServoMissing
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from drivers.types import ServoSetup
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 
 class Rig(MovingBus):
@@ -76,7 +76,7 @@ class Rig(MovingBus):
     def __init__(self, fast=True, indirect=True, heed_baud=False, **params):
         super().__init__()
         specs = [ServoSpec(i, "xl330-m077", 2000) for i in IDS]
-        self.chain = build_chain(specs, lambda: self.now_s)
+        self.chain = build_dynamixel(specs, lambda: self.now_s)
         self.chain.heed_baud = heed_baud
         self.port = InProcessPort(self.chain, self.sent.append, sleep_until=self.sleep_until)
         setups = [
@@ -443,7 +443,7 @@ def test_14_one_silent_servo_of_nine_costs_little_time(fast):
         now_s[0] = max(now_s[0], t_s)
 
     ids = range(1, 10)
-    chain = build_chain([ServoSpec(i, "xl330-m077", 2000) for i in ids], lambda: now_s[0])
+    chain = build_dynamixel([ServoSpec(i, "xl330-m077", 2000) for i in ids], lambda: now_s[0])
     port = InProcessPort(chain, sleep_until=sleep_until, wire_time=True)
     setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
     bus = DynamixelBus(port, setups, DynamixelParams(fast_sync_read=fast))

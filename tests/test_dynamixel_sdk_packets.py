@@ -30,9 +30,9 @@ from drivers.dynamixel.protocol import instruction, statuses
 from drivers.dynamixel.sdk_handler import SdkPackets
 from drivers.errors import BusLost
 from drivers.servo_bus.registers import Identity, Registers
+from sim_mock.dynamixel.chain import build_dynamixel, status
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain, status
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 HEADER = b"\xff\xff\xfd\x00"
 
@@ -43,7 +43,7 @@ class Rig:
     def __init__(self):
         self.now_s = 0.0
         specs = [ServoSpec(i, "xl330-m077", 2000 + i) for i in (1, 2, 3)]
-        self.chain = build_chain(specs, lambda: self.now_s)
+        self.chain = build_dynamixel(specs, lambda: self.now_s)
         self.sent = []
         self.port = SpoiltPort(self.chain, self.sent.append, sleep_until=self.sleep_until)
         self.port.setBaudRate(1_000_000)

@@ -8,9 +8,9 @@ from drivers.errors import PortError, ServoMissing
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.servo_bus.registers import Registers
 from drivers.types import ServoSetup
+from sim_mock.dynamixel.chain import build_dynamixel, status
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain, status
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3)
 
@@ -31,7 +31,9 @@ class Rig:
     def __init__(self, model="xl330-m077"):
         self.now_s = 0.0
         self.sent = []
-        self.chain = build_chain([ServoSpec(i, model, 2000 + i) for i in IDS], lambda: self.now_s)
+        self.chain = build_dynamixel(
+            [ServoSpec(i, model, 2000 + i) for i in IDS], lambda: self.now_s
+        )
         self.port = SpoiltPort(self.chain, self.sent.append)
         setups = [ServoSetup(i, model, 1000, 3000, 6000.0) for i in IDS]
         self.bus = DynamixelBus(self.port, setups, DynamixelParams())
@@ -136,7 +138,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
     specs = [ServoSpec(i, "xl330-m077", 2000 + i, fw) for i, fw in enumerate(firmwares, 1)]
     sent: list[bytes] = []
     now_s = [0.0]
-    port = InProcessPort(build_chain(specs, lambda: now_s[0]), sent.append)
+    port = InProcessPort(build_dynamixel(specs, lambda: now_s[0]), sent.append)
     setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
     bus = DynamixelBus(port, setups, DynamixelParams())
     bus.open()
@@ -179,7 +181,7 @@ def test_open_with_an_impossible_baud_rate_names_it():
 def test_old_firmware_is_read_the_plain_way():
     specs = [ServoSpec(1, "xl330-m077", 2000, 45), ServoSpec(2, "xl330-m077", 2000, 53)]
     sent: list[bytes] = []
-    port = InProcessPort(build_chain(specs, lambda: 0.0), sent.append)
+    port = InProcessPort(build_dynamixel(specs, lambda: 0.0), sent.append)
     setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
     bus = DynamixelBus(port, setups, DynamixelParams())
     bus.open()

@@ -12,7 +12,7 @@ from drivers.serial.port import BlockingPort
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
 from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3)
 SPECS = [ServoSpec(i, "xl330-m077", 1200) for i in IDS]

@@ -17,7 +17,7 @@ from drivers.serial.port import BlockingPort
 from robot.cli import emulate as command
 from robot.cli.emulate import app
 from sim_mock.device_spec import line_of, parse_servos
-from sim_mock.devices import DynamixelLine, StsLine
+from sim_mock.devices import DynamixelLine, FeetechLine
 
 ROOT = Path(__file__).parents[1]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTTIN)
@@ -250,7 +250,7 @@ def test_a_rig_of_hobby_servos_is_a_board_that_sends_no_pulses_yet():
 
 
 MIXED = {
-    "": StsLine(parse_servos("1:sts3215", 10), 1_000_000),
+    "": FeetechLine(parse_servos("1:sts3215", 10), 1_000_000),
     "eyes": DynamixelLine(parse_servos("1-2:xl330-m077", 53), 57_600),
 }
 
@@ -346,7 +346,7 @@ def test_servos_are_read():
 
 def test_the_models_decide_the_kind_of_line():
     specs = parse_servos("3:STS3215@7,253:sts3215-12v", 10)
-    assert line_of("3:STS3215@7,253:sts3215-12v", 10, 500_000) == StsLine(specs, 500_000)
+    assert line_of("3:STS3215@7,253:sts3215-12v", 10, 500_000) == FeetechLine(specs, 500_000)
     assert [(s.id, s.model, s.start_steps) for s in specs] == [
         (3, "sts3215", 7),
         (253, "sts3215-12v", 2048),

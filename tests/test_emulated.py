@@ -9,8 +9,8 @@ from sim_mock.devices import (
     BAUDS,
     CASES,
     DynamixelLine,
+    FeetechLine,
     MaestroLine,
-    StsLine,
     build,
     packed,
     unpacked,
@@ -22,7 +22,7 @@ from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 BUILT = ServoSpec(7, "xl330-m288", 1000, 45, Physics(stop_low_steps=900.0), Quirks(True), 3)
 LINES = [
     DynamixelLine((BUILT, ServoSpec(1, "xc330-m288")), 57_600),
-    StsLine((ServoSpec(253, "sts3215", 5, physics=Physics(load_nm=0.1)),)),
+    FeetechLine((ServoSpec(253, "sts3215", 5, physics=Physics(load_nm=0.1)),)),
     MaestroLine(24, 5, True, (HobbySpec(3, 4000.0),), 9600),
     MaestroLine(),
 ]
@@ -52,7 +52,7 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(TypeError, match="volts"):
         unpacked({"kind": "maestro", "volts": 6})
     with pytest.raises(ValueError, match="baud 12"):
-        build(StsLine((ServoSpec(1, "sts3215"),), 12), lambda: 0.0)
+        build(FeetechLine((ServoSpec(1, "sts3215"),), 12), lambda: 0.0)
 
 
 @KINDS

@@ -7,9 +7,9 @@ from test_maestro_board import World, acceleration, speed, target
 from drivers.dynamixel.control_table import MODELS
 from sim_mock.dynamixel.motor import PAUSE_MS, Loop, Shaft, long_pause
 from sim_mock.dynamixel.profile import Profile, SpeedProfile
-from sim_mock.feetech.protection import StsProtection
+from sim_mock.dynamixel.servo import DynamixelServo
+from sim_mock.feetech.protection import FeetechProtection
 from sim_mock.smart_servo.physics import Physics, ServoSpec
-from sim_mock.smart_servo.servo import Servo
 
 HOUR_S = 3600.0
 GOAL, GOAL_SPEED, MODE = 42, 46, 33
@@ -19,7 +19,7 @@ GOAL, GOAL_SPEED, MODE = 42, 46, 33
 def lived_ms(monkeypatch):
     """Count the milliseconds that shafts live through, and the looks of protections."""
     count = [0]
-    run, look = Shaft.run, StsProtection.look
+    run, look = Shaft.run, FeetechProtection.look
 
     def counted(shaft, ticks):
         count[0] += 0 if shaft.quiet else ticks
@@ -30,7 +30,7 @@ def lived_ms(monkeypatch):
         look(protection, *words)
 
     monkeypatch.setattr(Shaft, "run", counted)
-    monkeypatch.setattr(StsProtection, "look", looked)
+    monkeypatch.setattr(FeetechProtection, "look", looked)
     return count
 
 
@@ -94,7 +94,7 @@ def test_a_pause_ends_where_a_life_through_it_does(begin):
 
 
 def test_a_dynamixel_that_moved_and_idled_answers_and_is_there(lived_ms):
-    servo = Servo(ServoSpec(1, "xl330-m077", 1000.0, physics=Physics(gravity_nm=0.01)), 0)
+    servo = DynamixelServo(ServoSpec(1, "xl330-m077", 1000.0, physics=Physics(gravity_nm=0.01)), 0)
     servo.memory.set("torque_enable", 1)
     servo._switch(True)
     servo.drive.aim(2000)

@@ -13,7 +13,7 @@ from drivers.errors import ServoFault, ServoMissing
 from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.serial.port import BlockingPort
 from drivers.types import ServoSetup
-from sim_mock.devices import StsLine
+from sim_mock.devices import FeetechLine
 from sim_mock.pty.client import PtyBus
 from sim_mock.smart_servo.physics import ServoSpec
 
@@ -55,7 +55,7 @@ def twin(request):
         yield Twin(rig.port, lambda s: rig.sleep_until(rig.now_s + s))
         return
     with PtyBus() as server:
-        port = BlockingPort(server.start_device(StsLine(SPECS)))
+        port = BlockingPort(server.start_device(FeetechLine(SPECS)))
         yield Twin(port, time.sleep)
         port.closePort()
 

@@ -18,8 +18,8 @@ from robot.bringup.jog import JogParams, ManualControl, duration_s
 from robot.bringup.look_at import ends_reached, look_at
 from robot.clock import SimulatedClock
 from robot.safety.guard import Guard
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
 from sim_mock.smart_servo.physics import ServoSpec
 
 RIG = load_rig("desk")
@@ -35,7 +35,7 @@ class Bench:
             ServoSpec(j.id, j.model, round(j.steps(radians(CROOKED.get(name, 0.0)))))
             for name, j in ((name, rig.joints[name]) for name in JOINTS)
         ]
-        self.chain = build_chain(specs, self.clock.now_s)
+        self.chain = build_dynamixel(specs, self.clock.now_s)
         self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
         setups = [rig.joints[name].setup(name) for name in JOINTS]
         bus = DynamixelBus(self.port, setups, rig.bus.dynamixel)

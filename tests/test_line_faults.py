@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import BusLost, PortError
+from sim_mock.dynamixel.chain import build_dynamixel, status
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain, status
 from sim_mock.smart_servo.fault_commands import VERBS, usage
 
 IDS = (1, 2, 3)
@@ -38,7 +38,7 @@ class World:
 
     def __init__(self, sleeps=True, **options):
         self.now_s = 0.0
-        chain = build_chain(
+        chain = build_dynamixel(
             [(i, "xl330-m077", 2000 + i) for i in IDS], lambda: self.now_s, **options
         )
         self.port = InProcessPort(chain, sleep_until=self.sleep_until if sleeps else None)

@@ -7,9 +7,9 @@ from fastcrc.crc16 import umts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_mock.feetech.chain import build_sts
+from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.maestro.board import build_board
-from sim_mock.smart_servo.chain import build_chain
 from sim_mock.wire import ServoLine
 
 
@@ -32,7 +32,7 @@ class Wire:
 
     def __init__(self, return_delay=0, **options):
         self.now_s = 0.0
-        self.chain = build_chain([(i, "xl330-m077", 2048) for i in IDS], lambda: self.now_s)
+        self.chain = build_dynamixel([(i, "xl330-m077", 2048) for i in IDS], lambda: self.now_s)
         self.chain.receive(instruction(0xFE, 3, struct.pack("<HB", 9, return_delay)))
         self.chain.refresh()
         self.line = ServoLine(self.chain, wire_time=True, **options)
@@ -164,7 +164,7 @@ class Device:
 
 
 def sts(now_s):
-    chain = build_sts([(i, "sts3215", 2048) for i in IDS], now_s)
+    chain = build_feetech([(i, "sts3215", 2048) for i in IDS], now_s)
     chain.exchange(sts_packet(0xFE, 3, bytes((7, 0))))
     return chain
 

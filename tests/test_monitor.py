@@ -12,8 +12,8 @@ from robot.bringup.monitor import Monitor, as_json
 from robot.bringup.telemetry import DynamixelLooks, load_share, look
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
 from sim_mock.smart_servo.physics import ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
@@ -26,7 +26,7 @@ class Bench:
     def __init__(self) -> None:
         self.clock = SimulatedClock()
         specs = [ServoSpec(1, EYE.model, 2100), ServoSpec(7, NECK.model, 1900)]
-        self.chain = build_chain(specs, self.clock.now_s)
+        self.chain = build_dynamixel(specs, self.clock.now_s)
         self.sent: list[bytes] = []
         self.port = InProcessPort(self.chain, self.sent.append, sleep_until=self.clock.sleep_until)
         self.port.setBaudRate(1_000_000)

@@ -15,7 +15,7 @@ from robot.calibrate.placing import HandPlacer, Steered, by_places
 from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
-from sim_mock.feetech.chain import build_sts
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.smart_servo.physics import Physics, ServoSpec
 
@@ -31,7 +31,7 @@ class Bench:
         self.clock = SimulatedClock()
         physics = Physics(stop_low_steps=stops[0], stop_high_steps=stops[1])
         spec = ServoSpec(EYE.id, EYE.model, start, physics=physics)
-        self.chain = build_sts([spec], self.clock.now_s)
+        self.chain = build_feetech([spec], self.clock.now_s)
         self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
         self.port.setBaudRate(1_000_000)
         self.registers = StsRegisters(self.port)

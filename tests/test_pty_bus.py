@@ -14,10 +14,10 @@ from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, GroupSyncWrite, PacketHan
 from drivers.errors import BusLost, PortError
 from drivers.serial import port as serial_port
 from drivers.serial.port import BlockingPort
-from sim_mock.devices import DynamixelLine, MaestroLine, StsLine
+from sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.pty.client import PtyBus, PtyBuses
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = [(1, "xl330-m288", 2048), (2, "xl330-m288", 1000), (3, "xl330-m288", 3000)]
 DEVICE = {"kind": "dynamixel", "servos": SPECS}
@@ -311,7 +311,7 @@ def asked(path, data, length, baud=1_000_000):
 
 def test_feetech_servos_answer_at_their_baud_rate_only():
     with PtyBus() as bus:
-        path = bus.start_device(StsLine((ServoSpec(1, "sts3215"),), baud=500_000))
+        path = bus.start_device(FeetechLine((ServoSpec(1, "sts3215"),), baud=500_000))
         assert asked(path, STS_PING, 6, 500_000) == STS_PONG
         port = BlockingPort(path)
         port.setBaudRate(1_000_000)
@@ -345,7 +345,7 @@ def test_a_board_wants_a_crc_where_it_is_told_to():
 def test_choices_and_faults_are_those_of_the_device():
     with PtyBus() as bus:
         path = bus.start_device(
-            StsLine((ServoSpec(1, "sts3215"),)), choices={"broadcast-ping": "silence"}
+            FeetechLine((ServoSpec(1, "sts3215"),)), choices={"broadcast-ping": "silence"}
         )
         assert bus.command("lose 1 count 1") == "servo 1 does not answer 1 times"
         assert asked(path, STS_PING + STS_PING, 6) == STS_PONG
@@ -358,7 +358,7 @@ def test_the_buses_of_a_rig_live_in_one_process():
         paths = buses.start(
             {
                 "": DynamixelLine((ServoSpec(1, "xl330-m288"),), baud=1_000_000),
-                "neck": StsLine((ServoSpec(1, "sts3215"),), baud=1_000_000),
+                "neck": FeetechLine((ServoSpec(1, "sts3215"),), baud=1_000_000),
             }
         )
         assert list(paths) == ["", "neck"]

@@ -11,10 +11,10 @@ from robot.bringup.searching import (
     plan,
     search,
 )
-from sim_mock.feetech.chain import build_sts
+from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.maestro.board import build_board
-from sim_mock.smart_servo.chain import build_chain
 from sim_mock.smart_servo.physics import ServoSpec
 
 ALL = known_kinds("all")
@@ -112,7 +112,7 @@ def memory(servo):
 
 
 def test_dynamixel_servos_are_found_and_the_search_ends_there():
-    chain = build_chain([ServoSpec(1, "xl330-m077"), ServoSpec(7, "xc330-m288")], lambda: 0.0)
+    chain = build_dynamixel([ServoSpec(1, "xl330-m077"), ServoSpec(7, "xc330-m288")], lambda: 0.0)
     rounds = Line(chain).search()
     assert {one.kind for one in rounds} == {"maestro", "dynamixel"}
     kinds = {(kind, servo.id) for kind, servo in found_of(rounds)}
@@ -120,7 +120,7 @@ def test_dynamixel_servos_are_found_and_the_search_ends_there():
 
 
 def test_no_packet_changes_dynamixel_servos():
-    chain = build_chain([ServoSpec(i, "xl330-m077") for i in (1, 2, 253 - 1)], lambda: 0.0)
+    chain = build_dynamixel([ServoSpec(i, "xl330-m077") for i in (1, 2, 253 - 1)], lambda: 0.0)
     for servo in chain.servos:
         servo.memory.set("return_delay_time", 77)
     before = [memory(servo) for servo in chain.servos]
@@ -135,7 +135,7 @@ def test_no_packet_changes_dynamixel_servos():
 
 
 def test_no_packet_changes_sts_servos():
-    chain = build_sts([ServoSpec(i, "sts3215", 1900 + i) for i in (1, 49, 253)], lambda: 0.0)
+    chain = build_feetech([ServoSpec(i, "sts3215", 1900 + i) for i in (1, 49, 253)], lambda: 0.0)
     before = [chain[i].read(0, 56) for i in (1, 49, 253)]
     places = chain.positions_steps()
     rounds = Line(chain).search(to_the_end=True, thorough=True)
@@ -148,7 +148,7 @@ def test_no_packet_changes_sts_servos():
 
 
 def test_nobody():
-    chain = build_chain([ServoSpec(1, "xl330-m077")], lambda: 0.0, baud=2_000_000)
+    chain = build_dynamixel([ServoSpec(1, "xl330-m077")], lambda: 0.0, baud=2_000_000)
     rounds = Line(chain).search(rates=(57_600,))
     assert [(one.kind, one.baud) for one in rounds] == [
         ("maestro", 57_600), ("dynamixel", 57_600), ("feetech", 57_600),
@@ -170,7 +170,7 @@ def test_words_for_kinds():
 
 
 def test_sts_servos_that_answer_no_ping_to_everybody_are_found_by_a_thorough_search():
-    chain = build_sts([ServoSpec(5, "sts3215")], lambda: 0.0)
+    chain = build_feetech([ServoSpec(5, "sts3215")], lambda: 0.0)
     chain.choose("broadcast-ping", "silence")
     line = Line(chain)
     asked = plan("", ("feetech",), (1_000_000,))

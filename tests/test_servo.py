@@ -4,15 +4,15 @@ import struct
 
 import pytest
 
-from sim_mock.smart_servo.physics import Physics, Quirks
-from sim_mock.smart_servo.servo import Servo, ServoSpec
+from sim_mock.dynamixel.servo import DynamixelServo
+from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 
 class Bench:
     """A servo and its clock, which is set by hand."""
 
     def __init__(self, *spec):
-        self.servo = Servo(ServoSpec(1, *spec), 0)
+        self.servo = DynamixelServo(ServoSpec(1, *spec), 0)
         self.now_s = 0.0
 
     def advance(self) -> None:

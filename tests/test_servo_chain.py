@@ -7,7 +7,7 @@ from fastcrc.crc16 import umts
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_mock.smart_servo.chain import ServoChain, build_chain, status
+from sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel, status
 from sim_mock.smart_servo.physics import Quirks, ServoSpec
 
 ALERT = 0x80
@@ -27,7 +27,7 @@ class Bench:
 
     def __init__(self, *specs, **options):
         self.now_s = 0.0
-        self.chain: ServoChain = build_chain(specs, lambda: self.now_s, **options)
+        self.chain: DynamixelChain = build_dynamixel(specs, lambda: self.now_s, **options)
 
     def write(self, servo_id: int, address: int, size: int, value: int) -> int:
         """Write one register; give the error byte, -1 for silence."""

@@ -3,8 +3,9 @@
 import pytest
 
 from drivers.dynamixel.control_table import MODELS, indirect_blocks, registers_of
-from sim_mock.smart_servo.memory import ACCESS, DATA_LENGTH, DATA_RANGE, Memory
-from sim_mock.smart_servo.servo import Servo, ServoSpec
+from sim_mock.dynamixel.memory import ACCESS, DATA_LENGTH, DATA_RANGE, DynamixelMemory
+from sim_mock.dynamixel.servo import DynamixelServo
+from sim_mock.smart_servo.physics import ServoSpec
 
 EVERY = pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
 
@@ -15,7 +16,7 @@ def raw(value: int, size: int) -> bytes:
 
 @EVERY
 def test_every_register_starts_with_its_initial_value(model):
-    memory = Memory(model, 53)
+    memory = DynamixelMemory(model, 53)
     for register in registers_of(model):
         if register.initial is not None:
             assert memory.get(register.name) == register.initial, register.name
@@ -23,7 +24,7 @@ def test_every_register_starts_with_its_initial_value(model):
 
 @EVERY
 def test_every_register_keeps_to_its_access_range_and_size(model):
-    memory = Memory(model, 53)
+    memory = DynamixelMemory(model, 53)
     for register in registers_of(model):
         at, size = register.address, register.size
         if register.access == "r":
@@ -40,7 +41,7 @@ def test_every_register_keeps_to_its_access_range_and_size(model):
 
 @EVERY
 def test_what_no_register_covers_can_neither_be_read_nor_written(model):
-    memory = Memory(model, 53)
+    memory = DynamixelMemory(model, 53)
     known = {a for r in registers_of(model) for a in range(r.address, r.address + r.size)}
     for address in set(range(148)) - known:
         assert memory.read(address, 1) is None
@@ -53,7 +54,7 @@ def test_what_no_register_covers_can_neither_be_read_nor_written(model):
 @EVERY
 @pytest.mark.parametrize("firmware", [45, 52, 53])
 def test_every_window_shows_and_takes_other_bytes(model, firmware):
-    servo = Servo(ServoSpec(1, model.name, 1234, firmware), 0)
+    servo = DynamixelServo(ServoSpec(1, model.name, 1234, firmware), 0)
     for block in indirect_blocks(model, firmware):
         first, data = block.address_base, block.data_base
         for i in range(4):
@@ -73,7 +74,7 @@ def test_every_window_shows_and_takes_other_bytes(model, firmware):
 
 @EVERY
 def test_the_eeprom_is_locked_under_torque_and_nothing_changes(model):
-    servo = Servo(ServoSpec(1, model.name), 0)
+    servo = DynamixelServo(ServoSpec(1, model.name), 0)
     assert servo.write(64, b"\1") == 0
     before = bytes(servo.memory.bytes[:64])
     for register in registers_of(model):

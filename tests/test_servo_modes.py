@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_mock.smart_servo.physics import Physics
-from sim_mock.smart_servo.servo import Servo, ServoSpec
+from sim_mock.dynamixel.servo import DynamixelServo
+from sim_mock.smart_servo.physics import Physics, ServoSpec
 
 SIZE = {11: 1, 36: 2, 38: 2, 44: 4, 62: 1, 64: 1, 98: 1, 100: 2, 102: 2, 104: 4, 108: 4, 112: 4}
 
@@ -14,7 +14,7 @@ class Bench:
     """A servo in a mode, and its clock in milliseconds."""
 
     def __init__(self, mode, model="xl330-m077", **physics):
-        self.servo = Servo(ServoSpec(1, model, 2048, 53, Physics(**physics)), 0)
+        self.servo = DynamixelServo(ServoSpec(1, model, 2048, 53, Physics(**physics)), 0)
         self.ms = 0
         assert self.put(11, mode) == 0
 

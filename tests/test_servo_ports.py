@@ -11,9 +11,9 @@ from dynamixel_sdk import (
 )
 
 from drivers.errors import BusLost, PortError
-from sim_mock.devices import DynamixelLine, MaestroLine, StsLine, build
+from sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine, build
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
 from sim_mock.smart_servo.physics import ServoSpec
 
 STEADY_STEPS = 12
@@ -25,7 +25,7 @@ class World:
         self.now_s = 0.0
         self.sent: list[bytes] = []
         specs = [(1, "xl330-m288", 2048), (2, "xl330-m288", 1000), (3, "xl330-m288", 3000)]
-        self.chain = build_chain(specs, lambda: self.now_s)
+        self.chain = build_dynamixel(specs, lambda: self.now_s)
         self.port = InProcessPort(self.chain, self.sent.append)
         self.packets = PacketHandler(2.0)
         assert self.port.openPort()
@@ -115,7 +115,7 @@ KINDS = {
         bytes.fromhex("FFFFFD0001030001194E"),
         14,
     ),
-    "feetech": (StsLine((ServoSpec(1, "sts3215"),), 500_000), bytes.fromhex("FFFF010201FB"), 6),
+    "feetech": (FeetechLine((ServoSpec(1, "sts3215"),), 500_000), bytes.fromhex("FFFF010201FB"), 6),
     "maestro": (MaestroLine(6, baud=9600), bytes.fromhex("9001"), 2),
 }
 

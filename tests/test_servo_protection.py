@@ -2,13 +2,13 @@
 
 import pytest
 
-from sim_mock.smart_servo.physics import Physics
-from sim_mock.smart_servo.servo import Servo, ServoSpec
+from sim_mock.dynamixel.servo import DynamixelServo
+from sim_mock.smart_servo.physics import Physics, ServoSpec
 
 
 class Bench:
     def __init__(self, model="xl330-m077", **physics):
-        self.servo = Servo(ServoSpec(1, model, 2048, 53, Physics(**physics)), 0)
+        self.servo = DynamixelServo(ServoSpec(1, model, 2048, 53, Physics(**physics)), 0)
 
     def put(self, address, size, value):
         return self.servo.write(address, value.to_bytes(size, "little"))

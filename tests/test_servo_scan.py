@@ -23,9 +23,9 @@ from drivers.servo_bus.discovery import (
     ping,
     scan,
 )
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = (
     ServoSpec(9, "xc330-m288", 2100, 53),
@@ -36,7 +36,7 @@ SPECS = (
 
 def bus(specs=SPECS, bauds=None, now=lambda: 0.0):
     """Give a port to servos, each at its own baud rate, or heard at every one."""
-    chain = build_chain(specs, now)
+    chain = build_dynamixel(specs, now)
     for servo, baud in zip(chain.servos, bauds or (), strict=False):
         servo.memory.set("baud_rate", BAUD_RATES.index(baud))
     if bauds is not None:

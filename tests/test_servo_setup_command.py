@@ -10,9 +10,9 @@ from robot.bringup.servo_families import DYNAMIXEL
 from robot.bringup.servo_kind import Standing
 from robot.bringup.servo_reboot import restart
 from robot.bringup.servo_setup import assign, find_alone, search_order
+from sim_mock.dynamixel.chain import build_dynamixel, status
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain, status
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 YAW = ServoSetup(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw")
@@ -24,7 +24,7 @@ class Bench:
     def __init__(self, *specs, baud=57_600):
         self.now = 0.0
         specs = specs or (ServoSpec(1, "xc330-m288", 2000),)
-        self.chain = build_chain(specs, lambda: self.now, baud=baud)
+        self.chain = build_dynamixel(specs, lambda: self.now, baud=baud)
         self.port = InProcessPort(self.chain)
         self.told = []
 

@@ -8,9 +8,9 @@ from robot.bringup.servo_families import DYNAMIXEL, FEETECH
 from robot.bringup.servo_kind import Standing
 from robot.bringup.servo_reboot import restart
 from robot.bringup.servo_setup import assign, find_alone, search_order
-from sim_mock.feetech.chain import build_sts
+from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
 from sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
@@ -22,7 +22,9 @@ class Bench:
 
     def __init__(self, *specs, baud=BAUD):
         self.now = 10.0
-        self.chain = build_sts(specs or (ServoSpec(1, "sts3215", 2000),), lambda: self.now, baud)
+        self.chain = build_feetech(
+            specs or (ServoSpec(1, "sts3215", 2000),), lambda: self.now, baud
+        )
         self.port = InProcessPort(self.chain)
         self.told = []
 
@@ -133,4 +135,4 @@ def test_anybody_is_a_matter_of_answers_not_of_echoes():
     assert not FEETECH.anybody(bench.port)
     bench.port.faults.command("echo on")
     assert not FEETECH.anybody(bench.port)
-    assert DYNAMIXEL.anybody(InProcessPort(build_chain([], lambda: 0.0)))
+    assert DYNAMIXEL.anybody(InProcessPort(build_dynamixel([], lambda: 0.0)))

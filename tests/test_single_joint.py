@@ -13,8 +13,8 @@ from robot.calibrate.calibration import CalibrationRefused
 from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
 from sim_mock.smart_servo.physics import Physics, ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
@@ -29,7 +29,7 @@ class Bench:
         self.clock = SimulatedClock()
         physics = Physics(stop_low_steps=stops[0], stop_high_steps=stops[1])
         spec = ServoSpec(joint.id, joint.model, start, physics=physics)
-        self.chain = build_chain([spec], self.clock.now_s)
+        self.chain = build_dynamixel([spec], self.clock.now_s)
         self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
         self.port.setBaudRate(1_000_000)
         self.registers = Registers(self.port)

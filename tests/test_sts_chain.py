@@ -1,4 +1,4 @@
-"""The emulated STS bus against the written rules: instructions, memory, lock, groups, habits."""
+"""The emulated STS bus against the written rules: instructions, memory, lock, groups, quirks."""
 
 import pytest
 from hypothesis import given
@@ -23,7 +23,7 @@ from sts_bench import (
 from drivers.feetech import memory_table as feetech_table
 from sim_mock.device import Device
 from sim_mock.feetech import memory as sts_memory
-from sim_mock.feetech.chain import build_sts
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.smart_servo.physics import Physics, ServoSpec
 
 FACTORY = {
@@ -51,7 +51,7 @@ def restart(bench, servo_id=1):
 
 
 def test_it_is_a_device():
-    device: Device = build_sts([(1, "sts3215", 2048)], lambda: 0.0)
+    device: Device = build_feetech([(1, "sts3215", 2048)], lambda: 0.0)
     assert device.positions_steps() == (2048.0,)
     assert device.hears(57_600)
 
@@ -352,7 +352,7 @@ def test_other_broadcasts_are_obeyed_in_silence(code):
     assert [bench.read(i, 42, 2) for i in (1, 2, 3)] == ([7] * 3 if code == WRITE else [0] * 3)
 
 
-# --- habits
+# --- quirks
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from sim_mock.devices import StsLine
+from sim_mock.devices import FeetechLine
 from sim_mock.pty.client import PtyBus
 from sim_mock.smart_servo.physics import ServoSpec
 
@@ -29,7 +29,9 @@ def bus():
 def client(bus):
     rustypot = pytest.importorskip("rustypot", reason="rustypot is not installed")
     specs = [ServoSpec(i, "sts3215", place) for i, place in zip(IDS, PLACES, strict=True)]
-    opened = rustypot.Sts3215PyController(bus.start_device(StsLine(tuple(specs), BAUD)), BAUD, 0.2)
+    opened = rustypot.Sts3215PyController(
+        bus.start_device(FeetechLine(tuple(specs), BAUD)), BAUD, 0.2
+    )
     yield opened
     opened.close()
 

@@ -6,12 +6,12 @@ import select
 
 import pytest
 
-from sim_mock.devices import DynamixelLine, MaestroLine, StsLine
+from sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
 from sim_mock.pty.line import BusSettings, TerminalLine
 from sim_mock.smart_servo.physics import ServoSpec
 
 PING, PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
-STS = StsLine((ServoSpec(1, "sts3215"),))
+STS = FeetechLine((ServoSpec(1, "sts3215"),))
 BOARD = MaestroLine(6)
 
 

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from drivers.event_log import Journal, call
 from drivers.feetech.care import RESTART_S, Care
-from drivers.feetech.line import StsLine
+from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import STEPS_PER_TURN
 from drivers.feetech.params import FeetechParams as FeetechParams
 from drivers.feetech.protocol import MOST_GOALS, GoalWrite
@@ -64,7 +64,7 @@ class FeetechBus:
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
         self._goals = GoalWrite(self._ids)
         self._journal = Journal()
-        self._line = StsLine(
+        self._line = FeetechLine(
             port,
             params.prompt_timeout_ms / 1000.0,
             params.reply_timeout_ms / 1000.0,

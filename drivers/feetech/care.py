@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from math import inf
 
-from drivers.feetech.line import StsLine
+from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import REGISTERS, TORQUE_FULL, acceleration_units, name_errors
 from drivers.feetech.readings import Readings
 from drivers.feetech.revival import FAR_SIDE, Revival
@@ -38,7 +38,7 @@ class Care:
 
     def __init__(
         self,
-        line: StsLine,
+        line: FeetechLine,
         setups: Mapping[int, ServoSetup],
         revival: Revival,
         health: Health,

@@ -15,7 +15,7 @@ from drivers.serial.port import BITS_PER_BYTE
 from drivers.servo_bus.transaction import BusLine
 
 
-class StsLine(BusLine):
+class FeetechLine(BusLine):
     """A port with the patience of one bus; every method may raise drivers.errors.BusLost.
 
     What is asked and written here goes through sync read and sync write even for a single

@@ -9,7 +9,7 @@ from math import inf
 from typing import NamedTuple
 
 from drivers.feetech.group import Group
-from drivers.feetech.line import StsLine
+from drivers.feetech.line import FeetechLine
 from drivers.feetech.protocol import HEADER
 from drivers.feetech.views import Sample, View
 from drivers.servo_bus.poll_list import Roll, silent_ones
@@ -38,7 +38,7 @@ class Reader:
 
     def __init__(
         self,
-        line: StsLine,
+        line: FeetechLine,
         roll: Roll,
         together: Turns[View],
         alone: Turns[View],

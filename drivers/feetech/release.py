@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from drivers.errors import PortError
-from drivers.feetech.line import StsLine
+from drivers.feetech.line import FeetechLine
 from drivers.feetech.torque import switch_off
 from drivers.serial.port import BusPort
 
@@ -25,5 +25,5 @@ def disable_torque(port: BusPort, baud: int, ids: Sequence[int]) -> tuple[int, .
     """
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s")
-    released = switch_off(StsLine(port, LEAST_S, MOST_S, baud), ids)
+    released = switch_off(FeetechLine(port, LEAST_S, MOST_S, baud), ids)
     return (*released.holding, *released.mute)

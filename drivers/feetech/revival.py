@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from drivers.errors import ServoFault, ServoMissing
 from drivers.event_log import Journal
-from drivers.feetech.line import StsLine
+from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import MODELS, STEPS_PER_TURN, acceleration_units, speed_units
 from drivers.feetech.setup import Fitting
 from drivers.feetech.torque import insist, positions, switch_off, switch_on
@@ -31,7 +31,7 @@ class Revival:
 
     def __init__(
         self,
-        line: StsLine,
+        line: FeetechLine,
         fitting: Fitting,
         setups: Mapping[int, ServoSetup],
         health: Health,

@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 
 from drivers.errors import ServoMissing
 from drivers.event_log import call
-from drivers.feetech.line import StsLine
+from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import MODELS
 from drivers.feetech.registers import Identity, StsRegisters
 from drivers.feetech.scan import Found
 from drivers.types import ServoSetup
 
 
-def find(line: StsLine, registers: StsRegisters, setups: Sequence[ServoSetup]) -> None:
+def find(line: FeetechLine, registers: StsRegisters, setups: Sequence[ServoSetup]) -> None:
     """Find every servo and check its model and firmware.
 
     Raises:

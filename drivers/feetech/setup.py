@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from drivers.errors import ServoMissing
 from drivers.event_log import Journal, call, title
-from drivers.feetech.line import StsLine
+from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import MULTI_TURN, REGISTERS, TORQUE_FULL, Register
 from drivers.feetech.registers import StsRegisters
 from drivers.types import ServoSetup
@@ -41,7 +41,7 @@ class Fitting:
 
     def __init__(
         self,
-        line: StsLine,
+        line: FeetechLine,
         registers: StsRegisters,
         setups: Sequence[ServoSetup],
         journal: Journal,

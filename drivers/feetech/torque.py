@@ -10,7 +10,7 @@ from functools import partial
 from typing import NamedTuple, TypeVar
 
 from drivers.errors import ServoFault, ServoMissing
-from drivers.feetech.line import StsLine
+from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import REGISTERS, STEPS_PER_TURN, name_errors
 from drivers.feetech.protocol import GoalWrite
 
@@ -27,7 +27,7 @@ Value = TypeVar("Value")
 _GOAL, _SPEED = REGISTERS["goal_position"], REGISTERS["goal_speed"]
 
 
-def positions(line: StsLine, ids: Sequence[int]) -> tuple[int, ...]:
+def positions(line: FeetechLine, ids: Sequence[int]) -> tuple[int, ...]:
     """Read every position, as the servos count.
 
     Raises:
@@ -38,7 +38,7 @@ def positions(line: StsLine, ids: Sequence[int]) -> tuple[int, ...]:
     return tuple(found[servo_id] for servo_id in ids)
 
 
-def insist(line: StsLine, ids: Sequence[int], name: str, values: Sequence[int]) -> None:
+def insist(line: FeetechLine, ids: Sequence[int], name: str, values: Sequence[int]) -> None:
     """Write a register and read it back until every servo has its value.
 
     Raises:
@@ -54,7 +54,7 @@ def insist(line: StsLine, ids: Sequence[int], name: str, values: Sequence[int]) 
 
 
 def insist_goals(
-    line: StsLine, ids: Sequence[int], goals: Sequence[int], speeds: Sequence[int]
+    line: FeetechLine, ids: Sequence[int], goals: Sequence[int], speeds: Sequence[int]
 ) -> None:
     """Write goals with their speeds and read them back until every servo has them.
 
@@ -65,19 +65,19 @@ def insist_goals(
     _until(line, wanted, partial(_send_goals, line), partial(_ask_goals, line), "goal_position")
 
 
-def _send_goals(line: StsLine, wanted: Mapping[int, tuple[int, int]]) -> None:
+def _send_goals(line: FeetechLine, wanted: Mapping[int, tuple[int, int]]) -> None:
     goals = [goal for goal, _ in wanted.values()]
     speeds = [speed for _, speed in wanted.values()]
     line.send(GoalWrite(tuple(wanted)).packet(goals, speeds))
 
 
-def _ask_goals(line: StsLine, ids: Sequence[int]) -> dict[int, tuple[int, int]]:
+def _ask_goals(line: FeetechLine, ids: Sequence[int]) -> dict[int, tuple[int, int]]:
     found = line.ask_bytes(ids, GoalWrite.ADDRESS, GoalWrite.SIZE)
     return {i: (_GOAL.decode(data[:2]), _SPEED.decode(data[4:])) for i, data in found.items()}
 
 
 def _prepare_goals(
-    line: StsLine,
+    line: FeetechLine,
     ids: Sequence[int],
     goals: Sequence[int],
     speeds: Sequence[int],
@@ -102,7 +102,7 @@ def _prepare_goals(
 
 
 def _until(
-    line: StsLine,
+    line: FeetechLine,
     wanted: Mapping[int, Value],
     send: Callable[[Mapping[int, Value]], None],
     ask: Callable[[Sequence[int]], Mapping[int, Value]],
@@ -125,7 +125,7 @@ def _until(
 
 
 def switch_on(
-    line: StsLine, ids: Sequence[int], goals: Sequence[int], speeds: Sequence[int]
+    line: FeetechLine, ids: Sequence[int], goals: Sequence[int], speeds: Sequence[int]
 ) -> None:
     """Set the goals, then the torque, and see that every position is still the same.
 
@@ -161,7 +161,7 @@ class Released(NamedTuple):
     mute: tuple[int, ...]
 
 
-def switch_off(line: StsLine, ids: Sequence[int]) -> Released:
+def switch_off(line: FeetechLine, ids: Sequence[int]) -> Released:
     """Take the torque away, and see that it is gone."""
     left = tuple(ids)
     found: dict[int, int] = {}
@@ -177,7 +177,7 @@ def switch_off(line: StsLine, ids: Sequence[int]) -> Released:
     return Released(holding, tuple(servo_id for servo_id in left if servo_id not in found))
 
 
-def _raise_missing(line: StsLine, missing: Sequence[int]) -> None:
+def _raise_missing(line: FeetechLine, missing: Sequence[int]) -> None:
     if missing:
         named = ", ".join(line.who(servo_id) for servo_id in missing)
         raise ServoMissing(f"{line.port.port_name}: no answer from {named}: check its cable")

@@ -18,7 +18,7 @@ from robot.cli.setup_maestro import set_up_board, write_settings
 from robot.cli.terminal import RigArgument, clear_errors, say
 from robot.cli.wires import MockOption, PortOption, bus_label, setups_on, wires
 from robot.rig_bus import bus_names
-from sim_mock.devices import DynamixelLine, Emulated, StsLine
+from sim_mock.devices import DynamixelLine, Emulated, FeetechLine
 from sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()
@@ -119,7 +119,7 @@ def _fresh(rig: Rig, one: ServoSetup, kind: ServoKind) -> Emulated:
     """Give a servo as it comes from the factory."""
     spec = (ServoSpec(FACTORY_ID, one.model, rig.joints[one.name].zero),)
     if kind.name == "feetech":
-        return StsLine(spec, kind.factory_baud)
+        return FeetechLine(spec, kind.factory_baud)
     return DynamixelLine(spec, kind.factory_baud)
 
 

@@ -4,7 +4,7 @@ What exactly is stored no document tells; here everything that may be written, e
 what moves the servo.
 """
 
-from sim_mock.smart_servo.memory import Memory, in_eeprom
+from sim_mock.dynamixel.memory import DynamixelMemory, in_eeprom
 
 NOT_STORED = (
     "torque_enable", "bus_watchdog", "goal_pwm", "goal_current", "goal_velocity", "goal_position",
@@ -22,12 +22,12 @@ class Backup:
         """Tell whether there is something to restore."""
         return bool(self._stored)
 
-    def store(self, memory: Memory) -> None:
+    def store(self, memory: DynamixelMemory) -> None:
         """Copy the control table."""
         names = [register.name for register in memory.writable()]
         self._stored = {name: memory.get(name) for name in names if name not in NOT_STORED}
 
-    def recall(self, memory: Memory, eeprom: bool) -> None:
+    def recall(self, memory: DynamixelMemory, eeprom: bool) -> None:
         """Put one area back, the EEPROM's or the RAM's."""
         for name, value in self._stored.items():
             if in_eeprom(memory.named(name)) == eeprom:

@@ -1,7 +1,7 @@
 """The drive of an emulated servo: modes, goals and origin between registers and shaft.
 
 Reads the control table and never refuses anything: what may be written is decided in
-sim_mock.smart_servo.servo. The registers' position is ``side * shaft.x + shift``.
+sim_mock.dynamixel.servo. The registers' position is ``side * shaft.x + shift``.
 """
 
 from typing import NamedTuple
@@ -23,6 +23,7 @@ from sim_mock.dynamixel.live_registers import (
     Live,
     flicker,
 )
+from sim_mock.dynamixel.memory import DynamixelMemory
 from sim_mock.dynamixel.modes import (
     BY_TIME,
     BY_TIME_SINCE,
@@ -35,7 +36,6 @@ from sim_mock.dynamixel.modes import (
 )
 from sim_mock.dynamixel.motor import LIMP, Shaft
 from sim_mock.dynamixel.profile import Profile, SpeedProfile
-from sim_mock.smart_servo.memory import Memory
 from sim_mock.smart_servo.physics import Physics, Quirks
 
 TRIPPED = 255
@@ -70,7 +70,7 @@ class Drive:
 
     def __init__(
         self,
-        memory: Memory,
+        memory: DynamixelMemory,
         model: Model,
         physics: Physics,
         quirks: Quirks,

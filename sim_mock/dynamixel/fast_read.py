@@ -8,13 +8,13 @@ from collections.abc import Iterable, Mapping
 
 from fastcrc.crc16 import umts
 
+from sim_mock.dynamixel.memory import ACCESS
+from sim_mock.dynamixel.servo import DynamixelServo
 from sim_mock.replies import BROADCAST, CRC, HEAD, HEADER, STATUS
-from sim_mock.smart_servo.memory import ACCESS
-from sim_mock.smart_servo.servo import Servo
 
 
 def fast_reply(
-    servos: Mapping[int, Servo],
+    servos: Mapping[int, DynamixelServo],
     rows: Iterable[tuple[int, int, int]],
     length: int,
     now_ms: int,

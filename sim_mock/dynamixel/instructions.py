@@ -7,8 +7,8 @@ import struct
 from collections.abc import Callable
 
 from drivers.dynamixel.control_table import EEPROM_END
-from sim_mock.smart_servo.memory import ACCESS, DATA_RANGE, INSTRUCTION_ERROR
-from sim_mock.smart_servo.servo import Servo
+from sim_mock.dynamixel.memory import ACCESS, DATA_RANGE, INSTRUCTION_ERROR
+from sim_mock.dynamixel.servo import DynamixelServo
 
 PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, REBOOT = 1, 2, 3, 4, 5, 6, 8
 CLEAR, BACKUP = 0x10, 0x20
@@ -35,13 +35,13 @@ SPAN = struct.Struct("<HH")
 ROW = struct.Struct("<BHH")
 
 
-def carry_out(servo: Servo, code: int, params: bytes) -> Said:
+def carry_out(servo: DynamixelServo, code: int, params: bytes) -> Said:
     """Let a servo that is awake carry out an instruction."""
     action = _ACTIONS.get(code)
     return (INSTRUCTION_ERROR, b"") if action is None else action(servo, params)
 
 
-def answered_from(servo: Servo, code: int) -> int:
+def answered_from(servo: DynamixelServo, code: int) -> int:
     """Give the Status Return Level from which a servo answers an instruction."""
     if code == REBOOT and servo.quirks.mute_reboot:
         return NEVER
@@ -55,7 +55,7 @@ def touches_eeprom(code: int, params: bytes) -> bool:
     return code in (ACTION, FACTORY_RESET, BACKUP)
 
 
-def obeys_broadcast(servo: Servo, code: int, params: bytes) -> bool:
+def obeys_broadcast(servo: DynamixelServo, code: int, params: bytes) -> bool:
     """Tell whether a servo carries out an instruction that goes to all."""
     reset = code == FACTORY_RESET and params == RESET_ALL
     return not reset or servo.firmware < NO_BROADCAST_RESET_SINCE
@@ -96,49 +96,49 @@ def bulk_writes(params: bytes) -> list[tuple[int, int, bytes]]:
     return out
 
 
-def _ping(servo: Servo, params: bytes) -> Said:
+def _ping(servo: DynamixelServo, params: bytes) -> Said:
     return 0, struct.pack("<HB", servo.model.number, servo.firmware)
 
 
-def _read(servo: Servo, params: bytes) -> Said:
+def _read(servo: DynamixelServo, params: bytes) -> Said:
     if len(params) != SPAN.size:
         return INSTRUCTION_ERROR, b""
     data = servo.read(*SPAN.unpack(params))
     return (ACCESS, b"") if data is None else (0, data)
 
 
-def _write(servo: Servo, params: bytes) -> Said:
+def _write(servo: DynamixelServo, params: bytes) -> Said:
     return servo.write(int.from_bytes(params[:2], "little"), params[2:]), b""
 
 
-def _register(servo: Servo, params: bytes) -> Said:
+def _register(servo: DynamixelServo, params: bytes) -> Said:
     return servo.register(int.from_bytes(params[:2], "little"), params[2:]), b""
 
 
-def _action(servo: Servo, params: bytes) -> Said:
+def _action(servo: DynamixelServo, params: bytes) -> Said:
     return servo.action(), b""
 
 
-def _reboot(servo: Servo, params: bytes) -> Said:
+def _reboot(servo: DynamixelServo, params: bytes) -> Said:
     servo.reboot()
     return 0, b""
 
 
-def _factory_reset(servo: Servo, params: bytes) -> Said:
+def _factory_reset(servo: DynamixelServo, params: bytes) -> Said:
     return servo.factory_reset(params[0] if params else -1), b""
 
 
-def _backup(servo: Servo, params: bytes) -> Said:
+def _backup(servo: DynamixelServo, params: bytes) -> Said:
     if params[1:] != BACKUP_KEY or params[0] not in (STORE, RESTORE):
         return DATA_RANGE, b""
     return (servo.backup() if params[0] == STORE else servo.restore()), b""
 
 
-def _clear(servo: Servo, params: bytes) -> Said:
+def _clear(servo: DynamixelServo, params: bytes) -> Said:
     return (servo.clear_turns() if params == CLEAR_TURNS else DATA_RANGE), b""
 
 
-_ACTIONS: dict[int, Callable[[Servo, bytes], Said]] = {
+_ACTIONS: dict[int, Callable[[DynamixelServo, bytes], Said]] = {
     PING: _ping,
     READ: _read,
     WRITE: _write,

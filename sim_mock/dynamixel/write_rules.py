@@ -2,8 +2,8 @@
 
 from drivers.dynamixel.control_table import EEPROM_END, Model, Register
 from sim_mock.dynamixel.drive import TRIPPED, Drive
+from sim_mock.dynamixel.memory import ACCESS, DATA_LIMIT, DATA_RANGE, DynamixelMemory, Fields
 from sim_mock.dynamixel.modes import POSITION, modes_of
-from sim_mock.smart_servo.memory import ACCESS, DATA_LIMIT, DATA_RANGE, Fields, Memory
 
 GOALS = ("goal_pwm", "goal_current", "goal_velocity", "goal_position")
 MULTI_TURN_STEPS = 1_048_575
@@ -16,7 +16,7 @@ class Rules:
     goal_range: positions that a goal may have now
     """
 
-    def __init__(self, memory: Memory, model: Model, drive: Drive) -> None:
+    def __init__(self, memory: DynamixelMemory, model: Model, drive: Drive) -> None:
         self._memory = memory
         self._modes = modes_of(model)
         self._drive = drive

@@ -1,6 +1,6 @@
 """The device side of a bus of Feetech STS servos: bytes in, bytes out, nothing opened.
 
-Where documents and devices are silent or differ, the choice is one of ``StsHabits``. A client
+Where documents and devices are silent or differ, the choice is one of ``FeetechQuirks``. A client
 whose baud rate is not a servo's neither hears it nor is heard. Source: Feetech,
 communication protocol of the STS/SMS series.
 """
@@ -21,8 +21,8 @@ from sim_mock.feetech.instructions import (
     sync_writes,
 )
 from sim_mock.feetech.packets import BROADCAST, Framing, Instruction, pieces
-from sim_mock.feetech.quirks import StsHabits, chosen
-from sim_mock.feetech.servo import StsServo
+from sim_mock.feetech.quirks import FeetechQuirks, chosen
+from sim_mock.feetech.servo import FeetechServo
 from sim_mock.replies import Answer, Piece
 from sim_mock.smart_servo.physics import ServoSpec
 
@@ -30,7 +30,7 @@ TWIN_AWAY_STEPS = 257
 """A second servo with a taken id stands so far from the first, so that they differ."""
 
 
-class StsChain:
+class FeetechChain:
     """Servos on one bus.
 
     Args:
@@ -42,20 +42,20 @@ class StsChain:
 
     def __init__(
         self,
-        servos: Iterable[StsServo],
+        servos: Iterable[FeetechServo],
         now_s: Callable[[], float],
         heed_baud: bool = False,
         seed: int = 0,
     ) -> None:
         self.servos = tuple(servos)
         self.now_s = now_s
-        self.habits = self.servos[0].habits if self.servos else StsHabits()
+        self.quirks = self.servos[0].quirks if self.servos else FeetechQuirks()
         self.heed_baud = heed_baud
         self.faults = StsFaults(self, COMMANDS, seed)
         self._wire = self.faults.wire
         self._now_s = now_s()
         self._now_ms = _whole_ms(self._now_s)
-        self._framing = Framing(self.habits.packet_gap_s, self._now_s)
+        self._framing = Framing(self.quirks.packet_gap_s, self._now_s)
         self._client_baud: int | None = None
         self.refresh()
 
@@ -64,7 +64,7 @@ class StsChain:
     def refresh(self) -> None:
         """Look again at ids and bauds."""
         self._told = [servo.address for servo in self.servos]
-        by_id: dict[int, list[StsServo]] = {}
+        by_id: dict[int, list[FeetechServo]] = {}
         for servo in self.servos:
             if not self.heed_baud or self._client_baud in (None, servo.baud):
                 by_id.setdefault(servo.id, []).append(servo)
@@ -75,14 +75,14 @@ class StsChain:
         heeds = self.heed_baud and client_baud is not None
         return not heeds or any(servo.baud == client_baud for servo in self.servos)
 
-    def __getitem__(self, servo_id: int) -> StsServo:
+    def __getitem__(self, servo_id: int) -> FeetechServo:
         """Give a servo by its id, as it was when last looked at."""
         for servo in self.servos:
             if servo.id == servo_id:
                 return servo
         raise KeyError(f"no servo {servo_id}; there is {', '.join(map(str, self.ids()))}")
 
-    def here(self, servo_id: int) -> StsServo:
+    def here(self, servo_id: int) -> FeetechServo:
         """Give a servo by its id, brought up to now."""
         servo = self[servo_id]
         servo.advance(_whole_ms(self.now_s()))
@@ -97,14 +97,14 @@ class StsChain:
         first = self.here(servo_id)
         start = (first.position_steps + TWIN_AWAY_STEPS) % first.model.steps_per_turn
         spec = ServoSpec(servo_id, first.model.name, start, first.firmware)
-        twin = StsServo(spec, _whole_ms(self.now_s()), self.habits)
+        twin = FeetechServo(spec, _whole_ms(self.now_s()), self.quirks)
         for name in ("baud_rate", "return_delay"):
             twin.memory.keep(name, first.memory.get(name))
         self.servos = (*self.servos, twin)
         self.refresh()
 
     def choose(self, case: str, value: str) -> None:
-        """Choose one of the habits by its name, or whether baud rates are heeded.
+        """Choose one of the quirks by its name, or whether baud rates are heeded.
 
         Raises:
             ValueError: there is no such case or value.
@@ -115,10 +115,10 @@ class StsChain:
             self.heed_baud = value == "heed"
             self.refresh()
             return
-        self.habits = chosen(self.habits, case, value)
-        self._framing.gap_s = self.habits.packet_gap_s
+        self.quirks = chosen(self.quirks, case, value)
+        self._framing.gap_s = self.quirks.packet_gap_s
         for servo in self.servos:
-            servo.adopt(self.habits)
+            servo.adopt(self.quirks)
 
     def positions_steps(self) -> tuple[float, ...]:
         """Give the true positions now, in the order of ``servos``."""
@@ -162,7 +162,7 @@ class StsChain:
 
     def _garbage(self, data: bytes) -> list[Reply]:
         """Answer a client that no servo understands: nothing, or the ruins of its own bytes."""
-        if self.habits.wrong_baud == "silence" or not data:
+        if self.quirks.wrong_baud == "silence" or not data:
             return []
         return [Reply(len(data), [Piece(-1, bytes(b & 0x6E | 0x80 for b in data[::2]))])]
 
@@ -200,7 +200,9 @@ class StsChain:
                 answer = said if answer is None else said._replace(twin=answer)
         return None if answer is None or self._silent(servo_id) else answer
 
-    def _answer(self, servo: StsServo, servo_id: int, code: int, params: bytes) -> Answer | None:
+    def _answer(
+        self, servo: FeetechServo, servo_id: int, code: int, params: bytes
+    ) -> Answer | None:
         """Let one servo carry out an instruction; gives what it says, None where it is silent."""
         if not servo.advance(self._now_ms):
             return None
@@ -216,8 +218,8 @@ class StsChain:
     # --- groups
 
     def _ping_all(self) -> list[Piece]:
-        """Answer a ping to all as the habits say."""
-        policy = self.habits.broadcast_ping
+        """Answer a ping to all as the quirks say."""
+        policy = self.quirks.broadcast_ping
         if policy == "silence":
             return []
         found = [self._answer_all(servo_id, PING, b"") for servo_id in self._by_id]
@@ -233,7 +235,7 @@ class StsChain:
         """Answer with one status a servo, in the order asked."""
         address, length, ids = sync_read(params)
         said: list[Answer] = []
-        late_s, policy = 0.0, self.habits.after_missing
+        late_s, policy = 0.0, self.quirks.after_missing
         for servo_id in ids:
             answer = self._part(servo_id, address, length)
             if answer is not None:
@@ -242,7 +244,7 @@ class StsChain:
             elif policy == "silence":
                 break
             elif policy == "timeout":
-                late_s += self.habits.slot_timeout_s
+                late_s += self.quirks.slot_timeout_s
         return self._out(said)
 
     def _part(self, servo_id: int, address: int, length: int) -> Answer | None:
@@ -270,12 +272,12 @@ class StsChain:
         return self._wire.spoil_pieces(spoilt, False, self._now_s)
 
 
-def build_sts(
+def build_feetech(
     specs: Iterable[ServoSpec | tuple[int, str, float]],
     now_s: Callable[[], float],
     baud: int | None = None,
     seed: int = 0,
-) -> StsChain:
+) -> FeetechChain:
     """Build servos and their bus; a plain tuple is (id, model, start position in steps).
 
     With a baud rate the servos are set to it, all else as from the factory, and only
@@ -284,14 +286,14 @@ def build_sts(
     Raises:
         ValueError: there is no such model, id or baud rate.
     """
-    now_ms, habits = _whole_ms(now_s()), StsHabits()
-    servos = [StsServo(ServoSpec(*spec), now_ms, habits) for spec in specs]
+    now_ms, quirks = _whole_ms(now_s()), FeetechQuirks()
+    servos = [FeetechServo(ServoSpec(*spec), now_ms, quirks) for spec in specs]
     if baud is not None:
         if baud not in BAUD_RATES:
             raise ValueError(f"baud {baud}: STS servos know {', '.join(map(str, BAUD_RATES))}")
         for servo in servos:
             servo.memory.keep("baud_rate", BAUD_RATES.index(baud))
-    return StsChain(servos, now_s, baud is not None, seed)
+    return FeetechChain(servos, now_s, baud is not None, seed)
 
 
 def _whole_ms(now_s: float) -> int:

@@ -3,16 +3,16 @@
 from sim_mock.faults.grammar import Commands
 from sim_mock.faults.servo import Chain, JointFaults
 from sim_mock.feetech.packets import HEADER
-from sim_mock.feetech.servo import StsServo
+from sim_mock.feetech.servo import FeetechServo
 
 TOO_HOT_C = 5.0
 """An overheated motor is so much above its limit."""
 
 
-class StsFaults(JointFaults[StsServo]):
+class StsFaults(JointFaults[FeetechServo]):
     """The faults of one chain."""
 
-    def __init__(self, chain: Chain[StsServo], commands: Commands, seed: int = 0) -> None:
+    def __init__(self, chain: Chain[FeetechServo], commands: Commands, seed: int = 0) -> None:
         super().__init__(chain, commands, seed, HEADER)
 
     def overload(self, servo_id: int) -> str:
@@ -45,7 +45,7 @@ class StsFaults(JointFaults[StsServo]):
         return [_report(self._bus.here(servo_id)) for servo_id in self._bus.ids()]
 
 
-def _report(servo: StsServo) -> dict[str, object]:
+def _report(servo: FeetechServo) -> dict[str, object]:
     return {
         "id": servo.id,
         "model": servo.model.name,

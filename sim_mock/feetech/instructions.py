@@ -7,22 +7,22 @@ Source: Feetech, communication protocol of the STS/SMS series.
 from collections.abc import Callable
 
 from drivers.feetech.memory_table import STEPS_PER_TURN
-from sim_mock.feetech.servo import MIDDLE, StsServo
+from sim_mock.feetech.servo import MIDDLE, FeetechServo
 
 PING, READ, WRITE, REG_WRITE, ACTION = 1, 2, 3, 4, 5
 RESTORE, REBOOT, RESET_TURNS, CALIBRATE = 6, 8, 10, 11
 SYNC_READ, SYNC_WRITE = 0x82, 0x83
 
 
-def carry_out(servo: StsServo, code: int, params: bytes) -> bytes | None:
+def carry_out(servo: FeetechServo, code: int, params: bytes) -> bytes | None:
     """Let a servo that is awake carry out an instruction; gives what it says, None for nothing."""
     action = _ACTIONS.get(code)
     return None if action is None else action(servo, params)
 
 
-def answers(servo: StsServo, code: int) -> bool:
+def answers(servo: FeetechServo, code: int) -> bool:
     """Tell whether a servo answers an instruction to it alone."""
-    if code == REBOOT and servo.habits.reboot == "mute":
+    if code == REBOOT and servo.quirks.reboot == "mute":
         return False
     return code in (PING, READ) or servo.answers_all
 
@@ -39,56 +39,56 @@ def sync_writes(params: bytes) -> list[tuple[int, bytes]]:
     return [(params[at], params[at + 1 : at + size]) for at in range(2, len(params), size)]
 
 
-def _ping(servo: StsServo, params: bytes) -> bytes:
+def _ping(servo: FeetechServo, params: bytes) -> bytes:
     return b""
 
 
-def _read(servo: StsServo, params: bytes) -> bytes | None:
+def _read(servo: FeetechServo, params: bytes) -> bytes | None:
     return servo.read(*params) if len(params) == 2 else None
 
 
-def _write(servo: StsServo, params: bytes) -> bytes | None:
+def _write(servo: FeetechServo, params: bytes) -> bytes | None:
     if not params:
         return None
     servo.write(params[0], params[1:])
     return b""
 
 
-def _register(servo: StsServo, params: bytes) -> bytes | None:
+def _register(servo: FeetechServo, params: bytes) -> bytes | None:
     if not params:
         return None
     servo.register(params[0], params[1:])
     return b""
 
 
-def _action(servo: StsServo, params: bytes) -> bytes:
+def _action(servo: FeetechServo, params: bytes) -> bytes:
     servo.action()
     return b""
 
 
-def _restore(servo: StsServo, params: bytes) -> bytes:
+def _restore(servo: FeetechServo, params: bytes) -> bytes:
     servo.factory_reset()
     return b""
 
 
-def _reboot(servo: StsServo, params: bytes) -> bytes:
+def _reboot(servo: FeetechServo, params: bytes) -> bytes:
     servo.restart()
     return b""
 
 
-def _reset_turns(servo: StsServo, params: bytes) -> bytes:
+def _reset_turns(servo: FeetechServo, params: bytes) -> bytes:
     servo.drive.forget_turns()
     return b""
 
 
-def _calibrate(servo: StsServo, params: bytes) -> bytes | None:
+def _calibrate(servo: FeetechServo, params: bytes) -> bytes | None:
     if len(params) not in (0, 2):
         return None
     servo.drive.calibrate(int.from_bytes(params, "little") % STEPS_PER_TURN if params else MIDDLE)
     return b""
 
 
-_ACTIONS: dict[int, Callable[[StsServo, bytes], bytes | None]] = {
+_ACTIONS: dict[int, Callable[[FeetechServo, bytes], bytes | None]] = {
     PING: _ping,
     READ: _read,
     WRITE: _write,

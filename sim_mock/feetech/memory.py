@@ -104,7 +104,7 @@ SPEED_UNIT_STEPS_S = 50
 """Unit of Maximum Speed (84)."""
 
 
-class StsMemory:
+class FeetechMemory:
     """One servo's memory; ``bytes`` is what is read, the EEPROM's own content stands apart."""
 
     def __init__(self, model: FeetechModel, servo_id: int, firmware: int) -> None:

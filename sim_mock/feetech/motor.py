@@ -17,7 +17,7 @@ from drivers.feetech.memory_table import TORQUE_FULL as FULL
 from sim_mock.dynamixel.live_registers import flicker
 from sim_mock.dynamixel.motor import LIMP, Loop, Shaft
 from sim_mock.dynamixel.profile import Profile, SpeedProfile
-from sim_mock.feetech.memory import PWM, SERVO, STEP, WHEEL, StsMemory
+from sim_mock.feetech.memory import PWM, SERVO, STEP, WHEEL, FeetechMemory
 from sim_mock.feetech.packets import signed, unsigned
 from sim_mock.smart_servo.physics import Physics
 
@@ -50,7 +50,7 @@ class Sensed(NamedTuple):
     current: int
 
 
-class StsDrive:
+class FeetechDrive:
     """What turns the shaft.
 
     torque: whether it is switched on
@@ -59,7 +59,7 @@ class StsDrive:
 
     def __init__(
         self,
-        memory: StsMemory,
+        memory: FeetechMemory,
         model: FeetechModel,
         physics: Physics,
         start_steps: float,

@@ -11,7 +11,7 @@ Source: Feetech, memory table of the STS series, registers 13-15, 28, 34-38 and 
 from typing import NamedTuple
 
 from drivers.feetech.memory_table import FeetechModel
-from sim_mock.feetech.memory import StsMemory
+from sim_mock.feetech.memory import FeetechMemory
 from sim_mock.feetech.motor import CURRENT_UNIT_A
 from sim_mock.smart_servo.physics import Physics
 from sim_mock.smart_servo.protection import LOOK_MS as LOOK_MS
@@ -35,14 +35,14 @@ class Limits(NamedTuple):
     overload_looks: float
 
 
-class StsProtection:
+class FeetechProtection:
     """Temperature of the motor, and what is wrong.
 
     status: bits of register 65
     ambient_c: degC, may be changed at any time
     """
 
-    def __init__(self, model: FeetechModel, physics: Physics, memory: StsMemory) -> None:
+    def __init__(self, model: FeetechModel, physics: Physics, memory: FeetechMemory) -> None:
         self._model = model
         self._physics = physics
         self._memory = memory

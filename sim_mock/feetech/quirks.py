@@ -8,7 +8,7 @@ report decides; they and times marked [A] are assumed.
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from sim_mock.smart_servo.choosing import cases_of, decided
+from sim_mock.smart_servo.quirks import cases_of, decided
 
 AfterMissing = Literal["silence", "skip", "timeout"]
 BroadcastPing = Literal["answer", "mix", "silence"]
@@ -21,7 +21,7 @@ WrongBaud = Literal["silence", "garbage"]
 
 
 @dataclass(frozen=True)
-class StsHabits:
+class FeetechQuirks:
     """The choices.
 
     after_missing: what servos do that come after a silent one in a sync read: never answer,
@@ -69,10 +69,10 @@ def cases() -> dict[str, str]:
     return cases_of(_CHOICES)
 
 
-def chosen(habits: StsHabits, case: str, value: str) -> StsHabits:
-    """Give the habits with one case decided otherwise.
+def chosen(quirks: FeetechQuirks, case: str, value: str) -> FeetechQuirks:
+    """Give the quirks with one case decided otherwise.
 
     Raises:
         ValueError: there is no such case or value.
     """
-    return decided(habits, _CHOICES, case, value)
+    return decided(quirks, _CHOICES, case, value)

@@ -16,11 +16,11 @@ from drivers.feetech.memory_table import (
     SET_MIDDLE,
 )
 from sim_mock.dynamixel.motor import long_pause
-from sim_mock.feetech.memory import StsMemory
-from sim_mock.feetech.motor import GOALS_AT, StsDrive
+from sim_mock.feetech.memory import FeetechMemory
+from sim_mock.feetech.motor import GOALS_AT, FeetechDrive
 from sim_mock.feetech.packets import unsigned
-from sim_mock.feetech.protection import ANGLE, CURRENT, LOOK_MS, OVERLOAD, StsProtection
-from sim_mock.feetech.quirks import StsHabits
+from sim_mock.feetech.protection import ANGLE, CURRENT, LOOK_MS, OVERLOAD, FeetechProtection
+from sim_mock.feetech.quirks import FeetechQuirks
 from sim_mock.smart_servo.physics import Physics, ServoSpec, checked
 
 REBOOT_MS = 800
@@ -32,7 +32,7 @@ _SENSED = struct.Struct("<HHHBBBBBHH")
 """56 position, speed, load, voltage, temperature, registered, status, moving, target, current."""
 
 
-class StsServo:
+class FeetechServo:
     """One servo on the chain. Its clock counts the chain's whole milliseconds.
 
     The spec's ``firmware`` is the number behind 3; its ``quirks`` are those of Dynamixel
@@ -42,26 +42,26 @@ class StsServo:
         ValueError: there is no such model, or the spec's physics cannot exist.
     """
 
-    def __init__(self, spec: ServoSpec, now_ms: int, habits: StsHabits) -> None:
+    def __init__(self, spec: ServoSpec, now_ms: int, quirks: FeetechQuirks) -> None:
         if spec.model not in MODELS:
             raise ValueError(f"model {spec.model!r}: STS servos are {', '.join(MODELS)}")
         self.model = MODELS[spec.model]
         self.firmware = spec.firmware
         physics = checked(Physics(*spec.physics))
-        self.memory = StsMemory(self.model, spec.id, spec.firmware)
+        self.memory = FeetechMemory(self.model, spec.id, spec.firmware)
         seed = spec.id if spec.seed is None else spec.seed
-        self.drive = StsDrive(self.memory, self.model, physics, float(spec.start_steps), seed)
+        self.drive = FeetechDrive(self.memory, self.model, physics, float(spec.start_steps), seed)
         self.shaft = self.drive.shaft
-        self.protection = StsProtection(self.model, physics, self.memory)
+        self.protection = FeetechProtection(self.model, physics, self.memory)
         self._ms = self._deaf_until_ms = now_ms
         self._look_ms = now_ms + LOOK_MS
-        self.adopt(habits)
+        self.adopt(quirks)
         self._boot()
 
-    def adopt(self, habits: StsHabits) -> None:
-        """Do from now on what these habits say."""
-        self.habits = habits
-        self.drive.timed(habits.goal_time == "obey")
+    def adopt(self, quirks: FeetechQuirks) -> None:
+        """Do from now on what these quirks say."""
+        self.quirks = quirks
+        self.drive.timed(quirks.goal_time == "obey")
 
     def _boot(self) -> None:
         """Begin as after power-on: what was kept, and no torque."""
@@ -209,14 +209,14 @@ class StsServo:
         drive, memory = self.drive, self.memory
         if self.error & OVERLOAD and memory.bytes[GOAL_AT:GOAL_END] != goal_before:
             self._goal_after_overload()
-        if new_goal and not drive.torque and self.habits.goal == "torque-on":
+        if new_goal and not drive.torque and self.quirks.goal == "torque-on":
             memory.set("torque", 1)
             self._switch(1)
         drive.follow(new_goal)
 
     def _goal_after_overload(self) -> None:
         """Let a goal that is not the old one end the overload, where one does."""
-        ends = self.habits.overload_ends
+        ends = self.quirks.overload_ends
         ahead = self.memory.get("goal_position") - self.position_steps
         if ends == "new-goal" or (ends == "goal-away" and ahead * self._pushed < 0.0):
             self._end_overload()
@@ -229,13 +229,13 @@ class StsServo:
             drive.calibrate(MIDDLE)
             return
         protection.end(CURRENT)
-        if value == 0 and self.habits.overload_ends != "restart":
+        if value == 0 and self.quirks.overload_ends != "restart":
             self._end_overload()
         unload = self.memory.get("unload_conditions")
         if protection.status & unload & ~OVERLOAD:
             self.memory.set("torque", 0)
             value = 0
-        drive.switch(value, self.habits.torque_on == "present")
+        drive.switch(value, self.quirks.torque_on == "present")
         self._calm = False
 
     def _end_overload(self) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from sim_mock.smart_servo.servo import Servo
+from sim_mock.dynamixel.servo import DynamixelServo
 
 
 class Roster:
@@ -13,16 +13,16 @@ class Roster:
     delay_s: return delay by id
     """
 
-    def __init__(self, servos: Iterable[Servo], client_baud: int | None) -> None:
-        self.by_id: dict[int, Servo] = {}
-        self.twins: dict[int, list[Servo]] = {}
-        self.shadows: dict[int, list[Servo]] = {}
+    def __init__(self, servos: Iterable[DynamixelServo], client_baud: int | None) -> None:
+        self.by_id: dict[int, DynamixelServo] = {}
+        self.twins: dict[int, list[DynamixelServo]] = {}
+        self.shadows: dict[int, list[DynamixelServo]] = {}
         self.delay_s: dict[int, float] = {}
         for servo in servos:
             if hears(servo, client_baud):
                 self._enter(servo)
 
-    def _enter(self, servo: Servo) -> None:
+    def _enter(self, servo: DynamixelServo) -> None:
         if servo.id in self.by_id:
             self.twins.setdefault(servo.id, []).append(servo)
         else:
@@ -32,11 +32,11 @@ class Roster:
         if shadow is not None and shadow != servo.id:
             self.shadows.setdefault(shadow, []).append(servo)
 
-    def everyone(self) -> list[Servo]:
+    def everyone(self) -> list[DynamixelServo]:
         """List all servos that hear the client."""
         return [*self.by_id.values(), *(twin for pair in self.twins.values() for twin in pair)]
 
 
-def hears(servo: Servo, client_baud: int | None) -> bool:
+def hears(servo: DynamixelServo, client_baud: int | None) -> bool:
     """Tell whether a servo and a client at this baud rate (None: any) understand each other."""
     return client_baud is None or servo.baud == client_baud

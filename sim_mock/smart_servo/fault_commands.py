@@ -1,9 +1,9 @@
 """What can be asked of an emulated Dynamixel bus as text; ``Faults`` does it."""
 
+from sim_mock.dynamixel.quirks import cases
 from sim_mock.faults.grammar import Commands, Verb, Word, number, or_all, whole
 from sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, packet_verbs
 from sim_mock.smart_servo.faults import Faults
-from sim_mock.smart_servo.quirks import cases
 
 _ID = Word("ID", whole(0, 252, "a servo id"))
 _WHO = Word("ID", or_all(_ID.read))

@@ -1,7 +1,7 @@
 """What can go wrong with emulated Dynamixel servos, beside all that can on their line."""
 
+from sim_mock.dynamixel.servo import DynamixelServo
 from sim_mock.faults.servo import JointFaults
-from sim_mock.smart_servo.servo import Servo
 
 _REPORTED = {
     "position": ("present_position", 132, 4),
@@ -13,7 +13,7 @@ _REPORTED = {
 }
 
 
-class Faults(JointFaults[Servo]):
+class Faults(JointFaults[DynamixelServo]):
     """The faults of one chain."""
 
     def overload(self, servo_id: int) -> str:

@@ -1,59 +1,46 @@
-"""What servos do where documents and devices are silent or differ.
+"""How a frozen set of choices is made otherwise, case by case, as typed by a person."""
 
-Sources: ROBOTIS e-Manual, Protocol 2.0; the device side of ROBOTIS' Dynamixel2Arduino
-(silent on a wrong CRC); logic analyser traces published by users of ROBOTIS' SDK (later
-servos of a group wait for a missing one). Times marked [A] are assumed.
-"""
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar
 
-from dataclasses import dataclass
-from typing import Literal, get_args
+H = TypeVar("H")
 
-from sim_mock.smart_servo.choosing import cases_of, decided
-
-AfterMissing = Literal["silence", "skip", "timeout"]
-BadCrc = Literal["silent", "reply"]
-Stuffing = Literal["accept", "strict"]
-WrongBaud = Literal["silence", "garbage"]
+TIMES = {"slot_timeout_ms": "slot_timeout_s", "packet_gap_ms": "packet_gap_s"}
+"""Cases that are times, and the fields that hold them."""
 
 
-@dataclass(frozen=True)
-class Habits:
-    """The choices.
+def cases_of(choices: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
+    """Give the name of every case, as it is typed, and its possible values.
 
-    after_missing: what servos do that come after a silent one in a plain group read:
-        never answer, answer at once, or answer after ``slot_timeout_s`` [A]
-    bad_crc: a wrong CRC is met with silence or with error number 3
-    stuffing: an instruction with FF FF FD among its parameters that was not stuffed is
-        understood by its length, or dropped
-    wrong_baud: a client at another baud rate hears nothing, or garbage
-    packet_gap_s: a packet that stays unfinished so long is dropped
+    choices: field -> its possible words
     """
-
-    after_missing: AfterMissing = "silence"
-    bad_crc: BadCrc = "silent"
-    stuffing: Stuffing = "accept"
-    wrong_baud: WrongBaud = "silence"
-    slot_timeout_s: float = 0.001
-    packet_gap_s: float = 0.0015
+    named = {name.replace("_", "-"): "|".join(values) for name, values in choices.items()}
+    return named | {name.replace("_", "-"): "MS" for name in TIMES} | {"baud": "heed|any"}
 
 
-_CHOICES: dict[str, tuple[str, ...]] = {
-    "after_missing": get_args(AfterMissing),
-    "bad_crc": get_args(BadCrc),
-    "stuffing": get_args(Stuffing),
-    "wrong_baud": get_args(WrongBaud),
-}
-
-
-def cases() -> dict[str, str]:
-    """Give the name of every case, as it is typed, and its possible values."""
-    return cases_of(_CHOICES)
-
-
-def chosen(habits: Habits, case: str, value: str) -> Habits:
-    """Give the habits with one case decided otherwise.
+def decided(quirks: H, choices: Mapping[str, tuple[str, ...]], case: str, value: str) -> H:
+    """Give the quirks, a frozen dataclass, with one case decided otherwise.
 
     Raises:
         ValueError: there is no such case or value.
     """
-    return decided(habits, _CHOICES, case, value)
+    name = case.replace("-", "_")
+    if name in TIMES:
+        time_s = _milliseconds(case, value) / 1000.0
+        return replace(quirks, **{TIMES[name]: time_s})  # type: ignore[type-var]
+    if name not in choices:
+        raise ValueError(f"set {case!r}: unknown; there is {', '.join(cases_of(choices))}")
+    if value not in choices[name]:
+        raise ValueError(f"{case} {value!r}: it can be {', '.join(choices[name])}")
+    return replace(quirks, **{name: value})  # type: ignore[type-var]
+
+
+def _milliseconds(case: str, value: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = -1.0
+    if not 0.0 <= number < 1e6:
+        raise ValueError(f"{case} {value!r}: not a number of milliseconds of 0 or more")
+    return number

@@ -24,10 +24,10 @@ from rustypot import Xl330PyController
 from drivers.serial.port import BlockingPort
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.chain import build_chain
-from sim_mock.smart_servo.servo import ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
 IDS = tuple(range(1, 10))
 MODEL = "xl330-m077"
@@ -235,7 +235,7 @@ def line_alone() -> None:
     for baud in (1_000_000, 4_000_000):
         for indirect in (False, True):
             now = [0.0]
-            chain = build_chain(SPECS, lambda now=now: now[0])  # type: ignore[misc]
+            chain = build_dynamixel(SPECS, lambda now=now: now[0])  # type: ignore[misc]
             port = InProcessPort(
                 chain,
                 sleep_until=lambda t, now=now: now.__setitem__(0, max(now[0], t)),
@@ -326,7 +326,7 @@ FAULTS = (
 def dice(cycles: int) -> None:
     """Print faults injected, survived, and values delivered that were not true in their cycle."""
     now = [10.0]
-    chain = build_chain(SPECS, lambda: now[0])
+    chain = build_dynamixel(SPECS, lambda: now[0])
     truth: list[tuple[float, ...]] = []
     port = InProcessPort(
         chain,

@@ -30,7 +30,7 @@ from drivers.multi_bus import MixedBus, Share
 from drivers.serial.port import BlockingPort, BusPort
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoSetup
-from sim_mock.devices import DynamixelLine, Emulated, MaestroLine, StsLine, build
+from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.pty.client import PtyBus
@@ -85,7 +85,7 @@ def emulated(kind: str, ids: tuple[int, ...]) -> Emulated:
         return MaestroLine(12, servos=tuple(HobbySpec(i) for i in ids))
     model = "sts3215" if kind == "feetech" else "xl330-m077"
     specs = tuple(ServoSpec(i, model, 2048) for i in ids)
-    return StsLine(specs, BAUD[kind]) if kind == "feetech" else DynamixelLine(specs, BAUD[kind])
+    return FeetechLine(specs, BAUD[kind]) if kind == "feetech" else DynamixelLine(specs, BAUD[kind])
 
 
 def driver(kind: str, port: BusPort, ids: tuple[int, ...]) -> ServoBus:

@@ -18,8 +18,8 @@ from rich.console import Console
 from rich.table import Table
 
 from drivers.serial.port import BlockingPort
+from sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
 from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.chain import ServoChain, build_chain
 from sim_mock.wire import ServoLine
 
 IDS = tuple(range(1, 10))
@@ -66,7 +66,7 @@ def packets_per_second(cycles: int) -> Table:
     """Count instructions answered (or taken) a second, servos holding still, no wire time."""
     table = Table("instruction to nine servos", "in this process", "through a terminal")
     now = [0.0]
-    chain = build_chain(SPECS, lambda: now[0])
+    chain = build_dynamixel(SPECS, lambda: now[0])
     line = ServoLine(chain)
     with PtyBus() as bus:
         port = BlockingPort(bus.start(SPECS))
@@ -111,7 +111,7 @@ def simulated_seconds() -> Table:
         ("a sine of 1 Hz, 20 deg", lambda k: round(2048 + 228 * np.sin(2 * np.pi * k / 200))),
     ):
         now = [0.0]
-        chain = build_chain(SPECS, lambda now=now: now[0])  # type: ignore[misc]
+        chain = build_dynamixel(SPECS, lambda now=now: now[0])  # type: ignore[misc]
         if path is not None:
             chain.receive(TORQUE_ON)
         packets = [FAST + (goals(path(k)) if path else b"") for k in range(200)]
@@ -120,7 +120,7 @@ def simulated_seconds() -> Table:
     return table
 
 
-def ticker(chain: ServoChain, now: list[float], packets: list[bytes]) -> Callable[[], None]:
+def ticker(chain: DynamixelChain, now: list[float], packets: list[bytes]) -> Callable[[], None]:
     """Give one tick: the clock goes on by 5 ms, one packet is exchanged."""
     count = [0]
 

@@ -24,8 +24,8 @@ from robot.assemble import Assembly, Choice, assemble
 from robot.loop import run
 from robot.summary import Summary
 from robot.types import in_order
+from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.chain import build_chain
 
 
 def main() -> None:
@@ -141,7 +141,7 @@ def bus_exchange(cycles: int = 4000) -> None:
     specs = [(i + 1, "xl330-m077" if i < 6 else "xc330-m288", 2048) for i in range(9)]
     rig = load_rig("desk")
     setups = [rig.joints[name].setup() for name in in_order(rig.joints)]
-    chain = build_chain(specs, lambda: now[0])
+    chain = build_dynamixel(specs, lambda: now[0])
     bus = DynamixelBus(InProcessPort(chain), setups, rig.bus.dynamixel)
     bus.open()
     bus.engage()
@@ -152,7 +152,7 @@ def bus_exchange(cycles: int = 4000) -> None:
         bus.read(now[0])
         bus.write(goals)
 
-    port = InProcessPort(build_chain(specs, lambda: now[0]))
+    port = InProcessPort(build_dynamixel(specs, lambda: now[0]))
     port.openPort()
     handler = PacketHandler(2.0)
     reader, writer = GroupSyncRead(port, handler, 126, 10), GroupSyncWrite(port, handler, 116, 4)
@@ -168,7 +168,7 @@ def bus_exchange(cycles: int = 4000) -> None:
         writer.txPacket()
         writer.clearParam()
 
-    chain_only = build_chain(specs, lambda: now[0])
+    chain_only = build_dynamixel(specs, lambda: now[0])
     read = bytes.fromhex("fffffd00fe10008a7e000a00010203040506070809")
     read += crc16.umts(read).to_bytes(2, "little")
 

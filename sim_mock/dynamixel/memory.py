@@ -1,7 +1,7 @@
 """The control table of an emulated servo as bytes: access, ranges, indirect windows.
 
 Knows the rules that follow from the table alone; what needs the servo's state (EEPROM
-lock, limit registers, watchdog) is asked by sim_mock.smart_servo.servo.
+lock, limit registers, watchdog) is asked by sim_mock.dynamixel.servo.
 """
 
 from collections.abc import Callable, Iterator
@@ -36,7 +36,7 @@ class Gather(NamedTuple):
     profiled: bool
 
 
-class Memory:
+class DynamixelMemory:
     """One servo's control table."""
 
     def __init__(self, model: Model, firmware: int) -> None:

@@ -1,7 +1,7 @@
 """One emulated Dynamixel X servo: what may be written when, errors, watchdog, restarts.
 
 It moves when looked at: ``advance`` brings it up to a time, nothing runs by itself. The
-control table is in sim_mock.smart_servo.memory; what turns the shaft in servo_drive, its modes
+control table is in sim_mock.dynamixel.memory; what turns the shaft in servo_drive, its modes
 in servo_modes, profile in servo_profile, motor and shaft in servo_motion; heat, load and
 voltage in servo_protection; every physical number in servo_physics. What it does not do:
 play inside the gear, a blinking LED, the RC, S.Bus and iBus protocols of register 13.
@@ -18,21 +18,21 @@ from drivers.dynamixel.control_table import (
 from sim_mock.dynamixel.backup import Backup
 from sim_mock.dynamixel.drive import TRIPPED, Drive
 from sim_mock.dynamixel.live_registers import LIVE_AT, SENSED, SENSED_AT, put, put_sensed
-from sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
-from sim_mock.dynamixel.motor import long_pause
-from sim_mock.dynamixel.write_rules import GOALS, Rules
-from sim_mock.smart_servo.memory import (
+from sim_mock.dynamixel.memory import (
     ACCESS,
     DATA_RANGE,
     INSTRUCTION_ERROR,
     RESULT_FAIL,
-    Memory,
+    DynamixelMemory,
     in_eeprom,
 )
+from sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
+from sim_mock.dynamixel.motor import long_pause
+from sim_mock.dynamixel.write_rules import GOALS, Rules
 from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec, checked
 from sim_mock.smart_servo.protection import BITS, LOOK_MS, Protection
 
-__all__ = ["Servo", "ServoSpec"]
+__all__ = ["DynamixelServo", "ServoSpec"]
 
 ALERT = 0x80
 REBOOT_MS = 400
@@ -47,7 +47,7 @@ KEPT_BY_RESET: dict[int, tuple[str, ...]] = {0xFF: (), 1: ("id",), 2: ("id", "ba
 _GOAL_AT, _GOAL_SIZE = 116, 4
 
 
-class Servo:
+class DynamixelServo:
     """One servo on the chain. Its clock counts the chain's whole milliseconds.
 
     Raises:
@@ -58,7 +58,7 @@ class Servo:
         self.model = MODELS[spec.model]
         self.firmware = spec.firmware
         self.quirks = Quirks(*spec.quirks)
-        self.memory = Memory(self.model, spec.firmware)
+        self.memory = DynamixelMemory(self.model, spec.firmware)
         self.memory.set("firmware_version", spec.firmware)
         self.memory.set("id", spec.id)
         physics = checked(Physics(*spec.physics))

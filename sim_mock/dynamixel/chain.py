@@ -1,6 +1,6 @@
 """The device side of Dynamixel Protocol 2.0: bytes in, bytes out, nothing opened.
 
-Where documents and devices are silent or differ, the choice is one of ``Habits``. A
+Where documents and devices are silent or differ, the choice is one of ``DynamixelQuirks``. A
 client whose baud rate is not a servo's neither hears it nor is heard. Sources: ROBOTIS
 e-Manual, Protocol 2.0 and X series.
 """
@@ -30,15 +30,16 @@ from sim_mock.dynamixel.instructions import (
     sync_writes,
     touches_eeprom,
 )
+from sim_mock.dynamixel.memory import ACCESS
+from sim_mock.dynamixel.quirks import AfterMissing, DynamixelQuirks, chosen
+from sim_mock.dynamixel.servo import DynamixelServo
 from sim_mock.replies import BROADCAST, Answer, Piece, fast_pieces, plain_pieces, status
 from sim_mock.smart_servo.addresses import Roster, hears
 from sim_mock.smart_servo.fault_commands import COMMANDS
 from sim_mock.smart_servo.faults import Faults
-from sim_mock.smart_servo.memory import ACCESS
-from sim_mock.smart_servo.quirks import AfterMissing, Habits, chosen
-from sim_mock.smart_servo.servo import Servo, ServoSpec
+from sim_mock.smart_servo.physics import ServoSpec
 
-__all__ = ["Habits", "Reply", "ServoChain", "build_chain", "status", "whole_ms"]
+__all__ = ["DynamixelQuirks", "Reply", "DynamixelChain", "build_dynamixel", "status", "whole_ms"]
 
 MIN_WATCHDOG_MS = 20
 BAUD_AT = 8
@@ -46,32 +47,32 @@ TWIN_AWAY_STEPS = 257
 """A second servo with a taken id stands so far from the first, so that they differ."""
 
 
-class ServoChain:
+class DynamixelChain:
     """Servos on one bus.
 
     Args:
         servos: any order; servos with one id answer at the same time.
         now_s: the chain's clock.
-        habits: what servos do where documents and devices differ.
+        quirks: what servos do where documents and devices differ.
         heed_baud: only a client at a servo's baud rate is heard; else every client is.
         seed: of the dice that faults throw.
     """
 
     def __init__(
         self,
-        servos: Iterable[Servo],
+        servos: Iterable[DynamixelServo],
         now_s: Callable[[], float],
-        habits: Habits | None = None,
+        quirks: DynamixelQuirks | None = None,
         heed_baud: bool = False,
         seed: int = 0,
     ) -> None:
         self.servos = tuple(servos)
         self.now_s = now_s
-        self.habits = habits or Habits()
+        self.quirks = quirks or DynamixelQuirks()
         self.heed_baud = heed_baud
         self.faults = Faults(self, COMMANDS, seed)
         self._wire = self.faults.wire
-        self._framing = Framing(self.habits.packet_gap_s, now_s())
+        self._framing = Framing(self.quirks.packet_gap_s, now_s())
         self._now_s = now_s()
         self._now_ms = self._fed_ms = whole_ms(self._now_s)
         self._client_baud: int | None = None
@@ -98,14 +99,14 @@ class ServoChain:
         """Tell whether any servo understands a client at this baud rate."""
         return not self.heed_baud or any(hears(servo, client_baud) for servo in self.servos)
 
-    def __getitem__(self, servo_id: int) -> Servo:
+    def __getitem__(self, servo_id: int) -> DynamixelServo:
         """Give a servo by its id, as it was when last looked at."""
         for servo in self.servos:
             if servo.id == servo_id:
                 return servo
         raise KeyError(f"no servo {servo_id}; there is {', '.join(map(str, self.ids()))}")
 
-    def here(self, servo_id: int) -> Servo:
+    def here(self, servo_id: int) -> DynamixelServo:
         """Give a servo by its id, brought up to now."""
         servo = self[servo_id]
         servo.advance(whole_ms(self.now_s()), self._fed_ms)
@@ -119,7 +120,7 @@ class ServoChain:
         """Put a second servo with a taken id on the bus, a little turned from the first."""
         first, now_ms = self.here(servo_id), whole_ms(self.now_s())
         start = (first.position_steps + TWIN_AWAY_STEPS) % 4096
-        twin = Servo(ServoSpec(servo_id, first.model.name, start, first.firmware), now_ms)
+        twin = DynamixelServo(ServoSpec(servo_id, first.model.name, start, first.firmware), now_ms)
         settings = first.read(BAUD_AT, 2)
         assert settings is not None
         twin.write(BAUD_AT, settings)
@@ -127,7 +128,7 @@ class ServoChain:
         self.refresh()
 
     def choose(self, case: str, value: str) -> None:
-        """Choose one of the habits by its name, or whether baud rates are heeded.
+        """Choose one of the quirks by its name, or whether baud rates are heeded.
 
         Raises:
             ValueError: there is no such case or value.
@@ -138,8 +139,8 @@ class ServoChain:
             self.heed_baud = value == "heed"
             self.refresh()
             return
-        self.habits = chosen(self.habits, case, value)
-        self._framing.gap_s = self.habits.packet_gap_s
+        self.quirks = chosen(self.quirks, case, value)
+        self._framing.gap_s = self.quirks.packet_gap_s
 
     def positions_steps(self) -> tuple[float, ...]:
         """Give the true positions now, in the order of ``servos``."""
@@ -165,13 +166,13 @@ class ServoChain:
             self.refresh()
         if not self._by_id:
             return self._garbage(data)
-        found = self._framing.feed(data, now_s, self.habits.stuffing == "strict")
+        found = self._framing.feed(data, now_s, self.quirks.stuffing == "strict")
         replies = [Reply(i.end, pieces) for i in found if (pieces := self._execute(i))]
         return self.faults.around(replies, data) if self._wire.any else replies
 
     def _garbage(self, data: bytes) -> list[Reply]:
         """Answer a client that no servo understands: nothing, or the ruins of its own bytes."""
-        if self.habits.wrong_baud == "silence" or not data:
+        if self.quirks.wrong_baud == "silence" or not data:
             return []
         return [Reply(len(data), [Piece(-1, bytes(b & 0x6E | 0x80 for b in data[::2]))])]
 
@@ -194,7 +195,7 @@ class ServoChain:
     def _reject(self, servo_id: int) -> list[Piece]:
         """Meet an instruction with a wrong CRC."""
         servo = self._awake(servo_id)
-        if servo is None or self.habits.bad_crc == "silent" or servo.status_level < 2:
+        if servo is None or self.quirks.bad_crc == "silent" or servo.status_level < 2:
             return []
         error = CRC_ERROR | servo.error_flag
         return self._plain_out([Answer(servo_id, error, b"", self._delay_s[servo_id])])
@@ -206,7 +207,7 @@ class ServoChain:
                 servo.advance(self._now_ms, self._fed_ms)
         self._fed_ms = self._now_ms
 
-    def _awake(self, servo_id: int) -> Servo | None:
+    def _awake(self, servo_id: int) -> DynamixelServo | None:
         """Give the servo with this id brought up to now, None where there is none or it is deaf."""
         servo = self._by_id.get(servo_id)
         if servo is not None and servo.advance(self._now_ms, self._fed_ms):
@@ -233,7 +234,7 @@ class ServoChain:
                 self._answer(shadow, code, params)
         return None if answer is None or self._silent(servo_id) else answer
 
-    def _answer(self, servo: Servo, code: int, params: bytes) -> Answer | None:
+    def _answer(self, servo: DynamixelServo, code: int, params: bytes) -> Answer | None:
         """Let one servo carry out an instruction; gives what it says, None where it is silent."""
         if not servo.advance(self._now_ms, self._fed_ms):
             return None
@@ -264,7 +265,7 @@ class ServoChain:
                 answer = answer._replace(twin=self._seen(twin, address, length))
         return answer
 
-    def _seen(self, servo: Servo, address: int, length: int) -> Answer:
+    def _seen(self, servo: DynamixelServo, address: int, length: int) -> Answer:
         data, servo_id, flag = servo.read(address, length), servo.id, servo.error_flag
         if data is None:
             return Answer(servo_id, flag | ACCESS, b"", self._delay_s[servo_id])
@@ -272,7 +273,7 @@ class ServoChain:
 
     def _plain(self, rows: Sequence[Wanted]) -> list[Piece]:
         """Answer with one status a servo, in the order asked."""
-        answers, late_s, policy = [], 0.0, self.habits.after_missing
+        answers, late_s, policy = [], 0.0, self.quirks.after_missing
         for servo_id, address, length in rows:
             answer = self._part(servo_id, address, length)
             if answer is not None:
@@ -281,7 +282,7 @@ class ServoChain:
             elif policy == "silence":
                 break
             elif policy == "timeout":
-                late_s += self.habits.slot_timeout_s
+                late_s += self.quirks.slot_timeout_s
         return self._plain_out(answers)
 
     def _plain_out(self, answers: list[Answer]) -> list[Piece]:
@@ -336,34 +337,34 @@ class ServoChain:
                 other.write(address, data)
 
 
-def build_chain(
+def build_dynamixel(
     specs: Iterable[ServoSpec | tuple[int, str, float]],
     now_s: Callable[[], float],
     after_missing: AfterMissing = "silence",
     packet_gap_s: float = 0.0015,
     baud: int | None = None,
-    habits: Habits | None = None,
+    quirks: DynamixelQuirks | None = None,
     seed: int = 0,
-) -> ServoChain:
+) -> DynamixelChain:
     """Build servos and their bus; a plain tuple is (id, model, start position in steps).
 
     With a baud rate the servos are set to it, return delay and all else as from the
     factory, and only clients at their rate are heard; without one every client is.
-    ``habits`` instead of ``after_missing`` and ``packet_gap_s`` chooses all cases at once.
+    ``quirks`` instead of ``after_missing`` and ``packet_gap_s`` chooses all cases at once.
 
     Raises:
         ValueError: not all of these servos know this baud rate.
     """
     now_ms = whole_ms(now_s())
-    servos = [Servo(ServoSpec(*spec), now_ms) for spec in specs]
+    servos = [DynamixelServo(ServoSpec(*spec), now_ms) for spec in specs]
     if baud is not None:
         if baud not in BAUD_RATES:
             raise ValueError(f"baud {baud}: servos know {', '.join(map(str, BAUD_RATES))}")
         for servo in servos:
             if servo.write(BAUD_AT, bytes((BAUD_RATES.index(baud),))):
                 raise ValueError(f"baud {baud}: {servo.model.name} does not know it")
-    habits = habits or Habits(after_missing=after_missing, packet_gap_s=packet_gap_s)
-    return ServoChain(servos, now_s, habits, baud is not None, seed)
+    quirks = quirks or DynamixelQuirks(after_missing=after_missing, packet_gap_s=packet_gap_s)
+    return DynamixelChain(servos, now_s, quirks, baud is not None, seed)
 
 
 def whole_ms(now_s: float) -> int:
