@@ -5,8 +5,10 @@ from typing import Literal, NamedTuple, get_args
 
 from drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from drivers.dynamixel.control_table import STEPS_PER_TURN
+from drivers.event_log import servo_label as label_with
 from drivers.feetech.memory_table import MODELS as FEETECH
 from drivers.hobby_board.models import HOBBY, US_STEPS
+from drivers.types import ServoSetup
 
 BusKind = Literal["dynamixel", "feetech", "maestro", "pca9685"]
 BUS_KINDS: tuple[BusKind, ...] = get_args(BusKind)
@@ -83,3 +85,8 @@ SERVOS: dict[str, ServoFacts] = {
     },
 }
 """By the name that a rig's YAML gives a model."""
+
+
+def servo_label(setup: ServoSetup) -> str:
+    """Return how people know a servo: its joint and its id, or its channel."""
+    return label_with(setup, "channel" if setup.model in HOBBY else "servo")

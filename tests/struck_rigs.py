@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 from config.rig import BusConfig
 from config.schema import Rig, load_rig
-from drivers.event_log import call
-from drivers.servo_models import HOBBY_KINDS
+from drivers.servo_models import HOBBY_KINDS, servo_label
 from robot.body import Body
 from robot.clock import SimulatedClock
 from robot.emulated_rig import emulated_lines, place_of
@@ -368,7 +367,7 @@ class Machine:
         for i, name in enumerate(self.names):
             if well[i]:
                 continue
-            if not any(call(self.setups[i]) in line for line in said):
+            if not any(servo_label(self.setups[i]) in line for line in said):
                 return f"{name} is not well and nobody says why"
             if self.clock.now_s() - self._fast_s[i] < 0.5:
                 return f"{name} is not well and moves fast"

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.event_log import call
+from drivers.servo_models import servo_label
 
 TWINS = ("in-process", "pty")
 AWAY = (0.2, 0.8, 0.3, 0.7, 0.25, 0.75)
@@ -128,7 +128,7 @@ def test_who_cannot_tell_his_place_goes_to_his_rest_and_that_is_said(here):
     limp = [line for line in told if "had no pulses: they go to their places at once" in line]
     assert len(limp) == any(hobby)
     for place, setup in enumerate(here.setups):
-        assert not any(hobby) or hobby[place] == (call(setup) in limp[0])
+        assert not any(hobby) or hobby[place] == (servo_label(setup) in limp[0])
     bus.release()
     bus.close()
 
@@ -261,7 +261,7 @@ def test_one_silent_servo_costs_only_itself(here, held_here):
 
 def _says(bus, twin, place, what):
     """Tell whether the bus says something of a servo by its joint's name."""
-    who = call(twin.setups[place])
+    who = servo_label(twin.setups[place])
     return any(line.startswith(who) and what in line for line in bus.events())
 
 
@@ -431,7 +431,9 @@ def test_a_fault_is_named_with_its_joint_or_board(here):
                 here.command("brown-out", name)
                 here.run(bus, 0.3, starts(here))
             assert here.run(bus, 0.1)[places[1]].fault.startswith("restarts again and again")
-            assert f"{call(here.setups[places[1]])}: restarts again" in " ".join(bus.faults())
+            assert f"{servo_label(here.setups[places[1]])}: restarts again" in " ".join(
+                bus.faults()
+            )
             continue
         if name == "maestro":
             here.command("error protocol", name)
@@ -439,7 +441,7 @@ def test_a_fault_is_named_with_its_joint_or_board(here):
         else:
             here.strike("overload", places[1])
             setup = here.setups[places[1]]
-            cause = f"{call(setup)}: overload"
+            cause = f"{servo_label(setup)}: overload"
         readings = here.run(bus, 0.3, starts(here))
         assert any(fault.startswith(cause) for fault in bus.faults()), bus.faults()
         assert any(cause.split(": ")[1] in line for line in bus.events())

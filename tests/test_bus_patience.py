@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.dynamixel.control_table import MODELS, indirect_blocks
-from drivers.event_log import MOST, Journal, call, title
+from drivers.event_log import MOST, EventLog, register_label
 from drivers.serial.reopening import Reconnect
 from drivers.servo_bus.adaptive_timeout import WINDOW, Patience
 from drivers.servo_bus.faults import AGAIN_AND_AGAIN, Health
@@ -15,6 +15,7 @@ from drivers.servo_bus.read_windows import (
     indirect_turns,
 )
 from drivers.servo_bus.window_schedule import CALM_S
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 
 
@@ -99,7 +100,7 @@ def test_a_lost_port_is_tried_ever_more_seldom_but_once_a_second():
 
 
 def test_the_fourth_restart_within_ten_seconds_is_one_too_many():
-    health = Health({3: ServoSetup(3, "xl330-m077", 0, 4095, 1.0, "jaw")}, Journal())
+    health = Health({3: ServoSetup(3, "xl330-m077", 0, 4095, 1.0, "jaw")}, EventLog())
     for t_s in (0.0, 4.0, 8.0):
         assert not health.exhausted(3, t_s)
         health.restarted(3, t_s)
@@ -110,17 +111,17 @@ def test_the_fourth_restart_within_ten_seconds_is_one_too_many():
 
 
 def test_the_journal_forgets_what_nobody_takes():
-    journal = Journal()
+    journal = EventLog()
     for k in range(MOST + 5):
-        journal.say(str(k))
-    lines = journal.take()
+        journal.add(str(k))
+    lines = journal.drain()
     assert (len(lines), lines[-1]) == (MOST, str(MOST + 4))
-    assert journal.take() == ()
+    assert journal.drain() == ()
 
 
 def test_names_are_those_of_people_and_manuals():
     setup = ServoSetup(7, "xl330-m077", 0, 4095, 1.0)
-    assert call(setup) == "servo 7"
-    assert call(setup._replace(name="neck_yaw")) == "neck_yaw (servo 7)"
-    assert title("return_delay_time") == "Return Delay Time"
-    assert title("goal_pwm") == "Goal PWM"
+    assert servo_label(setup) == "servo 7"
+    assert servo_label(setup._replace(name="neck_yaw")) == "neck_yaw (servo 7)"
+    assert register_label("return_delay_time") == "Return Delay Time"
+    assert register_label("goal_pwm") == "Goal PWM"

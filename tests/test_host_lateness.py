@@ -6,7 +6,7 @@ import pytest
 from line_noise import Noisy
 
 from drivers.errors import PortError
-from drivers.event_log import SELDOM_S, Journal, Seldom
+from drivers.event_log import SELDOM_S, EventLog, Seldom
 from drivers.host_lateness import BUSY, WITHIN_S, HostLateness
 from drivers.serial.port import BlockingPort
 
@@ -24,12 +24,12 @@ def test_few_late_answers_are_no_busy_computer():
 
 
 def test_the_same_is_said_seldom_and_counted():
-    journal = Journal()
+    journal = EventLog()
     seldom = Seldom(journal)
     for k in range(30):
-        seldom.say("late", 7.0 + 0.1 * k)
-    seldom.say("late", 7.0 + SELDOM_S)
-    assert journal.take() == ("late", "late (29 more times since it was said last)")
+        seldom.add("late", 7.0 + 0.1 * k)
+    seldom.add("late", 7.0 + SELDOM_S)
+    assert journal.drain() == ("late", "late (29 more times since it was said last)")
 
 
 @pytest.mark.parametrize("kind", KINDS)

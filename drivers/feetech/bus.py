@@ -18,7 +18,7 @@ Faults do not latch: their bits come and go, and so do the names in ``faults``.
 from collections.abc import Sequence
 
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
-from drivers.event_log import Journal, call
+from drivers.event_log import EventLog, servo_label
 from drivers.feetech.care import RESTART_S, Care
 from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import STEPS_PER_TURN
@@ -63,13 +63,13 @@ class FeetechBus:
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
         self._goals = GoalWrite(self._ids)
-        self._journal = Journal()
+        self._log = EventLog()
         self._line = FeetechLine(
             port,
             params.prompt_timeout_ms / 1000.0,
             params.reply_timeout_ms / 1000.0,
             params.baud,
-            {setup.id: call(setup) for setup in setups},
+            {setup.id: servo_label(setup) for setup in setups},
         )
         self._opened = False
         self._now_s = 0.0
@@ -79,17 +79,17 @@ class FeetechBus:
     def _assemble(self) -> None:
         """Make the parts, with a clean sheet."""
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
-        line, journal = self._line, self._journal
+        line, log = self._line, self._log
         self._link = LastingPort(
-            self._port, self._params.baud, self._params.give_up_s, self._journal, self._trust_nobody
+            self._port, self._params.baud, self._params.give_up_s, self._log, self._trust_nobody
         )
         self._roll = Roll(self._ids)
         self._readings = Readings(self._setups)
-        self._health = Health(by_id, journal)
+        self._health = Health(by_id, log)
         turns = together_turns(self._params.torque_every)
         self._reader = Reader(line, self._roll, turns, alone_turns(), again_turns())
-        self._fitting = Fitting(line, StsRegisters(self._port, tries=1), self._setups, journal)
-        self._revival = Revival(line, self._fitting, by_id, self._health, journal)
+        self._fitting = Fitting(line, StsRegisters(self._port, tries=1), self._setups, log)
+        self._revival = Revival(line, self._fitting, by_id, self._health, log)
         self._care = Care(line, by_id, self._revival, self._health, self._readings)
         self._speeds = self._revival.speeds(self._ids, ())
 
@@ -110,7 +110,7 @@ class FeetechBus:
         try:
             find(self._line, registers, self._setups)
             self._assemble()
-            fitting = Fitting(self._line, registers, self._setups, self._journal)
+            fitting = Fitting(self._line, registers, self._setups, self._log)
             fitting.rest(self._ids)
             fitting.fit(self._ids)
         except (ServoMissing, BusLost):
@@ -214,7 +214,7 @@ class FeetechBus:
 
     def events(self) -> tuple[str, ...]:
         """Say what has happened since the last call."""
-        return self._journal.take()
+        return self._log.drain()
 
     def release(self) -> None:
         """Torque off on every servo, confirmed; never raises for a servo that does not answer.
@@ -254,10 +254,10 @@ class FeetechBus:
         self._link.released()
         self._line.errors["refused"] += len(released.holding)
         for servo_id in released.holding:
-            self._journal.say(f"{self._line.who(servo_id)} still reports torque: {_CUT}")
+            self._log.add(f"{self._line.who(servo_id)} still reports torque: {_CUT}")
         for servo_id in released.mute:
             who = self._line.who(servo_id)
-            self._journal.say(f"{who} does not confirm that its torque is off: {_CUT}")
+            self._log.add(f"{who} does not confirm that its torque is off: {_CUT}")
 
     def health(self) -> BusHealth:
         """Give byte and error counts of all exchanges."""
@@ -390,6 +390,6 @@ def _check_ranges(setups: Sequence[ServoSetup]) -> None:
     for setup in setups:
         if not 0 <= setup.min_steps <= setup.max_steps < STEPS_PER_TURN:
             raise ValueError(
-                f"{call(setup)}: {setup.min_steps}..{setup.max_steps} is no range within "
+                f"{servo_label(setup)}: {setup.min_steps}..{setup.max_steps} is no range within "
                 f"0..{STEPS_PER_TURN - 1} steps"
             )

@@ -7,7 +7,7 @@ becomes the present position, and only then comes the torque.
 from collections.abc import Collection, Mapping, Sequence
 
 from drivers.errors import ServoFault, ServoMissing
-from drivers.event_log import Journal
+from drivers.event_log import EventLog
 from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import MODELS, STEPS_PER_TURN, acceleration_units, speed_units
 from drivers.feetech.setup import Fitting
@@ -26,7 +26,7 @@ class Revival:
     Args:
         line, fitting: the bus, and what its servos must be like.
         setups: the servos by id.
-        health, journal: told what was found and done.
+        health, log: told what was found and done.
     """
 
     def __init__(
@@ -35,13 +35,13 @@ class Revival:
         fitting: Fitting,
         setups: Mapping[int, ServoSetup],
         health: Health,
-        journal: Journal,
+        log: EventLog,
     ) -> None:
         self._line = line
         self._fitting = fitting
         self._setups = setups
         self._health = health
-        self._journal = journal
+        self._log = log
         self._said = ""
 
     def revive(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
@@ -93,7 +93,7 @@ class Revival:
             switch_off(line, same)
             if self._said != str(fault):
                 self._said = str(fault)
-                self._journal.say(self._said)
+                self._log.add(self._said)
             return None
         for servo_id in well:
             if engaged and not torque[servo_id]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from drivers.errors import ServoMissing
-from drivers.event_log import call
+from drivers.event_log import servo_label
 from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import MODELS
 from drivers.feetech.registers import Identity, StsRegisters
@@ -34,12 +34,12 @@ def find(line: FeetechLine, registers: StsRegisters, setups: Sequence[ServoSetup
 def _problem(setup: ServoSetup, found: Identity | None) -> str:
     """Say what is wrong with one servo, "" where nothing is."""
     if found is None:
-        return f"{call(setup)} does not answer"
+        return f"{servo_label(setup)} does not answer"
     if found.model_number != MODELS[setup.model].number:
-        return f"{call(setup)} is {_model(found)}, not {setup.model}"
+        return f"{servo_label(setup)} is {_model(found)}, not {setup.model}"
     if found.firmware < setup.firmware_min:
         return (
-            f"{call(setup)} has firmware {found.firmware}, older than {setup.firmware_min}: "
+            f"{servo_label(setup)} has firmware {found.firmware}, older than {setup.firmware_min}: "
             "update it with the maker's tool"
         )
     return ""

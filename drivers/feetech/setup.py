@@ -2,14 +2,14 @@
 
 Registers are written only where they differ: the EEPROM wears out. It is written with the
 torque off and the lock (55) open, and the lock is closed again. Every write is noted in
-the journal.
+the log.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from drivers.errors import ServoMissing
-from drivers.event_log import Journal, call, title
+from drivers.event_log import EventLog, register_label, servo_label
 from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import MULTI_TURN, REGISTERS, TORQUE_FULL, Register
 from drivers.feetech.registers import StsRegisters
@@ -36,7 +36,7 @@ class Fitting:
     Args:
         line, registers: the bus, for groups and for single servos.
         setups: the servos.
-        journal: notes every write.
+        log: notes every write.
     """
 
     def __init__(
@@ -44,12 +44,12 @@ class Fitting:
         line: FeetechLine,
         registers: StsRegisters,
         setups: Sequence[ServoSetup],
-        journal: Journal,
+        log: EventLog,
     ) -> None:
         self._line = line
         self._registers = registers
         self.want(setups)
-        self._journal = journal
+        self._log = log
 
     def want(self, setups: Sequence[ServoSetup]) -> None:
         """Say what servos should be like from the next fitting on."""
@@ -124,8 +124,8 @@ class Fitting:
             for servo_id, register, found, wanted in differences:
                 if register.name != "lock":
                     self._write(servo_id, register.name, wanted)
-                who = call(self._setups[servo_id])
-                self._journal.say(f"{who}: {title(register.name)} {found} -> {wanted}")
+                who = servo_label(self._setups[servo_id])
+                self._log.add(f"{who}: {register_label(register.name)} {found} -> {wanted}")
         finally:
             open_ones = [d.servo_id for d in differences if d.register.name == "lock"]
             for servo_id in dict.fromkeys([*kept, *open_ones]):
@@ -145,18 +145,19 @@ class Fitting:
         if not differences:
             return
         named = "; ".join(
-            f"{call(self._setups[servo_id])} does not take {title(register.name)} {wanted}, "
+            f"{servo_label(self._setups[servo_id])} does not take "
+            f"{register_label(register.name)} {wanted}, "
             f"it has {found}"
             for servo_id, register, found, wanted in differences
         )
         raise ServoMissing(f"{self._where}: {named}: restart its power or correct the rig file")
 
     def _raise_missing(self, ids: Iterable[int], found: Mapping[int, object], what: str) -> None:
-        missing = [call(self._setups[i]) for i in ids if i not in found]
+        missing = [servo_label(self._setups[i]) for i in ids if i not in found]
         if missing:
             raise ServoMissing(
                 f"{self._where}: {', '.join(missing)} does not answer when asked for its "
-                f"{title(what)}: check its cable, restart its power"
+                f"{register_label(what)}: check its cable, restart its power"
             )
 
     @property

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from drivers.event_log import Journal
+from drivers.event_log import EventLog
 from drivers.hobby_board.channel import Channel
 from drivers.serial.port import BusPort
 from drivers.types import ServoSetup
@@ -106,7 +106,7 @@ class Board(Protocol):
         """
         ...
 
-    def find(self, setups: Sequence[ServoSetup], journal: Journal) -> tuple[int, ...]:
+    def find(self, setups: Sequence[ServoSetup], log: EventLog) -> tuple[int, ...]:
         """Find the board; return the pulses of these servos. Nothing moves.
 
         Raises:
@@ -114,7 +114,7 @@ class Board(Protocol):
         """
         ...
 
-    def prepare(self, journal: Journal) -> None:
+    def prepare(self, log: EventLog) -> None:
         """Make it ready for goals, before any is sent.
 
         Raises:

@@ -15,9 +15,10 @@ from collections.abc import Sequence
 from math import inf
 
 from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.event_log import Journal, call
+from drivers.event_log import EventLog
 from drivers.hobby_board.board import Board
 from drivers.hobby_board.channel import Channel
+from drivers.hobby_board.models import channel_label
 from drivers.hobby_board.release import TRIES, switch_off
 from drivers.hobby_board.silence import Silence
 from drivers.hobby_board.start import take_on
@@ -48,7 +49,7 @@ class HobbyBoardBus:
         self._ids = tuple(setup.id for setup in setups)
         if len(set(self._ids)) < len(self._ids):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
-        self._journal = Journal()
+        self._log = EventLog()
         self._opened = self._told = False
         self._now_s = 0.0
         self._begin()
@@ -57,11 +58,11 @@ class HobbyBoardBus:
         """Make the parts that have memory, with a clean sheet."""
         timing = self._board.timing
         self._channels = tuple(Channel(setup, timing.longest_lead_s) for setup in self._setups)
-        self._supervisor = Supervisor(self._board, self._channels, self._journal)
-        self._silence = Silence(self._journal)
+        self._supervisor = Supervisor(self._board, self._channels, self._log)
+        self._silence = Silence(self._log)
         self._rx_bytes, self._byte_s = 0, -inf
         self._link = LastingPort(
-            self._port, timing.baud, timing.give_up_s, self._journal, self._trust_nobody
+            self._port, timing.baud, timing.give_up_s, self._log, self._trust_nobody
         )
         self._heard_s = -inf
 
@@ -81,7 +82,7 @@ class HobbyBoardBus:
             raise PortError(f"{self._port.port_name} cannot run at {baud} bit/s: choose 115200")
         try:
             self._port.clearPort()
-            pulses = self._board.find(self._setups, self._journal)
+            pulses = self._board.find(self._setups, self._log)
             for channel, pulse in zip(self._channels, pulses, strict=True):
                 channel.settle(pulse)
         except (ServoMissing, BusLost):
@@ -134,8 +135,8 @@ class HobbyBoardBus:
         try:
             if not self._told:
                 self._told = True
-                self._journal.say(UNMEASURED)
-            take_on(self._board, self._channels, self._journal)
+                self._log.add(UNMEASURED)
+            take_on(self._board, self._channels, self._log)
         except ServoMissing:
             self.release()
             raise
@@ -187,13 +188,13 @@ class HobbyBoardBus:
 
     def faults(self) -> tuple[str, ...]:
         """Name what channels suffer from now, and the board's errors of the last 10 s."""
-        channels = (f"{call(c.setup)}: {c.fault}" for c in self._channels if c.fault)
+        channels = (f"{channel_label(c.setup)}: {c.fault}" for c in self._channels if c.fault)
         errors = self._supervisor.errors_of_late(self._port.now_s())
         return (*channels, *(f"{self._board.texts.name}: {name}" for name in errors))
 
     def events(self) -> tuple[str, ...]:
         """Say what has happened since the last call."""
-        return self._journal.take()
+        return self._log.drain()
 
     def release(self) -> None:
         """Stop all pulses, confirmed; never raises for a board that does not answer.
@@ -234,10 +235,13 @@ class HobbyBoardBus:
         self._line.errors["refused"] += len(released.holding)
         for channel in self._channels:
             if channel.id in released.holding:
-                self._journal.say(f"{call(channel.setup)} still gets pulses: cut the servo power")
+                self._log.add(
+                    f"{channel_label(channel.setup)} still gets pulses: cut the servo power"
+                )
             elif channel.id in released.mute:
-                self._journal.say(
-                    f"{call(channel.setup)} does not confirm that its pulses have stopped: "
+                self._log.add(
+                    f"{channel_label(channel.setup)} does not confirm that its pulses have "
+                    f"stopped: "
                     "cut the servo power"
                 )
             else:

@@ -6,10 +6,9 @@ where its servo is, and a first pulse is not ramped: the servo goes there at its
 
 from enum import Enum
 
-from drivers.event_log import call
 from drivers.hobby_board.board import Board
 from drivers.hobby_board.channel import FINE_STEPS, Channel
-from drivers.hobby_board.models import US_STEPS
+from drivers.hobby_board.models import US_STEPS, channel_label
 
 
 class Outcome(Enum):
@@ -52,6 +51,9 @@ def refusal(board: Board, channel: Channel) -> str:
     """Say why a channel gives another pulse than asked for, and the cure."""
     goal, pulse = channel.goal_steps, round(channel.ramp.pulse_steps) if channel.on else 0
     if not pulse:
-        return f"{call(channel.setup)} gives no pulses: {board.texts.no_pulses}"
+        return f"{channel_label(channel.setup)} gives no pulses: {board.texts.no_pulses}"
     sent, got = f"{goal / US_STEPS:g} us", f"{pulse / US_STEPS:g} us"
-    return f"{call(channel.setup)} is sent to {sent} and gets {got}: {board.texts.other_pulse}"
+    return (
+        f"{channel_label(channel.setup)} is sent to {sent} and gets {got}: "
+        f"{board.texts.other_pulse}"
+    )

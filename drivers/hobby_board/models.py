@@ -2,6 +2,9 @@
 
 from typing import NamedTuple
 
+from drivers.event_log import servo_label
+from drivers.types import ServoSetup
+
 US_STEPS = 4
 """Pulse widths are counted in quarters of a microsecond."""
 
@@ -24,3 +27,8 @@ HOBBY = {
     model.name: model
     for model in (HobbyModel("hobby", 1000 * US_STEPS * 4.0, 500 * US_STEPS, 2500 * US_STEPS),)
 }
+
+
+def channel_label(setup: ServoSetup) -> str:
+    """Return how people know a hobby servo: its joint and its channel."""
+    return servo_label(setup, "channel")

@@ -2,7 +2,7 @@
 
 from math import inf
 
-from drivers.event_log import Journal
+from drivers.event_log import EventLog
 
 AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
 """Time between questions to a board that stays silent: doubled from the first to the last."""
@@ -20,8 +20,8 @@ class Silence:
     missed: how many in a row
     """
 
-    def __init__(self, journal: Journal) -> None:
-        self._journal = journal
+    def __init__(self, log: EventLog) -> None:
+        self._log = log
         self.missed = 0
         self._told = False
         self._since_s, self._due_s, self._wait_s = 0.0, -inf, AGAIN_FIRST_S
@@ -41,7 +41,7 @@ class Silence:
         if not self._told and now_s - self._since_s >= SAY_S:
             self._told = True
             damaged = heard_s >= self._since_s
-            self._journal.say(
+            self._log.add(
                 "what the board answers arrives damaged: check cable, ground and baud rate"
                 if damaged
                 else "the board does not answer: check its power and the cable"
@@ -52,7 +52,7 @@ class Silence:
         if not self.missed:
             return
         if self._told:
-            self._journal.say(f"the board answers again after {now_s - self._since_s:.1f} s")
+            self._log.add(f"the board answers again after {now_s - self._since_s:.1f} s")
         self.missed, self._told, self._due_s = 0, False, -inf
 
     def seconds(self, now_s: float) -> float:

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from math import inf
 
 from drivers.errors import ServoMissing
-from drivers.event_log import Journal, call
+from drivers.event_log import EventLog
 from drivers.hobby_board.board import Board
 from drivers.hobby_board.channel import Channel
 from drivers.hobby_board.hold import Outcome, refusal, take
+from drivers.hobby_board.models import channel_label
 from drivers.hobby_board.release import TRIES
 from drivers.types import ServoSetup
 
@@ -27,11 +28,13 @@ def every_pulse(board: Board, setups: Sequence[ServoSetup]) -> tuple[int, ...]:
     where = board.line.port.port_name
     for setup in setups:
         if board.pulses((setup.id,)) is None:
-            raise ServoMissing(f"{where}: no answer about {call(setup)}: {board.texts.unheard}")
+            raise ServoMissing(
+                f"{where}: no answer about {channel_label(setup)}: {board.texts.unheard}"
+            )
     raise ServoMissing(f"{where}: answers get lost: {board.texts.noise}")
 
 
-def take_on(board: Board, channels: Sequence[Channel], journal: Journal) -> None:
+def take_on(board: Board, channels: Sequence[Channel], log: EventLog) -> None:
     """Take hold of every channel, those without pulses one after another.
 
     Raises:
@@ -39,13 +42,13 @@ def take_on(board: Board, channels: Sequence[Channel], journal: Journal) -> None
         drivers.errors.ServoMissing: the board does not answer, or a channel does not take
             its goal.
     """
-    board.prepare(journal)
+    board.prepare(log)
     pulses = every_pulse(board, [channel.setup for channel in channels])
     for channel, pulse in zip(channels, pulses, strict=True):
         channel.found(pulse)
-    limp = [call(channel.setup) for channel in channels if not channel.on]
+    limp = [channel_label(channel.setup) for channel in channels if not channel.on]
     if limp:
-        journal.say(f"{', '.join(limp)} had no pulses: they go to their places at once")
+        log.add(f"{', '.join(limp)} had no pulses: they go to their places at once")
     start_s = -inf
     for channel, pulse in zip(channels, pulses, strict=True):
         if not pulse:
@@ -68,5 +71,7 @@ def _insist(board: Board, channel: Channel, pulse: int) -> None:
             break
     where = board.line.port.port_name
     if outcome is Outcome.MUTE:
-        raise ServoMissing(f"{where}: no answer about {call(channel.setup)}: check its cable")
+        raise ServoMissing(
+            f"{where}: no answer about {channel_label(channel.setup)}: check its cable"
+        )
     raise ServoMissing(f"{where}: {refusal(board, channel)}")

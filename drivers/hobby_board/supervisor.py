@@ -8,10 +8,11 @@ and what the board says of itself.
 from collections.abc import Sequence
 from math import inf
 
-from drivers.event_log import Journal, call
+from drivers.event_log import EventLog
 from drivers.hobby_board.board import Board
 from drivers.hobby_board.channel import Channel
 from drivers.hobby_board.hold import Outcome, refusal, take
+from drivers.hobby_board.models import channel_label
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
 """A board that lets go of its channels more often within such a time stays without pulses."""
@@ -29,11 +30,11 @@ class Supervisor:
     engaged: goals are followed
     """
 
-    def __init__(self, board: Board, channels: Sequence[Channel], journal: Journal) -> None:
+    def __init__(self, board: Board, channels: Sequence[Channel], log: EventLog) -> None:
         self._board = board
         self._line = board.line
         self._channels = tuple(channels)
-        self._journal = journal
+        self._log = log
         self.engaged = False
         self._pending: list[Channel] = []
         self._asked = -1
@@ -73,7 +74,7 @@ class Supervisor:
         for name in names:
             self._line.errors[name] += 1
             if now_s - self._errors_s.get(name, -inf) >= SAME_S:
-                self._journal.say(f"the board reports: {name}")
+                self._log.add(f"the board reports: {name}")
             self._errors_s[name] = now_s
 
     def errors_of_late(self, now_s: float) -> tuple[str, ...]:
@@ -190,7 +191,7 @@ class Supervisor:
         if channel.met_end(pulse) and not channel.told:
             channel.told = True
             self._line.errors["other pulse"] += 1
-            self._journal.say(refusal(self._board, channel))
+            self._log.add(refusal(self._board, channel))
 
     def _lost_hold(self, lost: Sequence[Channel], errors: Sequence[str], now_s: float) -> None:
         """Note that channels are not where they were sent, and that they are to be held anew."""
@@ -198,7 +199,7 @@ class Supervisor:
         who = (
             "the board"
             if len(lost) == len(self._channels)
-            else ", ".join(call(channel.setup) for channel in lost)
+            else ", ".join(channel_label(channel.setup) for channel in lost)
         )
         self._line.errors["restarted"] += 1
         for channel in lost:
@@ -211,7 +212,7 @@ class Supervisor:
         if len(self._restarts) > MOST_RESTARTS:
             self._give_up()
         else:
-            self._journal.say(f"{who} restarted: set up anew")
+            self._log.add(f"{who} restarted: set up anew")
 
     def _noise_of_late(self, now_s: float) -> bool:
         """Tell whether bytes have been damaged of late, to the board or from it."""
@@ -235,7 +236,7 @@ class Supervisor:
         self._told_s = now_s
         again = f" again and again: held once the line is quiet; {self._board.texts.noise}"
         rest = again if often > 0 else ": set up anew"
-        self._journal.say(f"{who} was sent home by an error ({named}){rest}")
+        self._log.add(f"{who} was sent home by an error ({named}){rest}")
 
     def _drop(self, channel: Channel) -> None:
         if channel.held:
@@ -247,7 +248,7 @@ class Supervisor:
         fault = "restarts again and again: supply too weak"
         for channel in self._pending:
             channel.fault = fault
-            self._journal.say(f"{call(channel.setup)}: {fault}")
+            self._log.add(f"{channel_label(channel.setup)}: {fault}")
         self._board.stop([channel.id for channel in self._pending])
         for channel in self._pending:
             channel.stop()

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from math import inf
 
 from drivers.errors import ServoMissing
-from drivers.event_log import Journal, call
+from drivers.event_log import EventLog
 from drivers.hobby_board.board import BoardTexts, Seen, Timing, goals_of
 from drivers.hobby_board.channel import Channel
+from drivers.hobby_board.models import channel_label
 from drivers.hobby_board.start import every_pulse
 from drivers.maestro.commands import (
     ERRORS,
@@ -61,7 +62,7 @@ class MaestroBoard:
                 f"within {LOWEST}..{HIGHEST} (64..4080 us)"
             )
 
-    def find(self, setups: Sequence[ServoSetup], journal: Journal) -> tuple[int, ...]:
+    def find(self, setups: Sequence[ServoSetup], log: EventLog) -> tuple[int, ...]:
         """Greet the board and return the pulses of these servos; nothing moves.
 
         Raises:
@@ -79,12 +80,12 @@ class MaestroBoard:
             )
         if register:
             named = ", ".join(name_errors(register))
-            journal.say(f"the board held errors from before, cleared now: {named}")
+            log.add(f"the board held errors from before, cleared now: {named}")
         pulses = every_pulse(self, setups)
         for setup, pulse in zip(setups, pulses, strict=True):
             if 0 < pulse <= MOST_INPUT:
                 raise ServoMissing(
-                    f"{where}: channel {setup.id} is an input, {call(setup)} cannot "
+                    f"{where}: channel {setup.id} is an input, {channel_label(setup)} cannot "
                     "move: set it to Servo in Pololu's program"
                 )
         return pulses
@@ -100,11 +101,11 @@ class MaestroBoard:
             f"its CRC must be {check_byte}"
         )
 
-    def prepare(self, journal: Journal) -> None:
+    def prepare(self, log: EventLog) -> None:
         """Stop the board's own script where one runs: it would move servos against us."""
         if self.line.ask(self.line.speech.script_status(), 1) == b"\0":
             self.line.send(self.line.speech.stop_script())
-            journal.say("the board ran a script of its own: stopped")
+            log.add("the board ran a script of its own: stopped")
 
     def look(self, channel: Channel) -> Seen | None:
         """Ask for one channel's pulse and the error register; None where no answer came."""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from math import ceil, floor
 
 from drivers.errors import ServoMissing
-from drivers.event_log import Journal
+from drivers.event_log import EventLog
 from drivers.hobby_board.board import BoardTexts, Seen, Timing
 from drivers.hobby_board.channel import Channel
 from drivers.hobby_board.release import TRIES
@@ -127,7 +127,7 @@ class Pca9685Board:
 
     # --- finding
 
-    def find(self, setups: Sequence[ServoSetup], journal: Journal) -> tuple[int, ...]:
+    def find(self, setups: Sequence[ServoSetup], log: EventLog) -> tuple[int, ...]:
         """See that the boards are there and return the pulses of these servos; nothing changes.
 
         Raises:
@@ -181,7 +181,7 @@ class Pca9685Board:
 
     # --- setting up
 
-    def prepare(self, journal: Journal) -> None:
+    def prepare(self, log: EventLog) -> None:
         """Prepare nothing: boards are set up where they need it, before their first pulse."""
 
     def _ready(self, address: int) -> bool:

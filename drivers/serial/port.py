@@ -1,4 +1,4 @@
-"""Serial port for Dynamixel servos: waits in select() instead of spinning, names its errors.
+"""Serial port of a servo bus: waits in select() instead of spinning, names its errors.
 
 Owns the host clock of the servo bus (monotonic seconds).
 """
@@ -16,7 +16,6 @@ from serial import Serial, SerialException
 from serial.tools import list_ports
 
 from drivers.errors import BusLost, PortError
-from drivers.feetech.memory_table import BAUD_RATES as FEETECH_RATES
 from drivers.serial.list_ports import holders, lasting_name
 
 BITS_PER_BYTE = 10
@@ -28,6 +27,9 @@ QUIET_S = 0.003
 
 BABBLE_S = 0.06
 """Draining gives up on a line that never falls silent."""
+
+MORE_RATES = (38_400, 76_800, 128_000, 250_000)
+"""Bit/s that servos and adaptors know and the SDK's list of rates lacks."""
 
 WRITE_S = 0.05
 """A packet that cannot be handed to the adapter within this time never will be."""
@@ -225,8 +227,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         Raises:
             drivers.errors.PortError: absent, busy or not permitted.
         """
-        # Feetech servos know rates that the SDK's list lacks.
-        if baudrate not in FEETECH_RATES and self.getCFlagBaud(baudrate) <= 0:
+        if baudrate not in MORE_RATES and self.getCFlagBaud(baudrate) <= 0:
             return False
         self.baudrate = baudrate
         return self.setupPort(baudrate)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from drivers.errors import BusLost, PortError
-from drivers.event_log import Journal
+from drivers.event_log import EventLog
 from drivers.serial.port import BusPort
 from drivers.serial.reopening import FIRST_S, LAST_S, Reconnect
 
@@ -15,7 +15,7 @@ class LastingPort:
         port: opened once already.
         baud: bit/s to open it with.
         give_up_s: it may stay away for so long.
-        journal: where its going and coming is told.
+        log: where its going and coming is told.
         anew: called when it is open again: nobody on it may be trusted.
 
     release_due: torque has to be taken off as soon as the port is there, before all else; set
@@ -27,11 +27,11 @@ class LastingPort:
         port: BusPort,
         baud: int,
         give_up_s: float,
-        journal: Journal,
+        log: EventLog,
         anew: Callable[[], None],
     ) -> None:
         self._port, self._baud, self._give_up_s = port, baud, give_up_s
-        self._journal, self._anew = journal, anew
+        self._log, self._anew = log, anew
         self._link = Reconnect()
         self.release_due = False
 
@@ -44,7 +44,7 @@ class LastingPort:
         """Note that the port is gone."""
         self._link.lost(now_s)
         self._port.closePort()
-        self._journal.say(f"port lost: {lost}")
+        self._log.add(f"port lost: {lost}")
 
     def returned(self, now_s: float) -> bool:
         """Try to open the port again where that is due; tell whether it is open.
@@ -57,7 +57,7 @@ class LastingPort:
             if self._open():
                 where = getattr(self._port, "opened_as", self._port.port_name)
                 renamed = f" as {where}" if where != self._port.port_name else ""
-                self._journal.say(f"port back after {self._link.back(now_s):.1f} s{renamed}")
+                self._log.add(f"port back after {self._link.back(now_s):.1f} s{renamed}")
                 return True
             self._link.failed(now_s, FIRST_S if self.release_due else LAST_S)
         if gone_s >= self._give_up_s:
@@ -73,7 +73,7 @@ class LastingPort:
     def released(self) -> None:
         """Note that torque was taken off on everything that answers."""
         if self.release_due:
-            self._journal.say("torque switched off, as was asked for while the port was gone")
+            self._log.add("torque switched off, as was asked for while the port was gone")
         self.release_due = False
 
     def open_once_more(self, now_s: float) -> bool:

@@ -13,7 +13,7 @@ from drivers.dynamixel.control_table import (
 )
 from drivers.dynamixel.protocol import ERROR_NUMBER, SyncWrite
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
-from drivers.event_log import Journal, call
+from drivers.event_log import EventLog, servo_label
 from drivers.serial.port import BusPort
 from drivers.serial.reconnect import LastingPort
 from drivers.servo_bus.faults import Health
@@ -57,13 +57,13 @@ class DynamixelBus:
         goal = REGISTERS["goal_position"]
         self._goals = SyncWrite(self._ids, goal.address, goal.size)
         self._watchdog = ceil(params.watchdog_ms / 1000.0 / WATCHDOG_UNIT_S)
-        self._journal = Journal()
+        self._log = EventLog()
         self._line = Line(
             port,
             params.prompt_timeout_ms / 1000.0,
             params.reply_timeout_ms / 1000.0,
             params.baud,
-            {setup.id: call(setup) for setup in setups},
+            {setup.id: servo_label(setup) for setup in setups},
         )
         self._opened = False
         self._now_s = 0.0
@@ -74,18 +74,18 @@ class DynamixelBus:
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
         self._fast, self._block = fast, block
         self._link = LastingPort(
-            self._port, self._params.baud, self._params.give_up_s, self._journal, self._trust_nobody
+            self._port, self._params.baud, self._params.give_up_s, self._log, self._trust_nobody
         )
         self._roll = Roll(self._ids)
         self._readings = Readings(self._setups)
-        self._health = Health(by_id, self._journal)
+        self._health = Health(by_id, self._log)
         together = indirect_turns(block) if block else direct_turns()
         self._reader = Reader(self._line, self._roll, together, alone_turns(), fast)
         self._fitting = Fitting(
-            self._line, Registers(self._port, tries=1), self._setups, block, self._journal
+            self._line, Registers(self._port, tries=1), self._setups, block, self._log
         )
         self._revival = Revival(
-            self._line, self._fitting, by_id, self._watchdog, self._health, self._journal
+            self._line, self._fitting, by_id, self._watchdog, self._health, self._log
         )
         self._care = Care(
             self._line,
@@ -112,9 +112,9 @@ class DynamixelBus:
             raise PortError(f"{where} cannot run at {baud} bit/s: choose 57600 or 1000000")
         registers = Registers(self._port)
         try:
-            firmware = find(self._line, registers, self._setups, self._journal)
+            firmware = find(self._line, registers, self._setups, self._log)
             self._assemble(self._common_block(firmware), self._all_fast(firmware))
-            fitting = Fitting(self._line, registers, self._setups, self._block, self._journal)
+            fitting = Fitting(self._line, registers, self._setups, self._block, self._log)
             fitting.rest(self._ids)
             fitting.fit(self._ids)
             self._line.starved = False
@@ -223,7 +223,7 @@ class DynamixelBus:
 
     def events(self) -> tuple[str, ...]:
         """Say what has happened since the last call."""
-        return self._journal.take()
+        return self._log.drain()
 
     def release(self) -> None:
         """Torque off on every servo, confirmed; never raises for a servo that does not answer.
@@ -265,7 +265,7 @@ class DynamixelBus:
         for kind, ids in (("still reports torque", released.holding), ("mute", released.mute)):
             for servo_id in ids:
                 what = kind if kind != "mute" else "does not confirm that its torque is off"
-                self._journal.say(f"{self._line.who(servo_id)} {what}: cut the servo power")
+                self._log.add(f"{self._line.who(servo_id)} {what}: cut the servo power")
 
     def health(self) -> BusHealth:
         """Give byte and error counts of all exchanges."""

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 
 from drivers.dynamixel.control_table import name_errors
-from drivers.event_log import Journal, Seldom, call
+from drivers.event_log import EventLog, Seldom, servo_label
 from drivers.types import ServoSetup
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
@@ -27,16 +27,16 @@ class Health:
     latches: those of them that the servo itself has latched
     """
 
-    def __init__(self, setups: Mapping[int, ServoSetup], journal: Journal) -> None:
+    def __init__(self, setups: Mapping[int, ServoSetup], log: EventLog) -> None:
         self._setups = setups
-        self._journal = journal
+        self._log = log
         self.faults: dict[int, str] = {}
         self.latches: set[int] = set()
         self._restarts: dict[int, list[float]] = {}
         self._silent_since: dict[int, float] = {}
         self._told: set[int] = set()
         self._all_silent = False
-        self._seldom = Seldom(journal)
+        self._seldom = Seldom(log)
 
     def latched(self, servo_id: int, status: int) -> bool:
         """Note Hardware Error Status; gives whether that is news."""
@@ -50,14 +50,14 @@ class Health:
     def name(self, servo_id: int, fault: str) -> None:
         """Note a fault that stays until the servo has been restarted."""
         self.faults[servo_id] = fault
-        self._journal.say(f"{call(self._setups[servo_id])}: {fault}")
+        self._log.add(f"{servo_label(self._setups[servo_id])}: {fault}")
 
     def cleared(self, servo_id: int) -> None:
         """Note that a servo's latched error is gone."""
         if servo_id in self.latches:
             self.latches.discard(servo_id)
             del self.faults[servo_id]
-            self._journal.say(f"{call(self._setups[servo_id])}: the fault is gone")
+            self._log.add(f"{servo_label(self._setups[servo_id])}: the fault is gone")
 
     def exhausted(self, servo_id: int, now_s: float) -> bool:
         """Tell whether a servo has restarted too often of late; that is a fault then."""
@@ -71,7 +71,7 @@ class Health:
     def restarted(self, servo_id: int, now_s: float) -> None:
         """Note that a servo had restarted and is well again."""
         self._restarts.setdefault(servo_id, []).append(now_s)
-        self._journal.say(f"{call(self._setups[servo_id])} restarted: set up anew")
+        self._log.add(f"{servo_label(self._setups[servo_id])} restarted: set up anew")
 
     def note_silent(
         self, out: Collection[int], now_s: float, garbling: Collection[int] = (), late: int = 0
@@ -84,12 +84,12 @@ class Health:
             since_s = self._silent_since.pop(servo_id)
             if servo_id in self._told:
                 self._told.discard(servo_id)
-                who = call(self._setups[servo_id])
-                self._journal.say(f"{who} answers again after {now_s - since_s:.1f} s")
+                who = servo_label(self._setups[servo_id])
+                self._log.add(f"{who} answers again after {now_s - since_s:.1f} s")
         for servo_id in out:
             self._silent_since.setdefault(servo_id, now_s)
         if late and out and now_s - min(self._silent_since.values()) < BUSY_S:
-            self._seldom.say(f"this computer is busy: {late} answers late in the last s", now_s)
+            self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
             return
         self._tell(out, now_s, garbling)
 
@@ -100,12 +100,12 @@ class Health:
         """
         servos = f"the watchdog of {count} servo{'s' if count > 1 else ''}"
         if asleep_s:
-            self._seldom.say(
+            self._seldom.add(
                 f"this computer was late: it sent nothing for {asleep_s:.2f} s, so {servos} "
                 "stopped them; they go on from where they are", now_s, "late",
             )  # fmt: skip
         else:
-            self._seldom.say(
+            self._seldom.add(
                 f"{servos} stopped them, as packets get lost: check cable and plugs; they go on "
                 "from where they are", now_s, "lost",
             )  # fmt: skip
@@ -115,17 +115,17 @@ class Health:
         if everybody and not self._all_silent:
             if now_s - max(self._silent_since.values()) >= SAY_SILENT_S:
                 self._all_silent = True
-                self._journal.say("no servo answers: check servo power and cable")
+                self._log.add("no servo answers: check servo power and cable")
             return
         if not out and self._all_silent:
             self._all_silent = False
-            self._journal.say("all servos answer again")
+            self._log.add("all servos answer again")
         for servo_id in out:
             silent_s = now_s - self._silent_since[servo_id]
             if servo_id not in self._told and silent_s >= SAY_SILENT_S and not self._all_silent:
                 self._told.add(servo_id)
                 what = GARBLES if servo_id in garbling else "does not answer"
-                self._journal.say(f"{call(self._setups[servo_id])} {what}")
+                self._log.add(f"{servo_label(self._setups[servo_id])} {what}")
 
     def silent_for_s(self, now_s: float) -> float:
         """Give for how long nobody at all has answered."""

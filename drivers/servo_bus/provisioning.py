@@ -1,7 +1,7 @@
 """Bringing servos into the state the driver needs, one register at a time.
 
 Registers are written only where they differ: the EEPROM wears out, and a write to it
-needs the torque off. Every write is noted in the journal.
+needs the torque off. Every write is noted in the log.
 """
 
 import struct
@@ -19,7 +19,7 @@ from drivers.dynamixel.control_table import (
     Register,
 )
 from drivers.errors import ServoMissing
-from drivers.event_log import Journal, call, title
+from drivers.event_log import EventLog, register_label, servo_label
 from drivers.servo_bus.line import Line
 from drivers.servo_bus.read_windows import INDIRECT_MAP
 from drivers.servo_bus.registers import Registers
@@ -62,7 +62,7 @@ class Fitting:
         line, registers: the bus, for groups and for single servos.
         setups: the servos.
         block: where the indirect map goes, None where there is none.
-        journal: notes every write.
+        log: notes every write.
     """
 
     def __init__(
@@ -71,13 +71,13 @@ class Fitting:
         registers: Registers,
         setups: Sequence[ServoSetup],
         block: IndirectBlock | None,
-        journal: Journal,
+        log: EventLog,
     ) -> None:
         self._line = line
         self._registers = registers
         self.want(setups)
         self._block = block
-        self._journal = journal
+        self._log = log
 
     def want(self, setups: Sequence[ServoSetup]) -> None:
         """Say what servos should be like from the next fitting on."""
@@ -157,9 +157,9 @@ class Fitting:
         for servo_id in dict.fromkeys(difference.servo_id for difference in differences):
             self._write(servo_id, "torque_enable", 0)
         for servo_id, register, found, wanted in differences:
-            who = call(self._setups[servo_id])
+            who = servo_label(self._setups[servo_id])
             if self._write(servo_id, register.name, wanted):
-                self._journal.say(f"{who}: {title(register.name)} {found} -> {wanted}")
+                self._log.add(f"{who}: {register_label(register.name)} {found} -> {wanted}")
 
     def _write(self, servo_id: int, name: str, value: int) -> bool:
         """Write a register; tells whether the servo has taken it.
@@ -178,10 +178,10 @@ class Fitting:
         for servo_id, data in self._addresses(ids, block, len(wanted)).items():
             if data != wanted:
                 self._registers.write_bytes(servo_id, block.address_base, wanted)
-                who = call(self._setups[servo_id])
-                self._journal.say(f"{who}: Indirect Addresses set")
+                who = servo_label(self._setups[servo_id])
+                self._log.add(f"{who}: Indirect Addresses set")
         found = self._addresses(ids, block, len(wanted))
-        bad = [call(self._setups[i]) for i, data in found.items() if data != wanted]
+        bad = [servo_label(self._setups[i]) for i, data in found.items() if data != wanted]
         if bad:
             raise ServoMissing(
                 f"{self._where}: {', '.join(bad)} does not take the indirect addresses: restart "
@@ -198,18 +198,19 @@ class Fitting:
         if not differences:
             return
         named = "; ".join(
-            f"{call(self._setups[servo_id])} does not take {title(register.name)} {wanted}, "
+            f"{servo_label(self._setups[servo_id])} does not take "
+            f"{register_label(register.name)} {wanted}, "
             f"it has {found}"
             for servo_id, register, found, wanted in differences
         )
         raise ServoMissing(f"{self._where}: {named}: restart its power or correct the rig file")
 
     def _raise_missing(self, ids: Iterable[int], found: Mapping[int, bytes], what: str) -> None:
-        missing = [call(self._setups[i]) for i in ids if i not in found]
+        missing = [servo_label(self._setups[i]) for i in ids if i not in found]
         if missing:
             raise ServoMissing(
                 f"{self._where}: {', '.join(missing)} does not answer when asked for its "
-                f"{title(what)}: check its cable, restart its power"
+                f"{register_label(what)}: check its cable, restart its power"
             )
 
     @property

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from drivers.dynamixel.control_table import MODELS, STEPS_PER_TURN
 from drivers.errors import ServoFault, ServoMissing
-from drivers.event_log import Journal
+from drivers.event_log import EventLog
 from drivers.servo_bus.faults import Health
 from drivers.servo_bus.line import Line
 from drivers.servo_bus.provisioning import Fitting, speed_units
@@ -24,7 +24,7 @@ class Revival:
         line, fitting: the bus, and what its servos must be like.
         setups: the servos by id.
         watchdog: Bus Watchdog to arm, in its units; 0 for none.
-        health, journal: told what was found and done.
+        health, log: told what was found and done.
     """
 
     def __init__(
@@ -34,14 +34,14 @@ class Revival:
         setups: Mapping[int, ServoSetup],
         watchdog: int,
         health: Health,
-        journal: Journal,
+        log: EventLog,
     ) -> None:
         self._line = line
         self._fitting = fitting
         self._setups = setups
         self._watchdog = watchdog
         self._health = health
-        self._journal = journal
+        self._log = log
 
     def revive(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
         """Set servos up as at the start, holding where they are if ``engaged``.
@@ -78,7 +78,7 @@ class Revival:
             return None
         except ServoFault as fault:
             switch_off(line, whole)
-            self._journal.say(str(fault))
+            self._log.add(str(fault))
             return None
         for servo_id in well:
             self._health.cleared(servo_id)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from drivers.dynamixel.control_table import MODELS
 from drivers.errors import ServoMissing
-from drivers.event_log import Journal, call
+from drivers.event_log import EventLog, servo_label
 from drivers.servo_bus.line import Line
 from drivers.servo_bus.registers import Identity, Registers
 from drivers.types import ServoSetup
@@ -13,11 +13,11 @@ NAMES = {model.number: model.name for model in MODELS.values()}
 
 
 def find(
-    line: Line, registers: Registers, setups: Sequence[ServoSetup], journal: Journal
+    line: Line, registers: Registers, setups: Sequence[ServoSetup], log: EventLog
 ) -> dict[int, int]:
     """Find every servo and check its model and firmware; gives the firmware of each.
 
-    Servos that no setup names are left alone and noted in the journal.
+    Servos that no setup names are left alone and noted in the log.
 
     Raises:
         drivers.errors.ServoMissing: some are absent, of another model or too old; all are
@@ -38,19 +38,19 @@ def find(
     if problems:
         raise ServoMissing(_message(where, problems, strangers, found))
     for servo_id, identity in sorted(strangers.items()):
-        journal.say(f"servo {servo_id} ({_model(identity)}) belongs to no joint: left alone")
+        log.add(f"servo {servo_id} ({_model(identity)}) belongs to no joint: left alone")
     return {servo_id: identity.firmware for servo_id, identity in found.items() if identity}
 
 
 def _problem(setup: ServoSetup, found: Identity | None) -> str:
     """Say what is wrong with one servo, "" where nothing is."""
     if found is None:
-        return f"{call(setup)} does not answer"
+        return f"{servo_label(setup)} does not answer"
     if found.model_number != MODELS[setup.model].number:
-        return f"{call(setup)} is {_model(found)}, not {setup.model}"
+        return f"{servo_label(setup)} is {_model(found)}, not {setup.model}"
     if found.firmware < setup.firmware_min:
         return (
-            f"{call(setup)} has firmware {found.firmware}, older than {setup.firmware_min}: "
+            f"{servo_label(setup)} has firmware {found.firmware}, older than {setup.firmware_min}: "
             "update it with the maker's tool"
         )
     return ""

@@ -12,11 +12,11 @@ from collections.abc import Iterator, Sequence
 from math import ceil, floor
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from drivers.event_log import call
 from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.commands import MICRO
 from drivers.maestro.limits import accel_units, speed_units
 from drivers.maestro.params import MaestroParams
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 
 FACTORY_US = (992, 2000)
@@ -138,11 +138,11 @@ def clipped(setup: ServoSetup, asked_steps: float, got_steps: float) -> str:
     low, high = range_us(setup)
     if not got_steps:
         return (
-            f"{call(setup)} gives no pulses: set its channel to Servo in Pololu's program; "
+            f"{servo_label(setup)} gives no pulses: set its channel to Servo in Pololu's program; "
             "gazerig doctor names errors of the board"
         )
     sent, got = f"{asked_steps / US_STEPS:g} us", f"{got_steps / US_STEPS:g} us"
     return (
-        f"{call(setup)} is sent to {sent} and the board stays at {got}: set its Min to "
+        f"{servo_label(setup)} is sent to {sent} and the board stays at {got}: set its Min to "
         f"{low} and its Max to {high} in Pololu's program"
     )

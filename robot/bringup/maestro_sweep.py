@@ -9,11 +9,11 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from drivers.errors import BusLost, ServoFault, ServoMissing
-from drivers.event_log import call
 from drivers.hobby_board.release import switch_off
 from drivers.maestro.commands import MOST_INPUT, name_errors
 from drivers.maestro.limits import SPEED_STEPS_S, speed_units
 from drivers.maestro.line import Line
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 
 SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0
@@ -52,7 +52,7 @@ def walk(
     """
     speech = line.speech
     if 0 < _pulse(line, setup) <= MOST_INPUT:
-        raise ServoMissing(f"{call(setup)} is an input: set it to Servo in Pololu's program")
+        raise ServoMissing(f"{servo_label(setup)} is an input: set it to Servo in Pololu's program")
     units = speed_units(speed_steps_s)
     line.send(speech.speed(setup.id, units) + speech.acceleration(setup.id, 0))
     gone: list[Place] = []
@@ -98,7 +98,9 @@ def _pulse(line: Line, setup: ServoSetup) -> int:
         found = line.pulses((setup.id,))
         if found is not None:
             return found[0]
-    raise ServoMissing(f"{line.port.port_name}: no answer about {call(setup)}: check its cable")
+    raise ServoMissing(
+        f"{line.port.port_name}: no answer about {servo_label(setup)}: check its cable"
+    )
 
 
 def _end(line: Line, setup: ServoSetup) -> None:
@@ -113,7 +115,7 @@ def _end(line: Line, setup: ServoSetup) -> None:
     except BusLost:
         sure = False
     if not sure:
-        raise ServoFault(f"{call(setup)} may still get pulses: switch the servo supply off")
+        raise ServoFault(f"{servo_label(setup)} may still get pulses: switch the servo supply off")
 
 
 def sent_home(line: Line) -> tuple[str, ...]:

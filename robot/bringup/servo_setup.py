@@ -7,8 +7,8 @@ both would make it worse.
 from collections.abc import Iterable, Sequence
 
 from drivers.errors import ServoMissing
-from drivers.event_log import call
 from drivers.serial.port import BusPort
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 from robot.bringup.servo_kind import Found, ServoKind, SetUp, Tell
 
@@ -69,7 +69,7 @@ def refuse_model(found: Found, kind: ServoKind, setup: ServoSetup, where: str) -
     """
     if found.number != kind.number(setup.model):
         raise ServoMissing(
-            f"{where}: this is {found.model}, {call(setup)} wants {setup.model}: "
+            f"{where}: this is {found.model}, {servo_label(setup)} wants {setup.model}: "
             "connect the right one, or correct the model in the YAML"
         )
 

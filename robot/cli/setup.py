@@ -7,8 +7,8 @@ import typer
 
 from config.schema import Rig, load_rig
 from drivers.errors import DriverError, SetupError
-from drivers.event_log import call
 from drivers.serial.port import BlockingPort
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 from robot.bringup import servo_setup as servo_setup
 from robot.bringup.servo_families import KINDS
@@ -90,7 +90,10 @@ def _chain(
     )
     left = []
     for n, one in enumerate(setups, 1):
-        say(f"{n} of {len(setups)}: connect the {one.model} of {call(one)}, and no other servo")
+        say(
+            f"{n} of {len(setups)}: connect the {one.model} of {servo_label(one)}, and no "
+            f"other servo"
+        )
         if not _step(rig, bus, one, port, mock, yes):
             left.append(one.name)
     return left
@@ -137,7 +140,10 @@ def _set_up(line: BlockingPort, kind: ServoKind, wanted: ServoSetup, baud: int, 
     result = servo_setup.assign(line, kind, found, wanted, baud, progress)
     wipe()
     done = "; ".join(result.done) or "nothing to change"
-    say(f"   {call(wanted)}: {done}; answers as id {result.now.id} at {result.now.baud} bit/s")
+    say(
+        f"   {servo_label(wanted)}: {done}; answers as id {result.now.id} at "
+        f"{result.now.baud} bit/s"
+    )
     return True
 
 

@@ -13,13 +13,13 @@ from pathlib import Path
 import typer
 
 from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
-from drivers.event_log import call
 from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
 from drivers.maestro.probe import USB_CHANNELS
 from drivers.serial.port import BlockingPort
 from drivers.serial.port_owner import POLOLU
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 from robot.bringup.maestro_settings import clipped, instructions, settings_file
 from robot.bringup.maestro_sweep import FINE_STEPS, Place, walk
@@ -63,7 +63,7 @@ def set_up_board(
     )
     left = []
     for n, setup in enumerate(setups, 1):
-        say(f"{n} of {len(setups)}: {call(setup)}")
+        say(f"{n} of {len(setups)}: {servo_label(setup)}")
         if not _channel(board, setup, joints[setup.name], yes):
             left.append(setup.name)
     return left
@@ -88,7 +88,7 @@ def write_settings(
 def _refuse_size(setups: Sequence[ServoSetup], usb: str, where: str) -> None:
     """See that a board whose size its USB product tells has all the channels."""
     size = USB_CHANNELS.get(usb)
-    beyond = [call(setup) for setup in setups if size is not None and setup.id >= size]
+    beyond = [servo_label(setup) for setup in setups if size is not None and setup.id >= size]
     if beyond:
         raise ServoMissing(
             f"{where}: this board has channels 0..{(size or 0) - 1}, not those of "

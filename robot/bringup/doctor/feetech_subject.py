@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from drivers.event_log import call
 from drivers.feetech.memory_table import MODELS, FeetechModel
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 from robot.bringup.doctor.subject import Verdict
 from robot.bringup.servo_kind import Found
@@ -31,7 +31,7 @@ class StsPatient:
     @property
     def where(self) -> str:
         """Name the joint and the servo."""
-        return call(self.setup)
+        return servo_label(self.setup)
 
     @property
     def whole(self) -> bool:

@@ -9,13 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from drivers.errors import PortError
-from drivers.event_log import call
 from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.commands import MICRO, MOST_INPUT
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
 from drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from drivers.serial.port import BusPort
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 from robot.bringup.doctor.findings import BOARD, Finding, Fix, Level
 from robot.bringup.maestro_settings import FACTORY_US, wide_range
@@ -197,7 +197,7 @@ def _channels(board: Board) -> Iterator[Finding]:
     """Judge every channel of the rig."""
     size = board.size or board.params.channels
     for setup in board.setups:
-        pulse, where = board.pulses.get(setup.id), call(setup)
+        pulse, where = board.pulses.get(setup.id), servo_label(setup)
         if setup.id >= size:
             says, cure = f"the board has channels 0..{size - 1} only", "correct its id in the YAML"
         elif setup.id not in board.pulses:
@@ -247,7 +247,7 @@ def _untold(board: Board) -> Iterator[Finding]:
             "note",
             f"goes to {setup.min_steps / US_STEPS:g}..{setup.max_steps / US_STEPS:g} us, beyond "
             f"the {FACTORY_US[0]}..{FACTORY_US[1]} us of a new board, which cuts goals silently",
-            call(setup),
+            servo_label(setup),
             f"set its Min to {low} and its Max to {high} in Pololu's program",
         )
     yield Finding(

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from drivers.errors import DriverError, PortError
-from drivers.event_log import call
 from drivers.serial.list_ports import WISHED_LATENCY_MS, Host, latency_file, latency_ms, set_latency
 from drivers.serial.port import BusPort
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 from robot.bringup.doctor.findings import Finding, Fix, worst
 from robot.bringup.doctor.port import examine_latency, examine_port, port_facts
@@ -81,7 +81,7 @@ def check(
     findings = list(judge_presence(presence, kind, baud))
     for setup in setups:
         if setup.id in presence.there:
-            tell(f"reading {call(setup)}")
+            tell(f"reading {servo_label(setup)}")
             found, spoilt = presence.there[setup.id], presence.garbled.get(setup.id, 0)
             findings += kind.examine(port, setup, found, spoilt)
     if presence.there:
@@ -105,7 +105,7 @@ def look(
     spoilt = {i: n for i, n in Counter(found.id for found in answers).items() if n > 1}
     for setup in setups:
         if setup.id not in there:
-            tell(f"asking {call(setup)}")
+            tell(f"asking {servo_label(setup)}")
             found = kind.ping(port, setup.id, baud, 2)
             if found is not None:
                 there[setup.id] = found
@@ -167,7 +167,7 @@ def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[F
 
 
 def _missing(setup: ServoSetup, at: Found | None, spoilt: int, baud: int) -> Finding:
-    where = call(setup)
+    where = servo_label(setup)
     if at is not None:
         return Finding(
             "error",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from drivers.dynamixel.control_table import MODELS, Model
-from drivers.event_log import call
+from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 from robot.bringup.doctor.findings import Level
 from robot.bringup.servo_kind import Found
@@ -32,7 +32,7 @@ class Patient:
     @property
     def where(self) -> str:
         """Name the joint and the servo."""
-        return call(self.setup)
+        return servo_label(self.setup)
 
 
 class Verdict(NamedTuple):
