@@ -6,8 +6,10 @@ Property tests draw the same examples every time; HYPOTHESIS_PROFILE=search draw
 import gc
 import os
 import sys
+import time
 from collections.abc import Iterator
 
+import child_processes
 import pytest
 from hypothesis import settings
 
@@ -40,3 +42,23 @@ def pytest_xdist_auto_num_workers() -> int:
     """Return three workers for two processors: for a third of the time tests wait."""
     processors = os.cpu_count() or 1
     return processors + (processors + 1) // 2
+
+
+_GRACE_S = 10.0
+"""So long may a process that a test has told to end go on, on a machine that does much else."""
+
+
+@pytest.fixture(autouse=True)
+def no_process_outlives_its_test() -> Iterator[None]:
+    """End what a test has started and left, whatever became of the test; leaving it is a fault.
+
+    What fixtures of a wider scope have started is theirs.
+    """
+    before = child_processes.running()
+    yield
+    end_s = time.monotonic() + _GRACE_S
+    while left := {p: said for p, said in child_processes.running().items() if p not in before}:
+        if time.monotonic() > end_s:
+            child_processes.end(left)
+            pytest.fail(f"the test left processes that went on: {left}")
+        time.sleep(0.01)

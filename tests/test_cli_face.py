@@ -194,6 +194,10 @@ def test_lines_of_a_script() -> None:
 # --- on a terminal
 
 
+PATIENCE_S = 60.0
+"""Longest wait for each thing that is to come, on a machine that does much else."""
+
+
 class Sitting:
     """The command on a pseudo-terminal, and what it has written so far."""
 
@@ -201,7 +205,6 @@ class Sitting:
         code = "from robot.cli.main import main; main()"
         words = ("calibrate", "face", str(rig), "--mock", "--yes", *words)
         self.said = ""
-        self._end_s = time.monotonic() + 60.0
         self.pid, self.fd = pty.fork()
         if self.pid == 0:
             os.chdir(ROOT)
@@ -209,8 +212,10 @@ class Sitting:
 
     def reads(self, words: str) -> None:
         """Wait for words that have not been waited for."""
+        end_s = time.monotonic() + PATIENCE_S
         while words not in self.said:
-            assert time.monotonic() < self._end_s and self._read(), self.said
+            going = time.monotonic() < end_s and self._read()
+            assert going, f"{words!r} does not come, only {self.said[-2000:]!r}"
         self.before, _, self.said = self.said.partition(words)
 
     def types(self, keys: bytes) -> None:
@@ -229,14 +234,18 @@ class Sitting:
 
     def ends(self) -> int:
         """Wait for the end; give the exit code."""
-        while time.monotonic() < self._end_s and self._read():
+        end_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end_s and self._read():
             continue
+        while not self._ended() and time.monotonic() < end_s:
+            time.sleep(0.01)
         return self._reap()
 
+    def _ended(self) -> bool:
+        return os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+
     def _reap(self) -> int:
-        if not os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT):
-            time.sleep(1.0)
-        if not os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+        if not self._ended():
             os.kill(self.pid, signal.SIGKILL)
         _, how = os.waitpid(self.pid, 0)
         os.close(self.fd)
@@ -248,7 +257,6 @@ class Sitting:
 
     def __exit__(self, *_: object) -> None:
         if self.pid:
-            os.kill(self.pid, signal.SIGKILL)
             self._reap()
 
 

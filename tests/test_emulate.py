@@ -8,11 +8,13 @@ import sys
 import time
 from pathlib import Path
 
+import child_processes
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler
 from typer.testing import CliRunner
 
 from drivers.errors import SetupError
+from drivers.maestro.commands import Speech
 from drivers.serial.port import BlockingPort
 from robot.cli import emulate as command
 from robot.cli.emulate import app
@@ -76,6 +78,7 @@ class Branch:
         if self.pid == 0:
             code = 1
             try:
+                child_processes.end_with_parent()
                 code = _command(options, cwd, ours, theirs)
             finally:
                 os._exit(code)
@@ -244,8 +247,12 @@ def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
 def test_a_rig_of_hobby_servos_is_a_board_that_sends_no_pulses_yet():
     emulator = Emulator("--rig", "maker")
     assert emulator.ready == {"path": emulator.path, "baud": None}
-    assert asked(emulator.path, bytes.fromhex("9000"), 2, 115_200) == bytes(2)
-    assert {servo["target"] for servo in emulator.type("status")["servos"]} == {0}
+    # The rig's board wants a check byte: it says nothing to whoever sends none.
+    plain, checked = Speech().position(0), Speech(crc=True).position(0)
+    assert asked(emulator.path, plain + bytes(1), 2, 115_200) == b""
+    status = emulator.type("status")
+    assert status["errors"] == ["crc"] and {servo["target"] for servo in status["servos"]} == {0}
+    assert asked(emulator.path, checked, 2, 115_200) == bytes(2)
     assert emulator.end() == 0
 
 

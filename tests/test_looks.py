@@ -9,6 +9,7 @@ from mixed_rig import mixed_text
 
 from config.schema import Rig, load_rig
 from drivers.feetech.registers import StsRegisters
+from drivers.maestro.commands import Speech
 from drivers.servo_bus.registers import Registers
 from robot.bringup.monitor import Monitor, as_json
 from robot.bringup.telemetry import DynamixelLooks, FeetechLooks, Look, MaestroLooks, look_at_pulse
@@ -77,7 +78,7 @@ def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees() -> None
     bench = Bench(MAKER)
     limp = bench.see("eyes_pan")
     assert limp.pulse_us == 0.0 and limp.position_deg is None and not limp.torque
-    bench.ports[""].write(bytes((0x84, 0, *divmod_7(1634 * 4))))
+    bench.ports[""].write(Speech(crc=MAKER.bus.maestro.crc).target(0, 1634 * 4))
     bench.clock.sleep_until(0.5)
     seen = bench.see("eyes_pan")
     assert seen.pulse_us == 1634.0 and seen.position_deg == pytest.approx(10.0)
@@ -85,10 +86,6 @@ def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees() -> None
     assert (seen.goal_deg, seen.velocity_deg_s, seen.load, seen.temperature_c, seen.voltage_v) == (
         None,
     ) * 5
-
-
-def divmod_7(number: int) -> tuple[int, int]:
-    return number & 0x7F, number >> 7
 
 
 def test_a_board_is_asked_for_pulses_alone_and_keeps_its_errors() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from config.schema import load_rig
 from drivers.errors import BusLost, ServoMissing
-from drivers.maestro.params import MaestroParams
+from drivers.maestro.commands import Speech
 from robot.bringup.hobby_servo import SPEED_US_S, OneHobby
 from robot.bringup.single_joint import Stopped
 from robot.calibrate.calibration import CalibrationRefused
@@ -18,6 +18,7 @@ from sim_mock.devices import build
 from sim_mock.in_process_port import InProcessPort
 
 RIG = load_rig("maker")
+BOARD = RIG.bus.maestro
 
 
 class Bench:
@@ -37,7 +38,7 @@ class Bench:
         self.said: list[str] = []
         self.channel = RIG.joints[name].id
         self.hobby = OneHobby(
-            name, RIG.joints[name], self.port, MaestroParams(), self.clock, lambda: self.why, pulses
+            name, RIG.joints[name], self.port, BOARD, self.clock, lambda: self.why, pulses
         )
         self.placer = HobbyPlacer(self.hobby, self)
 
@@ -118,7 +119,7 @@ def test_a_lid_is_left_shut_so_that_the_other_can_meet_it() -> None:
 def test_a_channel_that_gives_pulses_does_not_jump() -> None:
     bench = Bench("eyes_pan", "", "1550", "", "", "1450", "", "")
     bench.port.setBaudRate(115_200)
-    bench.port.write(bytes((0x84, 0, 0x78, 0x2F)))  # 1534 us
+    bench.port.write(Speech(crc=BOARD.crc).target(0, 1534 * 4))
     bench.clock.sleep_until(1.0)
     before = bench.place_us()
     bench.hobby.open()
@@ -162,7 +163,7 @@ def test_the_board_s_own_range_is_where_it_ends_and_is_named() -> None:
     bench.board = build(replace(narrow, servos=servos), bench.clock.now_s)
     bench.port = InProcessPort(bench.board, sleep_until=bench.clock.sleep_until)
     bench.hobby = OneHobby(
-        "eyes_pan", RIG.joints["eyes_pan"], bench.port, MaestroParams(), bench.clock,
+        "eyes_pan", RIG.joints["eyes_pan"], bench.port, BOARD, bench.clock,
         lambda: None, (500.0, 2500.0),
     )  # fmt: skip
     bench.hobby.open()

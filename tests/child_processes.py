@@ -1,0 +1,67 @@
+"""Processes that tests start: which of them still run, and the end of those.
+
+One that outlives its test may hold the standard output of the whole run open; whoever reads that
+would wait for ever.
+"""
+
+import ctypes
+import os
+import signal
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from multiprocessing import forkserver, resource_tracker
+from pathlib import Path
+
+_PR_SET_PDEATHSIG = 1
+_PROC = Path("/proc")
+
+
+def running() -> dict[int, str]:
+    """Return the children of this process that run, by id, each with its command line.
+
+    Those that multiprocessing keeps for itself are not among them, nor those that have ended.
+    """
+    own = (resource_tracker._resource_tracker, forkserver._forkserver)  # type: ignore[attr-defined]
+    kept = {getattr(one, name, None) for one in own for name in ("_pid", "_forkserver_pid")}
+    found = {}
+    for pid in _children(os.getpid()):
+        if pid not in kept and (command := _command(pid)):
+            found[pid] = command
+    return found
+
+
+def end(pids: Iterable[int]) -> None:
+    """Kill processes and all that these have started."""
+    for pid in pids:
+        family = [pid, *_descendants(pid)]
+        for one in family:
+            with suppress(ProcessLookupError):
+                os.kill(one, signal.SIGKILL)
+        with suppress(ChildProcessError):
+            os.waitpid(pid, 0)
+
+
+def end_with_parent() -> None:
+    """Let this process, a fork, be killed as soon as the thread that forked it has gone."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _children(pid: int) -> Iterator[int]:
+    """Give the children of a process; each of its threads has a list of its own."""
+    with suppress(OSError):
+        for thread in (_PROC / str(pid) / "task").iterdir():
+            with suppress(OSError):
+                yield from map(int, (thread / "children").read_text().split())
+
+
+def _descendants(pid: int) -> Iterator[int]:
+    for child in _children(pid):
+        yield child
+        yield from _descendants(child)
+
+
+def _command(pid: int) -> str:
+    """Give how a process was started; nothing where it has ended and is only not reaped."""
+    with suppress(OSError):
+        return (_PROC / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ").decode().strip()
+    return ""
