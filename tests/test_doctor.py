@@ -6,11 +6,13 @@ from drivers.errors import PortError
 from drivers.serial.list_ports import Access, Host, SerialPort
 from drivers.servo_bus.discovery import Found
 from drivers.types import ServoSetup
-from robot.bringup.doctor.checks import READ, examine
+from robot.bringup.doctor.checks import apply_fix, examine
+from robot.bringup.doctor.dynamixel import DYNAMIXEL as CHECKS
+from robot.bringup.doctor.dynamixel import READ
 from robot.bringup.doctor.findings import Finding, Fix, worst
 from robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
-from robot.bringup.doctor.run import check, check_all, look, mend, mend_latency
-from robot.bringup.doctor.subject import Patient
+from robot.bringup.doctor.run import apply_fixes, check, check_all, fix_latency, look
+from robot.bringup.doctor.subject import ServoState
 from robot.bringup.scan_report import remarks
 from robot.bringup.searching import Looked
 from robot.bringup.servo_families import DYNAMIXEL
@@ -50,8 +52,8 @@ class Rig:
         self.told = []
         return check(self.port, DYNAMIXEL, SETUPS, BAUD, self.told.append)
 
-    def mend(self, findings):
-        return list(mend(lambda fix: DYNAMIXEL.mend(self.port, fix), findings))
+    def fix(self, findings):
+        return list(apply_fixes(lambda fix: apply_fix(self.port, DYNAMIXEL, fix), findings))
 
     def check_all(self, host):
         return check_all(self.port, host, self.check)
@@ -73,13 +75,13 @@ def test_a_good_rig_is_well():
         "neck_yaw (servo 7)",
     ]
     well = one(findings, "ok", "neck_yaw (servo 7)", "xc330-m288, firmware 53, ")
-    assert "degC" in well.what and not well.cure and not well.fixes
+    assert "degC" in well.what and not well.remedy and not well.fixes
 
 
 def test_the_voltage_latch_is_explained_where_it_is_armed():
     findings = Rig().check()
     note = one(findings, "note", "left_eye_pan (servo 1)", "makes it limp until it is restarted")
-    assert "gazerig reboot" in note.cure and "3.5..7.0 V" in note.what
+    assert "gazerig reboot" in note.remedy and "3.5..7.0 V" in note.what
     assert not any(f.level == "note" and f.where == "neck_yaw (servo 7)" for f in findings)
 
 
@@ -108,14 +110,14 @@ BY_REGISTER = [
 
 @pytest.mark.parametrize(("register", "value", "level", "words", "fixable"), BY_REGISTER)
 def test_a_register_that_is_not_as_wished(register, value, level, words, fixable):
-    findings = examine(patient(**{register: value}))
+    findings = examine(servo_state(**{register: value}))
     found = one(findings, level, "left_eye_pan (servo 1)", words)
-    assert found.cure and bool(found.fixes) == fixable
+    assert found.remedy and bool(found.fixes) == fixable
     if fixable:
         assert any(fix.register == register and fix.was == value for fix in found.fixes)
 
 
-def patient(setup=SETUPS[0], found=None, garbled=0, **values):
+def servo_state(setup=SETUPS[0], found=None, corrupt=0, **values):
     """Give a healthy servo with some registers otherwise."""
     good = {
         **dict.fromkeys(READ, 0),
@@ -134,7 +136,7 @@ def patient(setup=SETUPS[0], found=None, garbled=0, **values):
         "present_input_voltage": 50,
         "present_temperature": 30,
     }
-    return Patient(setup, found or Found(1, 1190, 53, BAUD), {**good, **values}, garbled)
+    return ServoState(CHECKS, setup, found or Found(1, 1190, 53, BAUD), {**good, **values}, corrupt)
 
 
 BY_STATE = [
@@ -155,12 +157,12 @@ BY_STATE = [
 
 @pytest.mark.parametrize(("values", "level", "words", "cure"), BY_STATE)
 def test_the_state_of_a_servo(values, level, words, cure):
-    found = one(examine(patient(**values)), level, "left_eye_pan (servo 1)", words)
-    assert cure in found.cure
+    found = one(examine(servo_state(**values)), level, "left_eye_pan (servo 1)", words)
+    assert cure in found.remedy
 
 
 def test_two_latches_are_two_findings():
-    findings = examine(patient(hardware_error_status=0x24))
+    findings = examine(servo_state(hardware_error_status=0x24))
     assert [f.what for f in findings if f.level == "error"] == [
         "has latched: overheating",
         "has latched: overload",
@@ -182,27 +184,27 @@ def test_two_latches_are_two_findings():
     ],
 )
 def test_at_the_edge(values, edge):
-    assert worst(examine(patient(**values))) == edge
+    assert worst(examine(servo_state(**values))) == edge
 
 
 def test_firmware():
-    old = examine(patient(found=Found(1, 1190, 45, BAUD)))
-    assert one(old, "warn", "left_eye_pan (servo 1)", "no fast sync read").cure
-    known = examine(patient(found=Found(1, 1190, 52, BAUD)))
+    old = examine(servo_state(found=Found(1, 1190, 45, BAUD)))
+    assert one(old, "warn", "left_eye_pan (servo 1)", "no fast sync read").remedy
+    known = examine(servo_state(found=Found(1, 1190, 52, BAUD)))
     assert one(known, "note", "left_eye_pan (servo 1)", "firmware 52")
     wanted = SETUPS[0]._replace(firmware_min=53)
-    below = examine(patient(setup=wanted, found=Found(1, 1190, 52, BAUD)))
+    below = examine(servo_state(setup=wanted, found=Found(1, 1190, 52, BAUD)))
     assert one(below, "error", "left_eye_pan (servo 1)", "the YAML wants 53")
 
 
 def test_a_wrong_model_is_not_judged_further():
-    (only,) = examine(patient(found=Found(1, 1240, 53, BAUD), torque_enable=1))
+    (only,) = examine(servo_state(found=Found(1, 1240, 53, BAUD), torque_enable=1))
     assert only.level == "error" and "is xc330-m288, the YAML says xl330-m077" in only.what
-    assert "gazerig setup --joint left_eye_pan" in only.cure
+    assert "gazerig setup --joint left_eye_pan" in only.remedy
 
 
 def test_what_was_not_read_is_said():
-    found = one(examine(patient(shutdown=None, velocity_limit=None)), "error",
+    found = one(examine(servo_state(shutdown=None, velocity_limit=None)), "error",
                 "left_eye_pan (servo 1)", "gave no good answer about")  # fmt: skip
     assert "shutdown" in found.what and "velocity limit" in found.what
 
@@ -215,7 +217,7 @@ def test_a_missing_servo_a_stranger_and_one_at_another_rate():
     rig.set(2, baud_rate=1)
     findings = rig.check()
     assert "57600" in one(findings, "error", "left_eye_tilt (servo 2)", "answers at 57600").what
-    assert "gazerig setup" in one(findings, "error", "neck_yaw (servo 7)", "does not answer").cure
+    assert "gazerig setup" in one(findings, "error", "neck_yaw (servo 7)", "does not answer").remedy
     assert one(findings, "warn", "the bus", "servo 30 (xc330-m288) answers")
     assert one(findings, "ok", "left_eye_pan (servo 1)", "xl330-m077")
     assert any("57600" in words for words in rig.told)
@@ -227,28 +229,28 @@ def test_a_factory_fresh_servo_among_the_others():
     rig = Rig([*(ServoSpec(s.id, s.model) for s in SETUPS[:2]), ServoSpec(11, "xc330-m288")])
     rig.set(11, baud_rate=1)
     found = one(rig.check(), "warn", "the bus", "servo 11 (xc330-m288) answers at 57600")
-    assert "gazerig setup" in found.cure
+    assert "gazerig setup" in found.remedy
 
 
 def test_nobody():
     rig = Rig()
     rig.port.faults.command("lose all")
     (only,) = rig.check()
-    assert only.level == "error" and "supply" in only.cure
+    assert only.level == "error" and "supply" in only.remedy
 
 
 def test_two_servos_with_one_id():
     rig = Rig()
     rig.port.faults.command("collide 2")
     found = one(rig.check(), "error", "left_eye_tilt (servo 2)", "two servos share id 2")
-    assert "alone" in found.cure
+    assert "alone" in found.remedy
 
 
 def test_a_servo_of_which_only_pieces_come():
     rig = Rig()
     rig.port.faults.command("corrupt 2")
     found = one(rig.check(), "error", "left_eye_tilt (servo 2)", "in pieces only")
-    assert "alone" in found.cure
+    assert "alone" in found.remedy
 
 
 def test_reading_changes_nothing():
@@ -271,13 +273,13 @@ def test_fix_mends_what_is_safe_and_says_it():
     )  # fmt: skip
     rig.set(2, bus_watchdog=255)
     before = rig.chain.positions_steps()
-    done = rig.mend(rig.check())
+    done = rig.fix(rig.check())
     assert all(one.done for one in done)
     assert "left_eye_pan (servo 1): return delay time 250 -> 0: done" in map(str, done)
     assert "left_eye_tilt (servo 2): bus watchdog 255 -> 0: done" in map(str, done)
     assert worst(rig.check()) == "note" and not any(f.fixes for f in rig.check())
     assert rig.chain.positions_steps() == before
-    assert rig.mend(rig.check()) == []
+    assert rig.fix(rig.check()) == []
 
 
 def test_a_servo_that_answers_pings_alone_is_brought_to_speak():
@@ -286,7 +288,7 @@ def test_a_servo_that_answers_pings_alone_is_brought_to_speak():
     servo.memory.set("status_return_level", 0)
     servo.status_level = 0
     found = one(rig.check(), "error", "left_eye_tilt (servo 2)", "answers pings and nothing else")
-    (done,) = rig.mend([found])
+    (done,) = rig.fix([found])
     assert done.done and worst(rig.check()) == "note"
 
 
@@ -295,7 +297,7 @@ def test_fix_leaves_a_servo_alone_whose_torque_is_on():
     rig.set(1, return_delay_time=250)
     rig.chain[1].write(64, b"\x01")
     findings = rig.check()
-    (done,) = rig.mend(findings)
+    (done,) = rig.fix(findings)
     assert str(done) == (
         "left_eye_pan (servo 1): return delay time 250 -> 0: not done, its torque is on"
     )
@@ -307,7 +309,7 @@ def test_a_servo_that_does_not_take_it_is_said():
     rig = Rig()
     fix = Finding("warn", "w", "neck_yaw (servo 7)", "", (Fix(7, "return_delay_time", 3, 0),))
     rig.port.faults.command("refuse 7 7")
-    (done,) = rig.mend([fix])
+    (done,) = rig.fix([fix])
     assert not done.done and "does not take it" in done.what
 
 
@@ -323,7 +325,7 @@ def facts(access, holders=()):
 def test_a_good_port_and_its_lasting_name():
     first, second = examine_port(facts(Access(True, True, True, "dialout", True)))
     assert (first.level, second.level) == ("ok", "note")
-    assert "/dev/serial/by-id/usb-FTDI-if00" in second.cure
+    assert "/dev/serial/by-id/usb-FTDI-if00" in second.remedy
 
 
 @pytest.mark.parametrize(
@@ -341,7 +343,7 @@ def test_a_good_port_and_its_lasting_name():
 )  # fmt: skip
 def test_a_port_that_cannot_be_used(access, holders, words, cure):
     (only,) = examine_port(facts(access, holders))
-    assert only.level == "error" and words in only.what and cure in only.cure
+    assert only.level == "error" and words in only.what and cure in only.remedy
 
 
 def test_latency_timer(tmp_path):
@@ -352,14 +354,14 @@ def test_latency_timer(tmp_path):
     file.write_text("16\n")
     (slow,) = examine_latency("/dev/ttyUSB0", host)
     assert slow.level == "warn" and "16 ms" in slow.what
-    assert UDEV_RULE in slow.cure and str(file) in slow.cure
+    assert UDEV_RULE in slow.remedy and str(file) in slow.remedy
     assert UDEV_RULE == (
         'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
     )
-    (done,) = mend_latency("/dev/ttyUSB0", host)
+    (done,) = fix_latency("/dev/ttyUSB0", host)
     assert str(done) == "/dev/ttyUSB0: latency timer 16 -> 1 ms: done"
     (good,) = examine_latency("/dev/ttyUSB0", host)
-    assert good.level == "ok" and mend_latency("/dev/ttyUSB0", host) == []
+    assert good.level == "ok" and fix_latency("/dev/ttyUSB0", host) == []
     file.write_text("what?")
     (unread,) = examine_latency("/dev/ttyUSB0", host)
     assert unread.level == "note"

@@ -6,10 +6,11 @@ from drivers.feetech.memory_table import REGISTERS, TABLE_END
 from drivers.feetech.registers import StsRegisters
 from drivers.feetech.scan import Found
 from drivers.types import ServoSetup
-from robot.bringup.doctor.feetech import examine, take
-from robot.bringup.doctor.feetech_subject import StsPatient
+from robot.bringup.doctor.checks import apply_fix, examine, take
+from robot.bringup.doctor.feetech import FEETECH as CHECKS
 from robot.bringup.doctor.findings import worst
-from robot.bringup.doctor.run import check, mend
+from robot.bringup.doctor.run import apply_fixes, check
+from robot.bringup.doctor.subject import ServoState
 from robot.bringup.servo_families import FEETECH
 from sim_mock.feetech.chain import build_feetech
 from sim_mock.in_process_port import InProcessPort
@@ -54,8 +55,8 @@ class Rig:
     def check(self):
         return check(self.port, FEETECH, SETUPS, BAUD, lambda _: None)
 
-    def mend(self, findings):
-        return list(mend(lambda fix: FEETECH.mend(self.port, fix), findings))
+    def fix(self, findings):
+        return list(apply_fixes(lambda fix: apply_fix(self.port, FEETECH, fix), findings))
 
 
 def one(findings, level, where, words):
@@ -73,7 +74,7 @@ def test_a_good_rig_is_well_and_nobody_guards_it():
     assert one(findings, "ok", YAW, "sts3215, firmware 3.53, 7.4 V, 30 degC, at step 2048")
 
 
-def patient(setup=SETUPS[0], found=None, garbled=0, **values):
+def servo_state(setup=SETUPS[0], found=None, corrupt=0, **values):
     """Give a healthy servo with some registers otherwise."""
     good = {
         "id": setup.id,
@@ -100,7 +101,9 @@ def patient(setup=SETUPS[0], found=None, garbled=0, **values):
         "present_temperature": 30,
         "status": 0,
     }
-    return StsPatient(setup, found or Found(setup.id, 777, 353, BAUD), {**good, **values}, garbled)
+    return ServoState(
+        CHECKS, setup, found or Found(setup.id, 777, 353, BAUD), {**good, **values}, corrupt
+    )
 
 
 RULES = [
@@ -137,8 +140,8 @@ RULES = [
 
 @pytest.mark.parametrize(("values", "level", "words", "cure"), RULES)
 def test_what_can_be_wrong(values, level, words, cure):
-    found = one(examine(patient(**values)), level, PAN, words)
-    assert cure in found.cure
+    found = one(examine(servo_state(**values)), level, PAN, words)
+    assert cure in found.remedy
     assert bool(found.fixes) == (cure == "--fix")
 
 
@@ -155,41 +158,44 @@ def test_what_can_be_wrong(values, level, words, cure):
     ],
 )
 def test_at_the_edge(values):
-    assert worst(examine(patient(**values))) == "ok"
+    assert worst(examine(servo_state(**values))) == "ok"
 
 
 def test_a_twelve_volt_servo_that_is_still_set_for_less():
     strong = ServoSetup(1, "sts3215-12v", 1650, 2446, 3000.0, "left_eye_pan")
     found = one(
-        examine(patient(strong, present_input_voltage=120)), "error", PAN, "limits are 4.0..8.0 V"
+        examine(servo_state(strong, present_input_voltage=120)),
+        "error",
+        PAN,
+        "limits are 4.0..8.0 V",
     )
-    assert "must come off this supply" in found.cure and "Max Voltage (14) to 140" in found.cure
+    assert "must come off this supply" in found.remedy and "Max Voltage (14) to 140" in found.remedy
     assert not found.fixes  # nobody but a person can see which servo it is
 
 
 def test_a_joint_that_asks_for_more_speed_than_there_is():
     fast = SETUPS[0]._replace(max_speed_steps_s=4000.0)
-    assert one(examine(patient(fast)), "note", PAN, "asks its shaft for 352 deg/s")
+    assert one(examine(servo_state(fast)), "note", PAN, "asks its shaft for 352 deg/s")
 
 
 def test_a_wrong_model_or_two_servos_are_not_judged_further():
-    other = patient(found=Found(1, 1029, 353, BAUD), status=0x20)
+    other = servo_state(found=Found(1, 1029, 353, BAUD), status=0x20)
     (only,) = examine(other)
     assert "is model number 1029, the YAML says sts3215" in only.what
-    (only,) = examine(patient(garbled=3, status=0x20))
+    (only,) = examine(servo_state(corrupt=3, status=0x20))
     assert "two servos share id 1" in only.what
 
 
 def test_firmware():
     wanted = SETUPS[0]._replace(firmware_min=400)
-    assert one(examine(patient(wanted)), "error", PAN, "firmware 353, the YAML wants 400")
+    assert one(examine(servo_state(wanted)), "error", PAN, "firmware 353, the YAML wants 400")
 
 
 def test_a_servo_that_does_not_tell():
     rig = Rig()
     found = FEETECH.ping(rig.port, 1, BAUD, 1)
     rig.port.faults.command("lose 1")
-    (only,) = examine(take(StsRegisters(rig.port), SETUPS[0], found, 0))
+    (only,) = examine(take(StsRegisters(rig.port), CHECKS, SETUPS[0], found, 0))
     assert only.level == "error" and "no good answer" in only.what
 
 
@@ -202,7 +208,7 @@ def test_a_missing_servo_a_stranger_and_one_at_another_rate():
     rig.chain.refresh()
     findings = rig.check()
     assert "115200" in one(findings, "error", TILT, "answers at 115200").what
-    assert "gazerig setup" in one(findings, "error", YAW, "does not answer").cure
+    assert "gazerig setup" in one(findings, "error", YAW, "does not answer").remedy
     assert one(findings, "warn", "the bus", "servo 30 (sts3215) answers")
     assert one(findings, "ok", PAN, "sts3215")
     assert rig.port.baudrate == BAUD
@@ -211,14 +217,14 @@ def test_a_missing_servo_a_stranger_and_one_at_another_rate():
 def test_two_servos_with_one_id():
     rig = Rig()
     rig.port.faults.command("collide 2")
-    assert "alone" in one(rig.check(), "error", TILT, "two servos share id 2").cure
+    assert "alone" in one(rig.check(), "error", TILT, "two servos share id 2").remedy
 
 
 def test_nobody():
     rig = Rig()
     rig.port.faults.command("lose all")
     (only,) = rig.check()
-    assert only.level == "error" and "jumper" in only.cure
+    assert only.level == "error" and "jumper" in only.remedy
 
 
 def test_what_servos_suffer():
@@ -229,7 +235,7 @@ def test_what_servos_suffer():
     rig.port.faults.command("overload 7")
     rig.pass_time()
     findings = rig.check()
-    assert "sts3215-12v" in one(findings, "error", PAN, "12.0 V").cure
+    assert "sts3215-12v" in one(findings, "error", PAN, "12.0 V").remedy
     assert one(findings, "warn", TILT, "64 degC")
     assert one(findings, "error", YAW, "reports: overload")
     assert one(findings, "warn", YAW, "torque is on")
@@ -251,7 +257,7 @@ def test_fix_mends_what_is_safe_for_good():
             temperature_limit=90, min_position_limit=0, max_position_limit=0)  # fmt: skip
     rig.set(2, lock=0, status_return_level=0)
     before = rig.chain.positions_steps()
-    done = rig.mend(rig.check())
+    done = rig.fix(rig.check())
     assert all(one.done for one in done), [str(one) for one in done]
     assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
     assert f"{TILT}: lock 0 -> 1: done" in map(str, done)
@@ -268,7 +274,7 @@ def test_fix_leaves_a_servo_alone_whose_torque_is_on():
     rig = Rig()
     rig.set(1, return_delay_time=250)
     rig.chain[1].write(40, b"\x01")
-    (done,) = rig.mend(rig.check())
+    (done,) = rig.fix(rig.check())
     assert str(done) == f"{PAN}: return delay time 250 -> 0: not done, its torque is on"
     assert rig.chain[1].read(7, 1) == b"\xfa"
 
@@ -278,5 +284,5 @@ def test_a_servo_that_does_not_take_it_is_said():
     rig.set(1, return_delay_time=250)
     findings = rig.check()
     rig.port.faults.command("lose 1")
-    (done,) = rig.mend(findings)
+    (done,) = rig.fix(findings)
     assert not done.done and "does not answer" in done.what

@@ -9,9 +9,8 @@ from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
 from drivers.types import ServoSetup
 from robot.bringup.doctor.findings import worst
-from robot.bringup.doctor.maestro import mend as mend_board
-from robot.bringup.doctor.maestro import visit
-from robot.bringup.doctor.run import mend
+from robot.bringup.doctor.maestro import apply_fix, visit
+from robot.bringup.doctor.run import apply_fixes
 from robot.bringup.maestro_settings import (
     clipped,
     instructions,
@@ -66,9 +65,9 @@ def test_a_good_board_and_what_no_board_tells():
     assert "12 channels" in one(findings, "ok", "the board", "compact and the pololu form").what
     assert one(findings, "note", "the servos", "hobby servos tell nothing")
     told = one(findings, "note", "the board", "serial timeout cannot be read")
-    assert "Pololu's program" in told.cure and "gazerig setup" in told.cure
+    assert "Pololu's program" in told.remedy and "gazerig setup" in told.remedy
     wide = one(findings, "note", "left_upper_lid (channel 2)", "goes to 900..1800 us")
-    assert "Min to 896" in wide.cure and "cuts goals silently" in wide.what
+    assert "Min to 896" in wide.remedy and "cuts goals silently" in wide.what
     assert not any(f.where == "eyes_pan (channel 0)" for f in findings)
 
 
@@ -84,23 +83,23 @@ def test_nobody_answers():
     rig = Rig()
     rig.board.choose("mode", "mute")
     (only,) = rig.check()
-    assert only.level == "error" and "serial pins" in only.cure
+    assert only.level == "error" and "serial pins" in only.remedy
     rig.usb = MINI
     (only,) = rig.check()
-    assert "USB Dual Port" in only.cure and "serial pins" not in only.cure
+    assert "USB Dual Port" in only.remedy and "serial pins" not in only.remedy
 
 
 @pytest.mark.parametrize(("real", "wanted"), [(True, False), (False, True)])
 def test_check_bytes(real, wanted):
     rig = Rig(params=MaestroParams(crc=wanted), crc=real)
     found = one(rig.check(), "error", "the board", "the YAML says crc")
-    assert f"bus.maestro.crc: {str(real).lower()}" in found.cure
+    assert f"bus.maestro.crc: {str(real).lower()}" in found.remedy
 
 
 def test_another_device_number():
     rig = Rig(params=MaestroParams(protocol="pololu"), device=3)
     found = one(rig.check(), "error", "the board", "answers the compact form only")
-    assert "its device number is not 12" in found.cure
+    assert "its device number is not 12" in found.remedy
     assert worst(Rig(params=MaestroParams(protocol="pololu", device=3), device=3).check()) == "note"
 
 
@@ -146,7 +145,7 @@ def test_errors_that_it_held(name, says, level, cure):
     rig = Rig()
     rig.board.faults.command(f"error {name}")
     found = one(rig.check(), level, "the board", f"cleared now: {says}")
-    assert cure in found.cure
+    assert cure in found.remedy
     assert not any("cleared now" in f.what for f in rig.check())
 
 
@@ -156,7 +155,7 @@ def test_a_script_is_stopped_by_fix():
     findings = rig.check()
     assert one(findings, "warn", "the board", "runs a script")
     assert rig.board.faults.board()["script"]  # looking alone does not stop it
-    (done,) = mend(lambda fix: mend_board(rig.port, rig.params, fix), findings)
+    (done,) = apply_fixes(lambda fix: apply_fix(rig.port, rig.params, fix), findings)
     assert str(done) == "the board: script 1 -> 0: done"
     assert not rig.board.faults.board()["script"] and worst(rig.check()) != "warn"
 
@@ -165,10 +164,10 @@ def test_pulses_without_a_program():
     rig = Rig()
     rig.do("84 00 70 2E")
     found = one(rig.check(), "warn", "eyes_pan (channel 0)", "1500 us though no program runs it")
-    assert "gazerig home" in found.cure
+    assert "gazerig home" in found.remedy
     rig.do("84 00 00 1F")
     found = one(rig.check(), "error", "eyes_pan (channel 0)", "outside its range 1100..1900 us")
-    assert "switch the servo supply off" in found.cure
+    assert "switch the servo supply off" in found.remedy
 
 
 def test_home():

@@ -4,7 +4,6 @@ import pytest
 from sts_rig import Rig
 
 from drivers.errors import ServoFault, ServoMissing
-from drivers.feetech.assign import assign
 from drivers.feetech.homing import set_middle
 from drivers.feetech.memory_table import BAUD_RATES
 from drivers.feetech.registers import Identity, StsRegisters
@@ -91,50 +90,6 @@ def test_single_registers_through_trouble(fault):
     rig.command(fault)
     assert registers.write(4, "torque_limit", 321)
     assert registers.read(4, "torque_limit") == 321
-
-
-@pytest.mark.parametrize(
-    ("servo_id", "baud"), [(12, 1_000_000), (1, 115_200), (12, 38_400), (1, 1_000_000)]
-)
-def test_assign_changes_id_and_rate_for_good(servo_id, baud):
-    rig = rig_at(1_000_000, 1)
-    rig.port.setBaudRate(1_000_000)
-    found = ping(rig.port, 1, 1_000_000)
-    rig.chain[1].write(40, b"\x01")
-    result = assign(rig.port, found, servo_id, baud)
-    assert result.before == found
-    assert result.now == Found(servo_id, 777, 353, baud)
-    assert ("torque 1 -> 0" in result.done) and not rig.chain[servo_id].torque
-    assert (f"id 1 -> {servo_id}" in result.done) == (servo_id != 1)
-    assert (f"baud rate 1000000 -> {baud} bit/s" in result.done) == (baud != 1_000_000)
-    rig.chain[servo_id].restart()
-    rig.now_s += 1.0
-    rig.chain.refresh()
-    assert ping(rig.port, servo_id, baud) == result.now
-    assert rig.get(servo_id, 55) == 1
-
-
-def test_assign_says_where_a_deaf_servo_answers_now():
-    rig = rig_at(1_000_000, 1)
-    rig.port.setBaudRate(1_000_000)
-    found = ping(rig.port, 1, 1_000_000)
-    rig.command("lose all")
-    with pytest.raises(ServoFault, match="answered last as id 1 at 1000000 bit/s"):
-        assign(rig.port, found, 5, 1_000_000)
-    rig.command("clear")
-    with pytest.raises(
-        ServoMissing, match="does not answer as id 1 at 1000000 bit/s: gazerig scan"
-    ):
-        assign(rig.port, found._replace(number=5), 1, 1_000_000)
-
-
-def test_assign_refuses_what_there_is_not():
-    rig = rig_at(1_000_000, 1)
-    found = Found(1, 777, 353, 1_000_000)
-    with pytest.raises(ValueError, match=r"id 254 is not in 0\.\.253"):
-        assign(rig.port, found, 254, 1_000_000)
-    with pytest.raises(ValueError, match="2000000 bit/s is none of"):
-        assign(rig.port, found, 1, 2_000_000)
 
 
 def test_the_present_place_becomes_the_middle_for_good():

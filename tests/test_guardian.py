@@ -16,7 +16,7 @@ from sts_rig import Rig as StsRig
 
 from config.schema import load_rig
 from drivers.errors import ServoFault, SetupError
-from robot.bringup.one_feetech import OneFeetech
+from robot.bringup.smart_servo import SmartServo
 from robot.guardian.guarded_bus import RETRY_S, GuardedBus
 from robot.guardian.guarded_servo import GuardedServo
 from robot.guardian.guardian import Guardian
@@ -64,7 +64,7 @@ def test_a_dynamixel_with_its_watchdog_needs_no_guardian():
 def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
     rig, guardian = StsRig(), Unattended()
     rig.port.setBaudRate(1_000_000)
-    servo = GuardedServo(OneFeetech("eye", 1, "sts3215", rig.port), guardian)
+    servo = GuardedServo(SmartServo("eye", 1, "sts3215", rig.port), guardian)
     servo.check()
     assert not guardian.other.armed(0)
     servo.hold(0.2, 100.0)

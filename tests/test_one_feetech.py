@@ -7,8 +7,8 @@ import pytest
 
 from drivers.errors import BusLost, ServoFault, ServoMissing
 from drivers.feetech.registers import StsRegisters
-from robot.bringup.one_feetech import OneFeetech
 from robot.bringup.single_joint import SingleJoint, Stopped
+from robot.bringup.smart_servo import SmartServo
 from robot.calibrate.calibrating import by_hand, by_motion
 from robot.calibrate.calibration import CalibrationRefused
 from robot.calibrate.placing import HandPlacer, Steered, by_places
@@ -38,7 +38,7 @@ class Bench:
         self.why: str | None = None
         self.script: list[int] = []
         self.said: list[str] = []
-        self.servo = OneFeetech("left_eye_pan", EYE.id, EYE.model, self.port)
+        self.servo = SmartServo("left_eye_pan", EYE.id, EYE.model, self.port)
         self.joint = SingleJoint("left_eye_pan", EYE, self.servo, self.clock, lambda: self.why)
 
     def get(self, register: str) -> int:

@@ -7,8 +7,7 @@ from drivers.errors import PortError, ServoFault, ServoMissing
 from drivers.servo_bus.discovery import COMMON_FIRST, Found
 from drivers.types import ServoSetup
 from robot.bringup.servo_families import DYNAMIXEL
-from robot.bringup.servo_kind import Standing
-from robot.bringup.servo_reboot import restart
+from robot.bringup.servo_reboot import Standing, restart
 from robot.bringup.servo_setup import assign, find_alone, search_order
 from sim_mock.dynamixel.chain import build_dynamixel, status
 from sim_mock.in_process_port import InProcessPort

@@ -5,8 +5,7 @@ import pytest
 from drivers.errors import ServoFault, ServoMissing
 from drivers.types import ServoSetup
 from robot.bringup.servo_families import DYNAMIXEL, FEETECH
-from robot.bringup.servo_kind import Standing
-from robot.bringup.servo_reboot import restart
+from robot.bringup.servo_reboot import Standing, restart
 from robot.bringup.servo_setup import assign, find_alone, search_order
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.feetech.chain import build_feetech
@@ -77,7 +76,7 @@ def test_two_servos_are_refused_at_one_rate_and_at_two():
 def test_another_model_is_refused_and_left_alone():
     bench = Bench()
     before = bench.chain[1].read(0, 40)
-    other = FEETECH._replace(number=lambda model: 1029)
+    other = FEETECH._replace(models={"sts3215": FEETECH.models["sts3215"]._replace(number=1029)})
     with pytest.raises(ServoMissing, match="this is sts3215"):
         assign(bench.port, other, bench.find(), YAW, BAUD, print)
     assert bench.chain[1].read(0, 40) == before
@@ -130,9 +129,9 @@ def test_kinds_write_firmware_as_their_makers_do():
 def test_anybody_is_a_matter_of_answers_not_of_echoes():
     bench = Bench()
     bench.port.setBaudRate(BAUD)
-    assert FEETECH.anybody(bench.port)
+    assert FEETECH.any_reply(bench.port)
     bench.port.faults.command("lose all")
-    assert not FEETECH.anybody(bench.port)
+    assert not FEETECH.any_reply(bench.port)
     bench.port.faults.command("echo on")
-    assert not FEETECH.anybody(bench.port)
-    assert DYNAMIXEL.anybody(InProcessPort(build_dynamixel([], lambda: 0.0)))
+    assert not FEETECH.any_reply(bench.port)
+    assert DYNAMIXEL.any_reply(InProcessPort(build_dynamixel([], lambda: 0.0)))

@@ -7,7 +7,7 @@ import pytest
 from drivers.errors import BusLost, ServoFault, ServoMissing
 from drivers.servo_bus.registers import Registers
 from robot.bringup.single_joint import SingleJoint, Stopped
-from robot.bringup.smart_servo import OneDynamixel
+from robot.bringup.smart_servo import SmartServo
 from robot.calibrate.calibrating import by_hand, by_motion
 from robot.calibrate.calibration import CalibrationRefused
 from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
@@ -39,7 +39,7 @@ class Bench:
         self.said: list[str] = []
         self.agreed = True
         name = "left_eye_pan" if joint.id == 1 else "neck_yaw"
-        servo = OneDynamixel(name, joint.id, joint.model, self.registers)
+        servo = SmartServo(name, joint.id, joint.model, self.port)
         self.joint = SingleJoint(name, joint, servo, self.clock, lambda: self.why)
 
     @property
@@ -214,7 +214,7 @@ def test_a_homing_offset_can_be_cleared() -> None:
 
 def test_a_wrong_model_a_fault_and_a_silent_servo_are_named() -> None:
     bench = free()
-    wrong = OneDynamixel("left_eye_pan", EYE.id, "xc330-m288", bench.registers)
+    wrong = SmartServo("left_eye_pan", EYE.id, "xc330-m288", bench.port)
     with pytest.raises(ServoMissing, match="is xl330-m077, not xc330-m288"):
         wrong.check()
     bench.port.faults.command("overload 1")

@@ -39,7 +39,10 @@ class StsRegisters:
     """Single registers by name; every exchange is tried three times.
 
     error: error bits of the newest answer; data and orders are good all the same
+    refusal: always 0: an STS refuses by silence
     """
+
+    refusal = 0
 
     def __init__(self, port: BusPort, tries: int = TRIES) -> None:
         self._port = port

@@ -149,9 +149,11 @@ def known_kinds(text: str) -> tuple[BusKind, ...]:
     Raises:
         ValueError: there is no such kind.
     """
-    for kind in BUS_KINDS:
+    for kind in ORDER:
         if text == kind:
             return (kind,)
+    if text in BUS_KINDS:
+        raise ValueError(f"{text}: hangs on no serial port: gazerig doctor RIG asks it")
     if text != "all":
-        raise ValueError(f"{text}: not all or one of {', '.join(BUS_KINDS)}")
-    return BUS_KINDS
+        raise ValueError(f"{text}: not all or one of {', '.join(sorted(ORDER))}")
+    return ORDER

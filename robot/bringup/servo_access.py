@@ -3,6 +3,7 @@
 from typing import NamedTuple, Protocol
 
 from drivers.errors import BusLost
+from robot.bringup.servo_kind import Registers
 
 
 class Found(NamedTuple):
@@ -82,18 +83,6 @@ class OneServo(Protocol):
 
     def leave(self) -> None:
         """Torque off, and everything else as it was found."""
-        ...
-
-
-class Registers(Protocol):
-    """Single registers by name, as drivers.servo_bus.registers and feetech_registers have them."""
-
-    def read(self, servo_id: int, name: str) -> int | None:
-        """Give a value, None where no good answer came."""
-        ...
-
-    def write(self, servo_id: int, name: str, value: int) -> bool:
-        """Write a value; tells whether the servo confirmed it."""
         ...
 
 

@@ -1,75 +1,159 @@
-"""The kinds of smart servos, each as bring-up deals with it."""
+"""The kinds of smart servos, each as bring-up deals with it: the only place that names makes."""
 
-from drivers.dynamixel.control_table import MODELS as DYNAMIXEL_MODELS
-from drivers.feetech import assign as feetech_assign
+from collections.abc import Callable
+
+from drivers.dynamixel import control_table as dynamixel
+from drivers.errors import SetupError
+from drivers.feetech import homing
+from drivers.feetech import memory_table as feetech
 from drivers.feetech import scan as feetech_scan
-from drivers.feetech.memory_table import MODELS as FEETECH_MODELS
+from drivers.feetech.protocol import REBOOT, instruction
+from drivers.feetech.registers import StsRegisters
 from drivers.serial.port import BusPort
 from drivers.servo_bus import discovery as dynamixel_scan
-from drivers.types import ServoSetup
-from robot.bringup import dynamixel_assign, dynamixel_care, feetech_care
-from robot.bringup.doctor import checks as doctor
-from robot.bringup.doctor import feetech as doctor_feetech
-from robot.bringup.servo_kind import Found, ServoKind, SetUp, Tell
+from drivers.servo_bus.registers import Registers
+from drivers.servo_models import SERVOS
+from robot.bringup.servo_kind import Driving, ServoKind, Setting
+
+XL430_LOAD_FULL = 1000.0
+"""Models without current measurement give their load in 0.1 % of the stall torque there."""
+
+GENTLE_ACCELERATION = 10
+"""1000 steps/s2: a search begins within a tenth of a second."""
 
 
-def _assign_dynamixel(
-    port: BusPort, found: Found, setup: ServoSetup, baud: int, tell: Tell
-) -> SetUp:
-    seen = dynamixel_scan.Found(found.id, found.number, found.firmware, found.baud)
-    return dynamixel_assign.assign(port, seen, setup, baud, tell)
+def _dynamixel_load(model: str, current: int) -> float:
+    """Return Present Current, or Present Load where the model has that, as a share of the stall."""
+    one = dynamixel.MODELS[model]
+    if one.current_limit is None:
+        return current / XL430_LOAD_FULL
+    return current * one.current_unit_ma / (1000.0 * one.stall_current_a)
 
 
-def _assign_feetech(port: BusPort, found: Found, setup: ServoSetup, baud: int, tell: Tell) -> SetUp:
-    tell(f"id {found.id} -> {setup.id}, {found.baud} -> {baud} bit/s")
-    seen = feetech_scan.Found(found.id, found.number, found.firmware, found.baud)
-    return SetUp(*feetech_assign.assign(port, seen, setup.id, baud))
+def _feetech_load(model: str, current: int) -> float:
+    """Return Present Current as a share of the stall current."""
+    amperes = current * feetech.CURRENT_UNIT_MA / 1000.0
+    return amperes / feetech.MODELS[model].stall_current_a
+
+
+def _gentle_dynamixel(
+    value: Callable[[str], int], strength: float, speed_steps_s: float
+) -> dict[str, int]:
+    return {
+        "goal_pwm": max(1, round(value("pwm_limit") * strength)),
+        "profile_acceleration": 0,
+        "profile_velocity": max(1, round(speed_steps_s / dynamixel.VELOCITY_UNIT_STEPS_S)),
+    }
+
+
+def _gentle_feetech(
+    value: Callable[[str], int], strength: float, speed_steps_s: float
+) -> dict[str, int]:
+    return {
+        "torque_limit": max(1, round(feetech.TORQUE_FULL * strength)),
+        "goal_time": 0,
+        "goal_speed": feetech.speed_units(speed_steps_s),
+        "acceleration": GENTLE_ACCELERATION,
+    }
+
+
+def _reboot_feetech(port: BusPort, servo_id: int) -> None:
+    """Tell a servo to restart; whether it has is seen by asking it afterwards."""
+    port.drain()
+    port.write(instruction(servo_id, REBOOT))
+    # Some firmware confirms it.
+    port.drain()
 
 
 DYNAMIXEL = ServoKind(
     name="dynamixel",
     title="Dynamixel",
+    models=dynamixel.MODELS,
     rates=dynamixel_scan.COMMON_FIRST,
+    baud_rates=dynamixel.BAUD_RATES,
     factory_baud=dynamixel_scan.FACTORY_BAUD,
-    nobody="is the servo supply on? does each servo's LED flash once when it comes on? is the "
+    highest_id=252,
+    no_reply="is the servo supply on? does each servo's LED flash once when it comes on? is the "
     "adaptor's plug the TTL one (3 pins), and the first cable in?",
     notes=(),
+    error_status="hardware_error_status",
+    latching=True,
+    answers_all=2,
+    watchdog_unit_s=dynamixel.WATCHDOG_UNIT_S,
+    lock=None,
+    driving=Driving(
+        settings=(Setting("operating_mode", 3), Setting("drive_mode", 0)),
+        offset="homing_offset",
+        offset_usable=False,
+        full_drive=("goal_pwm", "pwm_limit"),
+        gentle=_gentle_dynamixel,
+        load=_dynamixel_load,
+    ),
+    lasting=lambda name: dynamixel.REGISTERS[name].area == "eeprom",
+    name_errors=dynamixel.name_errors,
     version=str,
-    number=lambda model: DYNAMIXEL_MODELS[model].number,
-    everybody=dynamixel_scan.everybody,
-    anybody=lambda port: True,
+    registers=Registers,
+    scan_ids=dynamixel_scan.everybody,
+    any_reply=lambda port: True,
     ping=dynamixel_scan.ping,
-    garbled=dynamixel_scan.garbled,
-    assign=_assign_dynamixel,
-    examine=doctor.visit,
-    mend=dynamixel_care.mend,
-    standing=dynamixel_care.standing,
+    corrupt=dynamixel_scan.garbled,
     reboot=dynamixel_scan.reboot,
 )
 
 FEETECH = ServoKind(
     name="feetech",
     title="Feetech STS",
+    models=feetech.MODELS,
     rates=feetech_scan.COMMON_FIRST,
+    baud_rates=feetech.BAUD_RATES,
     factory_baud=feetech_scan.FACTORY_BAUD,
-    nobody="is the servo supply on, and its voltage that of the servos (7.4 or 12 V)? is the "
+    highest_id=feetech.HIGHEST_ID,
+    no_reply="is the servo supply on, and its voltage that of the servos (7.4 or 12 V)? is the "
     "first cable in, and the adaptor's jumper set to USB?",
     notes=(
         "an STS has no bus watchdog: if the cable or the computer dies it holds its last goal; "
         "keep the switch of the servo supply at hand",
     ),
+    error_status="status",
+    latching=False,
+    answers_all=1,
+    watchdog_unit_s=None,
+    lock="lock",
+    driving=Driving(
+        settings=(
+            Setting("operating_mode", 0),
+            Setting("phase", 0, feetech.MULTI_TURN),
+            Setting("angular_resolution", 1),
+        ),
+        offset="position_offset",
+        offset_usable=True,
+        full_drive=None,
+        gentle=_gentle_feetech,
+        load=_feetech_load,
+    ),
+    lasting=lambda name: feetech.REGISTERS[name].area == "eeprom",
+    name_errors=feetech.name_errors,
     version=lambda firmware: f"{firmware // 100}.{firmware % 100}",
-    number=lambda model: FEETECH_MODELS[model].number,
-    everybody=feetech_scan.everybody,
-    anybody=feetech_scan.anybody,
+    registers=StsRegisters,
+    scan_ids=feetech_scan.everybody,
+    any_reply=feetech_scan.anybody,
     ping=feetech_scan.ping,
-    garbled=feetech_scan.garbled,
-    assign=_assign_feetech,
-    examine=doctor_feetech.visit,
-    mend=feetech_care.mend,
-    standing=feetech_care.standing,
-    reboot=feetech_care.reboot,
+    corrupt=feetech_scan.garbled,
+    reboot=_reboot_feetech,
+    set_middle=homing.set_middle,
 )
 
-KINDS: dict[str, ServoKind] = {"dynamixel": DYNAMIXEL, "feetech": FEETECH}
+KINDS: dict[str, ServoKind] = {kind.name: kind for kind in (DYNAMIXEL, FEETECH)}
 """By the name that a rig's YAML gives them."""
+
+
+def kind_of(model: str) -> ServoKind:
+    """Return the kind of a servo by its model.
+
+    Raises:
+        drivers.errors.SetupError: it is no smart servo.
+    """
+    kind = KINDS.get(SERVOS[model].bus)
+    if kind is None:
+        raise SetupError(f"{model} is no servo that answers: name a joint with a smart servo")
+    return kind

@@ -1,19 +1,19 @@
-"""What bring-up asks of a kind of smart servo: finding, naming, examining and restarting one.
+"""What bring-up must know of a kind of smart servo: one value a kind.
 
-One value a kind stands in robot.bringup.servo_families; a Maestro, which has channels instead of
-servos that answer, is looked at in robot.bringup.doctor.maestro.
+The values stand in robot.bringup.servo_families; everything else in bring-up is written once.
+A board of hobby servos, whose channels do not answer, is no such kind.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from drivers.serial.port import BusPort
 from drivers.servo_models import BusKind
-from drivers.types import ServoSetup
-from robot.bringup.doctor.findings import Finding, Fix
 
 Tell = Callable[[str], None]
 """Is told in a few words what is being done now."""
+
+TRIES = 3
 
 
 class Found(Protocol):
@@ -21,59 +21,130 @@ class Found(Protocol):
 
     @property
     def id(self) -> int:
-        """Give its id."""
+        """Return its id."""
         ...
 
     @property
     def number(self) -> int:
-        """Give its model number."""
+        """Return its model number."""
         ...
 
     @property
     def firmware(self) -> int:
-        """Give its firmware as its kind counts it."""
+        """Return its firmware as its kind counts it."""
         ...
 
     @property
     def baud(self) -> int:
-        """Give the rate at which it answered."""
+        """Return the rate at which it answered."""
         ...
 
     @property
     def model(self) -> str:
-        """Name its model."""
+        """Return the name of its model."""
         ...
 
 
-class SetUp(NamedTuple):
-    """What has become of one servo: as it was found, as it is now, and what was written."""
+class ServoModel(Protocol):
+    """What kinds of servos tell of each of their models."""
 
-    before: Found
-    now: Found
-    done: tuple[str, ...]
+    @property
+    def name(self) -> str:
+        """Return its name in a rig's YAML."""
+        ...
+
+    @property
+    def number(self) -> int:
+        """Return the number by which it names itself."""
+        ...
+
+    @property
+    def max_voltage(self) -> int:
+        """Return its upper voltage limit from the factory, 0.1 V."""
+        ...
+
+    @property
+    def rated_v(self) -> float:
+        """Return the voltage that it is made for."""
+        ...
 
 
-class Standing(NamedTuple):
-    """How a servo stands.
+class Identity(Protocol):
+    """What a servo calls itself."""
 
-    errors: by name; torque: None where it could not be read
-    position: in steps, None likewise
-    latching: errors stay until a restart; else they go with their cause
+    @property
+    def model_number(self) -> int:
+        """Return the number of its model."""
+        ...
+
+    @property
+    def firmware(self) -> int:
+        """Return its firmware as its kind counts it."""
+        ...
+
+
+class Registers(Protocol):
+    """Single registers of single servos by name."""
+
+    @property
+    def refusal(self) -> int:
+        """Return the error number of the newest exchange that was refused, 0 for none."""
+        ...
+
+    def identify(self, servo_id: int) -> Identity | None:
+        """Return what a servo calls itself, None where nobody answers."""
+        ...
+
+    def read(self, servo_id: int, name: str) -> int | None:
+        """Return a value, None where no good answer came."""
+        ...
+
+    def read_bytes(self, servo_id: int, address: int, length: int) -> bytes | None:
+        """Return bytes of the table, None where no good answer came."""
+        ...
+
+    def write(self, servo_id: int, name: str, value: int) -> bool:
+        """Write a value; returns whether the servo confirmed it."""
+        ...
+
+    def write_all(self, ids: Sequence[int], name: str, value: int) -> None:
+        """Write one value to several servos at once, unconfirmed."""
+        ...
+
+    def settle(self, servo_id: int, name: str, value: int) -> bool:
+        """Write a value only where it differs; returns whether it has it now."""
+        ...
+
+
+class Setting(NamedTuple):
+    """A register that must have a value where it is calibrated; ``mask`` chooses its bits."""
+
+    register: str
+    value: int
+    mask: int = ~0
+
+    def of(self, now: int) -> int:
+        """Return what the register should be, being this now."""
+        return now & ~self.mask | self.value & self.mask
+
+
+class Driving(NamedTuple):
+    """How one servo of a kind is led gently by itself.
+
+    settings: without which its steps do not mean what they should
+    offset: register that shifts its position; offset_usable: it keeps to that
+    full_drive: register and the one that holds its largest value, to which it is put back
+    gentle: makes the registers of a share of full drive and a speed in steps/s; reads registers
+        by name
+    load: present current as a share of the stall current, of a model by its name
     """
 
-    errors: tuple[str, ...]
-    torque: bool | None
-    position: int | None
-    voltage_v: float | None
-    latching: bool = True
-
-    def __str__(self) -> str:
-        """Say it in a line."""
-        word, none = ("latched", "nothing latched") if self.latching else ("reports", "no errors")
-        errors = f"{word}: {' and '.join(self.errors)}" if self.errors else none
-        torque = {None: "torque unknown", False: "torque off", True: "torque on"}[self.torque]
-        volts = "" if self.voltage_v is None else f", {self.voltage_v:.1f} V"
-        return f"{errors}, {torque}, at step {self.position}{volts}"
+    settings: tuple[Setting, ...]
+    offset: str
+    offset_usable: bool
+    full_drive: tuple[str, str] | None
+    gentle: Callable[[Callable[[str], int], float, float], dict[str, int]]
+    load: Callable[[str, int], float]
 
 
 class ServoKind(NamedTuple):
@@ -81,33 +152,63 @@ class ServoKind(NamedTuple):
 
     title: as people call it
     rates: every baud rate, the usual ones first; factory_baud: of a new servo, whose id is 1
-    nobody: what to look at where no servo answers
+    baud_rates: by the value of the servo's register
+    no_reply: what to look at where no servo answers
     notes: what must be known of all of them
+    error_status: register of its errors; latching: they stay until a restart
+    answers_all: Status Return Level at which everything is confirmed
+    watchdog_unit_s: unit of its bus watchdog, None where it has none
+    lock: register that opens the memory which outlives the power, None where the torque does
+    lasting: whether a register is kept without power
     version: writes a firmware number as the maker does
-    number: gives the model number of a model by its name
-    everybody: asks all ids; gives who answered, and the number of bytes that made no sense
-    anybody: tells quickly whether anyone at all answers; True where only ``everybody`` knows
-    ping: asks one id at the baud rate given; garbled: how many of some answers came in pieces
-    assign: gives a servo id and baud rate of a joint
-    examine: judges one servo; the last number is what ``garbled`` has counted
-    mend: writes one fix, the torque being off; gives "" or why it was not done
-    standing: reads how a servo stands; reboot: tells it to restart
+    registers: makes access to single registers, of a port and a number of tries
+    scan_ids: asks all ids; returns who answered, and the number of bytes that made no sense
+    any_reply: whether any servo answers, quickly; True where only ``scan_ids`` can tell
+    ping: asks one id at the baud rate given; corrupt: how many of some answers came in pieces
+    reboot: tells a servo to restart
+    set_middle: makes the present position the middle, None where a kind cannot
     """
 
     name: BusKind
     title: str
+    models: Mapping[str, ServoModel]
     rates: tuple[int, ...]
+    baud_rates: tuple[int, ...]
     factory_baud: int
-    nobody: str
+    highest_id: int
+    no_reply: str
     notes: tuple[str, ...]
+    error_status: str
+    latching: bool
+    answers_all: int
+    watchdog_unit_s: float | None
+    lock: str | None
+    driving: Driving
+    lasting: Callable[[str], bool]
+    name_errors: Callable[[int], tuple[str, ...]]
     version: Callable[[int], str]
-    number: Callable[[str], int]
-    everybody: Callable[[BusPort, int], tuple[tuple[Found, ...], int]]
-    anybody: Callable[[BusPort], bool]
+    registers: Callable[[BusPort, int], Registers]
+    scan_ids: Callable[[BusPort, int], tuple[tuple[Found, ...], int]]
+    any_reply: Callable[[BusPort], bool]
     ping: Callable[[BusPort, int, int, int], Found | None]
-    garbled: Callable[[BusPort, int, int], int]
-    assign: Callable[[BusPort, Found, ServoSetup, int, Tell], SetUp]
-    examine: Callable[[BusPort, ServoSetup, Found, int], list[Finding]]
-    mend: Callable[[BusPort, Fix], str]
-    standing: Callable[[BusPort, int], Standing]
+    corrupt: Callable[[BusPort, int, int], int]
     reboot: Callable[[BusPort, int], None]
+    set_middle: Callable[[BusPort, int], int] | None = None
+
+    def model_name(self, number: int) -> str:
+        """Return the name of a model by its number, "model number 1029" where it is unknown."""
+        names = (name for name, model in self.models.items() if model.number == number)
+        return next(names, f"model number {number}")
+
+    def write_lasting(self, registers: Registers, servo_id: int, name: str, value: int) -> bool:
+        """Write a register so that it outlives the power, where it is one that can.
+
+        Where there is a lock it is open for this alone. Returns whether the servo has the value.
+        """
+        if self.lock is None or not self.lasting(name):
+            return registers.settle(servo_id, name, value)
+        if not registers.write(servo_id, self.lock, 0):
+            return False
+        written = registers.write(servo_id, name, value)
+        closed = registers.write(servo_id, self.lock, 1)
+        return closed and written and registers.read(servo_id, name) == value

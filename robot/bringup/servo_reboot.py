@@ -5,11 +5,34 @@ from typing import NamedTuple
 
 from drivers.errors import ServoFault, ServoMissing
 from drivers.serial.port import BusPort
-from robot.bringup.servo_kind import Found, ServoKind, Standing
+from robot.bringup.servo_kind import TRIES, Found, ServoKind
 
 BACK_S = 3.0
 """A servo that is not back after so long will not come; they take about 0.4 to 0.8 s."""
 PAUSE_S = 0.1
+
+
+class Standing(NamedTuple):
+    """How a servo stands.
+
+    errors: by name; torque: None where it could not be read
+    position: in steps, None likewise
+    latching: errors stay until a restart; else they go with their cause
+    """
+
+    errors: tuple[str, ...]
+    torque: bool | None
+    position: int | None
+    voltage_v: float | None
+    latching: bool = True
+
+    def __str__(self) -> str:
+        """Return it as a line."""
+        word, none = ("latched", "nothing latched") if self.latching else ("reports", "no errors")
+        errors = f"{word}: {' and '.join(self.errors)}" if self.errors else none
+        torque = {None: "torque unknown", False: "torque off", True: "torque on"}[self.torque]
+        volts = "" if self.voltage_v is None else f", {self.voltage_v:.1f} V"
+        return f"{errors}, {torque}, at step {self.position}{volts}"
 
 
 class Rebooted(NamedTuple):
@@ -35,6 +58,25 @@ def present(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> Found:
     return found
 
 
+def standing(port: BusPort, kind: ServoKind, servo_id: int) -> Standing:
+    """Return how a servo stands.
+
+    Raises:
+        drivers.errors.BusLost: the port is gone.
+    """
+    registers = kind.registers(port, TRIES)
+    status = registers.read(servo_id, kind.error_status)
+    torque = registers.read(servo_id, "torque_enable")
+    volts = registers.read(servo_id, "present_input_voltage")
+    return Standing(
+        kind.name_errors(status or 0),
+        None if torque is None else bool(torque),
+        registers.read(servo_id, "present_position"),
+        None if volts is None else volts / 10.0,
+        kind.latching,
+    )
+
+
 def restart(
     port: BusPort,
     kind: ServoKind,
@@ -50,14 +92,14 @@ def restart(
         drivers.errors.BusLost: the port is gone.
     """
     present(port, kind, servo_id, baud)
-    before, began_s = kind.standing(port, servo_id), port.now_s()
+    before, began_s = standing(port, kind, servo_id), port.now_s()
     kind.reboot(port, servo_id)
     for _ in range(round(BACK_S / PAUSE_S)):
         sleep_until(port.now_s() + PAUSE_S)
         if kind.ping(port, servo_id, baud, 1) is None:
             continue
         away_s = port.now_s() - began_s
-        after = kind.standing(port, servo_id)
+        after = standing(port, kind, servo_id)
         if before.torque and after.torque:
             raise ServoFault(
                 f"{port.port_name}: servo {servo_id} has not restarted, its torque is still on: "

@@ -9,10 +9,10 @@ _JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 
 
 def grouped(findings: Sequence[Finding]) -> list[tuple[Level, str, str, str]]:
-    """Give level, places, what and cure, the worst first; the same at several places once."""
+    """Give level, places, what and remedy, the worst first; the same at several places once."""
     groups: dict[tuple[Level, str, str], list[str]] = {}
     for finding in findings:
-        groups.setdefault((finding.level, finding.what, finding.cure), []).append(finding.where)
+        groups.setdefault((finding.level, finding.what, finding.remedy), []).append(finding.where)
     told = [(level, together(at), what, cure) for (level, what, cure), at in groups.items()]
     return sorted(told, key=lambda row: -LEVELS.index(row[0]))
 
@@ -45,7 +45,7 @@ def as_plain(finding: Finding, bus: str) -> dict[str, object]:
         "level": finding.level,
         "where": finding.where,
         "what": finding.what,
-        "cure": finding.cure,
+        "cure": finding.remedy,
         "fixes": [fix._asdict() for fix in finding.fixes],
     }
 

@@ -1,123 +1,140 @@
-"""One Dynamixel servo by itself, for calibrating; implements robot.bringup.servo_access.OneServo.
+"""One smart servo by itself, for calibrating; implements robot.bringup.servo_access.OneServo.
 
-The bus watchdog is armed while the torque is on, so a servo that is left alone stops.
+Where it has a bus watchdog that is armed while the torque is on, so a servo that is left alone
+stops. Where its memory has a lock its limits are opened with the lock shut: the servo obeys and
+its EEPROM keeps the old ones, so switching it off and on puts back what a killed program left.
 """
 
-from drivers.dynamixel.control_table import (
-    MODELS,
-    STEPS_PER_TURN,
-    VELOCITY_UNIT_STEPS_S,
-    WATCHDOG_UNIT_S,
-    name_errors,
-)
 from drivers.errors import ServoFault, ServoMissing, SetupError
-from drivers.servo_bus.registers import Registers
+from drivers.serial.port import BusPort
 from robot.bringup.servo_access import Asked, Found
-from robot.bringup.telemetry import load_share
+from robot.bringup.servo_families import kind_of
+from robot.bringup.servo_kind import TRIES
 
 WATCHDOG_S = 0.3
 """Three readings that were lost in a row must not let it trip."""
 
-POSITION_MODE = 3
+STEPS_PER_TURN = 4096
+
+LIMITS = ("min_position_limit", "max_position_limit")
 
 
-class OneDynamixel:
+class SmartServo:
     """The servo of one joint.
 
     Args:
         name: the joint's.
         servo_id, model: as configured.
-        registers: of the opened port.
+        port: opened.
     """
 
-    def __init__(self, name: str, servo_id: int, model: str, registers: Registers) -> None:
+    def __init__(self, name: str, servo_id: int, model: str, port: BusPort) -> None:
         self.who = f"{name} (servo {servo_id})"
+        self._kind = kind_of(model)
         self.alone = ""
-        self._id, self._model = servo_id, MODELS[model]
-        self._registers = registers
-        self._asked = Asked(registers, servo_id, self.who)
-        self._limits: tuple[int, int] | None = None
+        if self._kind.watchdog_unit_s is None:
+            self.alone = (
+                "these servos have no watchdog: if this program is killed, it holds its last goal "
+                "weakly until the servo power is cut"
+            )
+        self._id, self._model, self._port = servo_id, model, port
+        self._registers = self._kind.registers(port, TRIES)
+        self._asked = Asked(self._registers, servo_id, self.who)
+        self._was: dict[str, int] = {}
 
     def check(self) -> Found:
         """See that it is the right servo, sound, and in position mode; see OneServo."""
-        value = self._asked.value
-        self._refuse_another()
-        latched = value("hardware_error_status")
-        if latched:
-            raise ServoFault(
-                f"{self.who}: {' and '.join(name_errors(latched))}: find the cause, then "
-                f"gazerig reboot {self._id}"
-            )
-        found = Found(
-            value("firmware_version"),
-            (value("min_position_limit"), value("max_position_limit")),
-            value("homing_offset"),
-        )
-        for register, wanted in (("operating_mode", POSITION_MODE), ("drive_mode", 0)):
-            is_now = value(register)
-            if is_now != wanted:
+        # A servo may be set to answer questions alone; this takes no answer and ends that.
+        self._registers.write_all((self._id,), "status_return_level", self._kind.answers_all)
+        firmware = self._refuse_another()
+        value, driving = self._asked.value, self._kind.driving
+        self._refuse_errors(value(self._kind.error_status))
+        low, high = (value(name) for name in LIMITS)
+        for setting in driving.settings:
+            now = value(setting.register)
+            if now != setting.of(now):
                 raise ServoMissing(
-                    f"{self.who}: {register} is {is_now}, not {wanted}: "
+                    f"{self.who}: {setting.register} is {now}, not {setting.of(now)}: "
                     "gazerig doctor --fix sets it"
                 )
-        if found.homing_offset:
+        offset = value(driving.offset)
+        if offset and not driving.offset_usable:
             raise ServoMissing(
-                f"{self.who}: its Homing Offset is {found.homing_offset} steps, which some "
+                f"{self.who}: its Homing Offset is {offset} steps, which some "
                 "firmware loses by a whole turn as the torque comes on: set it to 0 "
                 "(--clear-offset), the calibration makes up for it"
             )
-        return found
+        return Found(firmware, (low, high), offset)
 
-    def _refuse_another(self) -> None:
-        number = self._registers.ping(self._id)
-        if number is None:
+    def _refuse_another(self) -> int:
+        """Return the firmware of the servo, which is of the model that is wanted."""
+        found = self._registers.identify(self._id)
+        if found is None:
             raise ServoMissing(f"{self.who} does not answer: check power, cable, id and baud rate")
-        if number != self._model.number:
-            names = {model.number: model.name for model in MODELS.values()}
+        if found.model_number != self._kind.models[self._model].number:
             raise ServoMissing(
-                f"{self.who} is {names.get(number, f'model number {number}')}, "
-                f"not {self._model.name}: correct the rig file, or check the ids"
+                f"{self.who} is {self._kind.model_name(found.model_number)}, "
+                f"not {self._model}: correct the rig file, or check the ids"
             )
+        return found.firmware
+
+    def _refuse_errors(self, status: int) -> None:
+        if status:
+            remedy = (
+                f"find the cause, then gazerig reboot {self._id}"
+                if self._kind.latching
+                else "let it cool, free it, check its supply"
+            )
+            names = " and ".join(self._kind.name_errors(status))
+            raise ServoFault(f"{self.who}: {names}: {remedy}")
 
     def clear_offset(self) -> int:
-        """Set the Homing Offset to 0, torque off; gives what it was."""
-        was = self._asked.value("homing_offset")
+        """Set the offset of its position to 0, torque off; returns what it was."""
+        register = self._kind.driving.offset
+        was = self._asked.value(register)
         if was:
             self.let_go()
-            self._asked.put("homing_offset", 0)
+            if not self._kind.write_lasting(self._registers, self._id, register, 0):
+                raise ServoMissing(f"{self.who} does not take {register} 0: restart its power")
         return was
 
     def set_middle(self) -> int:
-        """Refuse: see OneServo.
-
-        Raises:
-            drivers.errors.SetupError: always, with the cure.
-        """
-        raise SetupError(
-            f"{self.who}: a Dynamixel servo cannot set its middle: in position mode some firmware "
-            "loses its Homing Offset; take the horn off and turn the shaft"
-        )
+        """Make its present position 2048; returns the offset it has now; see OneServo."""
+        if self._kind.set_middle is None:
+            raise SetupError(
+                f"{self.who}: a {self._kind.title} servo cannot set its middle: in position mode "
+                "some firmware loses its Homing Offset; take the horn off and turn the shaft"
+            )
+        self.let_go()
+        return self._kind.set_middle(self._port, self._id)
 
     def let_go(self) -> None:
-        """Take the torque away, and see that it is gone."""
-        self._asked.put("bus_watchdog", 0)
+        """Switch the torque off, and see that it is.
+
+        Raises:
+            drivers.errors.ServoFault: it is not.
+        """
+        if self._kind.watchdog_unit_s is not None:
+            self._asked.put("bus_watchdog", 0)
         self._asked.put("torque_enable", 0)
+        if self._asked.value("torque_enable"):
+            raise ServoFault(f"{self.who} does not let go: cut the servo power")
 
     def position(self) -> int:
-        """Give the present position."""
+        """Return the present position in steps."""
         return self._asked.value("present_position")
 
     def load(self) -> float:
-        """Give the present current as a share of the stall current; 0 where it has none."""
-        return load_share(self._model, self._asked.value("present_current"))
+        """Return the present current as a share of the stall current."""
+        return self._kind.driving.load(self._model, self._asked.value("present_current"))
 
     def hold(self, strength: float, speed_steps_s: float) -> None:
         """Switch the torque on where it is, weak and slow; see OneServo."""
         value, put = self._asked.value, self._asked.put
-        self._unlimited()
-        put("goal_pwm", max(1, round(value("pwm_limit") * strength)))
-        put("profile_acceleration", 0)
-        put("profile_velocity", max(1, round(speed_steps_s / VELOCITY_UNIT_STEPS_S)))
+        self.let_go()
+        if self._kind.lock is not None:
+            put(self._kind.lock, 1)
+        self._borrow(strength, speed_steps_s)
         before = self.position()
         if not 0 <= before < STEPS_PER_TURN:
             raise ServoMissing(
@@ -131,10 +148,29 @@ class OneDynamixel:
             raise ServoFault(f"{self.who}: the torque does not come on: gazerig doctor says why")
         if abs(now - before) > STEPS_PER_TURN // 4:
             raise ServoFault(f"{self.who}: its position jumped from {before} to {now}")
-        put("bus_watchdog", round(WATCHDOG_S / WATCHDOG_UNIT_S))
+        unit_s = self._kind.watchdog_unit_s
+        if unit_s is not None:
+            put("bus_watchdog", round(WATCHDOG_S / unit_s))
+
+    def _borrow(self, strength: float, speed_steps_s: float) -> None:
+        """Let goals lead anywhere in the turn, weak and slow; the stops alone are to be found."""
+        value, driving = self._asked.value, self._kind.driving
+        wanted = {
+            **dict(zip(LIMITS, (0, STEPS_PER_TURN - 1), strict=True)),
+            **driving.gentle(value, strength, speed_steps_s),
+        }
+        was = {name: value(name) for name in wanted}
+        found = dict(was)
+        if driving.full_drive is not None:
+            register, largest = driving.full_drive
+            found[register] = value(largest)
+        self._was = found | self._was
+        for name, wish in wanted.items():
+            if was[name] != wish:
+                self._asked.put(name, wish)
 
     def holds(self) -> bool:
-        """Tell whether the torque is on."""
+        """Return whether the torque is on."""
         return self._asked.value("torque_enable") == 1
 
     def send(self, goal_steps: int) -> None:
@@ -142,23 +178,9 @@ class OneDynamixel:
         self._asked.put("goal_position", goal_steps)
 
     def leave(self) -> None:
-        """Torque off, and everything else as it was found."""
+        """Switch the torque off and leave everything else as it was found."""
         self.let_go()
-        self._asked.put("goal_pwm", self._asked.value("pwm_limit"))
-        if self._limits is not None:
-            self._limit(*self._limits)
-            self._limits = None
-
-    def _unlimited(self) -> None:
-        """Let goals lead anywhere in the turn; the stops alone are to be found."""
-        value = self._asked.value
-        limits = value("min_position_limit"), value("max_position_limit")
-        if limits == (0, STEPS_PER_TURN - 1):
-            return
-        self.let_go()
-        self._limits = limits
-        self._limit(0, STEPS_PER_TURN - 1)
-
-    def _limit(self, low: int, high: int) -> None:
-        self._asked.put("min_position_limit", low)
-        self._asked.put("max_position_limit", high)
+        for name, value in self._was.items():
+            if self._asked.value(name) != value:
+                self._asked.put(name, value)
+        self._was = {}

@@ -8,13 +8,10 @@ from typing import NamedTuple
 from config.schema import Rig
 from drivers.errors import ServoFault, ServoMissing, SetupError
 from drivers.serial.port import BlockingPort
-from drivers.servo_bus.registers import Registers
-from drivers.servo_models import SERVOS
 from robot.bringup.hobby_servo import OneHobby
-from robot.bringup.one_feetech import OneFeetech
 from robot.bringup.servo_access import OneServo
 from robot.bringup.single_joint import SingleJoint
-from robot.bringup.smart_servo import OneDynamixel
+from robot.bringup.smart_servo import SmartServo
 from robot.calibrate.calibrating import by_hand, by_motion
 from robot.calibrate.calibration import Calibration, CalibrationRefused, Places
 from robot.calibrate.placing import HandPlacer, HobbyPlacer, by_places
@@ -134,7 +131,7 @@ def _one(bench: Bench, name: str, bus: str) -> Made:
     guardian = _guardian(bench, name, bus)
     with opened(bench.rig, bench.wire, bus, guardian) as port:
         joint = bench.rig.joints[name]
-        servo = _servo(name, joint.id, joint.model, port)
+        servo: OneServo = SmartServo(name, joint.id, joint.model, port)
         if guardian is not None:
             servo = GuardedServo(servo, guardian)
         single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
@@ -152,12 +149,6 @@ def _guardian(bench: Bench, name: str, bus: str) -> Guardian | None:
         return None
     plan = release_plan(bench.rig, bus, bench.wire.paths[bus])
     return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
-
-
-def _servo(name: str, servo_id: int, model: str, port: BlockingPort) -> OneServo:
-    if SERVOS[model].bus == "feetech":
-        return OneFeetech(name, servo_id, model, port)
-    return OneDynamixel(name, servo_id, model, Registers(port))
 
 
 def _smart(bench: Bench, single: SingleJoint) -> Made:

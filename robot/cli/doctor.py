@@ -10,7 +10,8 @@ from config.schema import Rig, load_rig
 from drivers.serial.port import BlockingPort
 from robot.bringup.doctor import maestro as doctor_maestro
 from robot.bringup.doctor import run as checkup
-from robot.bringup.doctor.findings import Finding, worst
+from robot.bringup.doctor.checks import apply_fix
+from robot.bringup.doctor.findings import Finding, Fix, worst
 from robot.bringup.doctor.guardian import examine_guardian
 from robot.bringup.doctor.run import Done
 from robot.bringup.servo_families import KINDS
@@ -107,9 +108,9 @@ def _fix(
     """Mend what can be, and say each thing."""
     done: list[Done] = []
     for bus, line in lines.items():
-        done += checkup.mend_latency(line.port_name, bench.host)
+        done += checkup.fix_latency(line.port_name, bench.host)
         if any(finding.fixes for finding in findings[bus]):
-            done += _mend(rig, bus, line, findings[bus])
+            done += _apply(rig, bus, line, findings[bus])
             line.closePort()
     for one in done:
         tell(str(one))
@@ -117,15 +118,16 @@ def _fix(
         tell("nothing that --fix may mend")
 
 
-def _mend(rig: Rig, bus: str, line: BlockingPort, findings: Sequence[Finding]) -> list[Done]:
+def _apply(rig: Rig, bus: str, line: BlockingPort, findings: Sequence[Finding]) -> list[Done]:
     config = rig.bus_named(bus)
     line.setBaudRate(config.baud)
-    if config.kind == "maestro":
-        return list(
-            checkup.mend(lambda fix: doctor_maestro.mend(line, config.maestro, fix), findings)
-        )
-    kind = KINDS[config.kind]
-    return list(checkup.mend(lambda fix: kind.mend(line, fix), findings))
+
+    def write(one: Fix) -> str:
+        if config.kind == "maestro":
+            return doctor_maestro.apply_fix(line, config.maestro, one)
+        return apply_fix(line, KINDS[config.kind], one)
+
+    return list(checkup.apply_fixes(write, findings))
 
 
 def show_findings(findings: Sequence[Finding], tell: Tell) -> None:

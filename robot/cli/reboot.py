@@ -20,7 +20,10 @@ from robot.rig_bus import bus_names, joints_on
 
 app = typer.Typer()
 
-HIGHEST_ID = {"dynamixel": 252, "feetech": 253, "maestro": 23}
+HIGHEST_ID: dict[str, int] = {
+    "maestro": 23,
+    **{kind.name: kind.highest_id for kind in KINDS.values()},
+}
 
 
 @app.command()
@@ -82,7 +85,7 @@ def _reboot(
     name = f"{names[0]} (servo {servo_id})" if names else f"servo {servo_id}"
     baud = rig.bus_named(bus).baud
     servo_reboot.present(line, kind, servo_id, baud)
-    before = kind.standing(line, servo_id)
+    before = servo_reboot.standing(line, kind, servo_id)
     say(f"{name}: {before}")
     limp = f"{name} goes limp: hold what it carries. Restart it?"
     if before.torque and not yes and not typer.confirm(limp, err=True):

@@ -1,141 +1,147 @@
 """What is wrong with a servo: registers as read, judged by the rig's YAML. Nothing is written.
 
-Every rule is a function of one ``Patient`` and yields verdicts. Sources: ROBOTIS e-Manual,
-X series; the numbers are those of drivers.dynamixel.control_table.
+Every rule is a function of one ``ServoState`` and yields verdicts.
 """
 
 from collections.abc import Iterator
 
 from drivers.serial.port import BusPort
-from drivers.servo_bus.discovery import SHARED
-from drivers.servo_bus.registers import Registers
 from drivers.types import ServoSetup
+from robot.bringup.doctor.dynamixel import DYNAMIXEL
+from robot.bringup.doctor.feetech import FEETECH
 from robot.bringup.doctor.findings import Finding, Fix
 from robot.bringup.doctor.settings import SETTINGS
 from robot.bringup.doctor.state import STATE
-from robot.bringup.doctor.subject import Patient, Verdict
-from robot.bringup.servo_kind import Found
+from robot.bringup.doctor.subject import FIX, ServoChecks, ServoState, Verdict
+from robot.bringup.servo_kind import TRIES, Found, Registers, ServoKind
 
-RULES = (*STATE, *SETTINGS)
+CHECKS: dict[str, ServoChecks] = {checks.kind.name: checks for checks in (DYNAMIXEL, FEETECH)}
+"""By the name of the kind."""
 
-READ = (
-    "status_return_level",
-    "torque_enable",
-    "hardware_error_status",
-    "bus_watchdog",
-    "baud_rate",
-    "return_delay_time",
-    "drive_mode",
-    "operating_mode",
-    "secondary_id",
-    "protocol_type",
-    "homing_offset",
-    "temperature_limit",
-    "max_voltage_limit",
-    "min_voltage_limit",
-    "velocity_limit",
-    "max_position_limit",
-    "min_position_limit",
-    "startup_configuration",
-    "shutdown",
-    "present_position",
-    "present_input_voltage",
-    "present_temperature",
-)
-"""The registers that are looked at."""
+SHARED = 2
+"""So many of six answers in pieces are no accident."""
+
+MOST_NAMED = 6
 
 
-def visit(port: BusPort, setup: ServoSetup, found: Found, garbled: int) -> list[Finding]:
+def visit(
+    port: BusPort, kind: ServoKind, setup: ServoSetup, found: Found, corrupt: int
+) -> list[Finding]:
     """Read one servo and judge it; torque is left as it is.
 
     Raises:
         drivers.errors.BusLost: the port is gone.
     """
-    return examine(take(Registers(port), setup, found, garbled))
+    return examine(take(kind.registers(port, TRIES), CHECKS[kind.name], setup, found, corrupt))
 
 
-def take(registers: Registers, setup: ServoSetup, found: Found, garbled: int) -> Patient:
+def take(
+    registers: Registers, checks: ServoChecks, setup: ServoSetup, found: Found, corrupt: int
+) -> ServoState:
     """Read all that the rules want to know of one servo.
 
     Raises:
         drivers.errors.BusLost: the port is gone.
     """
-    first = registers.read(setup.id, READ[0])
-    if first is None:  # answers pings alone: every further question would wait in vain
-        return Patient(setup, found, dict.fromkeys(READ), garbled)
-    rest = {name: registers.read(setup.id, name) for name in READ[1:]}
-    return Patient(setup, found, {READ[0]: first, **rest}, garbled)
+    return ServoState(checks, setup, found, checks.read(registers, setup.id), corrupt)
 
 
-def examine(patient: Patient) -> list[Finding]:
+def examine(state: ServoState) -> list[Finding]:
     """Judge one servo: all that is wrong; one finding says it where it is well.
 
     One that is not the right one, or not alone with its id, is not judged further.
     """
-    whole: list[Verdict] = [*_identity(patient), *_collision(patient)]
+    whole: list[Verdict] = [*_identity(state), *_collision(state)]
     if not whole:
-        silent = patient.values[READ[0]] is None
-        rules = (_mute,) if silent else (_unread, *RULES)
-        whole = [verdict for rule in rules for verdict in rule(patient)]
-    findings = [_finding(patient, verdict) for verdict in whole]
+        rules = (_mute,) if state.silent else (_unread, *STATE, *SETTINGS, *state.checks.rules)
+        whole = [verdict for rule in rules for verdict in rule(state)]
+    findings = [_finding(state, verdict) for verdict in whole]
     if not any(finding.level in ("warn", "error") for finding in findings):
-        findings.insert(0, Finding("ok", _well(patient), patient.where))
+        findings.insert(0, Finding("ok", _well(state), state.where))
     return findings
 
 
-def _finding(patient: Patient, verdict: Verdict) -> Finding:
+def _finding(state: ServoState, verdict: Verdict) -> Finding:
     fixes = tuple(
-        Fix(patient.setup.id, name, value, patient.values.get(name))
-        for name, value in verdict.fixes
+        Fix(state.setup.id, name, value, state.values.get(name)) for name, value in verdict.fixes
     )
-    return Finding(verdict.level, verdict.what, patient.where, verdict.cure, fixes)
+    return Finding(verdict.level, verdict.what, state.where, verdict.remedy, fixes)
 
 
-def _well(patient: Patient) -> str:
-    values, found = patient.values, patient.found
+def _well(state: ServoState) -> str:
+    values, found = state.values, state.found
     return (
-        f"{found.model}, firmware {found.firmware}, "
+        f"{found.model}, firmware {state.checks.kind.version(found.firmware)}, "
         f"{(values['present_input_voltage'] or 0) / 10.0:.1f} V, "
         f"{values['present_temperature']} degC, at step {values['present_position']}"
     )
 
 
-def _identity(patient: Patient) -> Iterator[Verdict]:
-    found, wanted = patient.found, patient.setup.model
-    if found.number != patient.model.number:
+def _identity(state: ServoState) -> Iterator[Verdict]:
+    if state.found.number != state.model.number:
         yield Verdict(
             "error",
-            f"is {found.model}, the YAML says {wanted}",
-            f"connect the right servo and run gazerig setup --joint {patient.setup.name}, "
+            f"is {state.found.model}, the YAML says {state.setup.model}",
+            f"connect the right servo and run gazerig setup --joint {state.setup.name}, "
             "or correct the model in the YAML",
         )
 
 
-def _collision(patient: Patient) -> Iterator[Verdict]:
-    if patient.garbled >= SHARED:
+def _collision(state: ServoState) -> Iterator[Verdict]:
+    if state.corrupt >= SHARED:
         yield Verdict(
             "error",
-            f"{patient.garbled} of 6 answers came in pieces: two servos share id "
-            f"{patient.setup.id}, or a plug is loose",
+            f"{state.corrupt} of 6 answers came in pieces: two servos share id "
+            f"{state.setup.id}, or a plug is loose",
             "connect this joint's servo alone and look with gazerig scan; a second one with "
             "the same id gets its own by gazerig setup",
         )
 
 
-def _mute(patient: Patient) -> Iterator[Verdict]:
-    yield Verdict(
-        "error",
-        "answers pings and nothing else (Status Return Level 0)",
-        "gazerig doctor --fix",
-        (("status_return_level", 2),),
-    )
-
-
-def _unread(patient: Patient) -> Iterator[Verdict]:
-    names = [name.replace("_", " ") for name, value in patient.values.items() if value is None]
-    if names:
+def _mute(state: ServoState) -> Iterator[Verdict]:
+    if state.checks.ping_only:
         yield Verdict(
             "error",
-            f"gave no good answer about {', '.join(names)}",
+            "answers pings and nothing else (Status Return Level 0)",
+            FIX,
+            (("status_return_level", state.checks.kind.answers_all),),
+        )
+    else:
+        yield from _unread(state)
+
+
+def _unread(state: ServoState) -> Iterator[Verdict]:
+    names = [name.replace("_", " ") for name, value in state.values.items() if value is None]
+    if names:
+        named = ", ".join(names) if len(names) <= MOST_NAMED else "its registers"
+        yield Verdict(
+            "error",
+            f"gave no good answer about {named}",
             "check its plug and its neighbours' and try again",
         )
+
+
+# --- mending
+
+
+def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
+    """Write a fix where the torque is off, so that it stays; returns "" or why it was not done.
+
+    Raises:
+        drivers.errors.BusLost: the port is gone.
+    """
+    registers, servo_id = kind.registers(port, TRIES), fix.servo_id
+    torque = registers.read(servo_id, "torque_enable")
+    if not torque and registers.read(servo_id, "status_return_level") != kind.answers_all:
+        # A servo that answers questions or pings alone confirms nothing of what follows.
+        registers.write_all((servo_id,), "status_return_level", kind.answers_all)
+        torque = registers.read(servo_id, "torque_enable")
+    if torque:
+        return "its torque is on"
+    if torque is None:
+        return "the servo does not take it" if registers.refusal else "the servo does not answer"
+    if not kind.write_lasting(registers, servo_id, fix.register, fix.value):
+        return "the servo does not take it"
+    if registers.read(servo_id, fix.register) != fix.value:
+        return "it reads back otherwise"
+    return ""

@@ -35,19 +35,19 @@ class Finding:
     """One thing found.
 
     level: ok, note (worth knowing), warn (works, but not well), error (does not work)
-    what: the fact; where: port, joint or file; cure: what to do, "" where nothing is needed
+    what: the fact; where: port, joint or file; remedy: what to do, "" where nothing is needed
     fixes: what ``--fix`` may do about it
     """
 
     level: Level
     what: str
     where: str
-    cure: str = ""
+    remedy: str = ""
     fixes: tuple[Fix, ...] = ()
 
     def __str__(self) -> str:
         """Write it on one line."""
-        return f"{self.level}: {self.where}: {self.what}{f': {self.cure}' if self.cure else ''}"
+        return f"{self.level}: {self.where}: {self.what}{f': {self.remedy}' if self.remedy else ''}"
 
 
 def worst(findings: Iterable[Finding]) -> Level:

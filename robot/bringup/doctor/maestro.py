@@ -259,7 +259,7 @@ def _untold(board: Board) -> Iterator[Finding]:
     )
 
 
-def mend(port: BusPort, params: MaestroParams, fix: Fix) -> str:
+def apply_fix(port: BusPort, params: MaestroParams, fix: Fix) -> str:
     """Stop the board's script; gives "" or why it was not done. Nothing moves.
 
     Raises:

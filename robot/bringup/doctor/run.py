@@ -1,6 +1,6 @@
 """A whole bus of a rig examined: who is there, at which baud rate, and how each servo is.
 
-Reads only; ``mend`` writes what the findings offer, to servos whose torque is off, and
+Reads only; ``apply_fixes`` writes what the findings offer, to servos whose torque is off, and
 moves nothing.
 """
 
@@ -14,6 +14,7 @@ from drivers.serial.list_ports import WISHED_LATENCY_MS, Host, latency_file, lat
 from drivers.serial.port import BusPort
 from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
+from robot.bringup.doctor.checks import visit
 from robot.bringup.doctor.findings import Finding, Fix, worst
 from robot.bringup.doctor.port import examine_latency, examine_port, port_facts
 from robot.bringup.servo_kind import Found, ServoKind, Tell
@@ -23,19 +24,19 @@ class Presence(NamedTuple):
     """Who answered at the rig's baud rate, by id, and who not.
 
     strangers: answered, but are not in the YAML; elsewhere: answered at other baud rates
-    garbled: how many of six answers came in pieces, by id, where any did
+    corrupt: how many of six answers came in pieces, by id, where any did
     """
 
     there: dict[int, Found]
     missing: tuple[ServoSetup, ...]
     strangers: tuple[Found, ...]
     elsewhere: tuple[Found, ...]
-    garbled: dict[int, int]
+    corrupt: dict[int, int]
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """One thing that ``mend`` did, or why it could not."""
+    """One thing that ``apply_fixes`` did, or why it could not."""
 
     where: str
     what: str
@@ -82,8 +83,8 @@ def check(
     for setup in setups:
         if setup.id in presence.there:
             tell(f"reading {servo_label(setup)}")
-            found, spoilt = presence.there[setup.id], presence.garbled.get(setup.id, 0)
-            findings += kind.examine(port, setup, found, spoilt)
+            found, spoilt = presence.there[setup.id], presence.corrupt.get(setup.id, 0)
+            findings += visit(port, kind, setup, found, spoilt)
     if presence.there:
         findings += [Finding("note", note, "the bus") for note in kind.notes]
     return findings
@@ -100,7 +101,7 @@ def look(
     """
     tell(f"asking everybody at {baud} bit/s")
     _open(port, baud)
-    answers, _ = kind.everybody(port, baud)
+    answers, _ = kind.scan_ids(port, baud)
     there = {found.id: found for found in answers}
     spoilt = {i: n for i, n in Counter(found.id for found in answers).items() if n > 1}
     for setup in setups:
@@ -109,7 +110,7 @@ def look(
             found = kind.ping(port, setup.id, baud, 2)
             if found is not None:
                 there[setup.id] = found
-        pieces = kind.garbled(port, setup.id, 6 if setup.id in there else 1)
+        pieces = kind.corrupt(port, setup.id, 6 if setup.id in there else 1)
         if pieces:
             spoilt[setup.id] = pieces
     missing = tuple(setup for setup in setups if setup.id not in there)
@@ -132,8 +133,8 @@ def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterato
         if other == baud:
             continue
         tell(f"somebody is missing: asking at {other} bit/s")
-        if port.setBaudRate(other) and kind.anybody(port):
-            yield from kind.everybody(port, other)[0]
+        if port.setBaudRate(other) and kind.any_reply(port):
+            yield from kind.scan_ids(port, other)[0]
 
 
 def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[Finding]:
@@ -143,12 +144,12 @@ def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[F
             "error",
             f"no servo answers, at {baud} bit/s or any other rate",
             "the bus",
-            f"{kind.nobody} gazerig scan asks other kinds of servos, too",
+            f"{kind.no_reply} gazerig scan asks other kinds of servos, too",
         )
         return
     at = {found.id: found for found in presence.elsewhere}
     for setup in presence.missing:
-        yield _missing(setup, at.pop(setup.id, None), presence.garbled.get(setup.id, 0), baud)
+        yield _missing(setup, at.pop(setup.id, None), presence.corrupt.get(setup.id, 0), baud)
     for found in at.values():
         yield Finding(
             "warn",
@@ -190,10 +191,10 @@ def _missing(setup: ServoSetup, at: Found | None, spoilt: int, baud: int) -> Fin
     )
 
 
-# --- mending
+# --- fixes
 
 
-def mend_latency(device: str, host: Host) -> list[Done]:
+def fix_latency(device: str, host: Host) -> list[Done]:
     """Set the adaptor's latency timer where it is too long; needs the right to write it."""
     file = latency_file(device, host)
     was = None if file is None else latency_ms(file)
@@ -204,7 +205,7 @@ def mend_latency(device: str, host: Host) -> list[Done]:
     return [Done(device, f"latency timer {was} -> {WISHED_LATENCY_MS} ms: {how}", done)]
 
 
-def mend(write: Callable[[Fix], str], findings: Iterable[Finding]) -> Iterator[Done]:
+def apply_fixes(write: Callable[[Fix], str], findings: Iterable[Finding]) -> Iterator[Done]:
     """Write what the findings offer, one after the other.
 
     write: writes one, where that is safe; gives "" or why it was not done

@@ -1,83 +1,129 @@
-"""How a servo is now: what it has latched, its supply, heat, torque and place.
+"""How a servo is now: its errors, supply, heat, torque and position, and what guards it.
 
-Source: ROBOTIS e-Manual, X series.
+Sources: ROBOTIS e-Manual, X series; Feetech memory table STS3215. A Dynamixel latches errors
+until a restart. On an STS nothing latches: a bit of Status stands as long as its cause, but for
+overload and overcurrent, which stand until a goal that leads away from what holds the joint, or
+a restart.
 """
 
 from collections.abc import Iterator
 
-from drivers.dynamixel.control_table import name_errors
 from robot.bringup.doctor.findings import Level
-from robot.bringup.doctor.subject import Patient, Rule, Verdict
+from robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
+from robot.bringup.servo_kind import ServoModel
 
 TRIPPED = 255
 WARM_C = 10
 """So near to its limit a servo is called warm."""
 WEAK = 0.9
 """Below this share of the rated voltage a servo has little speed and torque left."""
-
-CURES = {
-    "input voltage": "measure the supply at the last servo under load; keep it inside the limits",
-    "overheating": "let it cool for 20 minutes and find what makes it work so hard",
-    "encoder": "replace the servo if it comes again",
-    "electrical shock": "check plugs and wires for shorts; the supply may be too weak",
-    "overload": "free the joint: something holds it or its range is too wide",
-}
+MEANT = 0.875
+"""From this share of a rated voltage on a supply is meant for servos made for that."""
 
 
-def _latched(patient: Patient) -> Iterator[Verdict]:
-    status = patient.values["hardware_error_status"]
-    for error in name_errors(status or 0):
-        cure = CURES.get(error, "look it up in the e-Manual")
-        yield Verdict(
-            "error", f"has latched: {error}", f"{cure}; then gazerig reboot {patient.setup.id}"
-        )
+def _errors(state: ServoState) -> Iterator[Verdict]:
+    kind = state.checks.kind
+    verb = "has latched" if kind.latching else "reports"
+    for error in kind.name_errors(state.values[kind.error_status] or 0):
+        look = f"look it up in {state.checks.manual}"
+        remedy = state.checks.error_remedies.get(error, look)
+        if not remedy:
+            continue
+        if kind.latching:
+            remedy += "; then gazerig reboot {id}"
+        yield Verdict("error", f"{verb}: {error}", remedy.format(id=state.setup.id))
 
 
-def _voltage(patient: Patient) -> Iterator[Verdict]:
-    volts = patient.values["present_input_voltage"]
-    low, high = patient.values["min_voltage_limit"], patient.values["max_voltage_limit"]
+def _voltage(state: ServoState) -> Iterator[Verdict]:
+    volts = state.values["present_input_voltage"]
+    low, high = state.values["min_voltage_limit"], state.values["max_voltage_limit"]
     if volts is None or low is None or high is None:
         return
-    says = f"{volts / 10.0:.1f} V, its limits are {low / 10.0:.1f}..{high / 10.0:.1f} V"
+    text = f"{volts / 10.0:.1f} V, its limits are {low / 10.0:.1f}..{high / 10.0:.1f} V"
     if not low <= volts <= high:
-        yield Verdict("error", says, "correct the supply before anything moves")
-    elif volts < 10.0 * WEAK * patient.model.rated_v:
+        remedy = _too_high(state, volts) if volts > high else ""
+        yield Verdict(
+            "error",
+            f"{text}{state.checks.out_of_voltage}",
+            remedy or "correct the supply before anything moves",
+        )
+    elif volts < 10.0 * WEAK * state.model.rated_v:
         yield Verdict(
             "warn",
-            f"{says}; made for {patient.model.rated_v:g} V, it is slow and weak here",
+            f"{text}; made for {state.model.rated_v:g} V, it is slow and weak here",
             "measure at the supply and at this servo: thin wires and long chains lose volts",
         )
 
 
-def _temperature(patient: Patient) -> Iterator[Verdict]:
-    warm, limit = patient.values["present_temperature"], patient.values["temperature_limit"]
+def _too_high(state: ServoState, volts: int) -> str:
+    """Return what to do where a model's versions for other voltages look the same to the bus."""
+    model, program = state.model, state.checks.program
+    versions = [
+        one
+        for one in state.checks.kind.models.values()
+        if one.number == model.number and one.rated_v != model.rated_v
+    ]
+    for other in versions:
+        if other.rated_v > model.rated_v and volts >= 10.0 * MEANT * other.rated_v:
+            return (
+                f"switch the supply off: the YAML's {model.name} is a servo for "
+                f"{model.rated_v:g} V; is it the {other.rated_v:g} V version (see its label), "
+                f"write {other.name} into the YAML and {_raise_limit(other, program)}"
+            )
+        if other.rated_v < model.rated_v and volts <= model.max_voltage:
+            return (
+                f"see its label: a {other.rated_v:g} V servo must come off this supply at once; "
+                f"is it the {model.rated_v:g} V version, {_raise_limit(model, program)}"
+            )
+    return ""
+
+
+def _raise_limit(model: ServoModel, program: str) -> str:
+    return f"set Max Voltage (14) to {model.max_voltage} with {program}"
+
+
+def _temperature(state: ServoState) -> Iterator[Verdict]:
+    warm, limit = state.values["present_temperature"], state.values["temperature_limit"]
     if warm is None or limit is None or warm < limit - WARM_C:
         return
     level: Level = "error" if warm >= limit else "warn"
     yield Verdict(level, f"{warm} degC, it switches off above {limit}", "let it cool")
 
 
-def _torque(patient: Patient) -> Iterator[Verdict]:
-    if patient.values["torque_enable"]:
+def _torque(state: ServoState) -> Iterator[Verdict]:
+    if state.values["torque_enable"]:
         yield Verdict(
             "warn",
             "its torque is on though no program runs it; its settings cannot be changed so",
-            f"hold the joint, it goes limp: gazerig reboot {patient.setup.id}",
+            f"hold the joint, it goes limp: gazerig reboot {state.setup.id}",
         )
 
 
-def _watchdog(patient: Patient) -> Iterator[Verdict]:
-    if patient.values["bus_watchdog"] == TRIPPED:
+def _watchdog(state: ServoState) -> Iterator[Verdict]:
+    if state.checks.kind.watchdog_unit_s is None:
+        return
+    if state.values["bus_watchdog"] == TRIPPED:
         yield Verdict(
             "warn",
             "its bus watchdog has tripped: it refuses goals (a program ended without notice)",
-            "gazerig doctor --fix",
+            FIX,
             (("bus_watchdog", 0),),
         )
 
 
-def _place(patient: Patient) -> Iterator[Verdict]:
-    setup, position = patient.setup, patient.values["present_position"]
+def _lock(state: ServoState) -> Iterator[Verdict]:
+    lock = state.checks.kind.lock
+    if lock is not None and state.values[lock] == 0:
+        yield Verdict(
+            "warn",
+            "its memory is open (Lock 0): whatever is written to its settings stays for good",
+            FIX,
+            ((lock, 1),),
+        )
+
+
+def _position(state: ServoState) -> Iterator[Verdict]:
+    setup, position = state.setup, state.values["present_position"]
     if position is None or setup.min_steps <= position <= setup.max_steps:
         return
     yield Verdict(
@@ -88,4 +134,4 @@ def _place(patient: Patient) -> Iterator[Verdict]:
     )
 
 
-STATE: tuple[Rule, ...] = (_latched, _voltage, _temperature, _torque, _watchdog, _place)
+STATE: tuple[Rule, ...] = (_errors, _voltage, _temperature, _torque, _watchdog, _lock, _position)

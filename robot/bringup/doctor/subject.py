@@ -1,47 +1,123 @@
-"""One servo as found, and what a rule may say of it."""
+"""One servo as found, what a rule may say of it, and what rules must know of its kind."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drivers.dynamixel.control_table import MODELS, Model
 from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 from robot.bringup.doctor.findings import Level
-from robot.bringup.servo_kind import Found
+from robot.bringup.servo_kind import Found, Registers, ServoKind, ServoModel
 
-
-@dataclass(frozen=True, slots=True)
-class Patient:
-    """One servo as found.
-
-    values: registers by name, None where the servo gave no good answer
-    garbled: how many of six answers came in pieces
-    """
-
-    setup: ServoSetup
-    found: Found
-    values: Mapping[str, int | None]
-    garbled: int = 0
-
-    @property
-    def model(self) -> Model:
-        """Give the model that it should be."""
-        return MODELS[self.setup.model]
-
-    @property
-    def where(self) -> str:
-        """Name the joint and the servo."""
-        return servo_label(self.setup)
+FIX = "gazerig doctor --fix"
 
 
 class Verdict(NamedTuple):
-    """What a rule says of a patient."""
+    """What a rule says of a servo."""
 
     level: Level
     what: str
-    cure: str = ""
+    remedy: str = ""
     fixes: tuple[tuple[str, int], ...] = ()
 
 
-Rule = Callable[[Patient], Iterator[Verdict]]
+class WantedSetting(NamedTuple):
+    """A register that should have one value.
+
+    text: says what a value means
+    remedy: where it is not ``FIX`` no fix is offered; {joint} stands for the joint
+    mask: chooses its bits
+    """
+
+    register: str
+    value: int
+    level: Level
+    text: Callable[[int], str]
+    remedy: str = FIX
+    mask: int = ~0
+
+
+class FirmwareNote(NamedTuple):
+    """What is to be said of firmware below a number."""
+
+    below: int
+    level: Level
+    text: str
+    remedy: str = ""
+
+
+class Protection(NamedTuple):
+    """The register by which a servo protects motor and gears.
+
+    errors: those that it must heed, by the bits of the register
+    text: with {errors} and {value}
+    by_hand: what to do, by the model; None: bits that are missing may be set
+    """
+
+    register: str
+    errors: Mapping[int, str]
+    text: str
+    by_hand: Callable[[str], str] | None = None
+
+
+@dataclass(frozen=True)
+class ServoChecks:
+    """What rules must know of a kind of servo.
+
+    program: of the maker's, for what cannot be set here
+    manual: of the maker's
+    read: reads all registers that rules ask for; None where no good answer came
+    ping_only: Status Return Level 0 means that nothing but pings is answered
+    out_of_voltage: what comes of a supply outside the limits
+    error_remedies: by the error; {id} stands for the servo's; errors that are told by their
+        measured value alone have ""
+    unlimited_at_zero: both position limits 0 mean none at all
+    firmware_notes: of a model, the first that applies is said
+    rules: of this kind alone
+    """
+
+    kind: ServoKind
+    program: str
+    manual: str
+    read: Callable[[Registers, int], dict[str, int | None]]
+    ping_only: bool
+    out_of_voltage: str
+    error_remedies: Mapping[str, str]
+    unlimited_at_zero: bool
+    wanted: tuple[WantedSetting, ...]
+    protection: Protection
+    firmware_notes: Callable[[str], tuple[FirmwareNote, ...]]
+    rules: "tuple[Rule, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class ServoState:
+    """One servo as found.
+
+    values: registers by name, None where the servo gave no good answer
+    corrupt: how many of six answers came in pieces
+    """
+
+    checks: ServoChecks
+    setup: ServoSetup
+    found: Found
+    values: Mapping[str, int | None]
+    corrupt: int = 0
+
+    @property
+    def model(self) -> ServoModel:
+        """Return the model that it should be."""
+        return self.checks.kind.models[self.setup.model]
+
+    @property
+    def where(self) -> str:
+        """Return the joint and the servo."""
+        return servo_label(self.setup)
+
+    @property
+    def silent(self) -> bool:
+        """Return whether none of its registers was read."""
+        return all(value is None for value in self.values.values())
+
+
+Rule = Callable[[ServoState], Iterator[Verdict]]
