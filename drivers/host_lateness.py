@@ -6,6 +6,7 @@ from a servo that is silent.
 """
 
 from collections import deque
+from math import inf
 
 WITHIN_S = 1.0
 """Answers late within such a time are counted."""
@@ -13,16 +14,34 @@ WITHIN_S = 1.0
 BUSY = 3
 """So many late answers within that time are no accident."""
 
+SILENCE_S = 0.25
+"""Where nobody at all answers, that is worth a line from so long on."""
+
+BLAME_S = 1.5
+"""Plugs and power are blamed for such a silence only while it lasts longer than this: before,
+a computer that stood still looks the same. Its late answers tell afterwards."""
+
+STOOD_STILL = (
+    "this computer was busy, or the emulator stood still: for {:.1f} s no answer came, then "
+    "they came late and whole; plugs and power are not to blame"
+)
+
 
 class HostLateness:
     """Counts the answers that came after waiting for them had ended."""
 
     def __init__(self) -> None:
         self._late: deque[float] = deque(maxlen=1000)
+        self._last_s = -inf
 
     def late_answer(self, at_s: float) -> None:
         """Record that an answer has come late."""
         self._late.append(at_s)
+        self._last_s = at_s
+
+    def any_since(self, begin_s: float) -> bool:
+        """Tell whether an answer came late since then, noise beside it or not."""
+        return self._last_s >= begin_s
 
     def forget(self) -> None:
         """Begin to count anew."""

@@ -211,8 +211,8 @@ def test_17_no_goal_is_followed_before_positions_are_read_again(rig):
 
 
 def test_17_servo_power_cut_and_back(rig):
-    rig.command("lose all for 2.0")
-    for _ in range(100):
+    rig.command("lose all for 3.0")
+    for _ in range(180):
         assert rig.heard() == [False] * 4
     for servo_id in IDS:
         rig.chain[servo_id].reboot()

@@ -152,8 +152,8 @@ def test_after_a_replug_all_hold_where_they_are(rig):
 
 
 def test_servo_power_cut_and_back(rig):
-    rig.command("lose all for 2.0")
-    for _ in range(100):
+    rig.command("lose all for 3.0")
+    for _ in range(180):
         assert rig.heard() == [False] * 4
     for servo_id in IDS:
         rig.command(f"brown-out {servo_id}")

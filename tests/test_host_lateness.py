@@ -62,6 +62,59 @@ def test_a_host_that_slept_is_told_as_that_and_servos_go_on():
     assert outcome.outside == 0
 
 
+def standing_still(noisy: Noisy, seconds: float):
+    """Keep what is sent from now on from the servos for so long; then all of it arrives."""
+    until_s, held, write = noisy.now + seconds, [], noisy.port.write
+    available, read_until = noisy.port.getBytesAvailable, noisy.port.read_until
+
+    def arrive():
+        if noisy.now >= until_s:
+            for data in held:
+                write(data)
+            held.clear()
+
+    def queued(data):
+        held.append(data)
+        arrive()
+
+    def seen():
+        arrive()
+        return available()
+
+    def read(length, deadline_s):
+        if noisy.now < until_s <= deadline_s:
+            noisy.now = until_s
+        arrive()
+        return read_until(length, deadline_s)
+
+    noisy.port.write, noisy.port.getBytesAvailable, noisy.port.read_until = queued, seen, read
+
+
+@pytest.mark.parametrize("kind", (*KINDS, "maestro"))
+@pytest.mark.parametrize("seconds", (0.4, 1.0))
+def test_servos_that_stood_still_for_a_while_are_no_bad_plug(kind, seconds):
+    noisy = Noisy(kind)
+    noisy.start()
+    noisy.bus.events()
+    standing_still(noisy, seconds)
+    outcome = noisy.run("clear", 0.0, 500)
+    about = [text for text in outcome.said if "answer" in text or "check" in text]
+    assert len(about) == 1, about
+    assert "emulator stood still" in about[0]
+    assert outcome.wrong == 0
+
+
+@pytest.mark.parametrize("kind", (*KINDS, "maestro"))
+def test_servos_without_power_for_a_while_are_told_as_that(kind):
+    noisy = Noisy(kind)
+    noisy.start()
+    noisy.bus.events()
+    outcome = noisy.run("lose all for 0.6", 0.0, 500)
+    about = [text for text in outcome.said if "answer" in text]
+    assert len(about) == 1, about
+    assert "s: check" in about[0]
+
+
 # --- which port it is
 
 

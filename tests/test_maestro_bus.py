@@ -575,7 +575,7 @@ def test_nothing_is_sent_to_a_board_that_may_have_restarted(held):
 
 def test_a_board_that_comes_back_after_silence_is_looked_at(held):
     held.board.choose("mode", "mute")
-    held.run(1.0, [5000, 6000, 7000])
+    held.run(2.0, [5000, 6000, 7000])
     held.board.choose("mode", "usb-dual-port")
     seen = held.run(1.0, [5000, 6000, 7000])
     assert places(seen[-1]) == [5000, 6000, 7000]

@@ -296,7 +296,7 @@ class FeetechBus:
                 self._line.errors["implausible"] += 1
         self._care.note_out(self._roll.out, now_s)
         self._health.note_silent(
-            self._roll.out, now_s, self._roll.garbling, self._line.lateness.busy(now_s)
+            self._roll.out, now_s, self._roll.garbling, self._line.lateness, bool(heard)
         )
         return readings
 

@@ -50,6 +50,10 @@ class FeetechLine(BusLine):
             self.drain()
         return found
 
+    def answers(self, raw: bytes) -> int:
+        """Count the answers among received bytes that are right by their check bytes."""
+        return sum(status.intact for status in statuses(raw))
+
     def ping_all(self) -> dict[int, tuple[int, int]]:
         """Ask every id that there is, one after the other; gives (model number, firmware) by id."""
         found, _ = everybody(self.port, round(BITS_PER_BYTE / self._byte_s))

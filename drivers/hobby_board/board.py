@@ -11,15 +11,21 @@ from typing import NamedTuple, Protocol
 
 from drivers.event_log import EventLog
 from drivers.hobby_board.channel import Channel
+from drivers.host_lateness import HostLateness
 from drivers.serial.port import BusPort
 from drivers.types import ServoSetup
 
 
 class Exchange(Protocol):
-    """Where bytes go: their counts, and errors by kind."""
+    """Where bytes go: their counts, errors by kind, and answers that come late."""
 
     tx_bytes: int
     rx_bytes: int
+
+    @property
+    def lateness(self) -> HostLateness:
+        """Return the answers that came after waiting had ended."""
+        ...
 
     @property
     def port(self) -> BusPort:

@@ -59,7 +59,7 @@ class HobbyBoardBus:
         timing = self._board.timing
         self._channels = tuple(Channel(setup, timing.longest_lead_s) for setup in self._setups)
         self._supervisor = Supervisor(self._board, self._channels, self._log)
-        self._silence = Silence(self._log)
+        self._silence = Silence(self._log, self._line.lateness)
         self._rx_bytes, self._byte_s = 0, -inf
         self._link = LastingPort(
             self._port, timing.baud, timing.give_up_s, self._log, self._trust_nobody

@@ -3,6 +3,7 @@
 from math import inf
 
 from drivers.event_log import EventLog
+from drivers.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
 
 AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
 """Time between questions to a board that stays silent: doubled from the first to the last."""
@@ -10,8 +11,8 @@ AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
 IN_A_ROW = 3
 """So many answers may stay out before it is asked less often: each costs a read its patience."""
 
-SAY_S = 0.25
-"""Silence is spoken of from so long on: one lost answer is no news."""
+OWED_S = 0.1
+"""So long after the first answer, those that were owed have come."""
 
 
 class Silence:
@@ -20,10 +21,13 @@ class Silence:
     missed: how many in a row
     """
 
-    def __init__(self, log: EventLog) -> None:
-        self._log = log
+    def __init__(self, log: EventLog, lateness: HostLateness) -> None:
+        """Take where to say it, and the answers that come late, which is no board's fault."""
+        self._log, self._lateness = log, lateness
         self.missed = 0
         self._told = False
+        self._spoilt = 0
+        self._back_s: float | None = None
         self._since_s, self._due_s, self._wait_s = 0.0, -inf, AGAIN_FIRST_S
 
     def due(self, now_s: float) -> bool:
@@ -33,14 +37,18 @@ class Silence:
     def miss(self, now_s: float, heard_s: float = -inf) -> None:
         """Note an answer that stayed out, or could not be read; anything came last at heard_s."""
         if not self.missed:
-            self._since_s, self._wait_s = now_s, AGAIN_FIRST_S
+            self._wait_s = AGAIN_FIRST_S
+            if self._back_s is None:
+                self._since_s, self._spoilt = now_s, 0
+        self._back_s = None
         self.missed += 1
         if self.missed >= IN_A_ROW:
             self._due_s = now_s + self._wait_s
             self._wait_s = min(AGAIN_LAST_S, 2.0 * self._wait_s)
-        if not self._told and now_s - self._since_s >= SAY_S:
+        self._spoilt += heard_s >= now_s
+        damaged = self._spoilt >= IN_A_ROW
+        if not self._told and now_s - self._since_s >= (SILENCE_S if damaged else BLAME_S):
             self._told = True
-            damaged = heard_s >= self._since_s
             self._log.add(
                 "what the board answers arrives damaged: check cable, ground and baud rate"
                 if damaged
@@ -49,11 +57,21 @@ class Silence:
 
     def answer(self, now_s: float) -> None:
         """Note an answer."""
-        if not self.missed:
+        if self.missed:
+            self.missed, self._due_s, self._back_s = 0, -inf, now_s
+        if self._back_s is None or now_s - self._back_s < OWED_S:
             return
-        if self._told:
-            self._log.add(f"the board answers again after {now_s - self._since_s:.1f} s")
-        self.missed, self._told, self._due_s = 0, False, -inf
+        silent_s = self._back_s - self._since_s
+        noise = self._spoilt >= IN_A_ROW
+        if silent_s >= SILENCE_S and not noise and self._lateness.any_since(self._since_s):
+            self._log.add(STOOD_STILL.format(silent_s))
+        elif self._told:
+            self._log.add(f"the board answers again after {silent_s:.1f} s")
+        elif silent_s >= SILENCE_S:
+            self._log.add(
+                f"the board did not answer for {silent_s:.1f} s: check its power and the cable"
+            )
+        self._told, self._back_s = False, None
 
     def seconds(self, now_s: float) -> float:
         """Give for how long nothing has been heard; 0 where the last answer came."""

@@ -6,6 +6,7 @@ I2C has no check bytes: who acts upon an answer asks twice.
 from collections import Counter
 from collections.abc import Sequence
 
+from drivers.host_lateness import HostLateness
 from drivers.i2c.bridge import ASK_STATUS, OUTCOMES
 from drivers.serial.port import BITS_PER_BYTE, BusPort
 
@@ -17,6 +18,7 @@ class I2cLine:
 
     tx_bytes, rx_bytes: counts since it was made
     errors: counts by kind
+    lateness: answers that came after waiting had ended
     why: what was wrong with the last exchange; "" where nothing was
     """
 
@@ -24,6 +26,7 @@ class I2cLine:
         self.port = port
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
+        self.lateness = HostLateness()
         self.why = ""
         self._byte_s = BITS_PER_BYTE / baud
         self._patience_s = reply_timeout_ms / 1000.0
@@ -42,7 +45,9 @@ class I2cLine:
         """
         port = self.port
         if self._late:
-            port.drain()
+            dropped = port.drain()
+            if dropped and self.why == "timeout":
+                self.lateness.late_answer(port.now_s())
         else:
             port.clearPort()
         packet = b"".join(transfer + ASK_STATUS for transfer, _ in transfers)

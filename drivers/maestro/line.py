@@ -7,6 +7,7 @@ other. After one that stayed out the line is emptied before anything is asked ag
 from collections import Counter
 from collections.abc import Sequence
 
+from drivers.host_lateness import HostLateness
 from drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, Speech, words
 from drivers.maestro.params import MaestroParams
 from drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
@@ -28,6 +29,7 @@ class Line:
     speech: how the board wants its commands
     tx_bytes, rx_bytes: counts since it was made
     errors: counts by kind
+    lateness: answers that came after waiting had ended
     """
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
@@ -38,9 +40,11 @@ class Line:
         self._waking = Speech("pololu", params.device, params.crc).errors()
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
+        self.lateness = HostLateness()
         self._byte_s = BITS_PER_BYTE / params.baud
         self._patience_s = params.reply_timeout_ms / 1000.0
         self._late = False
+        self._owed = 0
         self._unheard = 0
 
     def send(self, packet: bytes) -> None:
@@ -51,8 +55,13 @@ class Line:
     def ask(self, packet: bytes, length: int) -> bytes | None:
         """Send questions and give their answers; None where they do not come in time."""
         port = self.port
-        if self._late:
-            port.drain()
+        if self._late or self._owed:
+            # After a silence the answer to an older question may come first, and more behind it.
+            dropped = port.drain()
+            if 0 < dropped <= self._owed:
+                self.lateness.late_answer(port.now_s())
+            if not self._late and not dropped:
+                self._owed = 0
         else:
             port.clearPort()
         self.send(packet)
@@ -60,6 +69,7 @@ class Line:
         answer = port.read_until(length, port.now_s() + wire_s + self._patience_s)
         self.rx_bytes += len(answer)
         self._late = len(answer) < length
+        self._owed += length - len(answer)
         if self._late:
             self.errors["incomplete" if answer else "timeout"] += 1
             return None

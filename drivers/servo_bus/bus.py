@@ -304,6 +304,8 @@ class DynamixelBus:
         readings = self._readings.whole(answer) if isinstance(answer, Whole) else None
         if readings is None:
             readings = self._take(answer, now_s)
+        elif self._health.returning:
+            self._health.heard_again(now_s, self._line.lateness)
         self._care.tend(readings, self._roll.group, now_s)
         return tuple(readings)
 
@@ -329,7 +331,7 @@ class DynamixelBus:
             elif believed:
                 self._line.errors["implausible"] += 1
         self._health.note_silent(
-            self._roll.out, now_s, self._roll.garbling, self._line.lateness.busy(now_s)
+            self._roll.out, now_s, self._roll.garbling, self._line.lateness, bool(heard)
         )
         return readings
 

@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping
 
 from drivers.dynamixel.control_table import name_errors
 from drivers.event_log import EventLog, Seldom, servo_label
+from drivers.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
 from drivers.types import ServoSetup
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
@@ -15,6 +16,9 @@ GARBLES = "answers, but its bytes arrive damaged: a second servo with its id, or
 
 BUSY_S = 2.0
 """Where answers come late a servo may be silent for so long before it is named."""
+
+OWED_S = 0.1
+"""So long after the first answer, those that were owed have come."""
 
 SAY_SILENT_S = 0.25
 """Silence is spoken of from so long on: one lost answer is no news."""
@@ -36,6 +40,8 @@ class Health:
         self._silent_since: dict[int, float] = {}
         self._told: set[int] = set()
         self._all_silent = False
+        self._nobody_since: float | None = None
+        self._back_s: float | None = None
         self._seldom = Seldom(log)
 
     def latched(self, servo_id: int, status: int) -> bool:
@@ -74,12 +80,26 @@ class Health:
         self._log.add(f"{servo_label(self._setups[servo_id])} restarted: set up anew")
 
     def note_silent(
-        self, out: Collection[int], now_s: float, garbling: Collection[int] = (), late: int = 0
+        self,
+        out: Collection[int],
+        now_s: float,
+        garbling: Collection[int],
+        lateness: HostLateness,
+        heard: bool,
     ) -> None:
         """Note who is out now; speaks of those who have been so for a while, once.
 
-        late: answers that came late of late: then it is this computer that is to blame, at first
+        lateness: answers that came late: then it is this computer that is to blame, at first
+        heard: anybody at all has answered
         """
+        if not heard and out:
+            self._back_s = None
+            if self._nobody_since is None:
+                self._nobody_since = now_s
+        elif heard and self._nobody_since is not None:
+            self.heard_again(now_s, lateness)
+            # While nobody was heard, nobody in particular was silent.
+            self._silent_since = {i: max(t, now_s) for i, t in self._silent_since.items()}
         for servo_id in [i for i in self._silent_since if i not in out]:
             since_s = self._silent_since.pop(servo_id)
             if servo_id in self._told:
@@ -88,10 +108,39 @@ class Health:
                 self._log.add(f"{who} answers again after {now_s - since_s:.1f} s")
         for servo_id in out:
             self._silent_since.setdefault(servo_id, now_s)
+        late = lateness.busy(now_s)
         if late and out and now_s - min(self._silent_since.values()) < BUSY_S:
             self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
             return
-        self._tell(out, now_s, garbling)
+        if self._nobody_since is None:
+            self._tell(out, now_s, garbling)
+        elif not self._all_silent and now_s - self._nobody_since >= BLAME_S:
+            self._all_silent = True
+            self._log.add("no servo answers: check servo power and cable")
+
+    @property
+    def returning(self) -> bool:
+        """Tell whether it is still to be said what a silence of all was."""
+        return self._nobody_since is not None
+
+    def heard_again(self, now_s: float, lateness: HostLateness) -> None:
+        """Say what a silence of all was, a moment after its end: what was owed comes first."""
+        if self._nobody_since is None:
+            return
+        if self._back_s is None:
+            self._back_s = now_s
+        if now_s - self._back_s < OWED_S:
+            return
+        silent_s = self._back_s - self._nobody_since
+        if silent_s >= SILENCE_S and lateness.any_since(self._nobody_since):
+            self._log.add(STOOD_STILL.format(silent_s))
+        elif self._all_silent:
+            who = "servos" if self._silent_since else "all servos"
+            self._log.add(f"{who} answer again after {silent_s:.1f} s")
+        elif silent_s >= SILENCE_S:
+            self._log.add(f"no servo answered for {silent_s:.1f} s: check servo power and cable")
+        self._nobody_since = self._back_s = None
+        self._all_silent = False
 
     def stopped(self, count: int, asleep_s: float, now_s: float) -> None:
         """Note that servos were stopped by their own watchdog and go on from where they are.
@@ -111,18 +160,9 @@ class Health:
             )  # fmt: skip
 
     def _tell(self, out: Collection[int], now_s: float, garbling: Collection[int]) -> None:
-        everybody = len(out) == len(self._setups)
-        if everybody and not self._all_silent:
-            if now_s - max(self._silent_since.values()) >= SAY_SILENT_S:
-                self._all_silent = True
-                self._log.add("no servo answers: check servo power and cable")
-            return
-        if not out and self._all_silent:
-            self._all_silent = False
-            self._log.add("all servos answer again")
         for servo_id in out:
             silent_s = now_s - self._silent_since[servo_id]
-            if servo_id not in self._told and silent_s >= SAY_SILENT_S and not self._all_silent:
+            if servo_id not in self._told and silent_s >= SAY_SILENT_S:
                 self._told.add(servo_id)
                 what = GARBLES if servo_id in garbling else "does not answer"
                 self._log.add(f"{servo_label(self._setups[servo_id])} {what}")

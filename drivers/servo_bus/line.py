@@ -54,6 +54,10 @@ class Line(BusLine):
             self.drain()
         return values
 
+    def answers(self, raw: bytes) -> int:
+        """Count the answers among received bytes that are right by their check bytes."""
+        return sum(status.intact for status in statuses(raw))
+
     def ping_all(self) -> dict[int, tuple[int, int]]:
         """Ask everybody who is there; gives (model number, firmware) by id."""
         port = self.port

@@ -51,7 +51,7 @@ class BusLine(ABC):
         self.starved = False
         self.asleep_s = 0.0
         self.lateness = HostLateness()
-        self._unheard = False
+        self._unheard = self._owed = False
         self.quiet = True
         self.whole_s = self.deadline_s = 0.0
         self._byte_s = BITS_PER_BYTE / baud
@@ -85,9 +85,10 @@ class BusLine(ABC):
         The wait ends as the patience does, beyond the time the bytes take on the wire.
         """
         port = self.port
-        # What is here before the question cannot be its answer.
-        if self._unheard and port.getBytesAvailable():
-            self.lateness.late_answer(port.now_s())
+        # What is here before the question cannot be its answer: it is that of an earlier one.
+        waited = self._owed and bool(port.getBytesAvailable())
+        if waited:
+            self._note_late(port.read_until(_ROOM, port.now_s()))
         port.clearPort()
         self.send(request)
         self.quiet = False
@@ -102,6 +103,8 @@ class BusLine(ABC):
         at_s = port.now_s()
         self.whole_s, self.deadline_s = whole_s, whole_s + 2.0 * half_s
         self.rx_bytes += len(raw)
+        # The first that is heard after a silence may be owed, too: more of that may follow.
+        self._owed = not raw or (self._owed and (self._unheard or waited))
         self._unheard = not raw
         if len(raw) == length:
             self.patience.note(at_s - whole_s)
@@ -124,17 +127,21 @@ class BusLine(ABC):
         Gives up on a line that never falls silent.
         """
         end_s = self.port.now_s() + BABBLE_S
-        dropped = 0
+        dropped = b""
         while True:
             more = self.port.read_until(_ROOM, self.port.now_s() + quiet_s)
-            dropped += len(more)
+            dropped += more
             self.rx_bytes += len(more)
-            if not more or self.port.now_s() >= end_s or dropped >= 16 * _ROOM:
-                if dropped and self._unheard:
-                    # Nothing came in its time, and then something did: an answer, not noise.
-                    self.lateness.late_answer(self.port.now_s())
+            if not more or self.port.now_s() >= end_s or len(dropped) >= 16 * _ROOM:
+                if dropped and self._owed:
+                    self._note_late(dropped)
                     self._unheard = False
-                return dropped
+                return len(dropped)
+
+    def _note_late(self, raw: bytes) -> None:
+        """Note answers that came after waiting for them had ended; noise is none."""
+        if self.answers(raw):
+            self.lateness.late_answer(self.port.now_s())
 
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos.
@@ -159,6 +166,10 @@ class BusLine(ABC):
                 if servo_id in values:
                     break
         return values
+
+    @abstractmethod
+    def answers(self, raw: bytes) -> int:
+        """Count the answers among received bytes that are right by their check bytes."""
 
     @abstractmethod
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:

@@ -114,7 +114,7 @@ def soak(args: argparse.Namespace) -> None:
     for k in count():
         if seen_s >= 3600.0 * args.hours:
             break
-        kind = dice.choice(tuple(CASES))
+        kind = dice.choice(tuple(args.kinds))
         rig = struck_rigs.rig_of(kind)
         if dice.random() < 0.7:
             rig = quick(rig)
@@ -172,7 +172,7 @@ class Stale:
             self.stale += 1
             print(
                 f"{self.where}: at {t_s:.3f} s {name} is said to be at {now:.4f} rad, "
-                f"truly {low:.4f} to {high:.4f}; heard {joints.at_s[i] - t_s:+.4f} s, "
+                f"truly {low:.4f} to {high:.4f}; heard {joints.measured_s[i] - t_s:+.4f} s, "
                 f"torque {joints.torque[i]}",
                 flush=True,
             )
@@ -192,6 +192,7 @@ def main() -> None:
     parser.add_argument("--rigs", nargs="*", default=list(RIGS))
     parser.add_argument("--scenes", nargs="*", default=list(scenes()))
     parser.add_argument("--late", nargs="*", default=list(LATES), choices=list(LATES))
+    parser.add_argument("--kinds", nargs="*", default=list(CASES), choices=list(CASES))
     parser.add_argument("--hours", type=float, default=12.0)
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
