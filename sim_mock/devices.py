@@ -10,9 +10,9 @@ from drivers.maestro.params import MaestroParams
 from drivers.pca9685.params import BRIDGE_BAUD
 from drivers.servo_models import HOBBY_KINDS, BusKind
 from sim_mock.device import Device
-from sim_mock.dynamixel import quirks as dynamixel_quirks
+from sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
 from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.feetech import quirks as feetech_quirks
+from sim_mock.feetech.chain import COMMANDS as FEETECH
 from sim_mock.feetech.chain import build_feetech
 from sim_mock.hobby_servo import HobbySpec
 from sim_mock.maestro import settings as maestro_settings
@@ -21,9 +21,9 @@ from sim_mock.pca9685.bridge import build_bridge
 from sim_mock.pca9685.faults import CASES as PCA9685_CASES
 from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
-CASES: dict[BusKind, dict[str, str]] = {
-    "dynamixel": dynamixel_quirks.cases(),
-    "feetech": feetech_quirks.cases(),
+CASES: dict[BusKind, Mapping[str, str]] = {
+    "dynamixel": DYNAMIXEL.cases,
+    "feetech": FEETECH.cases,
     "maestro": maestro_settings.cases(),
     "pca9685": PCA9685_CASES,
 }

@@ -1,25 +1,8 @@
-"""Packets of Dynamixel Protocol 2.0 as servos send them, and as they look for them on the line.
+"""What emulated servos say: one answer each, and the pieces of bytes that put it on the line."""
 
-Source: ROBOTIS e-Manual, Protocol 2.0. Fast replies are one packet of blocks that several
-servos send one after another; each block ends with the CRC over all bytes before it.
-"""
-
-import struct
-from collections.abc import Sequence
 from typing import NamedTuple
 
-from fastcrc.crc16 import umts
-
-HEADER = b"\xff\xff\xfd\x00"
-RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
 BROADCAST = 0xFE
-STATUS = 0x55
-SHORTEST = 10
-LONGEST = 1024
-"""No packet is longer; a larger length is noise."""
-
-HEAD = struct.Struct("<4sBHB")
-CRC = struct.Struct("<H")
 
 
 class Answer(NamedTuple):
@@ -47,52 +30,6 @@ class Piece(NamedTuple):
     data: bytes
     delay_s: float = 0.0
     late_s: float = 0.0
-
-
-def status(servo_id: int, error: int, params: bytes) -> bytes:
-    """Build a status packet."""
-    if RAW in params:
-        params = params.replace(RAW, STUFFED)
-    packet = HEAD.pack(HEADER, servo_id, len(params) + 4, STATUS) + bytes((error,)) + params
-    return packet + CRC.pack(umts(packet))
-
-
-def plain_pieces(answers: Sequence[Answer]) -> list[Piece]:
-    """Send each answer as a status of its own."""
-    return [
-        Piece(a[0], status(a[0], a[1], a[2]) if a[5] is None else _mixed(a), a[3], a[4])
-        for a in answers
-    ]
-
-
-def _mixed(answer: Answer) -> bytes:
-    """Build the status of servos that answer under one id at the same time."""
-    own = status(answer.servo_id, answer.error, answer.params)
-    return own if answer.twin is None else merge(own, _mixed(answer.twin))
-
-
-def fast_pieces(answers: Sequence[Answer], length: int) -> list[Piece]:
-    """Send answers as blocks of one packet whose length field says ``length``.
-
-    The first servo sends the head. Nobody can take the place of a missing block: the
-    packet ends where the answers end.
-    """
-    head = HEAD.pack(HEADER, BROADCAST, length, STATUS)
-    crc = umts(head)
-    pieces: list[Piece] = []
-    for answer in answers:
-        block = _block(answer, crc)
-        crc = umts(block, crc)
-        pieces.append(Piece(answer[0], head + block, 0.0 if pieces else answer[3], answer[4]))
-        head = b""
-    return pieces
-
-
-def _block(answer: Answer, crc: int) -> bytes:
-    """Build a servo's part of a fast reply behind bytes whose CRC is ``crc``."""
-    body = bytes((answer[1], answer[0])) + answer[2]
-    block = body + CRC.pack(umts(body, crc))
-    return block if answer[5] is None else merge(block, _block(answer[5], crc))
 
 
 def merge(one: bytes, other: bytes) -> bytes:

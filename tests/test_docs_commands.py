@@ -17,10 +17,10 @@ from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, each_of_pape
 
 from robot.loop import Robot
 from robot.remote.running_rig import RunningRig
-from sim_mock.feetech.fault_commands import COMMANDS as STS
+from sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
+from sim_mock.feetech.chain import COMMANDS as STS
 from sim_mock.maestro.faults import COMMANDS as MAESTRO
 from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.fault_commands import COMMANDS as DYNAMIXEL
 
 STANDS_FOR = {"NAME": "neck_yaw", "FILE": "a.mcap", "KEY": "seed"}
 """What to try where a paper has a word in capitals; 1 for all others."""

@@ -108,7 +108,7 @@ def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_healed(indirec
     rig.bus.engage()
     assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [0] * 3
     rig.now_s += 60.0
-    rig.chain[2].reboot()
+    rig.chain[2].restart()
     for _ in range(300):
         rig.tick([2500] * 3)
     assert rig.bus.faults() == ()
@@ -119,7 +119,7 @@ def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_healed(indirec
 def test_a_quick_restart_between_two_reads_is_found_by_asking_in_turn(fast):
     rig = Rig(fast, indirect_block=False)
     rig.bus.engage()
-    rig.chain[2].reboot()
+    rig.chain[2].restart()
     rig.chain[2]._deaf_until_ms = 0
     for _ in range(100):
         rig.tick([2500] * 3)

@@ -8,7 +8,8 @@ from drivers.dynamixel.protocol import instruction
 from drivers.errors import BusLost, ServoFault, ServoMissing
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
-from sim_mock.dynamixel.chain import build_dynamixel, status
+from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.dynamixel.packets import status
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.smart_servo.physics import ServoSpec
 
@@ -254,7 +255,7 @@ def test_engaging_a_latched_servo_names_it_and_leaves_all_without_torque():
 
 def test_engaging_a_silent_servo_names_it_and_leaves_all_without_torque():
     rig = Rig().open()
-    rig.chain[2].reboot()
+    rig.chain[2].restart()
     with pytest.raises(ServoMissing, match="servo 2 does not answer"):
         rig.bus.engage()
     assert not any(servo.torque for servo in rig.chain.servos)

@@ -7,7 +7,8 @@ import pytest
 from drivers.dynamixel.sync_packets import FastGroup, PlainGroup
 from drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
 from drivers.servo_bus.read_windows import DIRECT, direct_turns
-from sim_mock.dynamixel.chain import build_dynamixel, status
+from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.dynamixel.packets import status
 
 IDS = (4, 1, 9)
 PLACES = {4: 1000, 1: 2000, 9: 3000}

@@ -215,7 +215,7 @@ def test_17_servo_power_cut_and_back(rig):
     for _ in range(180):
         assert rig.heard() == [False] * 4
     for servo_id in IDS:
-        rig.chain[servo_id].reboot()
+        rig.chain[servo_id].restart()
     assert "no servo answers: check servo power and cable" in rig.bus.events()
     rig.until_all()
     assert rig.errors()["restarted"] >= 4
@@ -340,7 +340,7 @@ def test_22_to_26_latched_errors(rig, fault, name):
     assert rig.bus.events() == (f"jaw (servo 2): {name}",)
     assert not rig.chain[2].torque
     # Only a restart clears it; then the servo is set up anew.
-    rig.chain[2].reboot()
+    rig.chain[2].restart()
     rig.until_all()
     assert rig.bus.faults() == ()
     assert rig.tick()[1].fault == ""

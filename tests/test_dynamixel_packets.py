@@ -12,7 +12,7 @@ from drivers.dynamixel.protocol import (
     statuses,
     sync_read,
 )
-from sim_mock.dynamixel.chain import status
+from sim_mock.dynamixel.packets import status
 
 
 def vector(text: str) -> bytes:

@@ -8,7 +8,8 @@ from drivers.errors import PortError, ServoMissing
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.servo_bus.registers import Registers
 from drivers.types import ServoSetup
-from sim_mock.dynamixel.chain import build_dynamixel, status
+from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.dynamixel.packets import status
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.smart_servo.physics import ServoSpec
 

@@ -5,11 +5,11 @@ from sts_bench import Bench
 from test_maestro_board import World, acceleration, speed, target
 
 from drivers.dynamixel.control_table import MODELS
-from sim_mock.dynamixel.motor import PAUSE_MS, Loop, Shaft, long_pause
-from sim_mock.dynamixel.profile import Profile, SpeedProfile
 from sim_mock.dynamixel.servo import DynamixelServo
-from sim_mock.feetech.protection import FeetechProtection
+from sim_mock.smart_servo.motor import PAUSE_MS, Loop, Shaft, long_pause
 from sim_mock.smart_servo.physics import Physics, ServoSpec
+from sim_mock.smart_servo.profile import Profile, SpeedProfile
+from sim_mock.smart_servo.protection import Protection
 
 HOUR_S = 3600.0
 GOAL, GOAL_SPEED, MODE = 42, 46, 33
@@ -19,7 +19,7 @@ GOAL, GOAL_SPEED, MODE = 42, 46, 33
 def lived_ms(monkeypatch):
     """Count the milliseconds that shafts live through, and the looks of protections."""
     count = [0]
-    run, look = Shaft.run, FeetechProtection.look
+    run, look = Shaft.run, Protection.look
 
     def counted(shaft, ticks):
         count[0] += 0 if shaft.quiet else ticks
@@ -27,10 +27,10 @@ def lived_ms(monkeypatch):
 
     def looked(protection, *words):
         count[0] += 1
-        look(protection, *words)
+        return look(protection, *words)
 
     monkeypatch.setattr(Shaft, "run", counted)
-    monkeypatch.setattr(FeetechProtection, "look", looked)
+    monkeypatch.setattr(Protection, "look", looked)
     return count
 
 

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import BusLost, PortError
-from sim_mock.dynamixel.chain import build_dynamixel, status
+from sim_mock.dynamixel.chain import COMMANDS, build_dynamixel
+from sim_mock.dynamixel.packets import status
 from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.fault_commands import VERBS, usage
 
 IDS = (1, 2, 3)
 GOLDEN_PING = bytes.fromhex("FFFFFD0001030001194E")
@@ -387,7 +387,7 @@ def test_status_tells_servos_and_faults(world):
         ("echo perhaps", "'perhaps' is neither on nor off"),
         ("overload 1 count 3", "'count' has no meaning here"),
         ("set after-missing wait", "it can be silence, skip, timeout"),
-        ("set afterwards skip", "unknown; there is after-missing, bad-crc"),
+        ("set afterwards skip", "unknown; there is after-missing, wrong-baud"),
         ("set slot-timeout-ms -1", "not a number of milliseconds"),
     ],
 )
@@ -400,7 +400,7 @@ def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
 
 def test_help_explains_every_command(world):
     text = world.faults.command("help")
-    assert all(usage(name) in text for name in VERBS)
+    assert all(COMMANDS.usage(name) in text for name in COMMANDS.verbs)
     assert world.faults.command("help lose").startswith("lose ID [count N]")
 
 
@@ -413,7 +413,9 @@ def test_methods_do_what_commands_do():
     assert by_text.plain() == by_method.plain() != good(1) + good(2) + good(3)
 
 
-_WORDS = st.sampled_from([*VERBS, "help", "1", "2", "3", "0", "-1", "5", "on", "off", "all"])
+_WORDS = st.sampled_from(
+    [*COMMANDS.verbs, "help", "1", "2", "3", "0", "-1", "5", "on", "off", "all"]
+)
 
 
 @given(st.lists(st.lists(_WORDS, min_size=1, max_size=5), max_size=6))

@@ -238,7 +238,7 @@ def test_startup_configuration_switches_the_torque_on_and_restores_the_ram():
     for configuration, torque, gain in ((0, 0, 400), (1, 1, 400), (2, 0, 999), (3, 1, 999)):
         bench.write(64, 1, 0)
         assert bench.write(60, 1, configuration) == 0
-        bench.servo.reboot()
+        bench.servo.restart()
         bench.now_s += 1.0
         assert (bench.read(64, 1), bench.read(84, 2)) == (torque, gain)
         assert bench.read(132, 4) == 1000
@@ -285,7 +285,7 @@ def test_a_reboot_restarts_tick_ram_and_turns_and_keeps_the_eeprom():
     bench.write(112, 4, 77)
     bench.now_s = 3.0
     assert bench.read(132, 4) > 4400
-    bench.servo.reboot()
+    bench.servo.restart()
     bench.now_s = 3.5
     assert bench.read(120, 2) == 500
     assert (bench.read(64, 1), bench.read(112, 4), bench.read(9, 1)) == (0, 0, 3)

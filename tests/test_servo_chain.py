@@ -7,7 +7,8 @@ from fastcrc.crc16 import umts
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel, status
+from sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
+from sim_mock.dynamixel.packets import status
 from sim_mock.smart_servo.physics import Quirks, ServoSpec
 
 ALERT = 0x80

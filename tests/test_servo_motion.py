@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.dynamixel.control_table import MODELS
-from sim_mock.dynamixel.motor import LIMP, Loop, Shaft
+from sim_mock.smart_servo.motor import LIMP, Loop, Shaft
 from sim_mock.smart_servo.physics import Physics, checked
 
 DEG = 4096.0 / 360.0

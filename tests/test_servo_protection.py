@@ -39,7 +39,7 @@ def test_a_jammed_joint_overloads_after_its_time_and_only_a_reboot_clears_it():
     bench.servo.hold_fast(False)
     assert bench.put(64, 1, 1) == 0
     assert bench.get(64) == 0
-    bench.servo.reboot()
+    bench.servo.restart()
     assert not bench.at(1900)
     assert bench.at(2100)
     assert (bench.get(70), bench.put(64, 1, 1), bench.get(64)) == (0, 0, 1)
@@ -88,11 +88,11 @@ def test_overheating_latches_above_the_limit_register():
     bench.servo.temperature_c = 71.0
     bench.at(80)
     assert (bench.get(70), bench.get(64)) == (0x04, 0)
-    bench.servo.reboot()
+    bench.servo.restart()
     bench.at(600)
     assert bench.get(70) == 0x04
     bench.servo.temperature_c = 40.0
-    bench.servo.reboot()
+    bench.servo.restart()
     bench.at(1200)
     assert bench.get(70) == 0
 

@@ -9,7 +9,8 @@ from drivers.types import ServoSetup
 from robot.bringup.servo_families import DYNAMIXEL
 from robot.bringup.servo_reboot import Standing, restart
 from robot.bringup.servo_setup import assign, find_alone, search_order
-from sim_mock.dynamixel.chain import build_dynamixel, status
+from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.dynamixel.packets import status
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.smart_servo.physics import ServoSpec
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sts_bench import Bench, instruction
 
-from sim_mock.feetech.packets import Framing, checksum, signed, status, unsigned
+from sim_mock.feetech.packets import FeetechFraming, checksum, signed, status, unsigned
 
 MAKERS = {
     "ping": "FF FF 01 02 01 FB",
@@ -20,7 +20,7 @@ MAKERS = {
 
 
 def feed(data, gap_s=0.001):
-    return [tuple(found) for found in Framing(gap_s, 0.0).feed(data, 0.0)]
+    return [tuple(found) for found in FeetechFraming(gap_s, 0.0).feed(data, 0.0)]
 
 
 @pytest.mark.parametrize("name", MAKERS)
@@ -56,7 +56,7 @@ def test_the_checksum_is_the_inverse_of_the_sum():
 def test_an_instruction_in_pieces_behind_noise_is_found(noise, servo_id, params, cut):
     noise = noise.replace(b"\xff", b"\x00")
     data = noise + instruction(servo_id, 3, params)
-    framing = Framing(0.001, 0.0)
+    framing = FeetechFraming(0.001, 0.0)
     first = framing.feed(data[:cut], 0.0)
     found = first + framing.feed(data[cut:], 0.0005)
     assert [(f.servo_id, f.code, f.params) for f in found] == [(servo_id, 3, params)]
@@ -64,7 +64,7 @@ def test_an_instruction_in_pieces_behind_noise_is_found(noise, servo_id, params,
 
 def test_the_end_counts_from_the_newest_piece():
     data = instruction(1, 3, bytes(8))
-    framing = Framing(0.001, 0.0)
+    framing = FeetechFraming(0.001, 0.0)
     assert framing.feed(data[:5], 0.0) == []
     [found] = framing.feed(data[5:] + b"\x00", 0.0)
     assert found.end == len(data) - 5
@@ -72,7 +72,7 @@ def test_the_end_counts_from_the_newest_piece():
 
 def test_a_packet_that_stays_unfinished_is_dropped():
     data = instruction(1, 1)
-    framing = Framing(0.001, 0.0)
+    framing = FeetechFraming(0.001, 0.0)
     assert framing.feed(data[:4], 0.0) == []
     assert framing.feed(data[4:], 0.002) == []
     assert len(framing.feed(data, 0.002)) == 1

@@ -21,7 +21,6 @@ from sim_mock.dynamixel.live_registers import (
     IN_POSITION_STEPS,
     RUNNING,
     Live,
-    flicker,
 )
 from sim_mock.dynamixel.memory import DynamixelMemory
 from sim_mock.dynamixel.modes import (
@@ -34,9 +33,9 @@ from sim_mock.dynamixel.modes import (
     VELOCITY,
     loop_of,
 )
-from sim_mock.dynamixel.motor import LIMP, Shaft
-from sim_mock.dynamixel.profile import Profile, SpeedProfile
+from sim_mock.smart_servo.motor import LIMP, Shaft, flicker
 from sim_mock.smart_servo.physics import Physics, Quirks
+from sim_mock.smart_servo.profile import Profile, SpeedProfile
 
 TRIPPED = 255
 """Bus Watchdog (98) reads so after it has stopped the servo."""
@@ -122,11 +121,7 @@ class Drive:
         amps += round(current)
         return max(-self._most, min(self._most, amps)), speed, at
 
-    def voltage(self) -> int:
-        """Give the voltage at the servo in register units."""
-        return round(self.shaft.volts * self.model.rated_v * 10.0)
-
-    def live(self, tick_ms: int, now_ms: int, temperature: int) -> Live:
+    def live(self, tick_ms: int, now_ms: int, voltage: int, temperature: int) -> Live:
         """Give everything that lives."""
         shaft, side, sensed = self.shaft, self._side, self.sensed(now_ms)
         profile = shaft.profile
@@ -145,7 +140,7 @@ class Drive:
             sensed=sensed,
             velocity_asked=round(side * profile.v / _SPEED_UNIT),
             position_asked=round(side * place + self._shift),
-            voltage=self.voltage(),
+            voltage=voltage,
             temperature=temperature,
         )
 

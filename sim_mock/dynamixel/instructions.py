@@ -9,6 +9,7 @@ from collections.abc import Callable
 from drivers.dynamixel.control_table import EEPROM_END
 from sim_mock.dynamixel.memory import ACCESS, DATA_RANGE, INSTRUCTION_ERROR
 from sim_mock.dynamixel.servo import DynamixelServo
+from sim_mock.smart_servo.chain import Wanted
 
 PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, REBOOT = 1, 2, 3, 4, 5, 6, 8
 CLEAR, BACKUP = 0x10, 0x20
@@ -24,9 +25,6 @@ NEVER = 3
 """Above every Status Return Level."""
 NO_BROADCAST_RESET_SINCE = 42
 """First firmware that ignores a broadcast reset of everything."""
-
-Wanted = tuple[int, int, int]
-"""id, address, length of one servo's part of a group read."""
 
 Said = tuple[int, bytes]
 """Error number and parameters of an answer."""
@@ -120,7 +118,7 @@ def _action(servo: DynamixelServo, params: bytes) -> Said:
 
 
 def _reboot(servo: DynamixelServo, params: bytes) -> Said:
-    servo.reboot()
+    servo.restart()
     return 0, b""
 
 

@@ -58,18 +58,3 @@ def put_sensed(
     """Write what is sensed into a control table, the profile's registers left as they are."""
     SENSED.pack_into(into, SENSED_AT, *sensed)
     _SURROUNDINGS.pack_into(into, _SURROUNDINGS_AT, voltage, max(0, min(255, temperature)))
-
-
-def flicker(now_ms: int, seed: int, current: int, velocity: int) -> tuple[int, int]:
-    """Give the noise of current and velocity of a servo that holds still.
-
-    A number of time and seed alone, so that nobody changes it by looking; velocity is
-    mostly 0.
-    """
-    mixed = (now_ms * 0x9E3779B1 ^ seed * 0x27D4EB2F) & 0xFFFFFFFF
-    mixed = ((mixed ^ mixed >> 15) * 0x85EBCA6B) & 0xFFFFFFFF
-    mixed ^= mixed >> 13
-    amps = mixed % (2 * current + 1) - current
-    if mixed >> 24 & 3:
-        return amps, 0
-    return amps, (mixed >> 8) % (2 * velocity + 1) - velocity

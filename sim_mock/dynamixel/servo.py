@@ -1,19 +1,19 @@
 """One emulated Dynamixel X servo: what may be written when, errors, watchdog, restarts.
 
-It moves when looked at: ``advance`` brings it up to a time, nothing runs by itself. The
-control table is in sim_mock.dynamixel.memory; what turns the shaft in servo_drive, its modes
-in servo_modes, profile in servo_profile, motor and shaft in servo_motion; heat, load and
-voltage in servo_protection; every physical number in servo_physics. What it does not do:
-play inside the gear, a blinking LED, the RC, S.Bus and iBus protocols of register 13.
+The control table is in sim_mock.dynamixel.memory, modes, profiles and gains in its neighbours.
+What it does not do: play inside the gear, a blinking LED, the RC, S.Bus and iBus protocols of
+register 13.
 """
 
 from drivers.dynamixel.control_table import (
     BACKUP_SINCE,
     BAUD_RATES,
     FAST_READ_SINCE,
+    HARDWARE_ERRORS,
     MODELS,
     RETURN_DELAY_UNIT_S,
     SHADOW_OFF,
+    Model,
 )
 from sim_mock.dynamixel.backup import Backup
 from sim_mock.dynamixel.drive import TRIPPED, Drive
@@ -27,16 +27,14 @@ from sim_mock.dynamixel.memory import (
     in_eeprom,
 )
 from sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
-from sim_mock.dynamixel.motor import long_pause
 from sim_mock.dynamixel.write_rules import GOALS, Rules
 from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec, checked
-from sim_mock.smart_servo.protection import BITS, LOOK_MS, Protection
-
-__all__ = ["DynamixelServo", "ServoSpec"]
+from sim_mock.smart_servo.protection import Limits
+from sim_mock.smart_servo.servo import SmartServo
 
 ALERT = 0x80
-REBOOT_MS = 400
 WATCHDOG_UNIT_MS = 20
+BITS = {name: bit for bit, name in HARDWARE_ERRORS.items()}
 
 STARTS_WITH_TORQUE, RESTORES_RAM = 1, 2
 """Bits of Startup Configuration (60)."""
@@ -47,43 +45,54 @@ KEPT_BY_RESET: dict[int, tuple[str, ...]] = {0xFF: (), 1: ("id",), 2: ("id", "ba
 _GOAL_AT, _GOAL_SIZE = 116, 4
 
 
-class DynamixelServo:
-    """One servo on the chain. Its clock counts the chain's whole milliseconds.
+class DynamixelServo(SmartServo):
+    """One servo on the chain.
 
     Raises:
         ValueError: the spec's physics cannot exist.
     """
 
+    restart_ms = 400
+    model: Model
+    memory: DynamixelMemory
+    drive: Drive
+
     def __init__(self, spec: ServoSpec, now_ms: int) -> None:
         self.model = MODELS[spec.model]
-        self.firmware = spec.firmware
         self.quirks = Quirks(*spec.quirks)
         self.memory = DynamixelMemory(self.model, spec.firmware)
         self.memory.set("firmware_version", spec.firmware)
         self.memory.set("id", spec.id)
-        physics = checked(Physics(*spec.physics))
+        self._physics = checked(Physics(*spec.physics))
         seed = spec.id if spec.seed is None else spec.seed
         start = float(spec.start_steps)
-        self.drive = Drive(self.memory, self.model, physics, self.quirks, start, seed)
-        self.shaft = self.drive.shaft
+        self.drive = Drive(self.memory, self.model, self._physics, self.quirks, start, seed)
+        super().__init__(spec, self._physics, self._limits(), now_ms)
         self._rules = Rules(self.memory, self.model, self.drive)
-        self.protection = Protection(self.model, physics)
         self.id = spec.id
         self.fast_reads = spec.firmware >= FAST_READ_SINCE[self.model.family]
         self._new = spec.firmware >= BACKUP_SINCE[self.model.family]
         self._backup = Backup()
-        self._limits = (0, 0, 0)
-        self._ms = self._booted_ms = self._deaf_until_ms = now_ms
-        self._look_ms = now_ms + LOOK_MS
         self._boot()
+
+    def _limits(self) -> Limits:
+        """Return what it bears; when a load is too much stands in no register."""
+        get, physics = self.memory.get, self._physics
+        return Limits(
+            get("temperature_limit"),
+            get("max_voltage_limit"),
+            get("min_voltage_limit"),
+            physics.overload_share,
+            physics.overload_s,
+        )
 
     def _boot(self) -> None:
         """Give the RAM area its start values, torque off unless it is to start with it."""
         memory = self.memory
         memory.restore(lambda register: not in_eeprom(register))
         self._watchdog_ms = 0
-        self.alert = 0
-        self._pending: tuple[int, bytes] | None = None
+        self.errors = 0
+        self._pending = None
         self.protection.restart()
         memory.set("backup_ready", self._backup.ready)
         self.drive.boot()
@@ -95,81 +104,19 @@ class DynamixelServo:
             memory.set("torque_enable", 1)
             self._switch(True)
 
-    # --- time
-
-    def advance(self, now_ms: int, fed_ms: int) -> bool:
-        """Move on to now; the last packet before that was on the bus at ``fed_ms``.
-
-        Gives whether it listens: it is deaf while it restarts.
-        """
-        ahead = now_ms - self._ms
-        if ahead > 0:
-            if self._watchdog_ms and self.torque and now_ms >= fed_ms + self._watchdog_ms:
-                self._trip(fed_ms + self._watchdog_ms - self._ms, ahead)
-            if self.shaft.quiet and now_ms < self._look_ms:
-                self._ms = now_ms
-            else:
-                self._move(now_ms)
-        return now_ms >= self._deaf_until_ms
-
-    def _move(self, until_ms: int) -> None:
-        """Move on; a long pause is passed at once, so that whoever asks then is answered."""
-        pause_at_ms, pause_ms = long_pause(self._ms, until_ms, LOOK_MS)
-        self._live_on(pause_at_ms)
-        if pause_ms:
-            self.shaft.skip(pause_ms)
-            self._ms += pause_ms
-            self._look_ms += pause_ms - LOOK_MS
-            self._look(pause_ms // LOOK_MS)
-            self._live_on(until_ms)
-
-    def _live_on(self, until_ms: int) -> None:
-        """Move on, and look at heat, load and voltage every 20 ms of its own time."""
-        shaft = self.shaft
-        while self._ms < until_ms:
-            stop = min(until_ms, self._look_ms)
-            shaft.run(stop - self._ms)
-            self._ms = stop
-            if stop == self._look_ms:
-                self._look()
-                if self._calm and shaft.quiet and until_ms > self._look_ms:
-                    self._look_ms += (until_ms - self._look_ms) // LOOK_MS * LOOK_MS
-
-    def _look(self, looks: int = 1) -> None:
-        """Watch over itself: latch what is wrong, restart where the voltage is gone."""
-        self._look_ms += LOOK_MS
-        shaft, protection = self.shaft, self.protection
-        before = protection.temperature_c
-        bits = protection.look(shaft.effort, shaft.volts, self._limits, looks)
-        self._calm = protection.temperature_c == before and protection.steady
-        if bits & ~self.alert:
+    def _protect_from(self, bits: int) -> None:
+        """Latch what is wrong."""
+        if bits & ~self.errors:
             self._latch(bits)
-        if protection.browned_out(shaft.volts):
-            self.brown_out()
 
-    def _trip(self, after_ms: int, ahead_ms: int) -> int:
-        """Stop as the bus watchdog does; goals are refused until 98 is cleared.
-
-        Gives what is left of ``ahead_ms``.
-        """
-        after_ms = max(0, after_ms)
+    def _trip(self, after_ms: int) -> None:
+        """Stop as the bus watchdog does; goals are refused until 98 is cleared."""
         self._move(self._ms + after_ms)
         self._watchdog_ms = 0
         self.memory.set("bus_watchdog", TRIPPED)
         self.drive.halt()
-        return ahead_ms - after_ms
 
     # --- reading
-
-    @property
-    def torque(self) -> bool:
-        """Tell whether the torque is on."""
-        return self.drive.torque
-
-    @property
-    def position_steps(self) -> float:
-        """Give the true position of the shaft in the registers' terms, finer than they are."""
-        return self.drive.position_steps
 
     @property
     def joint_steps(self) -> float:
@@ -188,9 +135,10 @@ class DynamixelServo:
         """Bring the registers that live up to date, the profile's only where they are asked for."""
         warmth, drive = round(self.protection.temperature_c), self.drive
         if profiled:
-            put(drive.live(self._ms - self._booted_ms, self._ms, warmth), self.memory.bytes)
+            live = drive.live(self._ms - self._booted_ms, self._ms, self.voltage_01v, warmth)
+            put(live, self.memory.bytes)
         else:
-            put_sensed(drive.sensed(self._ms), drive.voltage(), warmth, self.memory.bytes)
+            put_sensed(drive.sensed(self._ms), self.voltage_01v, warmth, self.memory.bytes)
 
     # --- writing
 
@@ -247,7 +195,7 @@ class DynamixelServo:
 
     def _switch(self, on: bool) -> None:
         """Switch the torque; a latched error keeps it off."""
-        if on and self.alert & self.memory.get("shutdown"):
+        if on and self.errors & self.memory.get("shutdown"):
             self.memory.set("torque_enable", 0)
         else:
             self.drive.switch(on)
@@ -257,11 +205,12 @@ class DynamixelServo:
         get = self.memory.get
         self._calm = False
         self.status_level = get("status_return_level")
-        self._limits = (
-            get("temperature_limit"), get("max_voltage_limit"), get("min_voltage_limit"),
-        )  # fmt: skip
+        shadow = get("secondary_id")
+        self.shadow_id = None if shadow >= SHADOW_OFF else shadow
+        self.protection.limits = self._limits()
         self._rules.settle()
         self.drive.settle()
+        self._announce()
 
     # --- instructions
 
@@ -283,16 +232,6 @@ class DynamixelServo:
         self.memory.set("registered_instruction", 0)
         return self.write(address, data)
 
-    def reboot(self) -> None:
-        """Restart: deaf for 0.4 s, then RAM at its start values and no hardware error."""
-        self._booted_ms = self._ms
-        self._deaf_until_ms = self._ms + REBOOT_MS
-        self._boot()
-
-    def brown_out(self) -> None:
-        """Restart as a dip of the supply makes it: no status tells."""
-        self.reboot()
-
     def factory_reset(self, option: int) -> int:
         """Put the EEPROM back (0xFF all, 1 all but id, 2 all but id and baud), then restart."""
         kept = KEPT_BY_RESET.get(option)
@@ -302,8 +241,12 @@ class DynamixelServo:
             return ACCESS
         self.memory.restore(lambda register: in_eeprom(register) and register.name not in kept)
         self.id = self.memory.get("id")
-        self.reboot()
+        self.restart()
         return 0
+
+    def reset_all(self) -> int:
+        """Be as from the factory, id 1; return the error number."""
+        return self.factory_reset(0xFF)
 
     def clear_turns(self) -> int:
         """Bring a multi-turn position back into one turn; refused while moving."""
@@ -327,14 +270,14 @@ class DynamixelServo:
             return RESULT_FAIL
         self._backup.recall(self.memory, eeprom=True)
         self.id = self.memory.get("id")
-        self.reboot()
+        self.restart()
         self._backup.recall(self.memory, eeprom=False)
         self._remember()
         return 0
 
     # --- errors
 
-    def fail(self, error: str) -> None:
+    def fail(self, error: str) -> str:
         """Latch a hardware error by name, as the servo's own protection would.
 
         Raises:
@@ -343,19 +286,20 @@ class DynamixelServo:
         if error not in BITS:
             raise ValueError(f"hardware error {error!r}: there is {', '.join(BITS)}")
         self._latch(1 << BITS[error])
+        return f"has latched: {error}"
 
     def _latch(self, bits: int) -> None:
         """Set bits of Hardware Error Status; those of Shutdown take the torque."""
-        self.alert |= bits
-        self.memory.set("hardware_error_status", self.alert)
-        if self.alert & self.memory.get("shutdown"):
+        self.errors |= bits
+        self.memory.set("hardware_error_status", self.errors)
+        if self.errors & self.memory.get("shutdown"):
             self.memory.set("torque_enable", 0)
             self._switch(False)
 
     @property
     def error_flag(self) -> int:
         """Give the alert bit as it stands on every status."""
-        return ALERT if self.alert else 0
+        return ALERT if self.errors else 0
 
     # --- for the line
 
@@ -370,51 +314,6 @@ class DynamixelServo:
         return self.memory.get("return_delay_time") * RETURN_DELAY_UNIT_S
 
     @property
-    def shadow_id(self) -> int | None:
-        """Give the id under which it carries out writes to RAM and never answers."""
-        shadow = self.memory.get("secondary_id")
-        return None if shadow >= SHADOW_OFF else shadow
-
-    # --- from outside
-
-    def turn(self, steps: float) -> None:
-        """Turn the joint by hand, in the registers' direction; under torque it fights back."""
-        self.drive.turn(steps)
-
-    def hold_fast(self, stuck: bool = True) -> None:
-        """Jam the joint where it is, or free it."""
-        self.shaft.hold_fast(stuck)
-
-    def pull(self, load_nm: float) -> None:
-        """Hang a constant torque on the joint, as a spring or a cable does, from now on."""
-        self.shaft.pull(load_nm / self.model.stall_torque_nm)
-
-    @property
-    def supply_v(self) -> float:
-        """Give the open-circuit voltage; far too little makes it restart again and again."""
-        return self.shaft.supply * self.model.rated_v
-
-    @supply_v.setter
-    def supply_v(self, volts: float) -> None:
-        self._calm = False
-        self.shaft.feed(max(0.0, volts) / self.model.rated_v)
-
-    @property
-    def temperature_c(self) -> float:
-        """Give the temperature of the motor; it drifts to what load and room make it."""
-        return self.protection.temperature_c
-
-    @temperature_c.setter
-    def temperature_c(self, celsius: float) -> None:
-        self._calm = False
-        self.protection.temperature_c = celsius
-
-    @property
-    def ambient_c(self) -> float:
-        """Give the temperature around the servo."""
-        return self.protection.ambient_c
-
-    @ambient_c.setter
-    def ambient_c(self, celsius: float) -> None:
-        self._calm = False
-        self.protection.ambient_c = celsius
+    def answers_reads(self) -> bool:
+        """True if it answers more than a ping, by register 68."""
+        return self.status_level >= 1

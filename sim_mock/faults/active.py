@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import log
 from random import Random
 
-from sim_mock.replies import HEADER, Answer, Piece
+from sim_mock.replies import Answer, Piece
 
 NOBODY = -1
 """Id of pieces that no servo sent: noise, echo, babble."""
@@ -46,7 +46,7 @@ class ActiveFaults:
     header: what packets on this line begin with
     """
 
-    def __init__(self, seed: int, header: bytes = HEADER) -> None:
+    def __init__(self, seed: int, header: bytes) -> None:
         self._header = header
         self._faults: list[Fault] = []
         self._dice = Random(seed)

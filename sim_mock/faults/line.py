@@ -13,7 +13,7 @@ from typing import Protocol
 from sim_mock.device import Reply
 from sim_mock.faults.active import NOBODY, ActiveFaults, Fault
 from sim_mock.faults.grammar import Commands
-from sim_mock.replies import HEADER, Piece
+from sim_mock.replies import Piece
 
 
 class Struck(Protocol):
@@ -47,9 +47,7 @@ class LineFaults(ABC):
     noun = "servo"
     """What an id belongs to, for messages."""
 
-    def __init__(
-        self, chain: Struck, commands: Commands, seed: int = 0, header: bytes = HEADER
-    ) -> None:
+    def __init__(self, chain: Struck, commands: Commands, seed: int, header: bytes) -> None:
         self._chain = chain
         self.commands = commands
         self.wire = ActiveFaults(seed, header)

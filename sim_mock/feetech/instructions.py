@@ -27,16 +27,17 @@ def answers(servo: FeetechServo, code: int) -> bool:
     return code in (PING, READ) or servo.answers_all
 
 
-def sync_read(params: bytes) -> tuple[int, int, bytes]:
-    """Read the parameters of a sync read: address, length, ids."""
-    return (params[0], params[1], params[2:]) if len(params) > 2 else (0, 0, b"")
+def sync_rows(params: bytes) -> list[tuple[int, int, int]]:
+    """Read the parameters of a sync read: id, address and length of each servo's part."""
+    return [(servo_id, params[0], params[1]) for servo_id in params[2:]]
 
 
-def sync_writes(params: bytes) -> list[tuple[int, bytes]]:
-    """Read the parameters of a sync write behind the address: id and data of each servo."""
+def sync_writes(params: bytes) -> list[tuple[int, int, bytes]]:
+    """Read the parameters of a sync write: id, address and data of each servo."""
     if len(params) < 2 or (len(params) - 2) % (size := params[1] + 1):
         return []
-    return [(params[at], params[at + 1 : at + size]) for at in range(2, len(params), size)]
+    places = range(2, len(params), size)
+    return [(params[at], params[0], params[at + 1 : at + size]) for at in places]
 
 
 def _ping(servo: FeetechServo, params: bytes) -> bytes:

@@ -8,25 +8,12 @@ protocol of the STS/SMS series.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from sim_mock.replies import Answer, Piece, merge
+from sim_mock.smart_servo.framing import Framing, Instruction
 
 HEADER = b"\xff\xff"
-BROADCAST = 0xFE
 SHORTEST = 6
-
-
-class Instruction(NamedTuple):
-    """A packet found.
-
-    end: place of its last byte + 1, counted from the first byte of the newest piece
-    """
-
-    servo_id: int
-    code: int
-    params: bytes
-    end: int
 
 
 def checksum(body: bytes) -> int:
@@ -63,38 +50,17 @@ def unsigned(value: int, bit: int) -> int:
     return magnitude | 1 << bit if value < 0 else magnitude
 
 
-class Framing:
-    """Bytes in, instructions out; what has a wrong checksum is passed over in silence.
+class FeetechFraming(Framing):
+    """Bytes in, instructions out; what has a wrong checksum is passed over in silence."""
 
-    Args:
-        gap_s: a packet that stays unfinished so long is dropped.
-    """
-
-    def __init__(self, gap_s: float, now_s: float) -> None:
-        self.gap_s = gap_s
-        self._unfinished = b""
-        self._arrived_s = now_s
-
-    def forget(self) -> None:
-        """Drop an unfinished packet."""
-        self._unfinished = b""
-
-    def feed(self, data: bytes, now_s: float) -> list[Instruction]:
-        """Take bytes that arrive now and give the instructions they complete."""
-        before = 0
-        if self._unfinished and now_s - self._arrived_s < self.gap_s:
-            before = len(self._unfinished)
-            data = self._unfinished + data
-        self._unfinished = b""
-        self._arrived_s = now_s
+    def _search(self, data: bytes, before: int) -> tuple[list[Instruction], bytes]:
         found: list[Instruction] = []
         at = 0
         while True:
             at = data.find(HEADER, at)
             if at < 0:
                 # The first byte of a header may be the last one that came.
-                self._unfinished = data[-1:] if data.endswith(HEADER[:1]) else b""
-                return found
+                return found, data[-1:] if data.endswith(HEADER[:1]) else b""
             head = data[at + 2 : at + 4]
             if head[:1] == b"\xff":
                 at += 1
@@ -103,8 +69,7 @@ class Framing:
             if len(head) == 2 and head[1] < 2:
                 at += 2
             elif end > len(data):
-                self._unfinished = data[at:]
-                return found
+                return found, data[at:]
             elif checksum(data[at + 2 : end - 1]) != data[end - 1]:
                 at += 2
             else:

@@ -1,11 +1,14 @@
-"""Who listens on a bus: servos by id, those that share one, secondary ids, baud rates."""
+"""Which servos hear a client: by id, those that share one, secondary ids, baud rates."""
 
 from collections.abc import Iterable
+from typing import Generic, TypeVar
 
-from sim_mock.dynamixel.servo import DynamixelServo
+from sim_mock.smart_servo.servo import SmartServo
+
+S = TypeVar("S", bound=SmartServo)
 
 
-class Roster:
+class Addresses(Generic[S]):
     """The servos that hear one client.
 
     by_id: the first servo of each id; twins: further ones with the same id
@@ -13,16 +16,16 @@ class Roster:
     delay_s: return delay by id
     """
 
-    def __init__(self, servos: Iterable[DynamixelServo], client_baud: int | None) -> None:
-        self.by_id: dict[int, DynamixelServo] = {}
-        self.twins: dict[int, list[DynamixelServo]] = {}
-        self.shadows: dict[int, list[DynamixelServo]] = {}
+    def __init__(self, servos: Iterable[S], client_baud: int | None) -> None:
+        self.by_id: dict[int, S] = {}
+        self.twins: dict[int, list[S]] = {}
+        self.shadows: dict[int, list[S]] = {}
         self.delay_s: dict[int, float] = {}
         for servo in servos:
             if hears(servo, client_baud):
                 self._enter(servo)
 
-    def _enter(self, servo: DynamixelServo) -> None:
+    def _enter(self, servo: S) -> None:
         if servo.id in self.by_id:
             self.twins.setdefault(servo.id, []).append(servo)
         else:
@@ -32,11 +35,11 @@ class Roster:
         if shadow is not None and shadow != servo.id:
             self.shadows.setdefault(shadow, []).append(servo)
 
-    def everyone(self) -> list[DynamixelServo]:
-        """List all servos that hear the client."""
+    def all(self) -> list[S]:
+        """Return all servos that hear the client."""
         return [*self.by_id.values(), *(twin for pair in self.twins.values() for twin in pair)]
 
 
-def hears(servo: DynamixelServo, client_baud: int | None) -> bool:
-    """Tell whether a servo and a client at this baud rate (None: any) understand each other."""
+def hears(servo: SmartServo, client_baud: int | None) -> bool:
+    """True if a servo and a client at this baud rate (None: any) understand each other."""
     return client_baud is None or servo.baud == client_baud

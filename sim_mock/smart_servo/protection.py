@@ -1,16 +1,37 @@
-"""What an emulated servo watches over: temperature, load, input voltage.
+"""What an emulated servo watches over: temperature, load, current, input voltage.
 
 Looked at every 20 ms of its own time, so the result does not depend on how often it is
-asked. Thresholds and times that no data sheet tells are in sim_mock.smart_servo.physics.
+asked. A heavy load is torque, not duty: a motor at full speed has all the duty and no load.
 """
 
-from drivers.dynamixel.control_table import HARDWARE_ERRORS, Model
+from math import inf
+from typing import NamedTuple
+
+from sim_mock.smart_servo.motor import Motor
 from sim_mock.smart_servo.physics import Physics
 
 LOOK_MS = 20
 LOOK_S = LOOK_MS / 1000.0
 
-BITS = {name: bit for bit, name in HARDWARE_ERRORS.items()}
+VOLTAGE, HEAT, CURRENT, OVERLOAD = 1, 4, 8, 32
+"""Bits of what is wrong, as they stand in the registers of the servos that know them."""
+
+
+class Limits(NamedTuple):
+    """What a servo bears.
+
+    hottest_c: degC; highest_01v, lowest_01v: 0.1 V
+    overload_share: share of the stall torque at the present voltage; overload_s: for so long
+    current_a, current_s: the same of the current
+    """
+
+    hottest_c: int
+    highest_01v: int
+    lowest_01v: int
+    overload_share: float
+    overload_s: float
+    current_a: float = inf
+    current_s: float = inf
 
 
 def warmed(now_c: float, final_c: float, thermal_s: float, looks: int) -> float:
@@ -29,46 +50,48 @@ class Protection:
     ambient_c: degC, may be changed at any time
     """
 
-    def __init__(self, model: Model, physics: Physics) -> None:
+    def __init__(self, model: Motor, physics: Physics, limits: Limits) -> None:
         self._model = model
         self._physics = physics
+        self.limits = limits
         self.ambient_c = physics.ambient_c
         self.temperature_c = physics.ambient_c
-        self._overloaded_looks = 0
+        self._heavy_looks = self._strong_looks = 0
 
     def restart(self) -> None:
-        """Forget the load; the heat stays."""
-        self._overloaded_looks = 0
+        """Forget load and current; the heat stays."""
+        self._heavy_looks = self._strong_looks = 0
 
-    def look(
-        self, effort: float, volts: float, limits: tuple[int, int, int], looks: int = 1
-    ) -> int:
-        """Go on by 20 ms at this torque and voltage (shares); gives bits of register 70.
+    def look(self, effort: float, volts: float, looks: int = 1) -> int:
+        """Return the bits of what is wrong after 20 ms more at this torque and voltage (shares).
 
-        limits: registers 31, 32 and 34 (degC, 0.1 V, 0.1 V).
         looks: go on by so many times 20 ms at once
         """
-        physics = self._physics
+        physics, limits = self._physics, self.limits
         target = self.ambient_c + physics.stall_rise_c * effort * effort
         self.temperature_c = warmed(self.temperature_c, target, physics.thermal_s, looks)
-        too_much = abs(effort) >= physics.overload_share * volts and effort != 0.0
-        self._overloaded_looks = self._overloaded_looks + looks if too_much else 0
-        hottest, highest, lowest = limits
+        effort = abs(effort)
+        heavy = effort > 0.0 and effort >= limits.overload_share * volts - 1e-11
+        self._heavy_looks = self._heavy_looks + looks if heavy else 0
+        strong = effort * self._model.stall_current_a > limits.current_a
+        self._strong_looks = self._strong_looks + looks if strong else 0
         tenths = volts * self._model.rated_v * 10.0
         bits = 0
-        if self._overloaded_looks * LOOK_S >= physics.overload_s:
-            bits |= 1 << BITS["overload"]
-        if self.temperature_c > hottest:
-            bits |= 1 << BITS["overheating"]
-        if tenths > highest + 0.5 or tenths < lowest - 0.5:
-            bits |= 1 << BITS["input voltage"]
+        if heavy and self._heavy_looks * LOOK_S >= limits.overload_s:
+            bits |= OVERLOAD
+        if strong and self._strong_looks * LOOK_S >= limits.current_s:
+            bits |= CURRENT
+        if self.temperature_c > limits.hottest_c:
+            bits |= HEAT
+        if not limits.lowest_01v - 0.5 <= tenths <= limits.highest_01v + 0.5:
+            bits |= VOLTAGE
         return bits
 
     @property
     def steady(self) -> bool:
-        """Tell whether looking again changes nothing but what the motor does."""
-        return self._overloaded_looks == 0
+        """True if looking again changes nothing but what the motor does."""
+        return not self._heavy_looks and not self._strong_looks
 
     def browned_out(self, volts: float) -> bool:
-        """Tell whether the voltage (a share) is too low for the servo to run."""
+        """True if the voltage (a share) is too low for the servo to run."""
         return volts < self._physics.brown_out_share

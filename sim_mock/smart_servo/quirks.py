@@ -1,39 +1,66 @@
-"""How a frozen set of choices is made otherwise, case by case, as typed by a person."""
+"""What emulated servos do where documents and devices are silent or differ, typed case by case.
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import TypeVar
+Logic analyser traces published by users of ROBOTIS' SDK show that later servos of a group
+wait for a missing one. Times marked [A] are assumed.
+"""
 
-H = TypeVar("H")
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+
+AfterMissing = Literal["silence", "skip", "timeout"]
+WrongBaud = Literal["silence", "garbage"]
 
 TIMES = {"slot_timeout_ms": "slot_timeout_s", "packet_gap_ms": "packet_gap_s"}
 """Cases that are times, and the fields that hold them."""
 
 
-def cases_of(choices: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
-    """Give the name of every case, as it is typed, and its possible values.
+@dataclass(frozen=True, kw_only=True)
+class ChainQuirks:
+    """The choices that every chain has; a field that is a Literal is a case.
 
-    choices: field -> its possible words
+    after_missing: what servos do that come after a silent one in a plain group read:
+        never answer, answer at once, or answer after ``slot_timeout_s`` [A]
+    wrong_baud: a client at another baud rate hears nothing, or garbage
+    packet_gap_s: a packet that stays unfinished so long is dropped [A]
     """
-    named = {name.replace("_", "-"): "|".join(values) for name, values in choices.items()}
+
+    after_missing: AfterMissing = "silence"
+    wrong_baud: WrongBaud = "silence"
+    slot_timeout_s: float = 0.001
+    packet_gap_s: float = 0.0015
+
+
+Q = TypeVar("Q", bound=ChainQuirks)
+
+
+def _choices(kind: type[ChainQuirks]) -> dict[str, tuple[str, ...]]:
+    """Return every field that is one of some words, and these."""
+    hints = get_type_hints(kind).items()
+    return {name: get_args(hint) for name, hint in hints if get_origin(hint) is Literal}
+
+
+def cases_of(kind: type[ChainQuirks]) -> dict[str, str]:
+    """Return the name of every case, as it is typed, and its possible values."""
+    choices = _choices(kind).items()
+    named = {name.replace("_", "-"): "|".join(values) for name, values in choices}
     return named | {name.replace("_", "-"): "MS" for name in TIMES} | {"baud": "heed|any"}
 
 
-def decided(quirks: H, choices: Mapping[str, tuple[str, ...]], case: str, value: str) -> H:
-    """Give the quirks, a frozen dataclass, with one case decided otherwise.
+def decided(quirks: Q, case: str, value: str) -> Q:
+    """Return the quirks with one case decided otherwise.
 
     Raises:
         ValueError: there is no such case or value.
     """
-    name = case.replace("-", "_")
+    name, choices = case.replace("-", "_"), _choices(type(quirks))
+    change: dict[str, Any] = {name: value}
     if name in TIMES:
-        time_s = _milliseconds(case, value) / 1000.0
-        return replace(quirks, **{TIMES[name]: time_s})  # type: ignore[type-var]
-    if name not in choices:
-        raise ValueError(f"set {case!r}: unknown; there is {', '.join(cases_of(choices))}")
-    if value not in choices[name]:
+        change = {TIMES[name]: _milliseconds(case, value) / 1000.0}
+    elif name not in choices:
+        raise ValueError(f"set {case!r}: unknown; there is {', '.join(cases_of(type(quirks)))}")
+    elif value not in choices[name]:
         raise ValueError(f"{case} {value!r}: it can be {', '.join(choices[name])}")
-    return replace(quirks, **{name: value})  # type: ignore[type-var]
+    return replace(quirks, **change)
 
 
 def _milliseconds(case: str, value: str) -> float:

@@ -11,8 +11,8 @@ from math import inf, pi, sin
 from typing import NamedTuple, Protocol
 
 from drivers.dynamixel.control_table import STEPS_PER_TURN
-from sim_mock.dynamixel.profile import Profile, SpeedProfile
 from sim_mock.smart_servo.physics import Physics
+from sim_mock.smart_servo.profile import Profile, SpeedProfile
 
 STEPS_PER_RAD = STEPS_PER_TURN / (2.0 * pi)
 MS_S = 0.001
@@ -92,6 +92,21 @@ def long_pause(now_ms: int, until_ms: int, unit_ms: int) -> tuple[int, int]:
         return until_ms, 0
     between_ms = until_ms - now_ms - _BEFORE_MS - _AFTER_MS
     return now_ms + _BEFORE_MS, between_ms // unit_ms * unit_ms
+
+
+def flicker(now_ms: int, seed: int, current: int, velocity: int) -> tuple[int, int]:
+    """Return the noise of current and velocity of a servo that holds still.
+
+    A number of time and seed alone, so that nobody changes it by looking; velocity is
+    mostly 0.
+    """
+    mixed = (now_ms * 0x9E3779B1 ^ seed * 0x27D4EB2F) & 0xFFFFFFFF
+    mixed = ((mixed ^ mixed >> 15) * 0x85EBCA6B) & 0xFFFFFFFF
+    mixed ^= mixed >> 13
+    amps = mixed % (2 * current + 1) - current
+    if mixed >> 24 & 3:
+        return amps, 0
+    return amps, (mixed >> 8) % (2 * velocity + 1) - velocity
 
 
 class Shaft:
