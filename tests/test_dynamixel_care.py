@@ -95,7 +95,7 @@ def test_a_sleep_that_the_clock_does_not_show_is_found_by_asking(rig):
     """A suspended laptop's monotonic clock stands still; the servos' time goes on."""
     rig.bus.engage()
     for servo in rig.chain.servos:
-        servo._trip(0, 0)
+        servo._trip(0)
     for _ in range(250):
         rig.tick([2500] * 3)
     assert rig.errors() == {"watchdog": 3}
