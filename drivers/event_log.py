@@ -2,8 +2,10 @@
 
 from collections import deque
 from math import inf
+from typing import TYPE_CHECKING
 
-from drivers.types import ServoSetup
+if TYPE_CHECKING:  # the guardian, which names servos too, starts without numpy
+    from drivers.types import ServoSetup
 
 MOST = 200
 """More than so many lines that nobody has asked for are not kept."""
@@ -50,7 +52,7 @@ class Seldom:
         self._log.add(f"{text} ({often} more times since it was said last)" if often else text)
 
 
-def servo_label(setup: ServoSetup, noun: str = "servo") -> str:
+def servo_label(setup: "ServoSetup", noun: str = "servo") -> str:
     """Return how people know a servo: its joint and its id, or its id where it has no name."""
     return f"{setup.name} ({noun} {setup.id})" if setup.name else f"{noun} {setup.id}"
 

@@ -1,14 +1,16 @@
 """Every servo model that a joint can have: on which kind of bus, and in which steps it counts."""
 
 from math import inf
-from typing import Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 from drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from drivers.dynamixel.control_table import STEPS_PER_TURN
 from drivers.event_log import servo_label as label_with
 from drivers.feetech.memory_table import MODELS as FEETECH
 from drivers.hobby_board.models import HOBBY, US_STEPS
-from drivers.types import ServoSetup
+
+if TYPE_CHECKING:
+    from drivers.types import ServoSetup
 
 BusKind = Literal["dynamixel", "feetech", "maestro", "pca9685"]
 BUS_KINDS: tuple[BusKind, ...] = get_args(BusKind)
@@ -87,6 +89,6 @@ SERVOS: dict[str, ServoFacts] = {
 """By the name that a rig's YAML gives a model."""
 
 
-def servo_label(setup: ServoSetup) -> str:
+def servo_label(setup: "ServoSetup") -> str:
     """Return how people know a servo: its joint and its id, or its channel."""
     return label_with(setup, "channel" if setup.model in HOBBY else "servo")

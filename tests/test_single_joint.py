@@ -1,55 +1,77 @@
 """Calibrating one emulated joint: turned by a hand, or driven gently between its stops."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
-from drivers.errors import BusLost, ServoFault, ServoMissing
-from drivers.servo_bus.registers import Registers
+from drivers.errors import BusLost, ServoFault, ServoMissing, SetupError
+from robot.bringup.servo_families import kind_of
 from robot.bringup.single_joint import SingleJoint, Stopped
 from robot.bringup.smart_servo import SmartServo
 from robot.calibrate.calibrating import by_hand, by_motion
 from robot.calibrate.calibration import CalibrationRefused
+from robot.calibrate.placing import HandPlacer, Steered, by_places
 from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
 from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.smart_servo.physics import Physics, ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0)
+STS = JointParams(3, "sts3215", -35.0, 35.0, 300.0, 20000.0)
 GENTLY = StopSearchParams()
+FREE = (-1e9, 1e9)
+STOPS = (1700.0, 2500.0)
+
+each = pytest.mark.parametrize("joint", [EYE, STS], ids=["dynamixel", "feetech"])
 
 
 class Bench:
     """One emulated servo between stops, and a person with a script."""
 
-    def __init__(self, joint: JointParams, start: int, stops: tuple[float, float]) -> None:
+    def __init__(
+        self, joint: JointParams, start: int = 2100, stops: tuple[float, float] = FREE
+    ) -> None:
         self.clock = SimulatedClock()
         physics = Physics(stop_low_steps=stops[0], stop_high_steps=stops[1])
         spec = ServoSpec(joint.id, joint.model, start, physics=physics)
-        self.chain = build_dynamixel([spec], self.clock.now_s)
+        build = build_feetech if joint is STS else build_dynamixel
+        self.chain = build([spec], self.clock.now_s)
         self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
         self.port.setBaudRate(1_000_000)
-        self.registers = Registers(self.port)
+        self.kind = kind_of(joint.model)
+        self.registers = self.kind.registers(self.port, 3)
         self.why: str | None = None
         self.id = joint.id
         self.script: list[int] = []
         self.said: list[str] = []
         self.agreed = True
-        name = "left_eye_pan" if joint.id == 1 else "neck_yaw"
-        servo = SmartServo(name, joint.id, joint.model, self.port)
-        self.joint = SingleJoint(name, joint, servo, self.clock, lambda: self.why)
-
-    @property
-    def servo(self) -> object:
-        return self.chain.here(self.id)
+        name = "neck_yaw" if joint is NECK else "left_eye_pan"
+        self.servo = SmartServo(name, joint.id, joint.model, self.port)
+        self.joint = SingleJoint(name, joint, self.servo, self.clock, lambda: self.why)
 
     def get(self, register: str) -> int:
         value = self.registers.read(self.id, register)
         assert value is not None
         return value
+
+    def put(self, register: str, value: int) -> None:
+        assert self.kind.write_lasting(self.registers, self.id, register, value)
+
+    def limits(self) -> tuple[int, int]:
+        return self.get("min_position_limit"), self.get("max_position_limit")
+
+    def restart(self) -> None:
+        self.chain.faults.command(f"brown-out {self.id}")
+        self.clock.sleep_until(self.clock.now_s() + 1.0)
+
+    def command(self, text: str) -> None:
+        self.port.faults.command(text.format(id=self.id))
+        self.clock.sleep_until(self.clock.now_s() + 0.1)
 
     # robot.calibrate.calibrating.Person
 
@@ -74,24 +96,23 @@ class Bench:
         return self.agreed
 
 
-def free(joint: JointParams = EYE, start: int = 2100) -> Bench:
-    return Bench(joint, start, (-1e9, 1e9))
-
-
-def test_by_hand_zero_sign_and_range_are_found() -> None:
-    bench = free()
+@each
+def test_by_hand_zero_sign_and_range_are_found(joint: JointParams) -> None:
+    bench = Bench(joint)
     bench.script = [-400, 850, -440]  # left end at fewer steps: the sign is -1
+    bench.joint.check()
     found = by_hand(bench.joint, bench, 2.0)
-    assert found.sign == -1 and found.zero_step == 2110
-    assert found.max_deg == pytest.approx((2110 - 1700) / STEPS_PER_DEG - 2.0, abs=0.11)
-    assert found.min_deg == pytest.approx(-(2550 - 2110) / STEPS_PER_DEG + 2.0, abs=0.11)
+    assert found.sign == -1 and found.zero_step == pytest.approx(2110, abs=2)
+    assert found.max_deg == pytest.approx((2110 - 1700) / STEPS_PER_DEG - 2.0, abs=0.2)
+    assert found.min_deg == pytest.approx(-(2550 - 2110) / STEPS_PER_DEG + 2.0, abs=0.2)
     assert "turn left_eye_pan to its LEFT end, then press Enter" in bench.said
     assert bench.get("torque_enable") == 0
 
 
-def test_by_hand_torque_that_was_left_on_goes_off_first() -> None:
-    bench = free()
-    bench.registers.write(1, "torque_enable", 1)
+@each
+def test_by_hand_torque_that_was_left_on_goes_off_first(joint: JointParams) -> None:
+    bench = Bench(joint)
+    bench.registers.write(joint.id, "torque_enable", 1)
     bench.script = []
     with pytest.raises(Stopped):
         by_hand(bench.joint, bench, 2.0)
@@ -100,58 +121,107 @@ def test_by_hand_torque_that_was_left_on_goes_off_first() -> None:
 
 @pytest.mark.parametrize("start", [3900, 200])
 def test_by_hand_over_the_seam_is_refused_with_the_turn_that_helps(start: int) -> None:
-    bench = free(start=start)
+    bench = Bench(EYE, start)
     bench.script = [600, -1200, 600]
     with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* take the horn off"):
         by_hand(bench.joint, bench, 2.0)
+    with pytest.raises(SetupError, match="cannot set its middle"):
+        bench.joint.set_middle()
+
+
+def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> None:
+    bench = Bench(STS, 3900)
+    bench.script = [600, -1200, 600]
+    with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* --set-middle"):
+        by_hand(bench.joint, bench, 2.0)
+    bench.joint.set_middle()
+    bench.script = [600, -1200, 600]
+    found = by_hand(bench.joint, bench, 2.0)
+    assert found.zero_step == pytest.approx(2048, abs=4) and found.max_deg > 45.0
 
 
 def test_a_joint_next_to_the_seam_is_calibrated_on_its_side() -> None:
-    bench = free(start=3700)
+    bench = Bench(EYE, 3700)
     bench.script = [300, -800, 400]
     found = by_hand(bench.joint, bench, 2.0)
     assert found.zero_step == 3600 and found.max_deg < 36.0
 
 
 def test_a_servo_turned_by_whole_turns_before_gives_the_same() -> None:
-    bench = free(start=2100)
+    bench = Bench(EYE)
     bench.chain.here(1).turn(4096)
     bench.script = [400, -800, 400]
     assert by_hand(bench.joint, bench, 2.0).zero_step == 2100
 
 
-def test_by_motion_finds_the_stops_and_lets_go() -> None:
-    bench = Bench(EYE, 2100, (1700.0, 2500.0))
+def test_an_offset_that_was_set_can_be_cleared_for_good() -> None:
+    bench = Bench(STS, 3000)
+    bench.joint.set_middle()
+    offset = bench.get("position_offset")
+    assert offset and bench.joint.check().homing_offset == offset
+    assert bench.joint.clear_offset() == offset
+    bench.restart()
+    assert bench.get("position_offset") == 0
+    assert bench.get("present_position") == pytest.approx(3000, abs=4)
+
+
+def test_a_homing_offset_can_be_cleared() -> None:
+    bench = Bench(EYE)
+    bench.put("homing_offset", 300)
+    assert bench.joint.clear_offset() == 300
+    assert bench.joint.check().homing_offset == 0
+
+
+# --- driven
+
+
+@each
+def test_by_motion_finds_the_stops_and_puts_everything_back(joint: JointParams) -> None:
+    bench = Bench(joint, 2100, STOPS)
+    bench.put("min_position_limit", 2000)
+    bench.put("max_position_limit", 2200)
+    names = (
+        ("torque_limit", "goal_speed", "acceleration", "lock")
+        if joint is STS
+        else ("goal_pwm", "profile_acceleration", "profile_velocity", "bus_watchdog")
+    )
+    before = [bench.get(name) for name in names]
     found = by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
-    assert found.sign == 1 and found.zero_step == pytest.approx(2100, abs=6)
-    assert found.max_deg == pytest.approx(400 / STEPS_PER_DEG - 2.0, abs=0.7)
-    assert found.min_deg == pytest.approx(-400 / STEPS_PER_DEG + 2.0, abs=0.7)
+    assert found.sign == 1 and found.zero_step == pytest.approx(2100, abs=8)
+    assert found.max_deg == pytest.approx(400 / STEPS_PER_DEG - 2.0, abs=1.0)
+    assert found.min_deg == pytest.approx(-400 / STEPS_PER_DEG + 2.0, abs=1.0)
     assert bench.get("torque_enable") == 0
-    assert bench.get("goal_pwm") == bench.get("pwm_limit")
+    assert bench.limits() == (2000, 2200) and [bench.get(name) for name in names] == before
     pushed = [float(line.split("pushed for ")[1].split()[0]) for line in bench.said if "pu" in line]
     assert len(pushed) == 2 and max(pushed) <= 500.0
 
 
+def test_drive_that_a_killed_program_left_weak_is_full_again() -> None:
+    bench = Bench(EYE, 2100, STOPS)
+    bench.put("goal_pwm", 200)
+    by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
+    assert bench.get("goal_pwm") == bench.get("pwm_limit")
+
+
 def test_by_motion_the_person_says_which_way_it_went() -> None:
-    bench = Bench(EYE, 2100, (1700.0, 2500.0))
+    bench = Bench(EYE, 2100, STOPS)
     bench.agreed = False
     assert by_motion(bench.joint, bench, 2.0, GENTLY, "middle").sign == -1
 
 
 def test_by_motion_zero_by_a_person() -> None:
-    bench = Bench(EYE, 2100, (1700.0, 2500.0))
+    bench = Bench(EYE, 2100, STOPS)
     bench.script = [100]
     found = by_motion(bench.joint, bench, 2.0, GENTLY, "person")
     assert found.zero_step == pytest.approx(2200, abs=15)
 
 
-def test_by_motion_narrow_limits_of_the_servo_are_opened_and_put_back() -> None:
-    bench = Bench(NECK, 2100, (1700.0, 2500.0))
-    bench.registers.write(7, "min_position_limit", 2000)
-    bench.registers.write(7, "max_position_limit", 2200)
+def test_by_motion_narrow_limits_of_a_neck_servo_are_opened_and_put_back() -> None:
+    bench = Bench(NECK, 2100, STOPS)
+    bench.put("min_position_limit", 2000)
+    bench.put("max_position_limit", 2200)
     found = by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
-    assert found.max_deg > 30.0
-    assert (bench.get("min_position_limit"), bench.get("max_position_limit")) == (2000, 2200)
+    assert found.max_deg > 30.0 and bench.limits() == (2000, 2200)
 
 
 def test_by_motion_without_a_stop_before_the_seam_is_refused() -> None:
@@ -161,16 +231,21 @@ def test_by_motion_without_a_stop_before_the_seam_is_refused() -> None:
     assert bench.get("torque_enable") == 0
 
 
-def test_by_motion_a_stop_that_is_asked_for_lets_go_at_once() -> None:
-    bench = Bench(EYE, 2100, (1700.0, 2500.0))
+@each
+def test_by_motion_a_stop_that_is_asked_for_lets_go_at_once(joint: JointParams) -> None:
+    bench = Bench(joint, 2100, STOPS)
     bench.why = "SIGINT"
     with pytest.raises(Stopped, match="SIGINT"):
         by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
-    assert bench.get("torque_enable") == 0 and bench.get("bus_watchdog") == 0
+    assert bench.get("torque_enable") == 0
+    if joint is STS:
+        assert bench.get("torque_limit") == 1000
+    else:
+        assert bench.get("bus_watchdog") == 0
 
 
 def test_by_motion_is_slow_and_weak() -> None:
-    bench = Bench(EYE, 2100, (1700.0, 2500.0))
+    bench = Bench(EYE, 2100, STOPS)
     bench.joint.take_on(GENTLY)
     assert bench.get("goal_pwm") == round(0.3 * bench.get("pwm_limit"))
     assert 0 < bench.get("profile_velocity") <= 2.0 * 15.0 * STEPS_PER_DEG / 15.6 + 1
@@ -190,45 +265,93 @@ def test_by_motion_is_slow_and_weak() -> None:
     bench.joint.leave()
 
 
+def test_by_motion_a_servo_without_a_watchdog_is_said_to_be_one() -> None:
+    bench = Bench(STS, 2100, STOPS)
+    bench.joint.take_on(GENTLY)
+    assert bench.get("torque_limit") == 300
+    assert 0 < bench.get("goal_speed") <= 2.0 * 15.0 * STEPS_PER_DEG
+    assert "no watchdog" in bench.joint.alone and not Bench(EYE).joint.alone
+    bench.joint.leave()
+    by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
+    assert any("no watchdog" in line for line in bench.said)
+
+
+def test_limits_that_a_killed_program_left_open_are_narrow_again_after_a_restart() -> None:
+    bench = Bench(STS, 2100, STOPS)
+    bench.put("min_position_limit", 2000)
+    bench.put("max_position_limit", 2200)
+    bench.joint.take_on(GENTLY)
+    assert bench.get("min_position_limit") == 0
+    bench.restart()
+    assert bench.limits() == (2000, 2200)
+
+
+def test_a_servo_that_restarts_on_the_way_has_met_no_stop() -> None:
+    bench = Bench(STS, 2100, (1000.0, 3000.0))
+    bench.joint.take_on(GENTLY)
+    bench.chain.faults.command(f"brown-out {STS.id}")
+    with pytest.raises((ServoFault, BusLost)):
+        bench.joint.find_stop(GENTLY, 1)
+
+
+# --- what is refused
+
+
 @pytest.mark.parametrize(
-    ("register", "value", "says"),
+    ("joint", "register", "value", "says"),
     [
-        ("homing_offset", 300, r"Homing Offset is 300 steps.*--clear-offset"),
-        ("operating_mode", 4, r"operating_mode is 4, not 3: gazerig doctor --fix"),
-        ("drive_mode", 1, r"drive_mode is 1, not 0"),
+        (EYE, "homing_offset", 300, r"Homing Offset is 300 steps.*--clear-offset"),
+        (EYE, "operating_mode", 4, r"operating_mode is 4, not 3: gazerig doctor --fix"),
+        (EYE, "drive_mode", 1, r"drive_mode is 1, not 0"),
+        (STS, "operating_mode", 1, r"operating_mode is 1, not 0: gazerig doctor --fix"),
+        (STS, "phase", 0x1C, r"phase is 28, not 12: gazerig doctor --fix"),
     ],
 )
-def test_a_servo_set_up_in_another_way_is_refused(register: str, value: int, says: str) -> None:
-    bench = free()
-    bench.registers.write(1, register, value)
+def test_a_servo_set_up_in_another_way_is_refused(
+    joint: JointParams, register: str, value: int, says: str
+) -> None:
+    bench = Bench(joint)
+    bench.put(register, value)
     with pytest.raises(ServoMissing, match=says):
         bench.joint.check()
 
 
-def test_a_homing_offset_can_be_cleared() -> None:
-    bench = free()
-    bench.registers.write(1, "homing_offset", 300)
-    assert bench.joint.clear_offset() == 300
-    assert bench.joint.check().homing_offset == 0
-
-
-def test_a_wrong_model_a_fault_and_a_silent_servo_are_named() -> None:
-    bench = free()
+def test_a_wrong_model_is_named() -> None:
+    bench = Bench(EYE)
     wrong = SmartServo("left_eye_pan", EYE.id, "xc330-m288", bench.port)
     with pytest.raises(ServoMissing, match="is xl330-m077, not xc330-m288"):
         wrong.check()
-    bench.port.faults.command("overload 1")
-    with pytest.raises(ServoFault, match="overload: .*gazerig reboot 1"):
+
+
+@pytest.mark.parametrize(
+    ("joint", "fault", "says"),
+    [
+        (EYE, "overload {id}", "overload: .*gazerig reboot 1"),
+        (STS, "overheat {id}", "overheating: let it cool"),
+    ],
+)
+def test_a_servo_that_suffers_or_is_silent_is_named(
+    joint: JointParams, fault: str, says: str
+) -> None:
+    bench = Bench(joint)
+    bench.command(fault)
+    with pytest.raises(ServoFault, match=says):
         bench.joint.check()
-    bench.port.faults.command("lose 1")
+    bench.command("lose {id}")
     with pytest.raises(ServoMissing, match="does not answer"):
         bench.joint.check()
     with pytest.raises(BusLost, match="does not answer any more"):
         bench.joint.position()
 
 
+def test_a_servo_that_answers_pings_alone_is_brought_to_speak() -> None:
+    bench = Bench(EYE)
+    bench.put("status_return_level", 0)
+    assert bench.joint.check().limits == (0, 4095)
+
+
 def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
-    bench = free(start=4000)
+    bench = Bench(EYE, 4000)
     bench.chain.here(1).turn(200)
     with pytest.raises(ServoMissing, match="turned over the seam"):
         bench.joint.take_on(GENTLY)
@@ -236,7 +359,7 @@ def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
 
 
 def test_a_joint_that_is_left_alone_stops_by_itself() -> None:
-    bench = free()
+    bench = Bench(EYE)
     bench.joint.take_on(GENTLY)
     bench.registers.write(1, "goal_position", 3000)
     bench.clock.sleep_until(bench.clock.now_s() + 1.0)
@@ -245,3 +368,31 @@ def test_a_joint_that_is_left_alone_stops_by_itself() -> None:
     bench.clock.sleep_until(bench.clock.now_s() + 1.0)
     assert bench.get("present_position") == pytest.approx(stopped_at, abs=3)
     assert stopped_at < 2100 + 0.5 * 2.0 * 15.0 * STEPS_PER_DEG
+
+
+class Reader(Bench):
+    """Who turns a joint by hand and says the angles read off, those proposed where it is None."""
+
+    angles: list[float | None]
+
+    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        self.said.append(question)
+        live()
+        said = self.angles.pop(0)
+        return proposed if said is None else said
+
+    def steer(self, question: str, servo: Steered) -> None:
+        raise AssertionError("a servo that tells its place is turned by hand")
+
+
+def test_a_push_rod_on_a_smart_servo_is_measured_by_hand() -> None:
+    rod = replace(STS, min_deg=-20.0, max_deg=20.0, linkage=((-25.0, 1800.0), (25.0, 2400.0)))
+    bench = Reader(STS)
+    single = SingleJoint("left_eye_pan", rod, bench.servo, bench.clock, lambda: None)
+    bench.script = [0, 250, -490, 120, 240]
+    bench.angles = [22.0, -21.0, None, 10.0]
+    made = by_places(HandPlacer(single, bench), bench, 1.0, 1)
+    assert [round(at) for _, at in made.linkage] == [1860, 1980, 2100, 2220, 2350]
+    assert [angle for angle, _ in made.linkage] == [-21.0, -10.5, 0.0, 10.0, 22.0]
+    assert (made.min_deg, made.max_deg) == (-20.0, 21.0)
+    assert any("turn left_eye_pan until it reads about step 1980" in line for line in bench.said)

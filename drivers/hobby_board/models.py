@@ -1,9 +1,11 @@
 """Hobby servos, whatever board sends their pulses."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from drivers.event_log import servo_label
-from drivers.types import ServoSetup
+
+if TYPE_CHECKING:  # the guardian starts without numpy
+    from drivers.types import ServoSetup
 
 US_STEPS = 4
 """Pulse widths are counted in quarters of a microsecond."""
@@ -29,6 +31,6 @@ HOBBY = {
 }
 
 
-def channel_label(setup: ServoSetup) -> str:
+def channel_label(setup: "ServoSetup") -> str:
     """Return how people know a hobby servo: its joint and its channel."""
     return servo_label(setup, "channel")
