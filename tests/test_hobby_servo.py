@@ -80,7 +80,7 @@ def test_it_strains_at_a_hard_stop():
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
-        ({"channel": 24}, "channel is not in 0..23"),
+        ({"channel": 256}, "channel is not in 0..255"),
         ({"speed_steps_s": 0.0}, "speed_steps_s is not in 100"),
         ({"lag_s": float("nan")}, "lag_s is not in"),
         ({"min_steps": 0}, "min_steps is not in 256"),
