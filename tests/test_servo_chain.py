@@ -210,35 +210,6 @@ def test_noise_before_a_packet_is_passed_over(noise):
     assert len(bench.chain.receive(PING)) == 14
 
 
-def test_a_packet_may_arrive_byte_by_byte():
-    bench = Bench((1, "xm430-w210"))
-    answers = [bench.chain.receive(bytes([byte])) for byte in PING]
-    assert answers[:-1] == [b""] * 9
-    assert len(answers[-1]) == 14
-
-
-def test_a_torn_packet_is_forgotten_after_the_gap():
-    bench = Bench((1, "xm430-w210"))
-    bench.chain.receive(PING[:5])
-    bench.now_s = 0.002
-    assert bench.chain.receive(PING[5:]) == b""
-    assert bench.chain.receive(PING) != b""
-
-
-@pytest.mark.parametrize("at", range(4, 10))
-def test_a_damaged_instruction_is_met_with_silence(at):
-    bench = Bench((1, "xm430-w210"), (0, "xm430-w210"))
-    bad = PING[:at] + bytes([PING[at] ^ 1]) + PING[at + 1 :]
-    assert bench.chain.receive(bad) == b""
-    bench.now_s = 0.01
-    assert len(bench.chain.receive(PING)) == 14
-
-
-def test_two_packets_in_one_piece_are_both_answered():
-    bench = Bench((1, "xm430-w210"))
-    assert len(bench.chain.receive(PING + PING)) == 28
-
-
 # --- rules
 
 
@@ -277,17 +248,6 @@ def test_a_new_id_answers_once_under_the_old_one():
     assert answer[4] == 1
     assert bench.chain.receive(PING) == b""
     assert bench.read(9, 7, 1) == 9
-
-
-def test_missing_id_silences_later_ones_or_not():
-    wanted = struct.pack("<HH", 132, 4) + bytes((1, 9, 2))
-    servos = ((1, "xl330-m288"), (2, "xl330-m288"))
-    quiet, skipping = Bench(*servos), Bench(*servos, after_missing="skip")
-    assert len(quiet.chain.receive(instruction(0xFE, 0x82, wanted))) == 15
-    assert len(skipping.chain.receive(instruction(0xFE, 0x82, wanted))) == 30
-    cut = quiet.chain.receive(instruction(0xFE, 0x8A, wanted))
-    assert len(cut) == 8 + 8
-    assert int.from_bytes(cut[5:7], "little") == 1 + 3 * 8
 
 
 def test_old_firmware_knows_no_fast_read():
@@ -361,22 +321,6 @@ def test_the_watchdog_sleeps_without_torque():
     assert bench.read(1, 98, 1) == 1
 
 
-def test_results_do_not_depend_on_how_often_one_looks():
-    seldom, often = Bench((1, "xl330-m077", 1000)), Bench((1, "xl330-m077", 1000))
-    seen = []
-    for bench, looks in ((seldom, 1), (often, 17)):
-        bench.write(1, 112, 4, 120)
-        bench.engage(1, 3000)
-        for tick in range(1, 41):
-            for look in range(looks):
-                bench.now_s = (tick - 1) * 0.005 + 0.005 * (look + 1) / looks
-                bench.chain.positions_steps()
-            if tick == 20:
-                bench.write(1, 116, 4, 500)
-        seen.append(bench.chain.positions_steps())
-    assert seen[0] == seen[1]
-
-
 # --- who listens
 
 
@@ -440,12 +384,6 @@ def test_a_reset_servo_is_found_at_the_factory_settings():
     assert len(bench.chain.receive(instruction(6, 1), 1_000_000)) == 14
 
 
-def test_a_wrong_baud_rate_may_give_garbage():
-    bench = Bench((1, "xl330-m288"), baud=1_000_000)
-    bench.chain.choose("wrong-baud", "garbage")
-    assert 0 < len(bench.chain.receive(PING, 115200)) < 14
-
-
 def test_a_baud_rate_that_a_model_lacks_is_refused():
     with pytest.raises(ValueError, match="xl330-m288 does not know it"):
         Bench((1, "xl330-m288"), baud=4_500_000)
@@ -479,14 +417,6 @@ def test_a_packet_that_should_have_been_stuffed_may_be_dropped():
     bench.chain.choose("stuffing", "strict")
     assert bench.chain.receive(raw) == b""
     assert bench.chain.receive(stuffed)[8] == 0
-
-
-def test_a_missing_id_may_be_waited_for():
-    wanted = struct.pack("<HH", 132, 4) + bytes((9, 1, 8, 7, 2))
-    bench = Bench((1, "xl330-m288"), (2, "xl330-m288"), after_missing="timeout")
-    (reply,) = bench.chain.exchange(instruction(0xFE, 0x82, wanted))
-    assert [piece.servo_id for piece in reply.pieces] == [1, 2]
-    assert [piece.late_s for piece in reply.pieces] == [0.001, 0.002]
 
 
 def test_replies_know_their_servos_return_delay():

@@ -194,16 +194,6 @@ def test_what_follows_a_new_id_in_the_same_breath_is_heard():
     assert packets(bench.chain.receive(data)) == [(1, 0, b""), (7, 0, b"")]
 
 
-def test_a_wrong_baud_may_bring_garbage():
-    bench = Bench(baud=500_000)
-    bench.chain.choose("wrong-baud", "garbage")
-    sent = instruction(1, PING)
-    said = bench.chain.receive(sent, 1_000_000)
-    assert said and b"\xff\xff" not in said
-    bench.chain.choose("baud", "any")
-    assert len(bench.ask(1, PING, baud=1_000_000)) == 1
-
-
 def test_status_level_0_answers_reads_and_pings_only():
     bench = Bench()
     assert bench.write(1, 8, 0) == 0
@@ -291,26 +281,6 @@ def test_sync_read_answers_in_the_order_asked():
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("policy", "answered"), [("silence", [1]), ("skip", [1, 2, 3]), ("timeout", [1, 2, 3])]
-)
-def test_what_comes_behind_a_missing_one(policy, answered):
-    bench = three()
-    bench.chain.choose("after-missing", policy)
-    bench.chain.choose("slot-timeout-ms", "4")
-    replies = bench.chain.exchange(instruction(ALL, SYNC_READ, 56, 2, 1, 9, 2, 3))
-    pieces = [piece for reply in replies for piece in reply.pieces]
-    assert [piece.servo_id for piece in pieces] == answered
-    waits = [0.0, 0.004, 0.0] if policy == "timeout" else [0.0] * len(answered)
-    assert [piece.late_s for piece in pieces] == waits
-
-
-def test_a_silent_servo_is_a_missing_one():
-    bench = three()
-    bench.chain.faults.command("lose 2")
-    assert [i for i, _, _ in bench.ask(ALL, SYNC_READ, 56, 2, 1, 2, 3)] == [1]
-
-
 def test_sync_write_reaches_those_it_names():
     bench = three()
     assert bench.ask(ALL, SYNC_WRITE, 42, 2, 1, 5, 0, 3, 6, 0) == []
@@ -350,29 +320,6 @@ def test_other_broadcasts_are_obeyed_in_silence(code):
     bench = three()
     assert bench.ask(ALL, code, 42, 7, 0) == []
     assert [bench.read(i, 42, 2) for i in (1, 2, 3)] == ([7] * 3 if code == WRITE else [0] * 3)
-
-
-# --- quirks
-
-
-@pytest.mark.parametrize(
-    ("case", "value", "message"),
-    [
-        ("after-missing", "wait", "after-missing 'wait': it can be silence, skip, timeout"),
-        ("colour", "red", "set 'colour': unknown; there is after-missing"),
-        ("packet-gap-ms", "soon", "not a number of milliseconds"),
-        ("baud", "1000000", "it can be heed, any"),
-    ],
-)
-def test_habits_that_do_not_exist(case, value, message):
-    with pytest.raises(ValueError, match=message):
-        Bench().chain.choose(case, value)
-
-
-def test_habits_can_be_chosen_as_text():
-    bench = three()
-    assert bench.chain.faults.command("set after-missing skip") == "after-missing is skip"
-    assert len(bench.ask(ALL, SYNC_READ, 56, 2, 9, 1)) == 1
 
 
 # --- two clocks, one result

@@ -70,22 +70,6 @@ def test_the_end_counts_from_the_newest_piece():
     assert found.end == len(data) - 5
 
 
-def test_a_packet_that_stays_unfinished_is_dropped():
-    data = instruction(1, 1)
-    framing = FeetechFraming(0.001, 0.0)
-    assert framing.feed(data[:4], 0.0) == []
-    assert framing.feed(data[4:], 0.002) == []
-    assert len(framing.feed(data, 0.002)) == 1
-
-
-def test_a_wrong_checksum_is_met_with_silence_and_the_next_is_heard():
-    good = instruction(1, 1)
-    bad = good[:-1] + bytes((good[-1] ^ 4,))
-    bench = Bench()
-    assert bench.chain.receive(bad) == b""
-    assert len(bench.chain.receive(bad + good)) == 6
-
-
 @pytest.mark.parametrize("length", [0, 1])
 def test_a_length_that_cannot_be_is_passed_over(length):
     bad = bytes((255, 255, 1, length))
