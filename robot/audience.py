@@ -189,6 +189,9 @@ class Audience:
             # Who computes in another thread gives the interpreter back after so long, not the
             # usual 5 ms, which is a whole slot of the loop.
             sys.setswitchinterval(_SWITCH_S)
+        with self._spared("the recording"):
+            if self._recorder is not None:
+                self._recorder.begin()
         with self._spared("the page"):
             if self._page is not None:
                 self._page.open()
@@ -222,6 +225,10 @@ class Audience:
     def events(self) -> tuple[str, ...]:
         """Say what has happened to those who watch."""
         return self._recorder.events() if self._recorder is not None else ()
+
+    def unwritten(self) -> Path | None:
+        """Return the file that was asked for and is not whole, None where there is none."""
+        return self._recorder.unwritten if self._recorder is not None else None
 
     def close(self, count: LoopCount) -> None:
         """Close all, when the torque is off."""

@@ -9,7 +9,7 @@ in gaze.types; the world's origin is the neck base on the yaw axis.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from math import asin, atan2, hypot
+from math import asin, atan2, hypot, pi
 
 from gaze.angles import add, rotate, rotate_back, rotation, sub, yaw_pitch
 from gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
@@ -130,7 +130,7 @@ class Kinematics:
         x, y, z = rotate_back(R_world_head, sub(p_world_m, p_world_head_m))
         left, right = yaw_pitch((x, y - self._half, z)), yaw_pitch((x, y + self._half, z))
         if self.one_pan:
-            yaw = 0.5 * (left[0] + right[0])
+            yaw = _between(left[0], right[0])
             left, right = (yaw, left[1]), (yaw, right[1])
         if self.one_tilt:
             pitch = 0.5 * (left[1] + right[1])
@@ -181,3 +181,11 @@ class Kinematics:
             *command.head_rad,
         )
         return tuple([every[i] for i in self._wanted])
+
+
+def _between(one: float, other: float) -> float:
+    """Return the direction midway between two within -pi..pi, the short way round."""
+    middle = 0.5 * (one + other)
+    if abs(one - other) <= pi:
+        return middle
+    return middle - pi if middle > 0.0 else middle + pi

@@ -184,6 +184,8 @@ def _run(
             audience.give_up()
     faults.close()
     figures = _figures(made, summary, score, count, wall_s, faults)
+    if (unwritten := audience.unwritten()) is not None:
+        figures["not_written"] = str(unwritten)
     if face_gaze is not None and wanted.heatmap is not None:
         try:
             _draw_heatmap(face_gaze, wanted, wanted.heatmap, say)

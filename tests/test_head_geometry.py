@@ -1,6 +1,6 @@
 """Kinematics: forward and inverse against each other over the whole range."""
 
-from math import radians
+from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -14,8 +14,9 @@ from gaze.types import GazeCommand
 from robot.kinematics import GeometryParams, Kinematics
 from robot.types import JointState
 
+GEOMETRY = GeometryParams(62.0, 38.0, 51.0)
 KINEMATICS = Kinematics(
-    GeometryParams(62.0, 38.0, 51.0),
+    GEOMETRY,
     JOINTS,
     {
         "left_upper_lid": (radians(-25), radians(20)),
@@ -95,3 +96,25 @@ def test_eyes_are_where_the_geometry_says() -> None:
     gap = sub(state.p_world_eye_left_m, state.p_world_eye_right_m)
     assert norm(gap) == pytest.approx(0.0619)
     assert gap[1] > 0.0
+
+
+ONE_PAN = Kinematics(GEOMETRY, ("eyes_pan", "eyes_tilt"), {})
+
+
+@given(angle=st.floats(-3.14, 3.14), far=st.floats(0.3, 5.0))
+def test_eyes_on_one_linkage_point_between_what_each_would_need(angle: float, far: float) -> None:
+    R, p = ONE_PAN.head_pose((0.0, 0.0, 0.0))
+    point = (p[0] + far * cos(angle), far * sin(angle), p[2])
+    left, right = ONE_PAN.eyes_on(point, R, p)
+    assert left == right
+    off = abs(left[0] - angle)
+    # Beside the head one eye is nearer, so the mean is not quite that of the middle.
+    assert min(off, 2.0 * pi - off) < 0.01 / far
+
+
+def test_eyes_on_one_linkage_turn_to_the_end_for_a_point_straight_behind() -> None:
+    R, p = ONE_PAN.head_pose((0.0, 0.0, 0.0))
+    for aside in (-0.05, -0.001, 0.0, 0.001, 0.05):
+        (pan, _), _ = ONE_PAN.eyes_on((p[0] - 1.0, aside, p[2]), R, p)
+        assert abs(pan) > 3.0
+        assert pan * aside >= 0.0

@@ -16,6 +16,7 @@ import pytest
 from desk import JOINTS
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from typer.testing import CliRunner
 
 from config.load import load
 from config.schema import Rig, load_rig
@@ -27,6 +28,8 @@ from gaze.types import Bodies, Face, Percept
 from robot import stop_latch
 from robot.assemble import Assembly, assemble
 from robot.choice import Choice
+from robot.cli.main import app
+from robot.cli.terminal import BAD_INPUT, FAULT, _writer
 from robot.loop import Tick, run
 from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune
 from robot.page.picture import encode
@@ -469,6 +472,42 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_pa
     assert not recording.whole
     assert path.stat().st_size <= 60_000
     list(recording.ticks())  # what is there is not damaged
+
+
+def test_a_run_whose_recording_stopped_is_a_fault(small_disk: None, tmp_path: Path) -> None:
+    path = tmp_path / "full.mcap"
+    words = ["run", "--mock", "--fast", "--seconds", "5", "--record", str(path)]
+    made = CliRunner().invoke(app, words)
+    _writer.flush(20.0)
+    assert made.exit_code == FAULT, made.output
+    assert made.exception is None or isinstance(made.exception, SystemExit)
+
+
+def test_an_older_recording_stays_until_a_run_has_begun(tmp_path: Path) -> None:
+    path = tmp_path / "older.mcap"
+    path.write_bytes(b"older")
+    path.chmod(0o600)
+    recorder = Recorder(path, info_for(assembly()), lambda: BusHealth(0, 0, {}), over=True)
+    recorder.open()
+    assert path.read_bytes() == b"older"
+    assert recorder.close("it could not start") == f"nothing was recorded: {path} is as it was"
+    assert [one.name for one in tmp_path.iterdir()] == ["older.mcap"]
+
+    recorder = Recorder(path, info_for(assembly()), lambda: BusHealth(0, 0, {}), over=True)
+    recorder.open()
+    recorder.begin()
+    assert path.read_bytes() != b"older" and path.stat().st_mode & 0o777 == 0o600
+    assert [one.name for one in tmp_path.iterdir()] == ["older.mcap"]
+    recorder.close("seconds")
+
+
+def test_a_robot_that_cannot_start_leaves_an_older_recording(tmp_path: Path) -> None:
+    path = tmp_path / "older.mcap"
+    path.write_bytes(b"older")
+    words = ["run", "--port", "/dev/absent", "--scene", "visitor", "--no-page", "--force"]
+    made = CliRunner().invoke(app, [*words, "--record", str(path)])
+    assert made.exit_code == BAD_INPUT, made.output
+    assert path.read_bytes() == b"older"
 
 
 def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) -> None:

@@ -3,14 +3,18 @@
 import re
 import shlex
 from pathlib import Path
+from threading import Thread
 
 import pytest
 import typer
 from test_cli_servos import SMALL
 from typer.testing import CliRunner
 
+from config.schema import load_rig
 from robot.cli.main import app
-from robot.cli.suggestions import completed
+from robot.cli.suggestions import completed, speaking_of
+from robot.cli.terminal import _writer
+from robot.emulated_rig import emulated_lines
 from sim_mock.pty.client import PtyBus
 
 DESK = Path(__file__).parents[1] / "config/rigs/desk.yaml"
@@ -71,3 +75,37 @@ def test_every_cure_of_the_doctor_can_be_typed(
         assert values["port"] == path, words
         if "rig" in values and words[0] != "scan":
             assert values["rig"] == str(rig), words
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ["jog", "neck_yaw", "5", "--rig"],
+        ["look-at", "1", "0", "0.2", "--rig"],
+        ["home"],
+        ["run", "--scene", "visitor", "--no-page", "--seconds", "1"],
+    ],
+)
+def test_what_a_driver_says_at_the_start_can_be_typed(asked: list[str], tmp_path, capfd) -> None:
+    rig = tmp_path / "mine.yaml"
+    rig.write_text(DESK.read_text())
+    with PtyBus() as bus:
+        path = bus.start(
+            next(iter(emulated_lines(load_rig("desk")).values())).servos, baud=1_000_000
+        )
+        bus.command("overload 7")
+        made = CliRunner().invoke(app, [*asked, str(rig), "--port", path])
+        _writer.flush(20.0)
+    said = made.output + capfd.readouterr().err
+    assert made.exit_code in (1, 2), said
+    assert f"; gazerig doctor {rig} --port {path} finds the cause" in said
+
+
+def test_other_threads_suggest_the_same_and_inner_blocks_too() -> None:
+    heard = []
+    with speaking_of("my.yaml", "/dev/ttyACM3", False), speaking_of(None, None, False):
+        thread = Thread(target=lambda: heard.append(completed("gazerig home")))
+        thread.start()
+        thread.join()
+    assert heard == ["gazerig home my.yaml --port /dev/ttyACM3"]
+    assert completed("gazerig home") == "gazerig home"

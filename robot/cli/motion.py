@@ -65,7 +65,7 @@ def jog(
     with clear_errors(rig, port, mock):
         loaded = load_rig(rig)
         refuse_beyond(joint, deg, loaded.names, limits(loaded.joints))
-    with _commanded(loaded, _Way(mock, port, yes), speed, hold, not no_park) as control:
+    with _commanded(loaded, _Way(mock, port, yes, rig), speed, hold, not no_park) as control:
         moved = control.jog(joint, deg)
         _report(moved, (joint,))
         _stay(control, seconds, hold)
@@ -86,7 +86,7 @@ def home(
         loaded = load_rig(rig)
     centre = dict.fromkeys(loaded.names, 0.0)
     centre.update({name: degrees(wide) for name, (_, wide) in lid_ends(loaded).items()})
-    with _commanded(loaded, _Way(mock, port, yes), speed, hold, False) as control:
+    with _commanded(loaded, _Way(mock, port, yes, rig), speed, hold, False) as control:
         moved = control.pose(centre)
         _report(moved, loaded.names)
         _stay(control, 0.0, hold)
@@ -116,7 +116,7 @@ def look_at_command(
         from robot.assemble import gaze_parts
 
         kinematics, oculomotor = gaze_parts(loaded, seed)
-    with _commanded(loaded, _Way(mock, port, yes), 20.0, hold, not no_park) as control:
+    with _commanded(loaded, _Way(mock, port, yes, rig), 20.0, hold, not no_park) as control:
         looked = look_at(control, kinematics, oculomotor, (x, y, z), seconds)
         good = _report_look(looked, loaded)
         _stay(control, 0.0, hold)
@@ -124,11 +124,16 @@ def look_at_command(
 
 
 class _Way(NamedTuple):
-    """The way to the servos, as asked on the command line; yes: no hand is in them."""
+    """The way to the servos, as asked on the command line.
+
+    yes: no hand is in them
+    rig: as it was named, for the commands that messages suggest
+    """
 
     mock: bool
     port: str | None
     yes: bool
+    rig: str
 
 
 @contextlib.contextmanager
@@ -137,9 +142,15 @@ def _commanded(
 ) -> Iterator[ManualControl]:
     """Give a rig that holds where it is; whatever happens, it ends with the torque off."""
     if not way.mock:
-        with clear_errors():  # before Ctrl-C is a wish that somebody has to look at
+        with clear_errors(
+            way.rig, way.port
+        ):  # before Ctrl-C is a wish that somebody has to look at
             _ask_for_fingers(rig, way.yes)
-    with clear_errors(), signals() as stopped, wires(rig, way.mock, way.port) as wire:
+    with (
+        clear_errors(way.rig, way.port, way.mock),
+        signals() as stopped,
+        wires(rig, way.mock, way.port) as wire,
+    ):
         enter = _enter if hold and sys.stdin.isatty() else _never
         control = _control(rig, wire, speed, lambda: stopped() or enter())
         with PowerDown(

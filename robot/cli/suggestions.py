@@ -8,24 +8,34 @@ import contextlib
 import re
 import shlex
 from collections.abc import Iterator, Mapping
-from contextvars import ContextVar
 
 _SUGGESTED = re.compile(
     r"\bgazerig (?P<command>doctor|setup|calibrate|reboot|scan|home)\b"
     r"(?P<words>(?: --fix\b| --joint \w+| --kind \w+|(?<=reboot) \d+)*)"
 )
-_given: ContextVar[Mapping[str, object]] = ContextVar("given", default={})  # noqa: B039
+_given: list[Mapping[str, object]] = [{}]
+"""Of the command in force, last; for all threads, as those that watch a run speak, too."""
 _TAKE_RIG_AS_OPTION = ("reboot", "scan")
 
 
 @contextlib.contextmanager
 def speaking_of(rig: str | None, port: str | None, mock: bool) -> Iterator[None]:
-    """Let messages within the block suggest commands for this rig and port."""
-    token = _given.set({"rig": rig, "port": port, "mock": mock})
+    """Let messages within the block suggest commands for this rig and port.
+
+    A block that names no rig speaks of the one around it.
+    """
+    _given.append({"rig": rig, "port": port, "mock": mock} if rig is not None else _given[-1])
     try:
         yield
     finally:
-        _given.reset(token)
+        _given.pop()
+
+
+def with_doctor(text: str) -> str:
+    """Return a fault of servos with the command that finds its cause, where none is named yet."""
+    given = _given[-1]
+    reaches = isinstance(given.get("rig"), str) and given.get("mock") is not True
+    return f"{text}; gazerig doctor finds the cause" if reaches and "gazerig " not in text else text
 
 
 def completed(text: str, given: Mapping[str, object] | None = None) -> str:
@@ -37,7 +47,7 @@ def completed(text: str, given: Mapping[str, object] | None = None) -> str:
             where None.
     """
     if given is None:
-        given = _given.get()
+        given = _given[-1]
     if "gazerig " not in text or not isinstance(given.get("rig"), str):
         return text
     known = given

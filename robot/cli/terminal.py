@@ -16,9 +16,9 @@ from typing import Annotated, NoReturn
 import typer
 
 from config.load import ConfigError, shipped_names
-from drivers.errors import DriverError, SetupError
+from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from robot.cli.line_writer import LineWriter
-from robot.cli.suggestions import completed, speaking_of
+from robot.cli.suggestions import completed, speaking_of, with_doctor
 from robot.interrupts import Interrupts
 
 BAD_INPUT = 2
@@ -78,11 +78,11 @@ def _errors_said() -> Iterator[None]:
         yield
     except (ConfigError, SetupError) as error:
         _show_origin()
-        say(str(error))
+        say(with_doctor(str(error)) if isinstance(error, ServoMissing) else str(error))
         raise typer.Exit(BAD_INPUT) from None
     except DriverError as error:
         _show_origin()
-        say(str(error))
+        say(with_doctor(str(error)) if isinstance(error, ServoFault) else str(error))
         raise typer.Exit(FAULT) from None
     except BrokenPipeError:
         raise  # for run_app: nobody reads what is printed

@@ -6,6 +6,8 @@ as long as it takes to close the file.
 """
 
 import os
+import secrets
+import shutil
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
@@ -57,6 +59,7 @@ class Recorder:
         self._last_s: float | None = None
         self._seconds: float | None = None
         self._checked_s = self._sent_s = -inf
+        self._beside: Path | None = None
         self._opened = self._said = False
         self.lost = 0
 
@@ -66,7 +69,10 @@ class Recorder:
         Raises:
             drivers.errors.SetupError: the file exists or cannot be made.
         """
-        file_fd = _created(self._path, self._over)
+        if self._over and self._path.is_file():
+            target = Path(os.path.realpath(self._path))
+            self._beside = target.with_name(f".{target.name[:80]}-{secrets.token_hex(4)}")
+        file_fd = _created(self._beside or self._path, self._over)
         self._opened = True
         try:
             self._link.open(file_fd)
@@ -75,6 +81,19 @@ class Recorder:
         self._link.post(writer.BEGIN, (as_text(self._info), started_ns(self._info)))
         self._link.flush()
         self._pictures.start()
+
+    def begin(self) -> None:
+        """Take the place of an older recording, now that the run has begun.
+
+        Raises:
+            OSError: that is refused; the older one stays.
+        """
+        if self._beside is None:
+            return
+        target = Path(os.path.realpath(self._path))
+        shutil.copymode(target, self._beside)
+        os.replace(self._beside, target)
+        self._beside = None
 
     def tapped(self, body: Body) -> Body:
         """Give a body to take the place of a robot's, so that all it says is recorded."""
@@ -135,6 +154,9 @@ class Recorder:
         self._link.post(writer.END, {name: getattr(end, name) for name in RunEnd.__slots__})
         self._link.close()
         if self._last_s is None:
+            if self._beside is not None:
+                self._beside.unlink(missing_ok=True)
+                return f"nothing was recorded: {self._path} is as it was"
             if self._opened:  # else it is somebody else's
                 self._path.unlink(missing_ok=True)
             return f"nothing was recorded: {self._path} is not made"
@@ -145,6 +167,11 @@ class Recorder:
         lost = f"; {self.lost} ticks could not be kept" if self.lost else ""
         size_mb = done.size / 1e6
         return f"{done.ticks} ticks{pictures} ({size_mb:.1f} MB) recorded in {self._path}{lost}"
+
+    @property
+    def unwritten(self) -> Path | None:
+        """Return the file that is not as it was asked for, None where all is well."""
+        return self._path if self._opened and self._link.failed else None
 
     def _number(self, percept: Percept | None) -> int | None:
         """Give a percept's number, handing it over where it is new; None where it is lost."""
