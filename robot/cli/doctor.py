@@ -9,6 +9,7 @@ import typer
 from config.schema import Rig, load_rig
 from drivers.serial.port import BlockingPort
 from robot.bringup.doctor import maestro as doctor_maestro
+from robot.bringup.doctor import pca9685 as doctor_pca9685
 from robot.bringup.doctor import run as checkup
 from robot.bringup.doctor.checks import apply_fix
 from robot.bringup.doctor.findings import Finding, Fix, worst
@@ -83,6 +84,8 @@ def _examine(rig: Rig, bus: str, line: BlockingPort) -> list[Finding]:
         if config.kind == "maestro":
             usb = bench.usb_id(line.port_name)
             return doctor_maestro.visit(line, config.maestro, setups, usb)
+        if config.kind == "pca9685":
+            return doctor_pca9685.visit(line, config.pca9685, setups)
         return checkup.check(line, KINDS[config.kind], setups, config.baud, progress)
 
     return checkup.check_all(line, bench.host, behind)

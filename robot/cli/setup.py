@@ -49,7 +49,9 @@ def setup(
             mine = [one for one in setups_on(model, bus) if one.name in wanted]
             if not mine:
                 continue
-            if model.bus_named(bus).kind == "maestro":
+            if model.bus_named(bus).kind == "pca9685":
+                left += _pca9685(model, rig, bus, mine)
+            elif model.bus_named(bus).kind == "maestro":
                 left += _board(model, rig, bus, mine, port, mock, yes, settings)
             else:
                 left += _chain(model, rig, bus, mine, port, mock, yes)
@@ -180,3 +182,24 @@ def _board(
             every = setups_on(rig, bus)
             write_settings(settings, rig.bus_named(bus).maestro, every, line.port_name)
         return set_up_board(line, rig.bus_named(bus).maestro, setups, joints, yes)
+
+
+def _pca9685(rig: Rig, title: str, bus: str, setups: list[ServoSetup]) -> list[str]:
+    """Say what there is to set up on PCA9685 boards; returns the joints that are left to do.
+
+    A board keeps nothing without power: the program sets it up at every start.
+    """
+    params = rig.bus_named(bus).pca9685
+    say(f"{title}{_where(rig, bus)}: PCA9685; {len(setups)} of its channels.")
+    for address in params.addresses:
+        closed = [f"A{bit}" for bit in range(6) if address >> bit & 1]
+        say(f"   board {address:#x}: jumpers {', '.join(closed) or 'none'} closed")
+    for one in setups:
+        board, channel = divmod(one.id, 16)
+        say(f"   {one.name}: channel {channel} of board {params.addresses[board]:#x}")
+    say(
+        "   nothing else can be set; the board's own clock is some percent off: where angles are, "
+        "too, measure its frequency and correct bus.pca9685.oscillator_hz"
+    )
+    say("   which servo hangs on which channel is seen with gazerig jog JOINT 5")
+    return []
