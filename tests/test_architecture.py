@@ -62,7 +62,6 @@ OWNERS = {
     "serial": ("drivers.serial.", "sim_mock.in_process_port"),
     "dynamixel_sdk": (
         "drivers.dynamixel.",
-        "drivers.servo_bus.registers",
         "drivers.serial.port",
         "sim_mock.in_process_port",
     ),

@@ -9,9 +9,9 @@ from desk import JOINTS
 from typer.testing import CliRunner
 
 from config.save import copy_shipped, save_rig
+from drivers.dynamixel.registers import Registers
 from drivers.serial.list_ports import Host, SerialPort
 from drivers.serial.port import BlockingPort
-from drivers.servo_bus.registers import Registers
 from robot.cli import bench
 from robot.cli import servos as cli_servos
 from sim_mock.pty.client import PtyBus

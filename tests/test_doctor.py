@@ -2,9 +2,9 @@
 
 import pytest
 
+from drivers.dynamixel.discovery import Found
 from drivers.errors import PortError
 from drivers.serial.list_ports import Access, Host, SerialPort
-from drivers.servo_bus.discovery import Found
 from drivers.types import ServoSetup
 from robot.bringup.doctor.checks import apply_fix, examine
 from robot.bringup.doctor.dynamixel import DYNAMIXEL as CHECKS

@@ -27,9 +27,9 @@ import pytest
 from dynamixel_sdk import COMM_SUCCESS
 
 from drivers.dynamixel.protocol import instruction, statuses
+from drivers.dynamixel.registers import Identity, Registers
 from drivers.dynamixel.sdk_handler import SdkPackets
 from drivers.errors import BusLost
-from drivers.servo_bus.registers import Identity, Registers
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.dynamixel.packets import status
 from sim_mock.in_process_port import InProcessPort

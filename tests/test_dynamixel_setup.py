@@ -4,9 +4,9 @@ import pytest
 from dynamixel_sdk import PacketHandler
 
 from drivers.dynamixel.protocol import HEADER
+from drivers.dynamixel.registers import Registers
 from drivers.errors import PortError, ServoMissing
 from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
-from drivers.servo_bus.registers import Registers
 from drivers.types import ServoSetup
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.dynamixel.packets import status

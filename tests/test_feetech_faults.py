@@ -22,8 +22,8 @@ from moving_bus import (
 from sts_rig import Rig
 
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
-from drivers.feetech.revival import FAR_SIDE
 from drivers.servo_bus.faults import AGAIN_AND_AGAIN
+from drivers.servo_bus.recovery import FAR_SIDE
 from drivers.types import ServoSetup
 from sim_mock.smart_servo.physics import ServoSpec
 

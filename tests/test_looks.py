@@ -8,9 +8,9 @@ import pytest
 from mixed_rig import mixed_text
 
 from config.schema import Rig, load_rig
+from drivers.dynamixel.registers import Registers
 from drivers.feetech.registers import StsRegisters
 from drivers.maestro.commands import Speech
-from drivers.servo_bus.registers import Registers
 from robot.bringup.monitor import Monitor, as_json
 from robot.bringup.telemetry import DynamixelLooks, FeetechLooks, Look, MaestroLooks, look_at_pulse
 from robot.clock import SimulatedClock

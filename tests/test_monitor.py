@@ -7,7 +7,7 @@ from math import radians
 import pytest
 
 from drivers.dynamixel.control_table import MODELS
-from drivers.servo_bus.registers import Registers
+from drivers.dynamixel.registers import Registers
 from robot.bringup.monitor import Monitor, as_json
 from robot.bringup.telemetry import DynamixelLooks, load_share, look
 from robot.clock import SimulatedClock

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.servo_bus.discovery import COMMON_FIRST
+from drivers.dynamixel.discovery import COMMON_FIRST
 from robot.bringup.searching import (
     BOARD_RATES,
     Looked,

@@ -3,16 +3,7 @@
 import os
 
 from drivers.dynamixel.control_table import BAUD_RATES
-from drivers.serial.list_ports import (
-    Host,
-    access,
-    holders,
-    latency_file,
-    latency_ms,
-    serial_ports,
-    set_latency,
-)
-from drivers.servo_bus.discovery import (
+from drivers.dynamixel.discovery import (
     COMMON_FIRST,
     Found,
     ask_one,
@@ -22,6 +13,15 @@ from drivers.servo_bus.discovery import (
     old_answers,
     ping,
     scan,
+)
+from drivers.serial.list_ports import (
+    Host,
+    access,
+    holders,
+    latency_file,
+    latency_ms,
+    serial_ports,
+    set_latency,
 )
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort

@@ -3,8 +3,8 @@
 import pytest
 
 from drivers.dynamixel.control_table import BAUD_RATES
+from drivers.dynamixel.discovery import COMMON_FIRST, Found
 from drivers.errors import PortError, ServoFault, ServoMissing
-from drivers.servo_bus.discovery import COMMON_FIRST, Found
 from drivers.types import ServoSetup
 from robot.bringup.servo_families import DYNAMIXEL, FEETECH
 from robot.bringup.servo_reboot import Standing, restart

@@ -6,6 +6,7 @@ bus watchdog 20 ms; return delay 2 us; current ``Model.current_unit_ma``.
 Source: ROBOTIS e-Manual, X series.
 """
 
+from math import ceil
 from typing import Literal, NamedTuple
 
 Access = Literal["r", "rw"]
@@ -77,6 +78,14 @@ class Register(NamedTuple):
     def area(self) -> Literal["eeprom", "ram"]:
         """Name the memory the register lives in."""
         return "eeprom" if self.address < EEPROM_END else "ram"
+
+    def encode(self, value: int) -> bytes:
+        """Return a value as it is written; a negative one of a register without sign wraps."""
+        return (value & (1 << 8 * self.size) - 1).to_bytes(self.size, "little")
+
+    def decode(self, data: bytes) -> int:
+        """Return the value that bytes stand for."""
+        return int.from_bytes(data, "little", signed=self.signed)
 
 
 class Model(NamedTuple):
@@ -289,3 +298,19 @@ def name_errors(status: int) -> tuple[str, ...]:
     """Name the bits of Hardware Error Status that are set."""
     bits = [bit for bit in range(8) if status >> bit & 1]
     return tuple(HARDWARE_ERRORS.get(bit, f"error bit {bit}") for bit in bits)
+
+
+def speed_units(speed_steps_s: float) -> int:
+    """Return a speed in units of Profile Velocity, at least 1: there 0 means no limit."""
+    return max(1, int(speed_steps_s / VELOCITY_UNIT_STEPS_S))
+
+
+MOST_ACCELERATION = 32767
+"""Largest Profile Acceleration."""
+
+
+def acceleration_units(accel_steps_s2: float | None) -> int:
+    """Return an acceleration in units of Profile Acceleration; 0, which is no limit, for none."""
+    if accel_steps_s2 is None:
+        return 0
+    return min(MOST_ACCELERATION, max(1, ceil(accel_steps_s2 / ACCELERATION_UNIT_STEPS_S2)))

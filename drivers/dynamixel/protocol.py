@@ -9,10 +9,11 @@ length counts what follows it. Inside, FF FF FD is sent as FF FF FD FD (stuffing
 """
 
 import struct
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
 
 from fastcrc.crc16 import umts
+
+from drivers.servo_bus.family import Status
 
 HEADER = b"\xff\xff\xfd\x00"
 RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
@@ -25,6 +26,8 @@ STATUS_OVERHEAD = 11
 
 ERROR_NUMBER, ALERT = 0x7F, 0x80
 """Parts of the error byte: why an instruction failed; a hardware error is latched."""
+
+REFUSAL = ERROR_NUMBER
 
 LONGEST_STATUS = 256
 """No answer asked for here is longer; a larger length is noise."""
@@ -49,6 +52,12 @@ def sync_read(ids: Sequence[int], address: int, length: int, fast: bool = False)
     return instruction(BROADCAST, code, _SPAN.pack(address, length) + bytes(ids))
 
 
+def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes]) -> bytes:
+    """Build an order to write the same registers of several servos, ``size`` bytes each."""
+    body = b"".join(bytes((i,)) + row for i, row in zip(ids, rows, strict=True))
+    return instruction(BROADCAST, SYNC_WRITE, _SPAN.pack(address, size) + body)
+
+
 class SyncWrite:
     """Builds the packets that write one register of several servos, everything fixed once."""
 
@@ -68,15 +77,6 @@ class SyncWrite:
             return instruction(BROADCAST, SYNC_WRITE, self._params + body)
         packet = self._head + body
         return packet + _CRC.pack(umts(packet))
-
-
-class Status(NamedTuple):
-    """One status as it arrived; ``intact`` tells whether its CRC is right."""
-
-    id: int
-    error: int
-    params: bytes
-    intact: bool
 
 
 def statuses(raw: bytes) -> list[Status]:

@@ -20,23 +20,24 @@ from collections.abc import Sequence
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from drivers.event_log import EventLog, servo_label
 from drivers.feetech.care import RESTART_S, Care
-from drivers.feetech.line import FeetechLine
+from drivers.feetech.family import FEETECH
 from drivers.feetech.memory_table import STEPS_PER_TURN
 from drivers.feetech.params import FeetechParams as FeetechParams
 from drivers.feetech.protocol import MOST_GOALS, GoalWrite
 from drivers.feetech.reader import Heard, Reader
 from drivers.feetech.readings import Readings
 from drivers.feetech.registers import StsRegisters
-from drivers.feetech.revival import Revival
-from drivers.feetech.roster import find
-from drivers.feetech.setup import Fitting
-from drivers.feetech.torque import switch_off
 from drivers.feetech.views import again_turns, alone_turns, together_turns
 from drivers.serial.port import BusPort
 from drivers.serial.reconnect import LastingPort
+from drivers.servo_bus.discovery import find
 from drivers.servo_bus.faults import Health
 from drivers.servo_bus.goals import clipped
 from drivers.servo_bus.poll_list import Roll
+from drivers.servo_bus.provisioning import Provisioning
+from drivers.servo_bus.recovery import Recovery
+from drivers.servo_bus.torque import switch_off
+from drivers.servo_bus.transaction import Line
 from drivers.types import BusHealth, ServoReading, ServoSetup
 
 
@@ -64,8 +65,9 @@ class FeetechBus:
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
         self._goals = GoalWrite(self._ids)
         self._log = EventLog()
-        self._line = FeetechLine(
+        self._line = Line(
             port,
+            FEETECH,
             params.prompt_timeout_ms / 1000.0,
             params.reply_timeout_ms / 1000.0,
             params.baud,
@@ -88,10 +90,12 @@ class FeetechBus:
         self._health = Health(by_id, log)
         turns = together_turns(self._params.torque_every)
         self._reader = Reader(line, self._roll, turns, alone_turns(), again_turns())
-        self._fitting = Fitting(line, StsRegisters(self._port, tries=1), self._setups, log)
-        self._revival = Revival(line, self._fitting, by_id, self._health, log)
-        self._care = Care(line, by_id, self._revival, self._health, self._readings)
-        self._speeds = self._revival.speeds(self._ids, ())
+        self._provisioning = Provisioning(
+            line, StsRegisters(self._port, tries=1), self._setups, log
+        )
+        self._recovery = Recovery(line, self._provisioning, by_id, 0, self._health, log)
+        self._care = Care(line, by_id, self._recovery, self._health, self._readings)
+        self._speeds = self._recovery.speeds(self._ids, ())
 
     # --- the bus as others see it
 
@@ -108,11 +112,11 @@ class FeetechBus:
             raise PortError(f"{where} cannot run at {baud} bit/s: choose 115200 or 1000000")
         registers = StsRegisters(self._port)
         try:
-            find(self._line, registers, self._setups)
+            find(self._line, registers, self._setups, self._log)
             self._assemble()
-            fitting = Fitting(self._line, registers, self._setups, self._log)
-            fitting.rest(self._ids)
-            fitting.fit(self._ids)
+            provisioning = Provisioning(self._line, registers, self._setups, self._log)
+            provisioning.disable(self._ids)
+            provisioning.apply(self._ids)
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
@@ -158,8 +162,8 @@ class FeetechBus:
         try:
             self._take_wanted()
             # A servo may have restarted since it was prepared.
-            self._fitting.fit(self._ids)
-            goals, outside = self._revival.take_on(self._ids)
+            self._provisioning.apply(self._ids)
+            goals, outside = self._recovery.enable(self._ids)
         except (ServoMissing, ServoFault):
             self.release()
             raise
@@ -168,7 +172,7 @@ class FeetechBus:
             raise
         self._link.release_due = False
         self._care.take_on(outside)
-        self._speeds = self._revival.speeds(self._ids, ())
+        self._speeds = self._recovery.speeds(self._ids, ())
         return goals
 
     def write(self, goals_steps: Sequence[int]) -> None:
@@ -326,7 +330,7 @@ class FeetechBus:
         """
         entering, speeds = self._care.entering, self._speeds
         if entering:
-            speeds = self._revival.speeds(self._ids, entering.ids)
+            speeds = self._recovery.speeds(self._ids, entering.ids)
         withheld = self._care.withheld(self._now_s)
         if not withheld:
             self._line.send(self._goals.packet(goals, speeds))
@@ -343,7 +347,7 @@ class FeetechBus:
         self._setups = self._wanted
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in self._setups)
         self._by_id.update({setup.id: setup for setup in self._setups})
-        self._fitting.want(self._setups)
+        self._provisioning.set_target(self._setups)
         self._readings.want(self._setups)
 
     def _mind_silence(self, now_s: float) -> None:

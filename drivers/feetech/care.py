@@ -3,13 +3,12 @@
 from collections.abc import Collection, Mapping
 from math import inf
 
-from drivers.feetech.line import FeetechLine
 from drivers.feetech.memory_table import REGISTERS, TORQUE_FULL, acceleration_units, name_errors
 from drivers.feetech.readings import Readings
-from drivers.feetech.revival import FAR_SIDE, Revival
 from drivers.feetech.views import ARMED, Sample
 from drivers.servo_bus.faults import Health
-from drivers.servo_bus.transaction import TRIES
+from drivers.servo_bus.recovery import FAR_SIDE, Recovery
+from drivers.servo_bus.transaction import TRIES, Line
 from drivers.slow_entry import SlowEntry
 from drivers.types import ServoReading, ServoSetup
 
@@ -38,9 +37,9 @@ class Care:
 
     def __init__(
         self,
-        line: FeetechLine,
+        line: Line,
         setups: Mapping[int, ServoSetup],
-        revival: Revival,
+        recovery: Recovery,
         health: Health,
         readings: Readings,
     ) -> None:
@@ -48,7 +47,7 @@ class Care:
         self._setups = setups
         self._ids = tuple(setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
-        self._revival = revival
+        self._recovery = recovery
         self._health = health
         self._readings = readings
         self.engaged = False
@@ -162,7 +161,7 @@ class Care:
 
     def _mind_far_side(self, servo_id: int, steps: int) -> None:
         """See whether somebody has turned a joint back into its range."""
-        if not self._revival.is_lost(servo_id, steps):
+        if not self._recovery.is_lost(servo_id, steps):
             self._health.latches.add(servo_id)
             self._health.cleared(servo_id)
             self._readings.name_fault(self._slot[servo_id], "")
@@ -218,7 +217,7 @@ class Care:
             return
         # The readings of a line that has just been in trouble do not tell the torque.
         self._doubted.add(servo_id)
-        if self._revival.differs(servo_id):
+        if self._recovery.differs(servo_id):
             self._line.errors["setting changed"] += 1
             self._suspects.add(servo_id)
 
@@ -258,7 +257,7 @@ class Care:
         if not ids:
             return
         self._revive_at_s = now_s + AGAIN_S
-        found = self._revival.revive(ids, self.engaged, now_s)
+        found = self._recovery.recover(ids, self.engaged, now_s)
         if found is None:
             return
         self._suspects.difference_update(ids)

@@ -70,6 +70,11 @@ class FeetechModel(NamedTuple):
     stall_current_a: float
     no_load_rpm: float
 
+    @property
+    def no_load_steps_s(self) -> float:
+        """Return the speed without load at the rated voltage."""
+        return self.no_load_rpm / 60.0 * self.steps_per_turn
+
 
 MODELS = {
     model.name: model

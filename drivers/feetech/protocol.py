@@ -16,7 +16,8 @@ Source: Feetech, communication protocol of the SCS and STS series.
 
 import struct
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+
+from drivers.servo_bus.family import Status
 
 HEADER = b"\xff\xff"
 BROADCAST = 0xFE
@@ -25,6 +26,9 @@ SYNC_READ, SYNC_WRITE = 0x82, 0x83
 
 STATUS_OVERHEAD = 6
 """Bytes of a status without params."""
+
+REFUSAL = 0
+"""No bit of the error byte says that an order was refused: it says how the servo is."""
 
 LONGEST_STATUS = 128
 """Length of a status with more than the whole table: noise."""
@@ -96,15 +100,6 @@ class GoalWrite:
         row[3::4] = speeds
         body = self._head + self._rows.pack(*row)
         return HEADER + body + bytes((checksum(body),))
-
-
-class Status(NamedTuple):
-    """One status as it arrived; ``intact`` tells whether its checksum is right."""
-
-    id: int
-    error: int
-    params: bytes
-    intact: bool
 
 
 def statuses(raw: bytes) -> list[Status]:

@@ -9,10 +9,10 @@ from math import inf
 from typing import NamedTuple
 
 from drivers.feetech.group import Group
-from drivers.feetech.line import FeetechLine
 from drivers.feetech.protocol import HEADER
 from drivers.feetech.views import Sample, View
 from drivers.servo_bus.poll_list import Roll, silent_ones
+from drivers.servo_bus.transaction import Line
 from drivers.servo_bus.window_schedule import Turns
 
 MOST_GROUPS = 64
@@ -38,7 +38,7 @@ class Reader:
 
     def __init__(
         self,
-        line: FeetechLine,
+        line: Line,
         roll: Roll,
         together: Turns[View],
         alone: Turns[View],

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 
 from drivers.feetech.memory_table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
 from drivers.feetech.reader import Heard
-from drivers.feetech.turn import nearest_turn
 from drivers.plausibility import Plausibility
+from drivers.servo_bus.turn import nearest_turn
 from drivers.types import ServoReading, ServoSetup
 
 ALIKE_C, ALIKE_TENTH_V = 3, 10
@@ -53,7 +53,7 @@ class Readings:
 
     def believes(self, slot: int, heard: Heard) -> bool:
         """Tell whether one servo's answer can be true; to be asked once for every answer."""
-        position = nearest_turn(heard.sample.position, *self._ranges[slot])
+        position = nearest_turn(heard.sample.position, *self._ranges[slot], STEPS_PER_TURN)
         return self.places.one(slot, position, heard.at_s)
 
     def all_believed(self, heard: Mapping[int, Heard]) -> bool:
@@ -65,7 +65,7 @@ class Readings:
         if any(one.at_s != at_s for one in answers):
             return False
         positions = [
-            nearest_turn(one.sample.position, *span)
+            nearest_turn(one.sample.position, *span, STEPS_PER_TURN)
             for one, span in zip([heard[i] for i in self._ids], self._ranges, strict=True)
         ]
         return self.places.whole(positions, at_s)
@@ -94,7 +94,7 @@ class Readings:
     def one(self, slot: int, heard: Heard) -> ServoReading:
         """Take one servo's answer."""
         sample = heard.sample
-        position = nearest_turn(sample.position, *self._ranges[slot])
+        position = nearest_turn(sample.position, *self._ranges[slot], STEPS_PER_TURN)
         if sample.torque is not None:
             self._torque[slot] = sample.torque == 1
         if sample.temperature <= MOST_CELSIUS:
@@ -113,7 +113,7 @@ class Readings:
     def held(self, slot: int, position: int, at_s: float, torque: bool) -> ServoReading:
         """Make the first reading of a servo that was just set up again and stands still."""
         self._torque[slot] = torque
-        position = nearest_turn(position, *self._ranges[slot])
+        position = nearest_turn(position, *self._ranges[slot], STEPS_PER_TURN)
         self.places.place(slot, position, at_s)
         return self._make(slot, position, 0.0, 0.0, at_s, False, 0.0)
 

@@ -1,13 +1,11 @@
 """Single registers of single STS servos: for all that is not done every tick."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from drivers.feetech.memory_table import REGISTERS, Register
 from drivers.feetech.protocol import (
     PING,
     STATUS_OVERHEAD,
-    Status,
     bytes_missing,
     instruction,
     read,
@@ -17,6 +15,8 @@ from drivers.feetech.protocol import (
 )
 from drivers.feetech.scan import FACTORY_BAUD, IDENTITY_LENGTH, REPLY_S
 from drivers.serial.port import BITS_PER_BYTE, BusPort
+from drivers.servo_bus.family import Identity as Identity
+from drivers.servo_bus.family import Status
 
 TRIES = 3
 
@@ -26,13 +26,6 @@ LATE_S = 0.15
 ROOM = 4096
 LONGEST = 1024
 """A line that babbles is not listened to for longer than so many bytes."""
-
-
-class Identity(NamedTuple):
-    """What a servo is: the model number, and the firmware (310 for 3.10)."""
-
-    model_number: int
-    firmware: int
 
 
 class StsRegisters:

@@ -15,12 +15,12 @@ from drivers.feetech.protocol import (
     BROADCAST,
     PING,
     STATUS_OVERHEAD,
-    Status,
     instruction,
     read,
     statuses,
 )
 from drivers.serial.port import BITS_PER_BYTE, BusPort
+from drivers.servo_bus.family import Status
 
 FACTORY_BAUD = 1_000_000
 COMMON_FIRST = BAUD_RATES

@@ -2,34 +2,35 @@
 
 from collections.abc import Mapping, Sequence
 from math import ceil
+from struct import pack
 
 from drivers.dynamixel.control_table import (
     FAST_READ_SINCE,
     MODELS,
-    REGISTERS,
     WATCHDOG_UNIT_S,
     IndirectBlock,
     indirect_blocks,
 )
-from drivers.dynamixel.protocol import ERROR_NUMBER, SyncWrite
+from drivers.dynamixel.family import DYNAMIXEL
+from drivers.dynamixel.params import DynamixelParams as DynamixelParams
+from drivers.dynamixel.protocol import ERROR_NUMBER
+from drivers.dynamixel.registers import Registers
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from drivers.event_log import EventLog, servo_label
 from drivers.serial.port import BusPort
 from drivers.serial.reconnect import LastingPort
+from drivers.servo_bus.discovery import find
 from drivers.servo_bus.faults import Health
 from drivers.servo_bus.feedback import Readings
 from drivers.servo_bus.goals import clipped
-from drivers.servo_bus.line import Line
-from drivers.servo_bus.params import DynamixelParams as DynamixelParams
 from drivers.servo_bus.poll_list import Roll
-from drivers.servo_bus.provisioning import Fitting
-from drivers.servo_bus.read_windows import alone_turns, direct_turns, indirect_turns
-from drivers.servo_bus.recovery import Revival
-from drivers.servo_bus.registers import Registers
-from drivers.servo_bus.roster import find
+from drivers.servo_bus.provisioning import AddressMap, Provisioning
+from drivers.servo_bus.read_windows import INDIRECT_MAP, alone_turns, direct_turns, indirect_turns
+from drivers.servo_bus.recovery import Recovery
 from drivers.servo_bus.supervisor import Care
 from drivers.servo_bus.sync_read import Heard, Reader, Whole
 from drivers.servo_bus.torque import switch_off
+from drivers.servo_bus.transaction import Line
 from drivers.types import BusHealth, ServoReading, ServoSetup
 
 RESTART_S = 0.1
@@ -54,12 +55,12 @@ class DynamixelBus:
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
-        goal = REGISTERS["goal_position"]
-        self._goals = SyncWrite(self._ids, goal.address, goal.size)
+        self._goals = DYNAMIXEL.goals(self._ids)
         self._watchdog = ceil(params.watchdog_ms / 1000.0 / WATCHDOG_UNIT_S)
         self._log = EventLog()
         self._line = Line(
             port,
+            DYNAMIXEL,
             params.prompt_timeout_ms / 1000.0,
             params.reply_timeout_ms / 1000.0,
             params.baud,
@@ -81,17 +82,17 @@ class DynamixelBus:
         self._health = Health(by_id, self._log)
         together = indirect_turns(block) if block else direct_turns()
         self._reader = Reader(self._line, self._roll, together, alone_turns(), fast)
-        self._fitting = Fitting(
-            self._line, Registers(self._port, tries=1), self._setups, block, self._log
+        self._provisioning = Provisioning(
+            self._line, Registers(self._port, tries=1), self._setups, self._log, _address_map(block)
         )
-        self._revival = Revival(
-            self._line, self._fitting, by_id, self._watchdog, self._health, self._log
+        self._recovery = Recovery(
+            self._line, self._provisioning, by_id, self._watchdog, self._health, self._log
         )
         self._care = Care(
             self._line,
             by_id,
             self._watchdog,
-            self._revival,
+            self._recovery,
             self._health,
             self._readings,
             covered=block is not None,
@@ -114,9 +115,11 @@ class DynamixelBus:
         try:
             firmware = find(self._line, registers, self._setups, self._log)
             self._assemble(self._common_block(firmware), self._all_fast(firmware))
-            fitting = Fitting(self._line, registers, self._setups, self._block, self._log)
-            fitting.rest(self._ids)
-            fitting.fit(self._ids)
+            provisioning = Provisioning(
+                self._line, registers, self._setups, self._log, _address_map(self._block)
+            )
+            provisioning.disable(self._ids)
+            provisioning.apply(self._ids)
             self._line.starved = False
             self._care.find_alerts(self._ids)
         except (ServoMissing, BusLost):
@@ -162,8 +165,8 @@ class DynamixelBus:
         try:
             self._take_wanted()
             # A servo may have restarted since it was prepared.
-            self._fitting.fit(self._ids)
-            goals, outside = self._revival.take_on(self._ids)
+            self._provisioning.apply(self._ids)
+            goals, outside = self._recovery.enable(self._ids)
         except (ServoMissing, ServoFault):
             self.release()
             raise
@@ -188,7 +191,7 @@ class DynamixelBus:
         if not self._care.engaged or self._link.down or self._line.starved:
             return
         try:
-            self._line.send(self._goals.packet(goals))
+            self._line.send(self._goals.packet(goals, ()))
         except BusLost as lost:
             self._lose(lost)
 
@@ -213,7 +216,7 @@ class DynamixelBus:
         self._setups = self._wanted
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in self._setups)
         self._by_id.update({setup.id: setup for setup in self._setups})
-        self._fitting.want(self._setups)
+        self._provisioning.set_target(self._setups)
 
     def faults(self) -> tuple[str, ...]:
         """Name every fault that servos suffer from now, e.g. "neck_yaw (servo 7): overload"."""
@@ -371,3 +374,10 @@ class DynamixelBus:
             f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
             f"power keep their torque, {rest}: cut the servo power to free them"
         )
+
+
+def _address_map(block: IndirectBlock | None) -> AddressMap | None:
+    """Return what the addresses of an indirect block must be."""
+    if block is None:
+        return None
+    return AddressMap(block.address_base, pack(f"<{len(INDIRECT_MAP)}H", *INDIRECT_MAP))

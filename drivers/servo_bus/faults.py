@@ -1,8 +1,7 @@
 """What ails each servo: latched errors, restarts that do not stop, long silence."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
-from drivers.dynamixel.control_table import name_errors
 from drivers.event_log import EventLog, Seldom, servo_label
 from drivers.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
 from drivers.types import ServoSetup
@@ -44,9 +43,9 @@ class Health:
         self._back_s: float | None = None
         self._seldom = Seldom(log)
 
-    def latched(self, servo_id: int, status: int) -> bool:
-        """Note Hardware Error Status; gives whether that is news."""
-        fault = " and ".join(name_errors(status))
+    def latched(self, servo_id: int, errors: Sequence[str]) -> bool:
+        """Record latched errors; return whether that is news."""
+        fault = " and ".join(errors)
         if self.faults.get(servo_id) == fault:
             return False
         self.name(servo_id, fault)

@@ -6,22 +6,24 @@ becomes the present position, and only then comes the torque.
 
 from collections.abc import Collection, Mapping, Sequence
 
-from drivers.dynamixel.control_table import MODELS, STEPS_PER_TURN
 from drivers.errors import ServoFault, ServoMissing
 from drivers.event_log import EventLog
 from drivers.servo_bus.faults import Health
-from drivers.servo_bus.line import Line
-from drivers.servo_bus.provisioning import Fitting, speed_units
-from drivers.servo_bus.torque import find_latched, insist, positions, switch_off, switch_on
+from drivers.servo_bus.provisioning import Provisioning
+from drivers.servo_bus.torque import find_ailing, insist, positions, switch_off, switch_on
+from drivers.servo_bus.transaction import Line
+from drivers.servo_bus.turn import nearest_turn
 from drivers.slow_entry import entry_speed_steps_s
 from drivers.types import ServoSetup
 
+FAR_SIDE = "stands beyond its encoder's zero: turn it into its range by hand"
 
-class Revival:
+
+class Recovery:
     """Sets servos up again while others run.
 
     Args:
-        line, fitting: the bus, and what its servos must be like.
+        line, provisioning: the bus, and what its servos must be like.
         setups: the servos by id.
         watchdog: Bus Watchdog to arm, in its units; 0 for none.
         health, log: told what was found and done.
@@ -30,23 +32,24 @@ class Revival:
     def __init__(
         self,
         line: Line,
-        fitting: Fitting,
+        provisioning: Provisioning,
         setups: Mapping[int, ServoSetup],
         watchdog: int,
         health: Health,
         log: EventLog,
     ) -> None:
-        self._line = line
-        self._fitting = fitting
+        self._line, self._family = line, line.family
+        self._provisioning = provisioning
         self._setups = setups
         self._watchdog = watchdog
         self._health = health
         self._log = log
+        self._said = ""
 
-    def revive(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
+    def recover(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
         """Set servos up as at the start, holding where they are if ``engaged``.
 
-        Gives the position of each that is well again; none where something failed and
+        Returns the position of each that is well again; None where something failed and
         should be tried again.
 
         Raises:
@@ -55,83 +58,152 @@ class Revival:
         # Others are waiting: what fails is tried again later, not at once.
         before, self._line.tries = self._line.tries, 1
         try:
-            return self._revive(ids, engaged, now_s)
+            return self._recover(ids, engaged, now_s)
         finally:
             self._line.tries = before
 
-    def _revive(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
-        line = self._line
-        line.write_all(ids, "status_return_level", [2] * len(ids))
+    def differs(self, servo_id: int) -> bool:
+        """Return whether a servo's settings are not as they should be; a silent one's may be.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        try:
+            return bool(self._provisioning.differences((servo_id,)))
+        except ServoMissing:
+            return False
+
+    def _recover(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
+        line, health = self._line, self._health
+        line.write_all(ids, "status_return_level", [self._family.answer_level] * len(ids))
         torque = line.ask(ids, "torque_enable")
         if not torque:
             return None
-        whole = self._whole(tuple(torque))
+        whole = self._without_latched(self._same_models(tuple(torque)))
         try:
-            self._fitting.fit(whole)
+            self._provisioning.apply(whole)
             well = tuple(
-                i for i in whole if torque[i] or not engaged or not self._health.exhausted(i, now_s)
+                i for i in whole if torque[i] or not engaged or not health.exhausted(i, now_s)
             )
             if engaged:
-                self.take_on(well)
+                well = self._on_this_side(well)
+                self.enable(well)
             found = dict(zip(well, positions(line, well), strict=True))
         except ServoMissing:
             return None
         except ServoFault as fault:
             switch_off(line, whole)
-            self._log.add(str(fault))
+            if self._said != str(fault):
+                self._said = str(fault)
+                self._log.add(self._said)
             return None
         for servo_id in well:
-            self._health.cleared(servo_id)
+            if self._family.faults_latch:
+                health.cleared(servo_id)
             if engaged and not torque[servo_id]:
                 line.errors["restarted"] += 1
-                self._health.restarted(servo_id, now_s)
+                health.restarted(servo_id, now_s)
         return found
 
-    def _whole(self, ids: tuple[int, ...]) -> tuple[int, ...]:
-        """Leave out servos with a latched error, or of another model than before."""
-        latched = find_latched(self._line, ids)
+    def _same_models(self, ids: tuple[int, ...]) -> tuple[int, ...]:
+        """Leave out servos of another model than before."""
+        expected = {i: self._family.models[self._setups[i].model].number for i in ids}
         numbers = self._line.ask(ids, "model_number")
-        whole = []
-        for servo_id in ids:
-            model = self._setups[servo_id].model
-            if servo_id in latched:
-                self._health.latched(servo_id, latched[servo_id])
-            elif servo_id not in numbers:
-                continue
-            elif numbers[servo_id] != MODELS[model].number:
+        others = [i for i, n in numbers.items() if n != expected[i]]
+        if others:
+            # Damaged bytes may pass for another model: who has been exchanged says so twice.
+            again = self._line.ask(others, "model_number")
+            numbers = {i: n for i, n in numbers.items() if i not in others or again.get(i) == n}
+        for servo_id in numbers:
+            if numbers[servo_id] != expected[servo_id]:
+                model = self._setups[servo_id].model
                 self._health.name(servo_id, f"is not {model} any more: exchanged?")
-            else:
-                whole.append(servo_id)
-        return tuple(whole)
+        return tuple(i for i in ids if numbers.get(i) == expected[i])
 
-    def take_on(self, ids: Sequence[int]) -> tuple[tuple[int, ...], set[int]]:
+    def _without_latched(self, ids: tuple[int, ...]) -> tuple[int, ...]:
+        """Leave out servos that have latched an error, as they take no torque."""
+        latched = find_ailing(self._line, ids) if self._family.faults_latch else {}
+        for servo_id, bits in latched.items():
+            self._health.latched(servo_id, self._family.name_errors(bits))
+        return tuple(i for i in ids if i not in latched)
+
+    def _on_this_side(self, ids: tuple[int, ...]) -> tuple[int, ...]:
+        """Leave those limp that would go the wrong way round into their range.
+
+        Raises:
+            drivers.errors.ServoMissing: a servo does not answer.
+        """
+        if not self._family.single_turn:
+            return ids
+        present = dict(zip(ids, positions(self._line, ids), strict=True))
+        astray = [i for i in ids if self.is_lost(i, present[i])]
+        if astray:
+            # Damaged bytes may pass for such a place.
+            again = dict(zip(astray, positions(self._line, astray), strict=True))
+            astray = [i for i in astray if self.is_lost(i, again[i])]
+        for servo_id in astray:
+            self._health.name(servo_id, FAR_SIDE)
+        if astray:
+            switch_off(self._line, astray)
+        return tuple(i for i in ids if i not in astray)
+
+    def is_lost(self, servo_id: int, steps: int) -> bool:
+        """Return whether a servo that counts ``steps`` would go the wrong way into its range."""
+        setup = self._setups[servo_id]
+        turn = self._family.steps_per_turn
+        return nearest_turn(steps, setup.min_steps, setup.max_steps, turn) != steps
+
+    def enable(self, ids: Sequence[int]) -> tuple[tuple[int, ...], set[int]]:
         """Set goals to the present positions, clipped to the limits, then torque on.
 
-        Those outside their limits come inside slowly. Gives the goals, and who is outside.
+        Those outside their limits come inside slowly. Returns the goals, and who is outside.
 
         Raises:
             drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
-            drivers.errors.ServoFault: a servo has latched an error or lost its zero.
+            drivers.errors.ServoFault: a servo refuses its torque, or has lost its zero.
         """
-        line = self._line
+        line, family = self._line, self._family
         if not ids:
             return (), set()
-        insist(line, ids, "bus_watchdog", [0] * len(ids))
+        if family.watchdog_unit_s is not None:
+            insist(line, ids, "bus_watchdog", [0] * len(ids))
         present = positions(line, ids)
+        if family.single_turn:
+            self._refuse_lost(ids, present)
         goals = [self.clip(i, p) for i, p in zip(ids, present, strict=True)]
         outside = {i for i, p, g in zip(ids, present, goals, strict=True) if p != g}
-        insist(line, ids, "profile_velocity", self.entry_speeds(ids, outside))
-        switch_on(line, ids, goals)
-        insist(line, ids, "bus_watchdog", [self._watchdog] * len(ids))
+        speeds = self.speeds(ids, outside)
+        armed = speeds if family.arming.speed else self._accelerations(ids)
+        insist(line, ids, family.arming.register, armed)
+        switch_on(line, ids, goals, speeds)
+        if family.watchdog_unit_s is not None:
+            insist(line, ids, "bus_watchdog", [self._watchdog] * len(ids))
         return tuple(goals), outside
 
-    def entry_speeds(self, ids: Sequence[int], outside: Collection[int]) -> list[int]:
-        """Give Profile Velocities, slow for those outside their limits."""
+    def _refuse_lost(self, ids: Sequence[int], present: Sequence[int]) -> None:
+        """See that no servo would go the wrong way round into its range.
+
+        Raises:
+            drivers.errors.ServoFault: one would.
+        """
+        for servo_id, steps in zip(ids, present, strict=True):
+            if self.is_lost(servo_id, steps):
+                low, high = self._setups[servo_id].min_steps, self._setups[servo_id].max_steps
+                raise ServoFault(
+                    f"{self._line.who(servo_id)} stands at {steps}, beyond its encoder's zero, and "
+                    f"would go the long way round into {low}..{high}: turn it in there by hand"
+                )
+
+    def _accelerations(self, ids: Sequence[int]) -> list[int]:
+        units = self._family.acceleration_units
+        return [units(self._setups[i].max_accel_steps_s2) for i in ids]
+
+    def speeds(self, ids: Sequence[int], outside: Collection[int]) -> list[int]:
+        """Return limits of speed in register units, slow for those outside their limits."""
+        turn, units = self._family.steps_per_turn, self._family.speed_units
         setups = [self._setups[i] for i in ids]
         return [
-            speed_units(
-                entry_speed_steps_s(s, STEPS_PER_TURN) if s.id in outside else s.max_speed_steps_s
-            )
+            units(entry_speed_steps_s(s, turn) if s.id in outside else s.max_speed_steps_s)
             for s in setups
         ]
 

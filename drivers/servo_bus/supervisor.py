@@ -3,16 +3,14 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import inf
 
-from drivers.dynamixel.control_table import REGISTERS, WATCHDOG_UNIT_S
+from drivers.dynamixel.control_table import REGISTERS, WATCHDOG_UNIT_S, name_errors, speed_units
 from drivers.dynamixel.protocol import ALERT
 from drivers.servo_bus.faults import Health
 from drivers.servo_bus.feedback import Readings
-from drivers.servo_bus.line import Line
-from drivers.servo_bus.provisioning import speed_units
 from drivers.servo_bus.read_windows import Sample
-from drivers.servo_bus.recovery import Revival
+from drivers.servo_bus.recovery import Recovery
 from drivers.servo_bus.torque import TRIPPED, heal_tripped
-from drivers.servo_bus.transaction import TRIES
+from drivers.servo_bus.transaction import TRIES, Line
 from drivers.slow_entry import SlowEntry
 from drivers.types import ServoReading, ServoSetup
 
@@ -37,7 +35,7 @@ class Care:
         line: Line,
         setups: Mapping[int, ServoSetup],
         watchdog: int,
-        revival: Revival,
+        recovery: Recovery,
         health: Health,
         readings: Readings,
         covered: bool,
@@ -47,7 +45,7 @@ class Care:
         self._setups = setups
         self._ids = tuple(setups)
         self._watchdog = watchdog
-        self._revival = revival
+        self._recovery = recovery
         self._health = health
         self._readings = readings
         self._covered = covered
@@ -113,7 +111,7 @@ class Care:
         self._due_s = -inf
 
     def _latched(self, servo_id: int, status: int) -> None:
-        if self._health.latched(servo_id, status):
+        if self._health.latched(servo_id, name_errors(status)):
             self._line.errors["alert"] += 1
             self._readings.name_fault(servo_id, self._health.faults[servo_id])
 
@@ -165,7 +163,7 @@ class Care:
         if not ids:
             return
         self._revive_at_s = now_s + AGAIN_S
-        found = self._revival.revive(ids, self.engaged, now_s)
+        found = self._recovery.recover(ids, self.engaged, now_s)
         if found is None:
             return
         self._suspects.difference_update(ids)
@@ -250,7 +248,7 @@ class Care:
         ids = tuple(group)
         if not ids:
             return
-        healed = heal_tripped(self._line, ids, self._watchdog, self._revival.clip)
+        healed = heal_tripped(self._line, ids, self._watchdog, self._recovery.clip)
         self._rearmed.update(healed)
         self._line.errors["watchdog"] += len(healed)
         if healed:

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from drivers.dynamixel.protocol import HEADER
 from drivers.dynamixel.sync_packets import FastGroup, Group, PlainGroup, Values
-from drivers.servo_bus.line import Line
 from drivers.servo_bus.poll_list import Roll, silent_ones
 from drivers.servo_bus.read_windows import Sample, View
+from drivers.servo_bus.transaction import Line
 from drivers.servo_bus.window_schedule import Turns
 
 MOST_GROUPS = 64

@@ -1,27 +1,33 @@
 """Switching the torque on and off, so that nothing moves that was not asked to.
 
-Some firmware follows the last goal as soon as the torque comes on, so goals are read
-back before; some wraps the position by a turn at that moment, so positions are read
-again after.
+Some firmware follows the last goal as soon as the torque comes on, some switches the torque on
+with a goal, some wraps the position by a turn at that moment. So the first goal is the present
+place, with the speed that may be used for it where a goal carries one; it is read back before
+the torque comes on, and positions are read again after.
 """
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import NamedTuple, TypeVar
 
-from drivers.dynamixel.control_table import STEPS_PER_TURN, name_errors
 from drivers.errors import ServoFault, ServoMissing
-from drivers.servo_bus.line import Line
+from drivers.servo_bus.transaction import Line
 
 TRIES = 3
 TRIPPED = 255
-"""Bus Watchdog (98) reads so after it has stopped the servo."""
+"""Bus Watchdog reads so after it has stopped the servo."""
 
-JUMP_STEPS = STEPS_PER_TURN // 4
-"""No hand moves a joint so far while the torque comes on: the position has wrapped."""
+JUMP_TURN = 0.25
+"""No hand moves a joint by so much of a turn while the torque comes on: it has wrapped."""
+
+STILL_STEPS = 16
+"""A limp joint held by a hand moves so far between two questions."""
+
+Value = TypeVar("Value")
 
 
 def positions(line: Line, ids: Sequence[int]) -> tuple[int, ...]:
-    """Read every position.
+    """Read every position, as the servos count.
 
     Raises:
         drivers.errors.ServoMissing: a servo does not answer.
@@ -37,10 +43,53 @@ def insist(line: Line, ids: Sequence[int], name: str, values: Sequence[int]) -> 
     Raises:
         drivers.errors.ServoMissing: a servo does not answer or does not take it.
     """
-    left = dict(zip(ids, values, strict=True))
+    _until(
+        line,
+        dict(zip(ids, values, strict=True)),
+        lambda left: line.write_all(tuple(left), name, left.values()),
+        lambda left: line.ask(left, name),
+        name,
+    )
+
+
+def _send_goals(line: Line, wanted: Mapping[int, tuple[int, int]]) -> None:
+    goals = [goal for goal, _ in wanted.values()]
+    speeds = [speed for _, speed in wanted.values()]
+    line.send(line.family.goals(tuple(wanted)).packet(goals, speeds))
+
+
+def _ask_goals(
+    line: Line, present: Mapping[int, tuple[int, int]], ids: Sequence[int]
+) -> dict[int, tuple[int, int]]:
+    """Read goals and their speeds; one that went with a limp servo's place counts as its own.
+
+    present: place and goal of limp servos
+    """
+    goal, speed = (line.family.registers[name] for name in ("goal_position", "goal_speed"))
+    span = speed.address + speed.size - goal.address
+    found = {}
+    for i, data in line.ask_bytes(ids, goal.address, span).items():
+        steps = goal.decode(data[: goal.size])
+        place, wanted = present.get(i, (steps, steps))
+        # Where a limp servo's goal goes with its place, nothing can leap either.
+        near = abs(steps - place) <= STILL_STEPS
+        found[i] = wanted if near else steps, speed.decode(data[-speed.size :])
+    return found
+
+
+def _until(
+    line: Line,
+    wanted: Mapping[int, Value],
+    send: Callable[[Mapping[int, Value]], None],
+    ask: Callable[[Sequence[int]], Mapping[int, Value]],
+    name: str,
+) -> None:
+    """Send and ask until every servo has what is wanted of it."""
+    left: dict[int, Value] = dict(wanted)
+    found: Mapping[int, Value] = {}
     for _ in range(TRIES):
-        line.write_all(tuple(left), name, left.values())
-        found = line.ask(tuple(left), name)
+        send(left)
+        found = ask(tuple(left))
         left = {servo_id: v for servo_id, v in left.items() if found.get(servo_id) != v}
         if not left:
             return
@@ -51,32 +100,41 @@ def insist(line: Line, ids: Sequence[int], name: str, values: Sequence[int]) -> 
     )
 
 
-def switch_on(line: Line, ids: Sequence[int], goals: Sequence[int]) -> None:
+def switch_on(line: Line, ids: Sequence[int], goals: Sequence[int], speeds: Sequence[int]) -> None:
     """Set the goals, then the torque, and see that every position is still the same.
 
     Raises:
         drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
-        drivers.errors.ServoFault: a servo has latched an error, or its position jumped.
+        drivers.errors.ServoFault: a servo refuses its torque, or its position jumped.
     """
-    insist(line, ids, "goal_position", goals)
-    before = positions(line, ids)
+    family = line.family
+    wanted = dict(zip(ids, zip(goals, speeds, strict=True), strict=True))
+    send = partial(_send_goals, line)
+    if family.goal_speed:
+        before = positions(line, ids)
+        places = dict(zip(ids, zip(before, goals, strict=True), strict=True))
+        _until(line, wanted, send, partial(_ask_goals, line, places), "goal_position")
+    else:
+        insist(line, ids, "goal_position", goals)
+        before = positions(line, ids)
     try:
         insist(line, ids, "torque_enable", [1] * len(ids))
     except ServoMissing:
-        latched = find_latched(line, ids)
-        if not latched:
+        ailing = find_ailing(line, ids)
+        if not ailing:
             raise
         named = ", ".join(
-            f"{line.who(servo_id)}: {' and '.join(name_errors(status))}"
-            for servo_id, status in latched.items()
+            f"{line.who(i)}: {' and '.join(family.name_errors(bits))}" for i, bits in ailing.items()
         )
-        raise ServoFault(f"{named}: let it cool, free it, then restart the servo power") from None
+        raise ServoFault(f"{named}: let it cool, free it, {family.fault_cure}") from None
     for servo_id, was, now in zip(ids, before, positions(line, ids), strict=True):
-        if abs(now - was) > JUMP_STEPS:
+        if abs(now - was) > JUMP_TURN * family.steps_per_turn:
             raise ServoFault(
                 f"{line.who(servo_id)}: position jumped from {was} to {now} as the torque came on: "
-                "set its Homing Offset to 0"
+                f"{family.jump_cure}"
             )
+    if family.goal_speed:
+        _until(line, wanted, send, partial(_ask_goals, line, {}), "goal_position")
 
 
 class Released(NamedTuple):
@@ -90,9 +148,10 @@ def switch_off(line: Line, ids: Sequence[int]) -> Released:
     """Take the torque away, watchdog first, and see that it is gone."""
     left = tuple(ids)
     found: dict[int, int] = {}
+    watchdog = () if line.family.watchdog_unit_s is None else ("bus_watchdog",)
     for _ in range(TRIES):
         # Twice: no servo confirms a group write, and this one matters most.
-        for name in ("bus_watchdog", "torque_enable", "torque_enable"):
+        for name in (*watchdog, "torque_enable", "torque_enable"):
             line.write_all(left, name, [0] * len(left))
         found = line.ask(left, "torque_enable")
         left = tuple(servo_id for servo_id in left if found.get(servo_id, 1))
@@ -102,10 +161,10 @@ def switch_off(line: Line, ids: Sequence[int]) -> Released:
     return Released(holding, tuple(servo_id for servo_id in left if servo_id not in found))
 
 
-def find_latched(line: Line, ids: Sequence[int]) -> dict[int, int]:
-    """Give Hardware Error Status of the servos that answer and have latched any."""
-    found = line.ask(ids, "hardware_error_status")
-    return {servo_id: status for servo_id, status in found.items() if status}
+def find_ailing(line: Line, ids: Sequence[int]) -> dict[int, int]:
+    """Return the error bits of the servos that answer and have any."""
+    found = line.ask(ids, line.family.error_register)
+    return {servo_id: bits for servo_id, bits in found.items() if bits}
 
 
 def heal_tripped(
@@ -114,7 +173,7 @@ def heal_tripped(
     """Give servos whose bus watchdog has tripped their present position as goal and arm it anew.
 
     A tripped servo stands still and refuses goals. ``clip(id, steps)`` keeps a goal inside
-    the limits. Gives the servos that were healed.
+    the limits. Returns the servos that were healed.
     """
     state = line.ask(ids, "bus_watchdog")
     tripped = [servo_id for servo_id, value in state.items() if value == TRIPPED]

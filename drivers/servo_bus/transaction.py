@@ -1,13 +1,13 @@
 """Exchanges on a servo bus: bounded waiting, clean lines, counts, starvation noticed."""
 
-from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
 from drivers.host_lateness import HostLateness
 from drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 from drivers.servo_bus.adaptive_timeout import Patience
+from drivers.servo_bus.family import Family, Identity
 from drivers.servo_bus.poll_list import silent_ones
 
 TRIES, HURRIED = 3, 4.0
@@ -16,9 +16,13 @@ _ROOM = 4096
 _BACKLOG_S = 0.05
 
 
-class BusLine(ABC):
+class Line:
     """A port with the patience of one bus; every method may raise drivers.errors.BusLost.
 
+    What is asked and written here goes through sync read and sync write even for a single
+    servo: an echo of such a question cannot be taken for its answer.
+
+    family: the make of the servos
     tx_bytes, rx_bytes: counts since it was made
     errors: counts by kind
     patience: that of the cyclic exchange; all others have the longest
@@ -35,12 +39,13 @@ class BusLine(ABC):
     def __init__(
         self,
         port: BusPort,
+        family: Family,
         least_s: float,
         most_s: float,
         baud: int,
         names: Mapping[int, str] | None = None,
     ) -> None:
-        self.port = port
+        self.port, self.family = port, family
         self._names = names or {}
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
@@ -140,7 +145,7 @@ class BusLine(ABC):
 
     def _note_late(self, raw: bytes) -> None:
         """Note answers that came after waiting for them had ended; noise is none."""
-        if self.answers(raw):
+        if any(status.intact for status in self.family.codec.statuses(raw)):
             self.lateness.late_answer(self.port.now_s())
 
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
@@ -167,13 +172,48 @@ class BusLine(ABC):
                     break
         return values
 
-    @abstractmethod
-    def answers(self, raw: bytes) -> int:
-        """Count the answers among received bytes that are right by their check bytes."""
+    def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
+        """Read one register of several servos; who is not in the answer did not answer well."""
+        register = self.family.registers[name]
+        found = self.ask_bytes(ids, register.address, register.size)
+        return {servo_id: register.decode(data) for servo_id, data in found.items()}
 
-    @abstractmethod
+    def write_all(self, ids: Sequence[int], name: str, values: Iterable[int]) -> None:
+        """Write one register of several servos; no servo confirms it."""
+        register = self.family.registers[name]
+        rows = [register.encode(value) for value in values]
+        self.send(self.family.codec.sync_write(ids, register.address, register.size, rows))
+
+    def ping_all(self) -> dict[int, Identity]:
+        """Ask all servos who is there, expected or not."""
+        found = self.family.ping_all(self.port, round(BITS_PER_BYTE / self._byte_s))
+        return {servo_id: Identity(*one) for servo_id, one in found.items()}
+
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos once; gives those of who answered well."""
+        codec = self.family.codec
+        self.port.clearPort()
+        self.send(codec.sync_read(ids, address, length))
+        deadline_s = self._ends_s(len(ids) * (length + codec.STATUS_OVERHEAD))
+        found: dict[int, bytes] = {}
+        refused: set[int] = set()
+
+        def missing(raw: bytes) -> int:
+            others = 0
+            for status in codec.statuses(raw):
+                if status.intact and status.id in ids and status.error & codec.REFUSAL:
+                    refused.add(status.id)
+                elif status.id not in ids or len(status.params) != length:
+                    others += 1
+                elif status.intact:
+                    found[status.id] = status.params
+            done = len(found.keys() | refused) >= len(ids)
+            return 0 if done else codec.bytes_missing(raw, len(ids) + others, length)
+
+        self.complete(b"", missing, deadline_s)
+        if len(found) < len(ids):
+            self.drain()
+        return found
 
     def _ends_s(self, answer_bytes: int) -> float:
         """Give until when an answer to what was just sent is waited for.

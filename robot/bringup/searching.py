@@ -19,12 +19,12 @@ is not found out: with such a one on the line name the kind that is wished.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from drivers.dynamixel import discovery as dynamixel_scan
 from drivers.feetech import scan as feetech_scan
 from drivers.maestro.params import MaestroParams
 from drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from drivers.serial.port import BusPort
 from drivers.serial.port_owner import POLOLU
-from drivers.servo_bus import discovery as dynamixel_scan
 from drivers.servo_models import BUS_KINDS, BusKind
 from robot.bringup.servo_families import KINDS
 from robot.bringup.servo_kind import Found

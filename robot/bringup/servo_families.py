@@ -3,6 +3,8 @@
 from collections.abc import Callable
 
 from drivers.dynamixel import control_table as dynamixel
+from drivers.dynamixel import discovery as dynamixel_scan
+from drivers.dynamixel.registers import Registers
 from drivers.errors import SetupError
 from drivers.feetech import homing
 from drivers.feetech import memory_table as feetech
@@ -10,8 +12,6 @@ from drivers.feetech import scan as feetech_scan
 from drivers.feetech.protocol import REBOOT, instruction
 from drivers.feetech.registers import StsRegisters
 from drivers.serial.port import BusPort
-from drivers.servo_bus import discovery as dynamixel_scan
-from drivers.servo_bus.registers import Registers
 from drivers.servo_models import SERVOS
 from robot.bringup.servo_kind import Driving, ServoKind, Setting
 

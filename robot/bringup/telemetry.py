@@ -13,6 +13,7 @@ from typing import NamedTuple, Protocol
 from drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from drivers.dynamixel.control_table import REGISTERS, VELOCITY_UNIT_STEPS_S, Model
 from drivers.dynamixel.control_table import name_errors as name_dynamixel
+from drivers.dynamixel.registers import Registers
 from drivers.feetech.memory_table import LOAD_UNIT
 from drivers.feetech.memory_table import REGISTERS as STS
 from drivers.feetech.memory_table import name_errors as name_feetech
@@ -23,7 +24,6 @@ from drivers.maestro.commands import MOST_INPUT
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
 from drivers.serial.port import BusPort
-from drivers.servo_bus.registers import Registers
 from robot.joint import JointParams
 
 # 116 goal position | 120 tick, 122 moving, 123 status, 124 pwm | 126 current, 128 velocity,

@@ -12,9 +12,9 @@ from rich.live import Live
 from rich.table import Table
 
 from config.schema import Rig, load_rig
+from drivers.dynamixel.registers import Registers
 from drivers.feetech.registers import StsRegisters
 from drivers.serial.port import BlockingPort
-from drivers.servo_bus.registers import Registers
 from robot.bringup.monitor import Monitor, Sample, as_json
 from robot.bringup.telemetry import DynamixelLooks, FeetechLooks, Look, Looks, MaestroLooks
 from robot.cli.opened import opened

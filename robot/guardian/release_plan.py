@@ -51,9 +51,10 @@ def releaser(plan: ReleasePlan) -> Callable[[BusPort], tuple[int, ...]]:
     went away. All that it needs is imported here, and of the drivers no more than one.
     """
     if plan.kind == "feetech":
-        from drivers.feetech import release as feetech
+        from drivers.feetech.family import FEETECH
+        from drivers.servo_bus.release import disable_torque
 
-        return lambda port: feetech.disable_torque(port, plan.baud, plan.ids)
+        return lambda port: disable_torque(port, FEETECH, plan.baud, plan.ids)
     if plan.kind == "maestro":
         from drivers.maestro import release as maestro
 
@@ -66,9 +67,10 @@ def releaser(plan: ReleasePlan) -> Callable[[BusPort], tuple[int, ...]]:
         first, *more = plan.addresses
         boards = Pca9685Params(first, tuple(more))
         return lambda port: pca9685.stop_pulses(port, boards, plan.ids)
-    from drivers.dynamixel import release as dynamixel
+    from drivers.dynamixel.family import DYNAMIXEL
+    from drivers.servo_bus.release import disable_torque
 
-    return lambda port: dynamixel.disable_torque(port, plan.baud, plan.ids)
+    return lambda port: disable_torque(port, DYNAMIXEL, plan.baud, plan.ids)
 
 
 def describe(plan: ReleasePlan) -> str:

@@ -1,7 +1,6 @@
 """Single registers of single servos through the SDK: for all that is not done every tick."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from dynamixel_sdk import COMM_SUCCESS
 
@@ -9,6 +8,7 @@ from drivers.dynamixel.control_table import REGISTERS
 from drivers.dynamixel.protocol import ALERT, ERROR_NUMBER, SyncWrite
 from drivers.dynamixel.sdk_handler import SdkPackets
 from drivers.serial.port import BusPort
+from drivers.servo_bus.family import Identity as Identity
 
 TRIES = 3
 
@@ -16,13 +16,6 @@ LATE_S = 0.15
 """No answer is later than so long after waiting for it has ended."""
 
 ROOM = 4096
-
-
-class Identity(NamedTuple):
-    """What a ping tells: the model number and the firmware version."""
-
-    model_number: int
-    firmware: int
 
 
 class Registers:

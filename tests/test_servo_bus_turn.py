@@ -3,10 +3,18 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.feetech.turn import lost, nearest_turn
+from drivers.servo_bus.turn import nearest_turn as nearest
 
 STEPS = st.integers(-40000, 40000)
 RANGE = st.tuples(st.integers(0, 4095), st.integers(0, 4095)).map(lambda pair: tuple(sorted(pair)))
+
+
+def nearest_turn(steps, low, high):
+    return nearest(steps, low, high, 4096)
+
+
+def lost(steps, low, high):
+    return nearest_turn(steps, low, high) != steps
 
 
 def away(steps, low, high):

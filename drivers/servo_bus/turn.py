@@ -6,23 +6,16 @@ turns may have counted some while the joint was limp. What the joint is told is 
 nearest to its range. The servo itself would go the other way round: it must not.
 """
 
-from drivers.feetech.memory_table import STEPS_PER_TURN
 
-
-def nearest_turn(steps: int, low: int, high: int) -> int:
-    """Give the position, whole turns added, that lies nearest to the range low..high."""
+def nearest_turn(steps: int, low: int, high: int, turn: int) -> int:
+    """Return the position, whole turns added, that lies nearest to the range low..high."""
     if low <= steps <= high:
         return steps
-    above = low + (steps - low) % STEPS_PER_TURN
-    below = above - STEPS_PER_TURN
+    above = low + (steps - low) % turn
+    below = above - turn
     if above <= high or above - high < low - below:
         return above
     if above - high > low - below:
         return below
     # Both ways are as long: as the servo has it where it is one of them.
     return below if steps < low else above
-
-
-def lost(steps: int, low: int, high: int) -> bool:
-    """Tell whether a servo that counts ``steps`` would go the wrong way into its range."""
-    return nearest_turn(steps, low, high) != steps
