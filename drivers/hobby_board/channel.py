@@ -165,6 +165,14 @@ class Channel:
             pulse_steps = self.clip(pulse_steps)
         self.gives(pulse_steps)
 
+    def confirmed(self, pulse_steps: int) -> None:
+        """Note that it gives a pulse as expected.
+
+        One that the driver leads is farther by now than what it was sent last.
+        """
+        if self._longest_lead_s == inf:
+            self.found(pulse_steps)
+
     def gives(self, pulse_steps: int) -> None:
         """Note the pulse that it gives, whatever its goal is."""
         self.on = pulse_steps > 0

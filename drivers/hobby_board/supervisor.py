@@ -128,7 +128,7 @@ class Supervisor:
             if not self._look_at_all():
                 return False
         elif channel.held:
-            channel.found(pulse)
+            channel.confirmed(pulse)
         if self._pending and now_s >= self._hold_at_s:
             self._take_next(now_s)
         for one in self._channels:
@@ -159,7 +159,7 @@ class Supervisor:
                 self._met_end(channel, found[channel])
         for channel in held:
             if channel not in odd:
-                channel.found(found[channel])
+                channel.confirmed(found[channel])
         if away or home:
             self._remind()
         for channel in self._pending:

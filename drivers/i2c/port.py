@@ -7,7 +7,6 @@ held down, where its driver can.
 import errno
 import fcntl
 import os
-import re
 import stat
 import time
 from collections.abc import Callable
@@ -20,6 +19,7 @@ from smbus2 import SMBus, i2c_msg
 from drivers.errors import BusLost, PortError
 from drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, Part, commands
 from drivers.serial.port import BlockingPort, BusPort
+from drivers.serial.port_owner import is_i2c
 
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
 """Requests of the kernel's i2c-dev."""
@@ -31,11 +31,6 @@ _STUCK = (errno.ETIMEDOUT, errno.EAGAIN, errno.EBUSY, errno.EINTR)
 
 OpenBus = Callable[[str], Any]
 """Opens a bus by its path: smbus2's SMBus, or an emulated one with its methods."""
-
-
-def is_i2c(path: str) -> bool:
-    """Return whether a path is by its name that of an I2C bus."""
-    return re.fullmatch(r"i2c-\d+", os.path.basename(os.path.realpath(path))) is not None
 
 
 def port_of(

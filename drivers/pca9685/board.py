@@ -153,6 +153,11 @@ class Pca9685Board:
                 f"{where}the I2C bus is stuck, its data or clock line is held down: switch what "
                 "hangs on it off and on, check SDA and SCL for a short"
             )
+        if found is None and self.line.why != "not acknowledged":
+            raise ServoMissing(
+                f"{where}nobody answers as an I2C bus ({self.line.why}): a PCA9685 is reached over "
+                "an I2C bus such as /dev/i2c-1: write it under bus.port"
+            )
         if found is None:
             raise ServoMissing(
                 f"{where}no PCA9685 answers at {address:#x}: has the board its logic supply (VCC, "

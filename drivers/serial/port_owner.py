@@ -5,6 +5,7 @@ servo. Source: Pololu Maestro User's Guide (0J40), section 5.c.
 """
 
 import os
+import re
 from collections.abc import Sequence
 
 from drivers.errors import PortError
@@ -12,6 +13,11 @@ from drivers.serial.list_ports import SerialPort
 
 POLOLU = "1ffb:"
 """USB vendor of Pololu."""
+
+
+def is_i2c(device: str) -> bool:
+    """Return whether a path is by its name that of an I2C bus."""
+    return re.fullmatch(r"i2c-\d+", os.path.basename(os.path.realpath(device))) is not None
 
 
 def usb_of(device: str, ports: Sequence[SerialPort]) -> str:
@@ -26,6 +32,11 @@ def refuse_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
     Raises:
         drivers.errors.PortError: it is a board that they would move.
     """
+    if is_i2c(device) and kind != "pca9685":
+        raise PortError(
+            f"{device} is an I2C bus and no serial port: name the adaptor's port with --port or in "
+            "the YAML, or say that the kind of the bus is pca9685"
+        )
     if kind != "maestro" and usb_of(device, ports).startswith(POLOLU):
         raise PortError(
             f"{device} is a board of Pololu: {kind} packets would move what hangs on it; name the "

@@ -1,4 +1,4 @@
-"""One hobby servo on a Maestro by itself, moved slowly by a person who looks at it.
+"""One hobby servo on a board by itself, moved slowly by a person who looks at it.
 
 Nobody measures it: its place is the pulse that it gets, as far as nothing holds it back.
 The board knows no watchdog: a guardian stops its pulses when this program is killed.
@@ -10,6 +10,8 @@ from drivers.errors import BusLost
 from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.bus import MaestroBus
 from drivers.maestro.params import MaestroParams
+from drivers.pca9685.bus import Pca9685Bus
+from drivers.pca9685.params import Pca9685Params
 from drivers.serial.port import BusPort
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from robot.bringup.single_joint import Stopped
@@ -47,7 +49,7 @@ class OneHobby:
         name: str,
         joint: JointParams,
         port: BusPort,
-        params: MaestroParams,
+        params: MaestroParams | Pca9685Params,
         clock: Clock,
         stopped: Callable[[], str | None],
         pulses_us: tuple[float, float],
@@ -59,7 +61,8 @@ class OneHobby:
         low, high = (round(end * US_STEPS) for end in pulses_us)
         speed = SPEED_US_S * US_STEPS
         self._setup = ServoSetup(joint.id, joint.model, low, high, speed, name)
-        bus = MaestroBus(port, [self._setup], params)
+        bus = _bus(port, self._setup, params)
+        self._maestro = isinstance(params, MaestroParams)
         self._bus: ServoBus = bus if guardian is None else GuardedBus(bus, 1, guardian, 0)
         self._goal = self._pulse = 0
         self._said: list[str] = []
@@ -134,9 +137,10 @@ class OneHobby:
         """Stay where the board holds it, however it came there."""
         sent_us, held_us = self._goal / US_STEPS, pulse_steps / US_STEPS
         self._goal = pulse_steps
+        range_us = ": if it never comes farther, widen the range of its channel in Pololu's program"
         self._said.append(
-            f"{self.who} was sent to {sent_us:g} us and is held at {held_us:g} us: if it never "
-            "comes farther, widen the range of its channel in Pololu's program"
+            f"{self.who} was sent to {sent_us:g} us and is held at {held_us:g} us"
+            f"{range_us if self._maestro else ''}"
         )
 
     def events(self) -> tuple[str, ...]:
@@ -176,3 +180,10 @@ class OneHobby:
             if self._clock.now_s() > end_s:
                 raise BusLost(f"{self.who}: the board does not answer: check its cable and power")
             self._clock.sleep_until(self._clock.now_s() + PERIOD_S)
+
+
+def _bus(port: BusPort, setup: ServoSetup, params: MaestroParams | Pca9685Params) -> ServoBus:
+    """Return the bus of one servo on its board."""
+    if isinstance(params, Pca9685Params):
+        return Pca9685Bus(port, [setup], params)
+    return MaestroBus(port, [setup], params)

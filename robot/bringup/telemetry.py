@@ -23,6 +23,8 @@ from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.commands import MOST_INPUT
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
+from drivers.pca9685.board import Pca9685Board
+from drivers.pca9685.params import Pca9685Params
 from drivers.serial.port import BusPort
 from robot.joint import JointParams
 
@@ -162,6 +164,18 @@ class MaestroLooks:
             self._lines.reverse()
             return None
         return look_at_pulse(joint, found[0])
+
+
+class Pca9685Looks:
+    """Looks at the channels of PCA9685 boards: which pulse each gives, and nothing else."""
+
+    def __init__(self, port: BusPort, params: Pca9685Params) -> None:
+        self._board = Pca9685Board(port, params)
+
+    def look(self, joint: JointParams) -> Look | None:
+        """Ask for a joint's pulse; see Looks."""
+        found = self._board.pulses((joint.id,))
+        return None if found is None else look_at_pulse(joint, found[0])
 
 
 def look_at_pulse(joint: JointParams, pulse_steps: int) -> Look:

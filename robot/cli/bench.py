@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from drivers.i2c.port import port_of
 from drivers.serial.list_ports import Host, SerialPort, serial_ports
-from drivers.serial.port import BlockingPort
+from drivers.serial.port import BusPort
 from drivers.serial.port_owner import usb_of
 from robot.cli.terminal import status
 
@@ -31,12 +32,12 @@ def usb_id(path: str) -> str:
 
 
 @contextlib.contextmanager
-def to_open(path: str, on_traffic: Callable[[], None] | None = None) -> Iterator[BlockingPort]:
+def to_open(path: str, on_traffic: Callable[[], None] | None = None) -> Iterator[BusPort]:
     """Give a port that is not opened yet, closed again at the end.
 
     on_traffic: called whenever bytes are sent or waited for
     """
-    line = BlockingPort(path, on_traffic=on_traffic)
+    line = port_of(path, on_traffic=on_traffic)
     try:
         yield line
     finally:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from config.schema import Rig
 from drivers.errors import ServoFault, ServoMissing, SetupError
-from drivers.serial.port import BlockingPort
+from drivers.i2c.port import port_of
 from robot.bringup.hobby_servo import OneHobby
 from robot.bringup.servo_access import OneServo
 from robot.bringup.single_joint import SingleJoint
@@ -189,11 +189,10 @@ def _hobby(bench: Bench, name: str, bus: str) -> Made:
     config = bench.rig.bus_named(bus)
     guardian = _guardian(bench, name, bus)
     beat = guardian.beat if guardian is not None else None
-    port = BlockingPort(bench.wire.paths[bus], on_traffic=beat)
+    port = port_of(bench.wire.paths[bus], on_traffic=beat)
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
-    hobby = OneHobby(
-        name, joint, port, config.maestro, RealClock(), bench.stopped, how.pulses_us, guardian
-    )
+    params = config.pca9685 if config.kind == "pca9685" else config.maestro
+    hobby = OneHobby(name, joint, port, params, RealClock(), bench.stopped, how.pulses_us, guardian)
     person.hand = None
     with _let_go_after(hobby.who, hobby.let_go, bench.stopped):
         return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from config.schema import Rig, load_rig
-from drivers.serial.port import BlockingPort
+from drivers.serial.port import BusPort
 from robot.bringup.doctor import maestro as doctor_maestro
 from robot.bringup.doctor import pca9685 as doctor_pca9685
 from robot.bringup.doctor import run as checkup
@@ -62,7 +62,7 @@ def doctor(
         raise typer.Exit(FAULT)
 
 
-def _examined(rig: Rig, lines: Mapping[str, BlockingPort], tell: Tell) -> dict[str, list[Finding]]:
+def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Finding]]:
     """Examine every bus, and tell what was found; gives the findings by bus."""
     findings = {}
     for bus, line in lines.items():
@@ -76,7 +76,7 @@ def _examined(rig: Rig, lines: Mapping[str, BlockingPort], tell: Tell) -> dict[s
     return findings
 
 
-def _examine(rig: Rig, bus: str, line: BlockingPort) -> list[Finding]:
+def _examine(rig: Rig, bus: str, line: BusPort) -> list[Finding]:
     """Examine one bus."""
     config, setups = rig.bus_named(bus), setups_on(rig, bus)
 
@@ -104,7 +104,7 @@ def _tell(line: str) -> None:
 
 def _fix(
     rig: Rig,
-    lines: Mapping[str, BlockingPort],
+    lines: Mapping[str, BusPort],
     findings: Mapping[str, Sequence[Finding]],
     tell: Tell,
 ) -> None:
@@ -121,7 +121,7 @@ def _fix(
         tell("nothing that --fix may mend")
 
 
-def _apply(rig: Rig, bus: str, line: BlockingPort, findings: Sequence[Finding]) -> list[Done]:
+def _apply(rig: Rig, bus: str, line: BusPort, findings: Sequence[Finding]) -> list[Done]:
     config = rig.bus_named(bus)
     line.setBaudRate(config.baud)
 

@@ -49,6 +49,13 @@ def emulate(
             help="A Pololu Maestro with a hobby servo on each of its 6, 12, 18 or 24 channels.",
         ),
     ] = None,
+    pca9685: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS,...",
+            help="PCA9685 boards behind an I2C bridge, with a hobby servo on each channel: 0x40.",
+        ),
+    ] = None,
     rig: Annotated[
         str | None, typer.Option(help="All buses of a rig instead, each with its own terminal.")
     ] = None,
@@ -111,13 +118,17 @@ def emulate(
     Type `help` for the commands; Ctrl-C ends it.
     """
     with clear_errors(rig):
-        if sum(one is not None for one in (servos, maestro, rig)) != 1:
-            raise SetupError(f"name the servos: --servos {EXAMPLE}, or --maestro 12, or --rig NAME")
+        if sum(one is not None for one in (servos, maestro, pca9685, rig)) != 1:
+            raise SetupError(
+                f"name the servos: --servos {EXAMPLE}, or --maestro 12, --pca9685 0x40, --rig NAME"
+            )
         _see_what_fits(maestro is not None, firmware, device, crc)
         if servos is not None:
             devices: Mapping[str, Emulated] = {"": line_of(servos, firmware, DEFAULT_BAUD)}
         elif maestro is not None:
             devices = {"": _board(maestro, device, crc)}
+        elif pca9685 is not None:
+            devices = {"": _boards(pca9685)}
         else:
             devices = _of_rig(rig or "", firmware)
         if baud is not None and len(devices) > 1:
@@ -156,6 +167,15 @@ def _board(channels: int, device: int | None, crc: bool) -> MaestroLine:
         sizes = ", ".join(map(str, CHANNELS))
         raise SetupError(f"--maestro {channels}: a board has {sizes} channels")
     return MaestroLine(channels, DEFAULT_DEVICE if device is None else device, crc)
+
+
+def _boards(text: str) -> Pca9685Line:
+    try:
+        return Pca9685Line(tuple(int(one, 16) for one in text.split(",")))
+    except ValueError:
+        raise SetupError(
+            f"--pca9685 {text}: not addresses in hexadecimal, such as 0x40 or 0x40,0x41"
+        ) from None
 
 
 def _of_rig(name: str, firmware: int | None) -> dict[str, Emulated]:

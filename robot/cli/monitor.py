@@ -14,9 +14,16 @@ from rich.table import Table
 from config.schema import Rig, load_rig
 from drivers.dynamixel.registers import Registers
 from drivers.feetech.registers import StsRegisters
-from drivers.serial.port import BlockingPort
+from drivers.serial.port import BusPort
 from robot.bringup.monitor import Monitor, Sample, as_json
-from robot.bringup.telemetry import DynamixelLooks, FeetechLooks, Look, Looks, MaestroLooks
+from robot.bringup.telemetry import (
+    DynamixelLooks,
+    FeetechLooks,
+    Look,
+    Looks,
+    MaestroLooks,
+    Pca9685Looks,
+)
 from robot.cli.opened import opened
 from robot.cli.terminal import RigArgument, clear_errors, signals
 from robot.cli.wires import MockOption, PortOption, Wires, wires
@@ -75,10 +82,12 @@ def _looks(rig: Rig, wire: Wires) -> Iterator[dict[str, Looks]]:
         }
 
 
-def _looks_on(rig: Rig, bus: str, port: BlockingPort) -> Looks:
+def _looks_on(rig: Rig, bus: str, port: BusPort) -> Looks:
     config = rig.bus_named(bus)
     if config.kind == "maestro":
         return MaestroLooks(port, config.maestro)
+    if config.kind == "pca9685":
+        return Pca9685Looks(port, config.pca9685)
     if config.kind == "feetech":
         return FeetechLooks(StsRegisters(port, tries=1))
     return DynamixelLooks(Registers(port, tries=1))

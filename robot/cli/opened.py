@@ -5,16 +5,14 @@ from collections.abc import Iterator
 
 from config.schema import Rig
 from drivers.errors import PortError
-from drivers.serial.port import BlockingPort
+from drivers.serial.port import BusPort
 from robot.cli.bench import to_open
 from robot.cli.wires import Wires
 from robot.guardian.guardian import Guardian
 
 
 @contextlib.contextmanager
-def opened(
-    rig: Rig, wire: Wires, bus: str, guardian: Guardian | None = None
-) -> Iterator[BlockingPort]:
+def opened(rig: Rig, wire: Wires, bus: str, guardian: Guardian | None = None) -> Iterator[BusPort]:
     """Open the port of the bus of this name at its speed; nothing is sent.
 
     guardian: is shown a sign of life with all that is sent

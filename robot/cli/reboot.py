@@ -5,9 +5,10 @@ from typing import Annotated
 import typer
 
 from config.schema import Rig, load_rig
-from drivers.errors import SetupError
+from drivers.errors import ServoFault, SetupError
 from drivers.maestro.line import Line
-from drivers.serial.port import BlockingPort
+from drivers.pca9685.release import stop_pulses
+from drivers.serial.port import BusPort
 from robot.bringup import servo_reboot as servo_reboot
 from robot.bringup.maestro_sweep import sent_home
 from robot.bringup.servo_families import KINDS
@@ -22,6 +23,7 @@ app = typer.Typer()
 
 HIGHEST_ID: dict[str, int] = {
     "maestro": 23,
+    "pca9685": 255,
     **{kind.name: kind.highest_id for kind in KINDS.values()},
 }
 
@@ -50,6 +52,9 @@ def reboot(
                     if config.kind == "maestro":
                         _board(model, bus, line, yes)
                         continue
+                    if config.kind == "pca9685":
+                        _pulses_off(model, bus, line)
+                        continue
                     kind = KINDS[config.kind]
                     again += [_reboot(line, kind, model, bus, one, yes) for one in ids]
     if any(again):
@@ -77,9 +82,7 @@ def _servo(rig: Rig, text: str) -> tuple[str, int]:
     raise SetupError(f"{text}: neither an id from 0 to {most} nor a joint ({', '.join(rig.names)})")
 
 
-def _reboot(
-    line: BlockingPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, yes: bool
-) -> bool:
+def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, yes: bool) -> bool:
     """Restart one servo; tells whether it complains again."""
     names = [joint for joint in joints_on(rig, bus) if rig.joints[joint].id == servo_id]
     name = f"{names[0]} (servo {servo_id})" if names else f"servo {servo_id}"
@@ -98,7 +101,7 @@ def _reboot(
     return bool(result.after.errors)
 
 
-def _board(rig: Rig, bus: str, line: BlockingPort, yes: bool) -> None:
+def _board(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
     """Do what comes nearest to a restart of a Maestro: clear its errors, send it home."""
     label = bus_label(rig, bus)
     say(
@@ -111,3 +114,22 @@ def _board(rig: Rig, bus: str, line: BlockingPort, yes: bool) -> None:
         return
     held = sent_home(Line(line, rig.bus_named(bus).maestro))
     say(f"{label}: home; errors it held, cleared now: {', '.join(held) or 'none'}")
+
+
+def _pulses_off(rig: Rig, bus: str, line: BusPort) -> None:
+    """Do what comes nearest to a restart of a PCA9685: stop the pulses of the rig's channels.
+
+    Raises:
+        drivers.errors.ServoFault: some do not stop.
+    """
+    ids = tuple(rig.joints[joint].id for joint in joints_on(rig, bus))
+    left = stop_pulses(line, rig.bus_named(bus).pca9685, ids)
+    if left:
+        raise ServoFault(
+            f"{line.port_name}: channels {', '.join(map(str, left))} do not confirm that their "
+            "pulses have stopped: cut the servo power; gazerig doctor names the cause"
+        )
+    say(
+        f"{bus_label(rig, bus)}: a PCA9685 latches no errors; pulses of its {len(ids)} channels "
+        "are off, and it is set up anew at the next start"
+    )

@@ -12,8 +12,9 @@ from rich.table import Table
 
 from config.schema import load_rig
 from drivers.errors import SetupError
+from drivers.i2c.port import port_of
 from drivers.serial.list_ports import SerialPort
-from drivers.serial.port import BlockingPort
+from drivers.serial.port import BusPort
 from drivers.serial.port_owner import POLOLU
 from drivers.servo_models import BusKind
 from robot.bringup.doctor.port import name_ports
@@ -131,7 +132,7 @@ def _one(
         )
     if not asked:
         raise SetupError(f"--bauds: none of them is a rate of {' or '.join(kinds)}")
-    line = BlockingPort(path)
+    line = port_of(path)
     try:
         rounds = _search(line, usb, asked, thorough, named == "all")
         if not thorough and not any(one.somebody for one in rounds):
@@ -147,7 +148,7 @@ def _one(
 
 
 def _search(
-    line: BlockingPort,
+    line: BusPort,
     usb: str,
     asked: Sequence[tuple[BusKind, int]],
     thorough: bool,

@@ -8,6 +8,8 @@ _LEFT_ALONE: dict[BusKind, str] = {
     "dynamixel": "the Dynamixel servos' own watchdog stops them",
     "feetech": "Feetech servos hold their last goal until the servo power is cut, or "
     "the guardian, which tries for 10 s, reaches the port",
+    "pca9685": "a PCA9685 goes on with its last pulses until the servo power is cut, or "
+    "the guardian, which tries for 10 s, reaches the bus",
     "maestro": "a Maestro goes on with its last pulses until the servo power is cut, or "
     "the guardian, which tries for 10 s, reaches the port",
 }

@@ -7,7 +7,7 @@ import typer
 
 from config.schema import Rig, load_rig
 from drivers.errors import DriverError, SetupError
-from drivers.serial.port import BlockingPort
+from drivers.serial.port import BusPort
 from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
 from robot.bringup import servo_setup as servo_setup
@@ -128,7 +128,7 @@ def _fresh(rig: Rig, one: ServoSetup, kind: ServoKind) -> Emulated:
     return DynamixelLine(spec, kind.factory_baud)
 
 
-def _set_up(line: BlockingPort, kind: ServoKind, wanted: ServoSetup, baud: int, yes: bool) -> bool:
+def _set_up(line: BusPort, kind: ServoKind, wanted: ServoSetup, baud: int, yes: bool) -> bool:
     found = servo_setup.find_alone(line, kind, servo_setup.search_order(kind, baud), progress)
     wipe()
     say(

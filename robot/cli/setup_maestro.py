@@ -17,7 +17,7 @@ from drivers.hobby_board.models import US_STEPS
 from drivers.maestro.line import Line
 from drivers.maestro.params import MaestroParams
 from drivers.maestro.probe import USB_CHANNELS
-from drivers.serial.port import BlockingPort
+from drivers.serial.port import BusPort
 from drivers.serial.port_owner import POLOLU
 from drivers.servo_models import servo_label
 from drivers.types import ServoSetup
@@ -34,7 +34,7 @@ QUICK_STEPS_S = 90.0 / 360.0 * 16_000.0
 
 
 def set_up_board(
-    line: BlockingPort,
+    line: BusPort,
     params: MaestroParams,
     setups: Sequence[ServoSetup],
     joints: Mapping[str, JointParams],
@@ -96,7 +96,7 @@ def _refuse_size(setups: Sequence[ServoSetup], usb: str, where: str) -> None:
         )
 
 
-def _greeted(line: BlockingPort, params: MaestroParams) -> Line:
+def _greeted(line: BusPort, params: MaestroParams) -> Line:
     """Open the port and find the board as the rig says it is; a script of its own is stopped."""
     line.setBaudRate(params.baud)
     board = Line(line, params)

@@ -8,8 +8,9 @@ import typer
 
 from config.schema import Rig
 from drivers.errors import SetupError
+from drivers.i2c.port import port_of
 from drivers.serial.list_ports import serial_ports
-from drivers.serial.port import BlockingPort
+from drivers.serial.port import BusPort
 from drivers.serial.port_owner import refuse_owner
 from drivers.types import ServoSetup
 from robot.emulated_rig import emulated_lines
@@ -37,9 +38,9 @@ class Wires(NamedTuple):
     paths: Mapping[str, str]
     buses: PtyBuses | None
 
-    def opened_by(self) -> dict[str, BlockingPort]:
+    def opened_by(self) -> dict[str, BusPort]:
         """Give the ports, not opened yet."""
-        return {name: BlockingPort(path) for name, path in self.paths.items()}
+        return {name: port_of(path) for name, path in self.paths.items()}
 
     def command(self, text: str, bus: str) -> None:
         """Let something happen to what is emulated on a bus; does nothing on real wires.

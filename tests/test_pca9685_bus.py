@@ -1,0 +1,480 @@
+"""PCA9685 boards through the driver: over the kernel's bus, over a bridge, and what goes wrong."""
+
+import errno
+from dataclasses import replace
+
+import pytest
+from smbus2 import i2c_msg
+
+from config.load import shipped
+from config.schema import load_rig
+from drivers.errors import BusLost, PortError, ServoMissing
+from drivers.i2c import port as i2c_port
+from drivers.i2c.bridge import ASK_STATUS, Part, commands, read, write
+from drivers.i2c.port import I2cPort, explain, port_of
+from drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
+from drivers.pca9685.release import stop_pulses
+from drivers.serial.port import BlockingPort
+from drivers.serial.port_owner import refuse_owner
+from drivers.types import ServoSetup
+from robot.assemble import assemble
+from robot.choice import Choice
+from sim_mock.hobby_servo import HobbySpec
+from sim_mock.in_process_port import InProcessPort
+from sim_mock.pca9685.bridge import build_bridge
+from sim_mock.pca9685.smbus import EmulatedSMBus
+
+SPEED_STEPS_S = 4000.0
+GRAIN = 20
+QUICK = Pca9685Params(stagger_ms=0.0)
+
+
+def setup(servo_id, **changes):
+    made = ServoSetup(servo_id, "hobby", 4400, 7600, SPEED_STEPS_S, f"joint {servo_id}")
+    return made._replace(rest_steps=6000, **changes)
+
+
+class World:
+    """Boards in this process, and a bus on them."""
+
+    def __init__(self, ids=(0, 1, 5), params=QUICK, addresses=(0x40,), oscillator_hz=25e6, **more):
+        self.now = [10.0]
+        specs = [HobbySpec(i) for i in ids]
+        self.device = build_bridge(addresses, lambda: self.now[0], oscillator_hz, 0, specs)
+        self.sent = []
+        self.port = InProcessPort(self.device, self.sent.append, "emulated", self._sleep_until)
+        self.setups = [setup(i, **more) for i in ids]
+        self.bus = Pca9685Bus(self.port, self.setups, params)
+
+    def _sleep_until(self, t_s):
+        self.now[0] = max(self.now[0], t_s)
+
+    def held(self):
+        self.bus.open()
+        self.bus.engage()
+        self.bus.events()
+        return self
+
+    def run(self, seconds, goals=None, period_s=0.01):
+        for _ in range(round(seconds / period_s)):
+            readings = self.bus.read(self.now[0])
+            if goals is not None:
+                self.bus.write(goals)
+            self.now[0] += period_s
+        return readings
+
+    def chip(self, address=0x40):
+        return self.device.body.chips[address]
+
+    def widths(self):
+        return [self.device.body.width_steps(s.id, self.now[0]) for s in self.setups]
+
+    def places(self):
+        positions = self.device.positions_steps()
+        return [positions[s.id] for s in self.setups]
+
+    def command(self, text):
+        return self.device.faults.command(text)
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+# --- bytes
+
+
+def test_transfers_are_commands_of_the_bridge_and_come_back_as_they_were():
+    text = write(0x40, 6, b"\1\2") + ASK_STATUS + read(0x41, 0xFE, 1)
+    assert text.hex(" ") == "53 80 03 06 01 02 50 52 0a 50 53 82 01 fe 53 83 01 50"
+    assert list(commands(text)) == [
+        (Part(0x40, b"\6\1\2"),),
+        (),
+        (Part(0x41, b"\xfe"), Part(0x41, b"", 1)),
+    ]
+    with pytest.raises(ValueError, match="no whole command"):
+        list(commands(text[:-1]))
+
+
+def test_pulses_are_registers_and_back():
+    assert all(counts_of(pulse(counts)) == counts for counts in range(4096))
+    assert pulse(0)[3] == 0x10
+    assert [prescale_of(f, 25e6) for f in (50.0, 60.0, 200.0, 1526.0, 9e9)] == [121, 101, 30, 3, 3]
+
+
+# --- setting up
+
+
+def test_open_changes_nothing_and_engage_sets_up_and_goes_to_the_rest(world):
+    before = bytes(world.chip()._registers)
+    world.bus.open()
+    assert bytes(world.chip()._registers) == before
+    goals = world.bus.engage()
+    assert goals == (6000, 6000, 6000)
+    assert world.chip().read(0) == b""
+    assert world.chip()._registers[MODE1] == AWAKE
+    assert world.chip()._registers[PRESCALE] == 121
+    assert all(abs(width - 6000) <= GRAIN / 2 for width in world.widths())
+    assert sum(world.device.body.width_steps(k, world.now[0]) > 0 for k in range(16)) == 3
+    assert any("had no pulses" in line for line in world.bus.events())
+
+
+def test_pulses_that_are_there_go_on_and_nothing_sleeps(world):
+    world.held().run(0.5, [5000, 6800, 6000])
+    places = world.places()
+    again = Pca9685Bus(world.port, world.setups, QUICK)
+    world.sent.clear()
+    again.open()
+    goals = again.engage()
+    assert [abs(g - w) <= GRAIN for g, w in zip(goals, (5000, 6800, 6000), strict=True)]
+    asleep = write(0x40, MODE1, b"\x30")
+    assert not any(asleep in packet for packet in world.sent)
+    world.now[0] += 0.3
+    assert world.places() == pytest.approx(places, abs=1.0)
+
+
+def test_first_pulses_come_one_after_another():
+    world = World(params=Pca9685Params(stagger_ms=100.0))
+    world.bus.open()
+    began_s = world.now[0]
+    world.bus.engage()
+    assert world.now[0] - began_s == pytest.approx(0.2, abs=0.02)
+
+
+def test_neighbours_change_in_one_transfer(world):
+    world.held()
+    world.sent.clear()
+    world.bus.write([6010, 6010, 6010])
+    (packet,) = world.sent
+    assert [part.data[0] for (part,) in commands(packet)] == [6, 6 + 4 * 5]
+
+
+@pytest.mark.parametrize("hz", [50.0, 100.0, 300.0])
+def test_a_measured_oscillator_makes_true_pulses(hz):
+    for believed_hz, room in ((26.4e6, 0.003), (25e6, 0.08)):
+        params = replace(QUICK, frequency_hz=hz, oscillator_hz=believed_hz)
+        world = World(params=params, oscillator_hz=26.4e6).held()
+        world.run(0.8, [6000, 7200, 5000])
+        for width, goal in zip(world.widths(), (6000, 7200, 5000), strict=True):
+            assert width == pytest.approx(goal, rel=room, abs=GRAIN * 50 / hz)
+    assert world.widths()[0] < 0.96 * 6000
+
+
+def test_two_boards_are_one_bus():
+    params = replace(QUICK, further_addresses=(0x43,))
+    world = World((2, 17), params, (0x40, 0x43)).held()
+    world.run(1.0, [5000, 7000])
+    assert world.widths() == pytest.approx([5000, 7000], abs=GRAIN / 2)
+    assert world.chip(0x43).counts(1) and not world.chip(0x43).counts(2)
+    world.bus.release()
+    assert world.widths() == [0, 0]
+
+
+# --- moving
+
+
+def test_a_goal_far_away_is_a_way_at_the_joints_speed(world):
+    world.held()
+    before = world.widths()[0]
+    for _ in range(30):
+        world.bus.read(world.now[0])
+        world.bus.write([7600, 6000, 6000])
+        width = world.widths()[0]
+        assert width - before <= SPEED_STEPS_S * 0.01 + GRAIN
+        before, world.now[0] = width, world.now[0] + 0.01
+    assert before > 6000 + 0.9 * SPEED_STEPS_S * 0.28
+
+
+def test_after_a_pause_nothing_leaps(world):
+    world.held().run(0.1, [7600, 6000, 6000])
+    before = world.widths()[0]
+    world.now[0] += 2.0
+    world.bus.read(world.now[0])
+    assert 0 <= world.widths()[0] - before <= SPEED_STEPS_S * 0.05 + GRAIN
+
+
+def test_reads_alone_lead_a_pulse_to_its_goal(world):
+    world.held()
+    world.bus.write([7000, 6000, 6000])
+    world.run(0.6, period_s=0.03)
+    assert world.widths()[0] == pytest.approx(7000, abs=GRAIN)
+
+
+def test_a_joint_outside_its_limits_comes_inside_slowly():
+    world = World(ids=(0,), min_steps=3000, max_steps=9000).held()
+    world.run(1.0, [8400])
+    narrow = Pca9685Bus(world.port, [setup(0)], QUICK)
+    narrow.open()
+    assert narrow.engage() == (7600,)
+    world.bus, before = narrow, world.widths()[0]
+    assert before == pytest.approx(8400, abs=GRAIN)
+    readings = world.run(0.2, [7600])
+    assert readings[0].rearmed
+    # 30 deg/s of a shaft that turns 90 deg in 4000 steps
+    assert before - world.widths()[0] == pytest.approx(1333 * 0.2, abs=2 * GRAIN)
+    world.run(1.0, [7600])
+    assert world.widths()[0] <= 7600
+
+
+# --- what goes wrong
+
+
+def test_a_brown_out_is_seen_and_set_up_anew_one_after_another(world):
+    world.held().run(0.3, [5000, 6500, 7000])
+    world.command("brown-out")
+    on, seen = [], []
+    for _ in range(30):
+        readings = world.run(0.01, [5000, 6500, 7000])
+        seen.append(sum(r is None for r in readings))
+        on.append(sum(width > 0 for width in world.widths()))
+    assert on[-1] == 3 and {1, 2} <= set(on) and max(seen) >= 2
+    assert "the board restarted: set up anew" in world.bus.events()
+    assert world.chip()._registers[PRESCALE] == 121
+    assert world.places() == pytest.approx([5000, 6500, 7000], abs=2 * GRAIN)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda bus: bus.write_byte_data(0x40, MODE1, 0x01),
+        lambda bus: bus.write_byte_data(0x70, MODE1, 0x11),
+        lambda bus: (bus.write_byte_data(0x40, MODE1, 0x30), bus.write_byte_data(0x40, 0xFE, 40),
+                     bus.write_byte_data(0x40, MODE1, 0x20)),
+        lambda bus: bus.i2c_rdwr(i2c_msg.write(0, [6])),
+    ],
+    ids=["mode", "all call does not reach it", "prescaler", "software reset"],
+)  # fmt: skip
+def test_what_another_program_changes_is_set_right(world, spoil):
+    world.held().run(0.3, [6000, 6000, 6000])
+    try:
+        spoil(EmulatedSMBus(world.device.body))
+    except OSError as error:
+        assert error.errno == errno.EREMOTEIO
+    world.run(0.5, [6000, 6000, 6000])
+    assert (world.chip()._registers[MODE1], world.chip()._registers[PRESCALE]) == (AWAKE, 121)
+    assert world.widths() == pytest.approx([6000] * 3, abs=GRAIN / 2)
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("absent on", "no PCA9685 answers at 0x40: has the board its logic supply"),
+        ("stuck on", "the I2C bus is stuck"),
+        ("foreign on", "what answers at 0x40 is no PCA9685"),
+        ("lose all", "nobody answers as an I2C bus"),
+    ],
+)
+def test_what_cannot_be_used_is_named_and_nothing_moves(world, command, told):
+    world.command(command)
+    before = bytes(world.chip()._registers)
+    with pytest.raises(ServoMissing, match=told) as caught:
+        world.bus.open()
+    assert "\n" not in str(caught.value) and str(caught.value).startswith("emulated: ")
+    assert bytes(world.chip()._registers) == before
+    world.command("clear")
+    world.held()
+
+
+def test_a_board_on_an_external_clock_is_refused(world):
+    EmulatedSMBus(world.device.body).write_byte_data(0x40, MODE1, 0x50)
+    with pytest.raises(ServoMissing, match="external clock"):
+        world.bus.open()
+
+
+def test_only_own_channels_stop_unless_they_do_not(world):
+    world.held()
+    other = EmulatedSMBus(world.device.body)
+    other.i2c_rdwr(i2c_msg.write(0x40, [6 + 4 * 9, *pulse(300)]))
+    world.bus.release()
+    assert world.widths() == [0, 0, 0]
+    assert world.chip().counts(9) == 300
+    world.bus.engage()
+    world.command("lose-writes 6")
+    world.bus.release()
+    assert not any(world.chip().counts(k) for k in range(16))
+
+
+def test_a_guardian_stops_pulses_whatever_the_board_was_set_to(world):
+    world.held()
+    bus = EmulatedSMBus(world.device.body)
+    bus.write_byte_data(0x40, MODE1, 0x01)
+    assert stop_pulses(world.port, QUICK, (0, 1, 5)) == ()
+    assert world.widths() == [0, 0, 0]
+    world.command("absent on")
+    assert stop_pulses(world.port, QUICK, (0, 1, 5)) == (0, 1, 5)
+
+
+def test_a_lost_write_is_seen_and_the_way_goes_on(world):
+    world.held().run(0.2, [6000] * 3)
+    world.command("lose-writes for 0.3")
+    world.run(0.3, [7600] * 3)
+    before = world.widths()[0]
+    assert before == pytest.approx(6000, abs=GRAIN)
+    world.run(0.02, [7600] * 3)
+    assert world.widths()[0] - before <= 0.03 * SPEED_STEPS_S + 2 * GRAIN
+    world.run(0.8, [7600] * 3)
+    assert world.widths() == pytest.approx([7600] * 3, abs=GRAIN)
+
+
+# --- params
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"address": 0x70}, "0x70 is reserved"),
+        ({"further_addresses": (0x40,)}, "two boards have the same address"),
+        ({"min_pulse_us": 2500.0}, "min_pulse_us must be below"),
+        ({"frequency_hz": 330.0, "max_pulse_us": 2900.0}, "lower frequency_hz"),
+    ],
+)
+def test_params_that_cannot_be_are_refused(given, told):
+    with pytest.raises(ValueError, match=told):
+        Pca9685Params(**given)
+
+
+def test_channels_and_pulses_outside_the_board_are_refused(world):
+    for wrong, told in (
+        (setup(16), "1 PCA9685 have 0..15"),
+        (setup(0, min_steps=1000), "min_pulse_us 500"),
+    ):
+        with pytest.raises(ValueError, match=told):
+            Pca9685Bus(world.port, [wrong], QUICK)
+    with pytest.raises(ValueError, match="each can move one servo only"):
+        Pca9685Bus(world.port, [setup(0), setup(0)], QUICK)
+
+
+# --- the kernel's bus
+
+
+class Kernel:
+    """A bus of the kernel: opened by its path, and what the kernel says of it."""
+
+    def __init__(self, world):
+        self.bus, self.refuses = EmulatedSMBus(world.device.body), None
+
+    def open(self, path):
+        if self.refuses is not None:
+            raise OSError(self.refuses, "refused")
+        self.bus.gone = False
+        return self.bus
+
+
+@pytest.fixture
+def kernel(world, monkeypatch):
+    made = Kernel(world)
+    port = I2cPort("/dev/i2c-7", open_bus=made.open)
+    clock = type("Clock", (), {"monotonic": lambda: world.now[0], "sleep": world._wait})
+    monkeypatch.setattr(i2c_port, "time", clock)
+    made.servos = Pca9685Bus(port, world.setups, replace(QUICK, give_up_s=2.0))
+    return made
+
+
+World._wait = staticmethod(lambda seconds: None)
+
+
+def ticks(world, bus, seconds, goals=None):
+    world.bus = bus
+    return world.run(seconds, goals)
+
+
+def test_the_kernels_bus_is_driven_as_a_bridge_is(world, kernel):
+    bus = kernel.servos
+    bus.open()
+    # Its oscillator's start is waited for by the clock of this world.
+    world.now[0] += 0.01
+    bus.engage()
+    world.now[0] += 0.01
+    ticks(world, bus, 0.6, [5000, 6500, 7000])
+    assert world.widths() == pytest.approx([5000, 6500, 7000], abs=GRAIN / 2)
+    assert bus.health().errors == {}
+    bus.release()
+    assert world.widths() == [0, 0, 0]
+    bus.close()
+
+
+def test_an_adapter_that_goes_comes_back_and_holds(world, kernel):
+    bus = kernel.servos
+    bus.open()
+    bus.engage()
+    ticks(world, bus, 0.3, [6500] * 3)
+    kernel.bus.gone, kernel.refuses = True, errno.ENOENT
+    assert ticks(world, bus, 0.3, [6500] * 3) == (None,) * 3
+    kernel.refuses = None
+    readings = ticks(world, bus, 1.0, [6500] * 3)
+    assert all(r is not None and r.torque for r in readings)
+    told = " ".join(bus.events())
+    assert "port lost: /dev/i2c-7 is gone" in told and "port back after" in told
+    kernel.bus.gone, kernel.refuses = True, errno.ENOENT
+    with pytest.raises(BusLost, match="has been gone for 2"):
+        ticks(world, bus, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        (errno.ENOENT, "no I2C bus /dev/i2c-7: switch I2C on"),
+        (errno.EACCES, "'sudo usermod -aG i2c [$]USER'"),
+        (errno.EBUSY, "is busy: close the other program"),
+        (errno.ENOTTY, "is no I2C bus"),
+    ],
+)
+def test_a_bus_that_cannot_be_opened_is_named_with_its_cure(kernel, code, told):
+    kernel.refuses = code
+    with pytest.raises(PortError, match=told) as caught:
+        kernel.servos.open()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_path_says_what_kind_of_port_it_is(tmp_path):
+    assert isinstance(port_of("/dev/i2c-1"), I2cPort)
+    assert isinstance(port_of("/dev/ttyUSB0"), BlockingPort)
+    link = tmp_path / "servos"
+    link.symlink_to("/dev/i2c-3")
+    assert isinstance(port_of(str(link)), I2cPort)
+    assert "no I2C bus" in explain("/dev/i2c-99", errno.ENOENT)
+
+
+def test_a_maestros_yaml_on_an_i2c_bus_is_refused():
+    for kind in ("maestro", "dynamixel"):
+        with pytest.raises(PortError, match="is an I2C bus and no serial port.*pca9685"):
+            refuse_owner("/dev/i2c-1", kind, ())
+    refuse_owner("/dev/i2c-1", "pca9685", ())
+
+
+# --- the same head on either board
+
+
+def test_the_makers_rig_runs_on_either_board_by_one_section(tmp_path):
+    text = load_text("maker")
+    start, end = text.index("bus:  #"), text.index("geometry:")
+    section = "bus:\n  port: /dev/i2c-1\n  kind: pca9685\n  pca9685: {address: 0x40}\n\n"
+    file = tmp_path / "maker.yaml"
+    file.write_text(text[:start] + section + text[end:], encoding="utf-8")
+    seen = {}
+    for name in ("maker", str(file)):
+        rig = load_rig(name)
+        made = assemble(rig, Choice(mock=True, fast=True, seed=3, scene="boxing"))
+        clock, head, poses = made.clock, made.robot, []
+        head.start(clock)
+        for k in range(1, 501):
+            clock.sleep_until(k * 0.01)
+            poses.append(head.tick(clock.now_s(), 0.01).joints.position_rad)
+        head.stop()
+        made.close()
+        seen[name] = rig.joints, poses
+    (joints, one), (same, other) = seen.values()
+    assert joints == same
+    span = [max(column) - min(column) for column in zip(*one, strict=True)]
+    assert max(span) > 0.3
+    apart = [
+        max(abs(a - b) for a, b in zip(*rows, strict=True)) for rows in zip(one, other, strict=True)
+    ]
+    # Two estimates of the same goals: a board's ramp is 10 ms behind, a fast eye moves then.
+    assert sorted(apart)[len(apart) // 2] < 0.02
+
+
+def load_text(name):
+    return shipped("rigs", name).read_text(encoding="utf-8")
