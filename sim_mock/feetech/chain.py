@@ -5,7 +5,7 @@ Source: Feetech, communication protocol of the STS/SMS series.
 
 from collections.abc import Callable, Iterable, Sequence
 
-from drivers.feetech.memory_table import BAUD_RATES, HIGHEST_ID
+from drivers.feetech.memory_table import HIGHEST_ID
 from sim_mock.feetech.instructions import (
     PING,
     SYNC_READ,
@@ -70,6 +70,12 @@ class FeetechChain(ServoChain[FeetechServo, FeetechQuirks]):
     def _pieces(self, answers: Sequence[Answer]) -> list[Piece]:
         return pieces(answers)
 
+    def _part(self, servo_id: int, address: int, length: int) -> Answer | None:
+        servo = self._by_id.get(servo_id)
+        if servo is not None and not servo.table.sync_read:
+            return None
+        return super()._part(servo_id, address, length)
+
     def _ping_all(self) -> list[Piece]:
         """Answer a ping to all as the quirks say."""
         policy = self.quirks.broadcast_ping
@@ -102,8 +108,11 @@ def build_feetech(
     now_ms, quirks = whole_ms(now_s()), FeetechQuirks()
     servos = [FeetechServo(ServoSpec(*spec), now_ms, quirks) for spec in specs]
     if baud is not None:
-        if baud not in BAUD_RATES:
-            raise ValueError(f"baud {baud}: STS servos know {', '.join(map(str, BAUD_RATES))}")
         for servo in servos:
-            servo.memory.keep("baud_rate", BAUD_RATES.index(baud))
+            rates = servo.table.baud_rates
+            if baud not in rates:
+                raise ValueError(
+                    f"baud {baud}: {servo.model.name} knows {', '.join(map(str, rates))}"
+                )
+            servo.memory.keep("baud_rate", rates.index(baud))
     return FeetechChain(servos, now_s, baud is not None, seed)

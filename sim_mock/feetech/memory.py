@@ -7,14 +7,15 @@ Source: Feetech, memory table of the STS series; start values marked [A] are ass
 those that owners read out of an STS3215.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Literal, NamedTuple
 
 from drivers.feetech.memory_table import BAUD_RATES, HIGHEST_ID, FeetechModel
 from sim_mock.feetech.packets import signed
 
 SIZE = 256
 """What is not a register reads 0."""
+ABSENT_SIZE = 32
 
 SERVO, WHEEL, PWM, STEP = 0, 1, 2, 3
 """Operating modes (33)."""
@@ -88,18 +89,43 @@ FIXED = (
     Register("model", 3, 2),
     Register("registered", 64),
 )
-REGISTERS = {register.name: register for register in (*EEPROM, *FACTORY, *RAM, *FIXED)}
 
-_HIGHEST = {5: HIGHEST_ID, 6: len(BAUD_RATES) - 1, 33: STEP}
-"""Highest value that exists, by address."""
+
+class Table(NamedTuple):
+    """The registers of one series of servos.
+
+    eeprom, factory: kept without power; ram: given start values; fixed: never written
+    absent: what a series lacks and its motor goes by all the same; beyond what can be read
+    order: which byte of two comes first
+    lock_at: the register that keeps what is written from being kept
+    highest: largest value that exists, by address
+    turn_steps: steps of the position a whole turn would have
+    last_step: where the sensor of the position ends, None where it goes round
+    sync_read: its servos answer a sync read
+    baud_rates: bit/s by the value of their register
+    """
+
+    eeprom: tuple[Register, ...] = EEPROM
+    factory: tuple[Register, ...] = FACTORY
+    ram: tuple[Register, ...] = RAM
+    fixed: tuple[Register, ...] = FIXED
+    absent: tuple[Register, ...] = ()
+    order: Literal["little", "big"] = "little"
+    lock_at: int = LOCK_AT
+    highest: Mapping[int, int] = {5: HIGHEST_ID, 6: len(BAUD_RATES) - 1, 33: STEP}
+    turn_steps: float = 4096.0
+    last_step: int | None = None
+    sync_read: bool = True
+    baud_rates: tuple[int, ...] = BAUD_RATES
+
+
+STS = Table()
 
 
 def _bytes_of(registers: tuple[Register, ...]) -> frozenset[int]:
     return frozenset(r.address + i for r in registers for i in range(r.size))
 
 
-_KEPT = _bytes_of((*EEPROM, *FACTORY))
-_WRITABLE = _KEPT | _bytes_of(RAM)
 SPEED_UNIT_STEPS_S = 50
 """Unit of Maximum Speed (84)."""
 
@@ -107,11 +133,19 @@ SPEED_UNIT_STEPS_S = 50
 class FeetechMemory:
     """One servo's memory; ``bytes`` is what is read, the EEPROM's own content stands apart."""
 
-    def __init__(self, model: FeetechModel, servo_id: int, firmware: int) -> None:
+    def __init__(
+        self, model: FeetechModel, servo_id: int, firmware: int, table: Table = STS
+    ) -> None:
         self._model = model
-        self.bytes = bytearray(SIZE)
-        self._kept = bytearray(SIZE)
-        for register in (*EEPROM, *FACTORY, *RAM, *FIXED):
+        self.table = table
+        kept = (*table.eeprom, *table.factory)
+        registers = (*kept, *table.ram, *table.fixed, *table.absent)
+        self._registers = {register.name: register for register in registers}
+        self._kept_at = _bytes_of(kept)
+        self._writable = self._kept_at | _bytes_of(table.ram)
+        self.bytes = bytearray(SIZE + ABSENT_SIZE)
+        self._kept = bytearray(SIZE + ABSENT_SIZE)
+        for register in registers:
             self.set(register.name, register.initial)
         self.set("firmware_minor", firmware)
         self.set("model", model.number)
@@ -119,25 +153,25 @@ class FeetechMemory:
         self.keep("id", servo_id)
 
     def get(self, name: str) -> int:
-        """Give a register's value, with its sign where it has one."""
-        _, address, size, _, sign = REGISTERS[name]
-        raw = int.from_bytes(self.bytes[address : address + size], "little")
+        """Return a register's value, with its sign where it has one."""
+        _, address, size, _, sign = self._registers[name]
+        raw = int.from_bytes(self.bytes[address : address + size], self.table.order)
         return raw if sign is None else signed(raw, sign)
 
     def set(self, name: str, raw: int) -> None:
         """Set a register as it is on the wire; the EEPROM keeps what it has."""
-        _, address, size, _, _ = REGISTERS[name]
-        self.bytes[address : address + size] = raw.to_bytes(size, "little")
+        _, address, size, _, _ = self._registers[name]
+        self.bytes[address : address + size] = raw.to_bytes(size, self.table.order)
 
     def keep(self, name: str, raw: int) -> None:
         """Set a register as it is on the wire, in the EEPROM as well."""
         self.set(name, raw)
-        _, address, size, _, _ = REGISTERS[name]
+        _, address, size, _, _ = self._registers[name]
         self._kept[address : address + size] = self.bytes[address : address + size]
 
     def factory_settings(self) -> None:
         """Put everything in the EEPROM as it left the factory, except the id."""
-        for register in (*EEPROM, *FACTORY):
+        for register in (*self.table.eeprom, *self.table.factory):
             if register.name != "id":
                 self.keep(register.name, register.initial)
         model = self._model
@@ -149,23 +183,23 @@ class FeetechMemory:
 
     def power_up(self) -> None:
         """Give the RAM its start values and the EEPROM area what was kept."""
-        for address in _KEPT:
+        for address in self._kept_at:
             self.bytes[address] = self._kept[address]
-        for register in (*RAM, REGISTERS["registered"]):
+        for register in (*self.table.ram, self._registers["registered"]):
             self.set(register.name, register.initial)
         self.set("torque_limit", self.get("max_torque"))
 
     def read(self, address: int, length: int) -> bytes:
         """Give bytes as they are on the wire; what is no register is 0."""
-        return bytes(self.bytes[address : address + length]).ljust(length, b"\0")
+        return bytes(self.bytes[address : min(SIZE, address + length)]).ljust(length, b"\0")
 
     def write(self, address: int, data: bytes, changed: Callable[[int], None]) -> None:
         """Write what can be written; ``changed`` is told of every address that was."""
-        keeps = self.bytes[LOCK_AT] == 0
+        keeps, highest = self.bytes[self.table.lock_at] == 0, self.table.highest
         for at, byte in enumerate(data, address):
-            if at not in _WRITABLE or byte > _HIGHEST.get(at, 0xFF):
+            if at not in self._writable or byte > highest.get(at, 0xFF):
                 continue
             self.bytes[at] = byte
-            if keeps and at in _KEPT:
+            if keeps and at in self._kept_at:
                 self._kept[at] = byte
             changed(at)

@@ -28,7 +28,8 @@ FINE_SPEED, ZERO_IS_FASTEST, COUNTS_TURNS = 4, 8, 16
 """Bits of Phase (18)."""
 COARSE_STEPS_S = 50
 
-GOALS_AT, GOALS = 41, struct.Struct("<BHHH")
+GOALS_AT = 41
+GOALS = {"little": struct.Struct("<BHHH"), "big": struct.Struct(">BHHH")}
 """Acceleration, goal position, goal time, goal speed: written together ever again."""
 
 DAMPED = 2
@@ -65,7 +66,10 @@ class FeetechDrive:
         seed: int,
     ) -> None:
         self.memory = memory
-        self.shaft = Shaft(model, physics, start_steps)
+        self._goals = GOALS[memory.table.order]
+        self._scale = memory.table.turn_steps / TURN
+        self._last = memory.table.last_step
+        self.shaft = Shaft(model, physics, start_steps / self._scale)
         self._top = model.no_load_rpm / 60.0 * TURN / 1000.0
         self._current_full = model.stall_current_a / CURRENT_UNIT_A
         self._noise = seed, physics.noise_current, physics.noise_velocity
@@ -76,7 +80,7 @@ class FeetechDrive:
         """Begin without torque, within one turn."""
         self.torque = self.damped = False
         self.most = 1.0
-        self.mode = self.memory.get("mode")
+        self.mode = self._wanted_mode()
         self._asked: tuple[int, ...] = ()
         self._offset = self.memory.get("offset")
         self.shaft.let_go()
@@ -89,15 +93,18 @@ class FeetechDrive:
     def position_steps(self) -> float:
         """Give the true position in the registers' terms, finer than they are."""
         at = self.shaft.x + self._shift
-        return at if self.counts_turns or self.torque else at % TURN
+        goes_on = self.counts_turns or self.torque or self._last is not None
+        return (at if goes_on else at % TURN) * self._scale
 
     def sensed(self, now_ms: int) -> Sensed:
         """Give position, speed, load and current."""
         shaft = self.shaft
-        at = round(shaft.x + self._shift)
-        if not self.counts_turns:
+        at = round((shaft.x + self._shift) * self._scale)
+        if self._last is not None:
+            at = max(0, min(self._last, at))
+        elif not self.counts_turns:
             at %= TURN
-        speed = round(shaft.v * 1000.0 / self._speed_unit)
+        speed = round(shaft.v * self._scale * 1000.0 / self._speed_unit)
         load, current = round(shaft.u * FULL), round(shaft.effort * self._current_full)
         if self.torque and not shaft.v:
             more, speed = flicker(now_ms, *self._noise)
@@ -109,13 +116,13 @@ class FeetechDrive:
         """Tell whether it is on its way, or turned."""
         profile = self.shaft.profile
         led = self.torque and isinstance(profile, Profile) and profile.running
-        return led or abs(self.shaft.v * 1000.0 / self._speed_unit) > self._threshold
+        return led or abs(self.shaft.v * self._scale * 1000.0 / self._speed_unit) > self._threshold
 
     def target(self) -> int:
         """Give the position it is led to, in the registers' terms."""
         profile = self.shaft.profile
         if self.torque and isinstance(profile, Profile):
-            return round(profile.goal + self._shift)
+            return round((profile.goal + self._shift) * self._scale)
         return self.memory.get("goal_position")
 
     # --- settings
@@ -125,7 +132,7 @@ class FeetechDrive:
         get = self.memory.get
         phase, low, high = get("phase"), get("min_angle"), get("max_angle")
         endless = low == 0 and high == 0
-        self.counts_turns = endless or bool(phase & COUNTS_TURNS)
+        self.counts_turns = self._last is None and (endless or bool(phase & COUNTS_TURNS))
         self._range = None if endless else (min(low, high), max(low, high))
         self._speed_unit = 1 if phase & FINE_SPEED else COARSE_STEPS_S
         self._stops_at_zero = not phase & ZERO_IS_FASTEST
@@ -136,9 +143,16 @@ class FeetechDrive:
             self._offset = offset
             if not self.counts_turns:
                 self._locate()
-        if get("mode") != self.mode:
-            self._change_mode(get("mode"))
+        if self._wanted_mode() != self.mode:
+            self._change_mode(self._wanted_mode())
         self.tune()
+
+    def _wanted_mode(self) -> int:
+        """Return the mode of its register, or of its limits where a series has none."""
+        get = self.memory.get
+        if self._last is not None and get("min_angle") == get("max_angle") == 0:
+            return PWM
+        return get("mode")
 
     def tune(self) -> None:
         """Take over gains, torque limit and, in mode PWM, the duty."""
@@ -205,10 +219,10 @@ class FeetechDrive:
         """Follow the goal registers; ``new_goal``: the goal position was written just now."""
         if not self.torque:
             return
-        asked = GOALS.unpack_from(self.memory.bytes, GOALS_AT)
+        asked = self._goals.unpack_from(self.memory.bytes, GOALS_AT)
         profile = self.shaft.profile
         if isinstance(profile, SpeedProfile):
-            speed = signed(asked[3], 15) * self._speed_unit / 1000.0
+            speed = signed(asked[3], 15) * self._speed_unit / self._scale / 1000.0
             profile.aim(max(-self._top, min(self._top, speed)), asked[0] * RAMP_UNIT)
             self.shaft.wake()
         elif self.mode == PWM:
@@ -219,18 +233,18 @@ class FeetechDrive:
                 self._asked = asked
                 self._lead(profile, place, asked)
         elif self.mode == STEP and new_goal:
-            self._lead(profile, profile.goal + signed(asked[1], 15), asked)
+            self._lead(profile, profile.goal + signed(asked[1], 15) / self._scale, asked)
 
     def _place(self, goal: int) -> float:
         """Give where a goal position is, within the limits."""
         if self._range is not None:
             goal = max(self._range[0], min(self._range[1], goal))
-        return float(goal - self._shift)
+        return goal / self._scale - self._shift
 
     def _lead(self, profile: Profile, to: float, asked: tuple[int, ...]) -> None:
         """Lead the profile to a place, in a time or at goal speed and acceleration."""
         ramp, _, time_ms, speed = asked
-        cruise = abs(signed(speed, 15)) * self._speed_unit / 1000.0
+        cruise = abs(signed(speed, 15)) * self._speed_unit / self._scale / 1000.0
         if cruise == 0.0 and self._stops_at_zero:
             return
         if time_ms and self._timed and self.mode == SERVO:
@@ -248,11 +262,13 @@ class FeetechDrive:
 
     def _locate(self) -> None:
         """Bring the position into one turn, as power-on does."""
-        turns = (self.shaft.x - self._offset) // TURN
+        turns = 0 if self._last is not None else (self.shaft.x - self._offset) // TURN
         self._shift = -self._offset - int(turns) * TURN
 
     def calibrate(self, to: int) -> None:
         """Make the present position ``to``; the offset is kept without power."""
+        if self._last is not None:
+            return
         offset = (round(self.shaft.x) - to + TURN // 2) % TURN - TURN // 2
         self.memory.keep("offset", unsigned(offset, 11))
         self.settle()
@@ -267,4 +283,4 @@ class FeetechDrive:
 
     def turn(self, steps: float) -> None:
         """Turn the shaft by hand."""
-        self.shaft.turn(steps)
+        self.shaft.turn(steps / self._scale)

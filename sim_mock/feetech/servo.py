@@ -8,9 +8,7 @@ backup (09).
 import struct
 
 from drivers.feetech.memory_table import (
-    BAUD_RATES,
     EEPROM_END,
-    MODELS,
     RETURN_DELAY_UNIT_S,
     SET_MIDDLE,
     FeetechModel,
@@ -19,6 +17,7 @@ from sim_mock.feetech.memory import FeetechMemory
 from sim_mock.feetech.motor import CURRENT_UNIT_A, GOALS_AT, FeetechDrive
 from sim_mock.feetech.packets import unsigned
 from sim_mock.feetech.quirks import FeetechQuirks
+from sim_mock.feetech.series import series_of
 from sim_mock.smart_servo.physics import Physics, ServoSpec, checked
 from sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE, Limits
 from sim_mock.smart_servo.servo import SmartServo
@@ -31,10 +30,10 @@ TOO_HOT_C = 5.0
 ANGLE = 2
 """Bit of Status (65) of a broken angle sensor; the others are those of its protection."""
 
-FACTORY_AT = 80
+FACTORY_AT = 78
 TORQUE_AT, GOAL_AT, GOAL_END, GOALS_END, LIMIT_END = 40, 42, 44, 48, 50
-SENSED_AT = 56
-_SENSED = struct.Struct("<HHHBBBBBHH")
+SENSED_AT, SENSED_END = 56, 71
+_SENSED = {"little": struct.Struct("<HHHBBBBBHH"), "big": struct.Struct(">HHHBBBBBHH")}
 """56 position, speed, load, voltage, temperature, registered, status, moving, target, current."""
 
 
@@ -55,11 +54,9 @@ class FeetechServo(SmartServo):
     drive: FeetechDrive
 
     def __init__(self, spec: ServoSpec, now_ms: int, quirks: FeetechQuirks) -> None:
-        if spec.model not in MODELS:
-            raise ValueError(f"model {spec.model!r}: STS servos are {', '.join(MODELS)}")
-        self.model = MODELS[spec.model]
+        self.model, self.table = series_of(spec.model)
         physics = checked(Physics(*spec.physics))
-        self.memory = FeetechMemory(self.model, spec.id, spec.firmware)
+        self.memory = FeetechMemory(self.model, spec.id, spec.firmware, self.table)
         seed = spec.id if spec.seed is None else spec.seed
         self.drive = FeetechDrive(self.memory, self.model, physics, float(spec.start_steps), seed)
         super().__init__(spec, physics, self._limits(), now_ms)
@@ -120,7 +117,7 @@ class FeetechServo(SmartServo):
 
     def read(self, address: int, length: int) -> bytes:
         """Give bytes of the memory; what is no register is 0."""
-        if address < SENSED_AT + _SENSED.size and address + length > SENSED_AT:
+        if address < SENSED_END and address + length > SENSED_AT:
             self._refresh()
         return self.memory.read(address, length)
 
@@ -128,7 +125,7 @@ class FeetechServo(SmartServo):
         """Bring the registers that live up to date."""
         drive = self.drive
         sensed = drive.sensed(self._ms)
-        _SENSED.pack_into(
+        _SENSED[self.table.order].pack_into(
             self.memory.bytes,
             SENSED_AT,
             unsigned(sensed.position, 15),
@@ -250,7 +247,7 @@ class FeetechServo(SmartServo):
     @property
     def baud(self) -> int:
         """Give bit/s by register 6; a new one acts after the status of its write has gone out."""
-        return BAUD_RATES[self.memory.get("baud_rate")]
+        return self.table.baud_rates[self.memory.get("baud_rate")]
 
     @property
     def return_delay_s(self) -> float:

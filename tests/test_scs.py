@@ -1,0 +1,154 @@
+"""Emulated Feetech SCS servos: high byte first, 1024 steps on less than a turn; by rustypot."""
+
+import math
+import time
+
+import pytest
+from sts_bench import ALL, PING, READ, SYNC_READ, SYNC_WRITE, WRITE, Bench, instruction, packets
+
+from sim_mock.devices import FeetechLine
+from sim_mock.pty.client import PtyBus
+from sim_mock.smart_servo.physics import ServoSpec
+
+BAUD = 1_000_000
+FOUND = {1: 1284, 2: 1284}
+
+
+class ScsBench(Bench):
+    """A bench whose numbers of two bytes have the high one first."""
+
+    def __init__(self, *specs, **options):
+        super().__init__(*(specs or [(1, "scs0009", 511.0)]), **options)
+
+    def word(self, address, servo_id=1):
+        [(_, _, data)] = self.ask(servo_id, READ, address, 2)
+        return int.from_bytes(data, "big")
+
+    def put(self, address, value, servo_id=1):
+        assert len(self.ask(servo_id, WRITE, address, value.to_bytes(2, "big"))) == 1
+
+
+@pytest.mark.parametrize(
+    ("model", "number", "turn_steps"), [("scs0009", 1284, 1228.8), ("scs15", 1295, 1843.2)]
+)
+def test_its_table_has_the_high_byte_first(model, number, turn_steps):
+    bench = ScsBench((1, model, 300.0))
+    assert bench.ask(1, READ, 3, 2) == [(1, 0, number.to_bytes(2, "big"))]
+    assert [bench.word(at) for at in (9, 11, 16, 56)] == [0, 1023, 1000, 300]
+    # A quarter of a turn by hand is a quarter of the steps that a whole one would have.
+    bench.chain.faults.command(f"turn 1 {turn_steps / 4}")
+    assert bench.word(56) == pytest.approx(300 + turn_steps / 4, abs=1)
+    bench.chain.faults.command(f"turn 1 {turn_steps}")
+    assert bench.word(56) == 1023
+
+
+@pytest.mark.parametrize("speed", [0, 300])
+def test_it_goes_to_its_goal_at_the_speed_it_was_told(speed):
+    bench = ScsBench()
+    bench.write(1, 40, 1)
+    bench.ask(1, WRITE, 42, (711).to_bytes(2, "big"), 0, 0, speed.to_bytes(2, "big"))
+    bench.wait(0.3)
+    if speed:
+        assert bench.word(56) == pytest.approx(511 + 90, abs=8)
+        assert bench.word(58) == pytest.approx(300, rel=0.1)
+        assert bench.read(1, 66) == 1
+    bench.wait(1.0)
+    assert bench.word(56) == pytest.approx(711, abs=2)
+
+
+def test_its_goals_end_at_its_limits():
+    bench = ScsBench()
+    bench.write(1, 48, 0)
+    bench.put(11, 600)
+    bench.write(1, 40, 1)
+    bench.put(42, 900)
+    bench.wait(1.0)
+    assert bench.word(56) == pytest.approx(600, abs=2)
+
+
+@pytest.mark.parametrize("duty", [300, 300 | 1 << 10])
+def test_with_both_limits_0_goal_time_is_a_duty(duty):
+    bench = ScsBench()
+    bench.ask(1, WRITE, 9, bytes(4))
+    bench.write(1, 40, 1)
+    bench.put(44, duty)
+    bench.wait(0.1)
+    moved = bench.chain.positions_steps()[0] - 511
+    assert moved < -20 if duty >> 10 else moved > 20
+
+
+def test_what_is_written_while_locked_is_gone_after_a_restart():
+    bench = ScsBench()
+    bench.put(11, 800)
+    bench.write(1, 48, 0)
+    bench.put(9, 100)
+    bench.chain.faults.command("brown-out 1")
+    bench.wait(1.0)
+    assert (bench.word(9), bench.word(11), bench.read(1, 48)) == (100, 1023, 1)
+
+
+def test_an_overload_leaves_what_register_37_says():
+    bench = ScsBench()
+    bench.write(1, 40, 1)
+    bench.chain.faults.command("stick 1")
+    bench.put(42, 900)
+    bench.wait(1.9)
+    assert bench.error() == 0
+    bench.wait(0.3)
+    assert bench.error() == 0x20
+    assert bench.word(60) == 200
+
+
+def test_it_answers_no_sync_read_and_takes_sync_writes():
+    bench = ScsBench((1, "scs0009", 100.0), (2, "scs0009", 200.0))
+    assert bench.chain.receive(instruction(ALL, SYNC_READ, 56, 2, 1, 2)) == b""
+    bench.ask(ALL, SYNC_WRITE, 42, 2, 1, 1, 0, 2, 2, 0)
+    assert [bench.word(42, i) for i in (1, 2)] == [256, 512]
+
+
+def test_its_own_baud_rates():
+    bench = ScsBench(baud=19_200)
+    assert packets(bench.chain.receive(instruction(1, PING), 19_200)) == [(1, 0, b"")]
+    assert bench.chain.receive(instruction(1, PING), 38_400) == b""
+    with pytest.raises(ValueError, match="baud 76800: scs0009 knows 1000000"):
+        ScsBench(baud=76_800)
+
+
+# --- judged by a client that was written by others
+
+
+@pytest.fixture(scope="module")
+def client():
+    rustypot = pytest.importorskip("rustypot", reason="rustypot is not installed")
+    specs = (ServoSpec(1, "scs0009", 511), ServoSpec(2, "scs0009", 300))
+    with PtyBus() as bus:
+        opened = rustypot.Scs0009PyController(bus.start_device(FeetechLine(specs, BAUD)), BAUD, 0.2)
+        yield opened
+        opened.close()
+
+
+def eventually(check, patience_s=20.0):
+    deadline = time.monotonic() + patience_s
+    while not check():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def test_rustypot_finds_it_and_reads_every_register(client):
+    assert eventually(lambda: client.scan([1, 2, 3]) == FOUND)
+    for register in client.registers():
+        data, error = client.read_raw_data_with_error(1, register.addr, register.size)
+        assert (len(data), error) == (register.size, 0), register.name
+
+
+def test_rustypot_moves_it(client):
+    [present] = client.read_present_position(2)
+    assert present == pytest.approx(math.radians(300.0) * (300 - 511) / 1024, abs=0.01)
+    client.write_torque_enable(2, 1)
+    client.write_goal_position(2, 0.4)
+    assert eventually(lambda: abs(client.read_present_position(2)[0] - 0.4) < 0.02)
+    client.sync_write_goal_position([2], [-0.2])
+    assert eventually(lambda: abs(client.read_present_position(2)[0] + 0.2) < 0.02)
+    assert client.read_present_voltage(2) == [60]
