@@ -1,13 +1,13 @@
-"""Findings: each thing that can be wrong with a port or a servo is found, named and cured."""
+"""Findings: each thing that can be wrong with a port or a servo is found, named and remedied."""
 
 import pytest
 
 from drivers.dynamixel.discovery import Found
 from drivers.errors import PortError
+from drivers.feetech.memory_table import REGISTERS, TABLE_END
 from drivers.serial.list_ports import Access, Host, SerialPort
 from drivers.types import ServoSetup
-from robot.bringup.doctor.checks import apply_fix, examine
-from robot.bringup.doctor.dynamixel import DYNAMIXEL as CHECKS
+from robot.bringup.doctor.checks import CHECKS, apply_fix, examine, take
 from robot.bringup.doctor.dynamixel import READ
 from robot.bringup.doctor.findings import Finding, Fix, worst
 from robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
@@ -15,45 +15,86 @@ from robot.bringup.doctor.run import apply_fixes, check, check_all, fix_latency,
 from robot.bringup.doctor.subject import ServoState
 from robot.bringup.scan_report import remarks
 from robot.bringup.searching import Looked
-from robot.bringup.servo_families import DYNAMIXEL
+from robot.bringup.servo_families import DYNAMIXEL, FEETECH
 from robot.bringup.servo_report import grouped, summed_up, together
 from sim_mock.dynamixel.chain import build_dynamixel
+from sim_mock.feetech.chain import build_feetech
 from sim_mock.in_process_port import InProcessPort
 from sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
-SETUPS = (
-    ServoSetup(1, "xl330-m077", 1650, 2446, 6000.0, "left_eye_pan"),
-    ServoSetup(2, "xl330-m077", 1650, 2446, 6000.0, "left_eye_tilt"),
-    ServoSetup(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw"),
-)
-GOOD = {"return_delay_time": 0, "min_position_limit": 1650, "max_position_limit": 2446}
+RANGES = ((1, 1650, 2446, "left_eye_pan"), (2, 1650, 2446, "left_eye_tilt"),
+          (7, 1252, 2844, "neck_yaw"))  # fmt: skip
+EYE = {"dynamixel": "xl330-m077", "feetech": "sts3215"}
+NECK = {"dynamixel": "xc330-m288", "feetech": "sts3215"}
+SPEED = {"dynamixel": 6000.0, "feetech": 3000.0}
+PAN, TILT, YAW = "left_eye_pan (servo 1)", "left_eye_tilt (servo 2)", "neck_yaw (servo 7)"
+
+each = pytest.mark.parametrize("kind", [DYNAMIXEL, FEETECH], ids=lambda kind: kind.name)
+
+
+def setups_of(kind):
+    return tuple(
+        ServoSetup(i, (NECK if i == 7 else EYE)[kind.name], low, high,
+                   2000.0 if i == 7 else SPEED[kind.name], name)
+        for i, low, high, name in RANGES
+    )  # fmt: skip
 
 
 class Rig:
     """Three servos in this process, set as the rig wants them; some may be spoilt."""
 
-    def __init__(self, specs=None):
-        specs = specs or [ServoSpec(s.id, s.model, 2048) for s in SETUPS]
-        self.chain = build_dynamixel(specs, lambda: 0.0, baud=BAUD)
+    def __init__(self, kind, specs=None):
+        self.kind, self.setups, self.now_s = kind, setups_of(kind), 10.0
+        specs = specs or [ServoSpec(s.id, s.model, 2048) for s in self.setups]
+        build = build_feetech if kind is FEETECH else build_dynamixel
+        self.chain = build(specs, lambda: self.now_s, baud=BAUD)
         self.port = InProcessPort(self.chain)
-        for setup in SETUPS:
-            if any(servo.id == setup.id for servo in self.chain.servos):
+        self.port.setBaudRate(BAUD)
+        self.told = []
+        for setup in self.setups:
+            if any(spec.id == setup.id for spec in specs):
                 self.set(setup.id, return_delay_time=0, min_position_limit=setup.min_steps,
                          max_position_limit=setup.max_steps)  # fmt: skip
 
     def set(self, servo_id, **values):
         servo = self.chain[servo_id]
-        for name, value in values.items():
-            servo.memory.set(name, value)
+        if self.kind is DYNAMIXEL:
+            for name, value in values.items():
+                servo.memory.set(name, value)
+        else:
+            servo.write(55, b"\0")
+            for name, value in values.items():
+                servo.write(REGISTERS[name].address, REGISTERS[name].encode(value))
+            servo.write(55, bytes((values.get("lock", 1),)))
+        self.pass_time()
         self.chain.refresh()
 
+    def hold(self, servo_id):
+        self.chain[servo_id].write(64 if self.kind is DYNAMIXEL else 40, b"\x01")
+
+    def get(self, servo_id, name):
+        return self.kind.registers(self.port, 3).read(servo_id, name)
+
+    def command(self, text):
+        self.port.faults.command(text)
+        self.pass_time()
+
+    def pass_time(self, seconds=0.1):
+        self.now_s += seconds
+        self.chain.positions_steps()
+
+    def kept(self):
+        """Return what the servos hold, without what lives."""
+        end = 120 if self.kind is DYNAMIXEL else 56
+        return [bytes(self.chain[i].memory.bytes[:end]) for i in (1, 2, 7)]
+
     def check(self):
-        self.told = []
-        return check(self.port, DYNAMIXEL, SETUPS, BAUD, self.told.append)
+        self.told.clear()
+        return check(self.port, self.kind, self.setups, BAUD, self.told.append)
 
     def fix(self, findings):
-        return list(apply_fixes(lambda fix: apply_fix(self.port, DYNAMIXEL, fix), findings))
+        return list(apply_fixes(lambda fix: apply_fix(self.port, self.kind, fix), findings))
 
     def check_all(self, host):
         return check_all(self.port, host, self.check)
@@ -66,207 +107,340 @@ def one(findings, level, where, words):
     return named[0]
 
 
-def test_a_good_rig_is_well():
-    findings = Rig().check()
-    assert {f.level for f in findings} == {"ok", "note"}
-    assert [f.where for f in findings if f.level == "ok"] == [
-        "left_eye_pan (servo 1)",
-        "left_eye_tilt (servo 2)",
-        "neck_yaw (servo 7)",
-    ]
-    well = one(findings, "ok", "neck_yaw (servo 7)", "xc330-m288, firmware 53, ")
-    assert "degC" in well.what and not well.remedy and not well.fixes
+NUMBER = {"dynamixel": 1190, "feetech": 777}
+FIRMWARE = {"dynamixel": 53, "feetech": 353}
 
 
-def test_the_voltage_latch_is_explained_where_it_is_armed():
-    findings = Rig().check()
-    note = one(findings, "note", "left_eye_pan (servo 1)", "makes it limp until it is restarted")
-    assert "gazerig reboot" in note.remedy and "3.5..7.0 V" in note.what
-    assert not any(f.level == "note" and f.where == "neck_yaw (servo 7)" for f in findings)
+def found_as(kind, **other):
+    return Found(1, NUMBER[kind.name], FIRMWARE[kind.name], BAUD)._replace(**other)
 
 
-BY_REGISTER = [
-    ("return_delay_time", 250, "warn", "waits 500 us", True),
-    ("drive_mode", 1, "warn", "Drive Mode 1 (reversed)", True),
-    ("drive_mode", 12, "warn", "profile in milliseconds, torque on with any goal", True),
-    ("operating_mode", 4, "warn", "extended position mode", True),
-    ("secondary_id", 7, "error", "also obeys what is sent to servo 7", True),
-    ("startup_configuration", 1, "warn", "switches its torque on by itself", True),
-    ("homing_offset", -200, "warn", "Homing Offset -200", False),
-    ("min_position_limit", 1700, "warn", "1700..2446 cut the YAML's range 1650..2446", True),
-    ("max_position_limit", 4095, "note", "1650..4095 are wider than the YAML's range", True),
-    ("velocity_limit", 100, "note", "its Velocity Limit is 137 deg/s", False),
-    (
-        "shutdown",
-        1,
-        "warn",
-        "does not switch off at overheating, electrical shock, overload",
-        False,
-    ),
-    ("status_return_level", 1, "warn", "does not confirm what it is told", True),
-    ("protocol_type", 20, "warn", "Protocol Type 20", False),
-]
-
-
-@pytest.mark.parametrize(("register", "value", "level", "words", "fixable"), BY_REGISTER)
-def test_a_register_that_is_not_as_wished(register, value, level, words, fixable):
-    findings = examine(servo_state(**{register: value}))
-    found = one(findings, level, "left_eye_pan (servo 1)", words)
-    assert found.remedy and bool(found.fixes) == fixable
-    if fixable:
-        assert any(fix.register == register and fix.was == value for fix in found.fixes)
-
-
-def servo_state(setup=SETUPS[0], found=None, corrupt=0, **values):
+def servo_state(kind, setup=None, found=None, corrupt=0, **values):
     """Give a healthy servo with some registers otherwise."""
-    good = {
-        **dict.fromkeys(READ, 0),
-        **GOOD,
-        "status_return_level": 2,
-        "baud_rate": 3,
-        "operating_mode": 3,
-        "secondary_id": 255,
-        "protocol_type": 2,
+    setup = setup or setups_of(kind)[0]
+    both = {
+        "return_delay_time": 0,
+        "min_position_limit": setup.min_steps,
+        "max_position_limit": setup.max_steps,
         "temperature_limit": 70,
-        "max_voltage_limit": 70,
-        "min_voltage_limit": 35,
-        "velocity_limit": 1620,
-        "shutdown": 52,
+        "torque_enable": 0,
         "present_position": 2048,
-        "present_input_voltage": 50,
         "present_temperature": 30,
     }
-    return ServoState(CHECKS, setup, found or Found(1, 1190, 53, BAUD), {**good, **values}, corrupt)
+    own = {
+        "dynamixel": {
+            **dict.fromkeys(READ, 0),
+            "status_return_level": 2,
+            "baud_rate": 3,
+            "operating_mode": 3,
+            "secondary_id": 255,
+            "protocol_type": 2,
+            "max_voltage_limit": 70,
+            "min_voltage_limit": 35,
+            "velocity_limit": 1620,
+            "shutdown": 52,
+            "present_input_voltage": 50,
+        },
+        "feetech": {
+            "id": setup.id,
+            "baud_rate": 0,
+            "status_return_level": 1,
+            "max_voltage_limit": 80,
+            "min_voltage_limit": 40,
+            "max_torque": 1000,
+            "phase": 12,
+            "unloading_condition": 44,
+            "angular_resolution": 1,
+            "position_offset": 0,
+            "operating_mode": 0,
+            "protection_time": 200,
+            "overload_torque": 80,
+            "lock": 1,
+            "present_input_voltage": 74,
+            "status": 0,
+        },
+    }[kind.name]
+    whole = {**own, **both, **values}
+    return ServoState(CHECKS[kind.name], setup, found or found_as(kind), whole, corrupt)
 
 
-BY_STATE = [
+BOTH_RULES = [
+    ({"torque_enable": 1}, "warn", "torque is on", "hold the joint"),
+    ({"present_temperature": 60}, "warn", "60 degC, it switches off above 70", "cool"),
+    ({"present_temperature": 70}, "error", "70 degC", "cool"),
+    ({"present_position": 1649}, "warn", "stands at step 1649, outside", "gazerig calibrate"),
+    ({"return_delay_time": 250}, "warn", "waits 500 us", "--fix"),
+    ({"min_position_limit": 1700}, "warn", "1700..2446 cut the YAML's range 1650..2446", "--fix"),
+    ({"max_position_limit": 4095}, "note", "1650..4095 are wider than the YAML's range", "--fix"),
+]
+DYNAMIXEL_RULES = [
+    ({"drive_mode": 1}, "warn", "Drive Mode 1 (reversed)", "--fix"),
+    (
+        {"drive_mode": 12},
+        "warn",
+        "profile in milliseconds, torque on with any goal",
+        "--fix",
+    ),
+    ({"operating_mode": 4}, "warn", "extended position mode", "--fix"),
+    ({"secondary_id": 7}, "error", "also obeys what is sent to servo 7", "--fix"),
+    ({"startup_configuration": 1}, "warn", "switches its torque on by itself", "--fix"),
+    ({"homing_offset": -200}, "warn", "Homing Offset -200", "Wizard"),
+    ({"velocity_limit": 100}, "note", "its Velocity Limit is 137 deg/s", "max_speed_deg_s"),
+    (
+        {"shutdown": 1},
+        "warn",
+        "does not switch off at overheating, electrical shock, overload",
+        "set Shutdown (63) to 53",
+    ),
+    ({"status_return_level": 1}, "warn", "does not confirm what it is told", "--fix"),
+    ({"protocol_type": 20}, "warn", "Protocol Type 20", "Wizard"),
     ({"hardware_error_status": 0x20}, "error", "latched: overload", "gazerig reboot 1"),
     ({"hardware_error_status": 0x04}, "error", "latched: overheating", "cool"),
     ({"hardware_error_status": 0x01}, "error", "latched: input voltage", "supply"),
     ({"present_input_voltage": 34}, "error", "3.4 V, its limits are 3.5..7.0 V", "supply"),
     ({"present_input_voltage": 71}, "error", "7.1 V", "supply"),
     ({"present_input_voltage": 44}, "warn", "made for 5 V", "thin wires"),
-    ({"present_temperature": 60}, "warn", "60 degC, it switches off above 70", "cool"),
-    ({"present_temperature": 70}, "error", "70 degC", "cool"),
-    ({"torque_enable": 1}, "warn", "torque is on", "hold the joint"),
     ({"bus_watchdog": 255}, "warn", "bus watchdog has tripped", "--fix"),
-    ({"present_position": 1649}, "warn", "stands at step 1649, outside", "gazerig calibrate"),
     ({"baud_rate": 1}, "warn", "its Baud Rate is 57600", "gazerig setup"),
+]
+FEETECH_RULES = [
+    ({"status": 0x20}, "error", "reports: overload", "gazerig reboot 1"),
+    ({"status": 0x08}, "error", "reports: overcurrent", "shorts"),
+    ({"status": 0x04}, "error", "reports: overheating", "cool"),
+    ({"status": 0x02}, "error", "reports: encoder", "replace"),
+    ({"present_input_voltage": 121}, "error", "12.1 V, its limits are 4.0..8.0 V", "sts3215-12v"),
+    ({"present_input_voltage": 85}, "error", "8.5 V", "correct the supply"),
+    ({"present_input_voltage": 39}, "error", "3.9 V", "correct the supply"),
+    ({"present_input_voltage": 60}, "warn", "made for 7.4 V", "thin wires"),
+    ({"lock": 0}, "warn", "its memory is open (Lock 0)", "--fix"),
+    ({"baud_rate": 4}, "warn", "its Baud Rate is 115200", "gazerig setup"),
+    ({"status_return_level": 0}, "warn", "does not confirm", "--fix"),
+    ({"operating_mode": 1}, "warn", "is in wheel mode", "--fix"),
+    ({"angular_resolution": 2}, "warn", "counts 2 turns for one", "--fix"),
+    ({"phase": 28}, "warn", "beyond one turn (Phase 28)", "--fix"),
+    ({"min_position_limit": 0, "max_position_limit": 0}, "warn", "many turns", "--fix"),
+    ({"position_offset": -85}, "note", "shifted by -85 steps", "gazerig calibrate"),
+    ({"max_torque": 400}, "note", "gives 40% of its torque", "Max Torque (16)"),
+    ({"unloading_condition": 4}, "warn", "protect itself at overcurrent, overload", "--fix"),
+    ({"temperature_limit": 85}, "warn", "switches off above 85 degC only", "--fix"),
+    ({"overload_torque": 100}, "warn", "overload protection cannot act", "Overload Torque (36)"),
+    ({"protection_time": 0}, "warn", "overload protection cannot act", "Protection Time (35)"),
+]
+
+RULES = [
+    *((kind, *rule) for kind in (DYNAMIXEL, FEETECH) for rule in BOTH_RULES),
+    *((DYNAMIXEL, *rule) for rule in DYNAMIXEL_RULES),
+    *((FEETECH, *rule) for rule in FEETECH_RULES),
 ]
 
 
-@pytest.mark.parametrize(("values", "level", "words", "cure"), BY_STATE)
-def test_the_state_of_a_servo(values, level, words, cure):
-    found = one(examine(servo_state(**values)), level, "left_eye_pan (servo 1)", words)
-    assert cure in found.remedy
+@pytest.mark.parametrize(("kind", "values", "level", "words", "remedy"), RULES)
+def test_what_can_be_wrong(kind, values, level, words, remedy):
+    found = one(examine(servo_state(kind, **values)), level, PAN, words)
+    assert remedy in found.remedy
+    assert bool(found.fixes) == ("--fix" in found.remedy)
+    for fix in found.fixes:
+        assert fix.was == {**servo_state(kind).values, **values}[fix.register]
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "edge"),
+    [
+        *(
+            (kind, values, "ok")
+            for kind in (DYNAMIXEL, FEETECH)
+            for values in (
+                {"present_temperature": 59},
+                {"present_position": 1650},
+                {"present_position": 2446},
+            )
+        ),
+        (DYNAMIXEL, {"present_input_voltage": 35, "torque_enable": 0}, "warn"),
+        (DYNAMIXEL, {"present_input_voltage": 70}, "ok"),
+        (DYNAMIXEL, {"present_input_voltage": 45}, "ok"),
+        (DYNAMIXEL, {"bus_watchdog": 10}, "ok"),
+        (DYNAMIXEL, {"secondary_id": 253}, "ok"),
+        (DYNAMIXEL, {"shutdown": 52}, "ok"),
+        (FEETECH, {"present_input_voltage": 80}, "ok"),
+        (FEETECH, {"present_input_voltage": 67}, "ok"),
+        (FEETECH, {"unloading_condition": 47}, "ok"),
+        (FEETECH, {"temperature_limit": 60}, "ok"),
+    ],
+)
+def test_at_the_edge(kind, values, edge):
+    assert worst(examine(servo_state(kind, **values))) == edge
 
 
 def test_two_latches_are_two_findings():
-    findings = examine(servo_state(hardware_error_status=0x24))
+    findings = examine(servo_state(DYNAMIXEL, hardware_error_status=0x24))
     assert [f.what for f in findings if f.level == "error"] == [
         "has latched: overheating",
         "has latched: overload",
     ]
 
 
-@pytest.mark.parametrize(
-    ("values", "edge"),
-    [
-        ({"present_input_voltage": 35, "torque_enable": 0}, "warn"),
-        ({"present_input_voltage": 70}, "ok"),
-        ({"present_input_voltage": 45}, "ok"),
-        ({"present_temperature": 59}, "ok"),
-        ({"present_position": 1650}, "ok"),
-        ({"present_position": 2446}, "ok"),
-        ({"bus_watchdog": 10}, "ok"),
-        ({"secondary_id": 253}, "ok"),
-        ({"shutdown": 52}, "ok"),
-    ],
-)
-def test_at_the_edge(values, edge):
-    assert worst(examine(servo_state(**values))) == edge
+def test_a_twelve_volt_servo_that_is_still_set_for_less():
+    strong = setups_of(FEETECH)[0]._replace(model="sts3215-12v")
+    findings = examine(servo_state(FEETECH, strong, present_input_voltage=120))
+    found = one(findings, "error", PAN, "limits are 4.0..8.0 V")
+    assert "must come off this supply" in found.remedy
+    assert "Max Voltage (14) to 140" in found.remedy
+    assert not found.fixes  # nobody but a person can see which servo it is
 
 
-def test_firmware():
-    old = examine(servo_state(found=Found(1, 1190, 45, BAUD)))
-    assert one(old, "warn", "left_eye_pan (servo 1)", "no fast sync read").remedy
-    known = examine(servo_state(found=Found(1, 1190, 52, BAUD)))
-    assert one(known, "note", "left_eye_pan (servo 1)", "firmware 52")
-    wanted = SETUPS[0]._replace(firmware_min=53)
-    below = examine(servo_state(setup=wanted, found=Found(1, 1190, 52, BAUD)))
-    assert one(below, "error", "left_eye_pan (servo 1)", "the YAML wants 53")
+def test_a_joint_that_asks_for_more_speed_than_there_is():
+    fast = setups_of(FEETECH)[0]._replace(max_speed_steps_s=4000.0)
+    assert one(examine(servo_state(FEETECH, fast)), "note", PAN, "asks its shaft for 352 deg/s")
 
 
-def test_a_wrong_model_is_not_judged_further():
-    (only,) = examine(servo_state(found=Found(1, 1240, 53, BAUD), torque_enable=1))
-    assert only.level == "error" and "is xc330-m288, the YAML says xl330-m077" in only.what
+@each
+def test_firmware_that_is_too_old(kind):
+    now = FIRMWARE[kind.name]
+    wanted = setups_of(kind)[0]._replace(firmware_min=now + 1)
+    findings = examine(servo_state(kind, wanted))
+    assert one(findings, "error", PAN, f"firmware {now}, the YAML wants {now + 1}")
+
+
+def test_what_old_firmware_of_a_dynamixel_lacks():
+    old = examine(servo_state(DYNAMIXEL, found=found_as(DYNAMIXEL, firmware=45)))
+    assert one(old, "warn", PAN, "no fast sync read").remedy
+    known = examine(servo_state(DYNAMIXEL, found=found_as(DYNAMIXEL, firmware=52)))
+    assert one(known, "note", PAN, "firmware 52")
+
+
+@each
+def test_a_wrong_model_or_two_servos_are_not_judged_further(kind):
+    other = found_as(kind, number=1240 if kind is DYNAMIXEL else 1029)
+    (only,) = examine(servo_state(kind, found=other, torque_enable=1))
+    assert only.level == "error" and f"the YAML says {EYE[kind.name]}" in only.what
     assert "gazerig setup --joint left_eye_pan" in only.remedy
+    (only,) = examine(servo_state(kind, corrupt=3, torque_enable=1))
+    assert "two servos share id 1" in only.what
 
 
 def test_what_was_not_read_is_said():
-    found = one(examine(servo_state(shutdown=None, velocity_limit=None)), "error",
-                "left_eye_pan (servo 1)", "gave no good answer about")  # fmt: skip
+    findings = examine(servo_state(DYNAMIXEL, shutdown=None, velocity_limit=None))
+    found = one(findings, "error", PAN, "gave no good answer about")
     assert "shutdown" in found.what and "velocity limit" in found.what
+
+
+@each
+def test_every_rule_stands_registers_that_were_not_read(kind):
+    state = servo_state(kind)
+    for name in state.values:
+        assert one(examine(servo_state(kind, **{name: None})), "error", PAN, "no good answer about")
+
+
+@each
+def test_a_servo_that_does_not_tell(kind):
+    rig = Rig(kind)
+    found = kind.ping(rig.port, 1, BAUD, 1)
+    rig.command("lose 1")
+    checks = CHECKS[kind.name]
+    (only,) = examine(take(kind.registers(rig.port, 3), checks, rig.setups[0], found, 0))
+    says = "no good answer about its registers" if kind is FEETECH else "answers pings and nothing"
+    assert only.level == "error" and says in only.what
 
 
 # --- a whole bus
 
 
-def test_a_missing_servo_a_stranger_and_one_at_another_rate():
-    rig = Rig([ServoSpec(1, "xl330-m077"), ServoSpec(2, "xl330-m077"), ServoSpec(30, "xc330-m288")])
-    rig.set(2, baud_rate=1)
+@each
+def test_a_good_rig_is_well(kind):
+    findings = Rig(kind).check()
+    assert {f.level for f in findings} == {"ok", "note"}
+    assert [f.where for f in findings if f.level == "ok"] == [PAN, TILT, YAW]
+    version = "53" if kind is DYNAMIXEL else "3.53"
+    well = one(findings, "ok", YAW, f"{NECK[kind.name]}, firmware {version}, ")
+    assert "degC, at step 2048" in well.what and not well.remedy and not well.fixes
+
+
+def test_that_nobody_guards_servos_without_a_watchdog_is_said():
+    (note,) = [f for f in Rig(FEETECH).check() if f.level != "ok"]
+    assert note.level == "note" and "no bus watchdog" in note.what and "switch" in note.what
+
+
+def test_the_voltage_latch_is_explained_where_it_is_armed():
+    findings = Rig(DYNAMIXEL).check()
+    note = one(findings, "note", PAN, "makes it limp until it is restarted")
+    assert "gazerig reboot" in note.remedy and "3.5..7.0 V" in note.what
+    assert not any(f.level == "note" and f.where == YAW for f in findings)
+
+
+@each
+def test_a_missing_servo_a_stranger_and_one_at_another_rate(kind):
+    eye, neck = EYE[kind.name], NECK[kind.name]
+    rig = Rig(kind, [ServoSpec(1, eye), ServoSpec(2, eye), ServoSpec(30, neck)])
+    rig.set(2, baud_rate=kind.baud_rates.index(115_200))
     findings = rig.check()
-    assert "57600" in one(findings, "error", "left_eye_tilt (servo 2)", "answers at 57600").what
-    assert "gazerig setup" in one(findings, "error", "neck_yaw (servo 7)", "does not answer").remedy
-    assert one(findings, "warn", "the bus", "servo 30 (xc330-m288) answers")
-    assert one(findings, "ok", "left_eye_pan (servo 1)", "xl330-m077")
-    assert any("57600" in words for words in rig.told)
+    assert "115200" in one(findings, "error", TILT, "answers at 115200").what
+    assert "gazerig setup" in one(findings, "error", YAW, "does not answer").remedy
+    assert one(findings, "warn", "the bus", f"servo 30 ({neck}) answers")
+    assert one(findings, "ok", PAN, eye)
+    assert any("115200" in words for words in rig.told)
     # The port is back at the rig's rate, so that the others could be read.
     assert rig.port.baudrate == BAUD
 
 
-def test_a_factory_fresh_servo_among_the_others():
-    rig = Rig([*(ServoSpec(s.id, s.model) for s in SETUPS[:2]), ServoSpec(11, "xc330-m288")])
-    rig.set(11, baud_rate=1)
-    found = one(rig.check(), "warn", "the bus", "servo 11 (xc330-m288) answers at 57600")
+@each
+def test_a_new_servo_among_the_others(kind):
+    eye, neck = EYE[kind.name], NECK[kind.name]
+    rig = Rig(kind, [ServoSpec(1, eye), ServoSpec(2, eye), ServoSpec(11, neck)])
+    rig.set(11, baud_rate=kind.baud_rates.index(57_600))
+    found = one(rig.check(), "warn", "the bus", f"servo 11 ({neck}) answers at 57600")
     assert "gazerig setup" in found.remedy
 
 
-def test_nobody():
-    rig = Rig()
-    rig.port.faults.command("lose all")
+@each
+def test_nobody(kind):
+    rig = Rig(kind)
+    rig.command("lose all")
     (only,) = rig.check()
-    assert only.level == "error" and "supply" in only.remedy
+    assert only.level == "error" and kind.no_reply in only.remedy
 
 
-def test_two_servos_with_one_id():
-    rig = Rig()
-    rig.port.faults.command("collide 2")
-    found = one(rig.check(), "error", "left_eye_tilt (servo 2)", "two servos share id 2")
-    assert "alone" in found.remedy
+@each
+def test_two_servos_with_one_id(kind):
+    rig = Rig(kind)
+    rig.command("collide 2")
+    assert "alone" in one(rig.check(), "error", TILT, "two servos share id 2").remedy
 
 
-def test_a_servo_of_which_only_pieces_come():
-    rig = Rig()
-    rig.port.faults.command("corrupt 2")
-    found = one(rig.check(), "error", "left_eye_tilt (servo 2)", "in pieces only")
-    assert "alone" in found.remedy
+@each
+def test_a_servo_of_which_only_pieces_come(kind):
+    rig = Rig(kind)
+    rig.command("corrupt 2")
+    assert "alone" in one(rig.check(), "error", TILT, "in pieces only").remedy
 
 
-def test_reading_changes_nothing():
-    rig = Rig()
-    rig.set(2, return_delay_time=250, operating_mode=1, bus_watchdog=255)
-    rig.chain[1].write(64, b"\x01")
-    before = [bytes(servo.memory.bytes[:120]) for servo in rig.chain.servos]
+def test_what_servos_suffer():
+    rig = Rig(FEETECH)
+    rig.hold(7)
+    for fault in ("voltage 1 12.0", "temperature 2 64", "overload 7"):
+        rig.command(fault)
+    findings = rig.check()
+    assert "sts3215-12v" in one(findings, "error", PAN, "12.0 V").remedy
+    assert one(findings, "warn", TILT, "64 degC")
+    assert one(findings, "error", YAW, "reports: overload")
+    assert one(findings, "warn", YAW, "torque is on")
+
+
+@each
+def test_reading_changes_nothing(kind):
+    rig = Rig(kind)
+    odd = {"bus_watchdog": 255} if kind is DYNAMIXEL else {"lock": 0}
+    rig.set(2, return_delay_time=250, operating_mode=1, **odd)
+    rig.hold(1)
+    before = rig.kept()
     rig.check()
-    assert [bytes(servo.memory.bytes[:120]) for servo in rig.chain.servos] == before
+    assert rig.kept() == before
 
 
-# --- mending
+# --- fixes
 
 
 def test_fix_mends_what_is_safe_and_says_it():
-    rig = Rig()
+    rig = Rig(DYNAMIXEL)
     rig.set(
         1, return_delay_time=250, drive_mode=1, operating_mode=4, secondary_id=9,
         startup_configuration=1, min_position_limit=0, max_position_limit=4095,
@@ -275,42 +449,66 @@ def test_fix_mends_what_is_safe_and_says_it():
     before = rig.chain.positions_steps()
     done = rig.fix(rig.check())
     assert all(one.done for one in done)
-    assert "left_eye_pan (servo 1): return delay time 250 -> 0: done" in map(str, done)
-    assert "left_eye_tilt (servo 2): bus watchdog 255 -> 0: done" in map(str, done)
+    assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
+    assert f"{TILT}: bus watchdog 255 -> 0: done" in map(str, done)
     assert worst(rig.check()) == "note" and not any(f.fixes for f in rig.check())
     assert rig.chain.positions_steps() == before
     assert rig.fix(rig.check()) == []
 
 
+def test_fix_mends_an_sts_servo_for_good():
+    rig = Rig(FEETECH)
+    rig.set(1, return_delay_time=250, operating_mode=1, phase=28, unloading_condition=0,
+            temperature_limit=90, min_position_limit=0, max_position_limit=0)  # fmt: skip
+    rig.set(2, lock=0, status_return_level=0)
+    before = rig.chain.positions_steps()
+    done = rig.fix(rig.check())
+    assert all(one.done for one in done), [str(one) for one in done]
+    assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
+    assert f"{TILT}: lock 0 -> 1: done" in map(str, done)
+    assert not any(f.fixes for f in rig.check())
+    assert rig.chain.positions_steps() == before
+    for i in (1, 2):  # it outlives the power
+        rig.chain[i].restart()
+    rig.pass_time(1.0)
+    assert not any(f.fixes for f in rig.check()) and worst(rig.check()) == "note"
+    assert rig.chain[1].read(TABLE_END - 1, 1) and rig.chain[1].read(55, 1) == b"\1"
+
+
 def test_a_servo_that_answers_pings_alone_is_brought_to_speak():
-    rig = Rig()
+    rig = Rig(DYNAMIXEL)
     servo = rig.chain[2]
     servo.memory.set("status_return_level", 0)
     servo.status_level = 0
-    found = one(rig.check(), "error", "left_eye_tilt (servo 2)", "answers pings and nothing else")
+    found = one(rig.check(), "error", TILT, "answers pings and nothing else")
     (done,) = rig.fix([found])
     assert done.done and worst(rig.check()) == "note"
 
 
-def test_fix_leaves_a_servo_alone_whose_torque_is_on():
-    rig = Rig()
+@each
+def test_fix_leaves_a_servo_alone_whose_torque_is_on(kind):
+    rig = Rig(kind)
     rig.set(1, return_delay_time=250)
-    rig.chain[1].write(64, b"\x01")
-    findings = rig.check()
-    (done,) = rig.fix(findings)
-    assert str(done) == (
-        "left_eye_pan (servo 1): return delay time 250 -> 0: not done, its torque is on"
-    )
-    get = rig.chain[1].memory.get
-    assert (get("return_delay_time"), get("torque_enable")) == (250, 1)
+    rig.hold(1)
+    (done,) = rig.fix(rig.check())
+    assert str(done) == f"{PAN}: return delay time 250 -> 0: not done, its torque is on"
+    assert (rig.get(1, "return_delay_time"), rig.get(1, "torque_enable")) == (250, 1)
 
 
-def test_a_servo_that_does_not_take_it_is_said():
-    rig = Rig()
-    fix = Finding("warn", "w", "neck_yaw (servo 7)", "", (Fix(7, "return_delay_time", 3, 0),))
-    rig.port.faults.command("refuse 7 7")
+@pytest.mark.parametrize(
+    ("kind", "fault", "says"),
+    [
+        (DYNAMIXEL, "refuse 7 7", "does not take it"),
+        (DYNAMIXEL, "lose 7", "does not answer"),
+        (FEETECH, "lose 7", "does not answer"),
+    ],
+)
+def test_a_servo_that_does_not_take_it_is_said(kind, fault, says):
+    rig = Rig(kind)
+    fix = Finding("warn", "w", YAW, "", (Fix(7, "return_delay_time", 3, 0),))
+    rig.command(fault)
     (done,) = rig.fix([fix])
-    assert not done.done and "does not take it" in done.what
+    assert not done.done and says in done.what
 
 
 # --- ports
@@ -368,14 +566,14 @@ def test_latency_timer(tmp_path):
 
 
 def test_a_port_that_is_not_there_ends_the_examination(tmp_path):
-    rig = Rig()
+    rig = Rig(DYNAMIXEL)
     rig.port.port_name = str(tmp_path / "ttyUSB9")
     (only,) = rig.check_all(Host())
     assert only.level == "error" and only.where.endswith("ttyUSB9")
 
 
 def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
-    rig, host = Rig(), Host(processes=tmp_path)
+    rig, host = Rig(DYNAMIXEL), Host(processes=tmp_path)
     rig.port.port_name = "/dev/null"  # a character device that may be opened
     rig.port.faults.command("deny on")
     findings = rig.check_all(host)
@@ -385,7 +583,7 @@ def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
     assert not rig.port.is_open
     rig.port.setBaudRate = lambda baud: False
     with pytest.raises(PortError, match="cannot run at 1000000"):
-        look(rig.port, DYNAMIXEL, SETUPS, BAUD, lambda _: None)
+        look(rig.port, DYNAMIXEL, rig.setups, BAUD, lambda _: None)
 
 
 # --- words
