@@ -201,6 +201,7 @@ SAID = {
     *("time,x,y", "start,duration,part", "N: [x0, y0, x1, y1]", "start + k * period"),
     *("84 00 70 2E", "2B", "83 01", "17", "FF FF 01 02 01 FB", "pytest -k e17"),
     *("sudo udevadm control --reload", "sudo usermod -aG dialout $USER", "ls /dev/serial/by-id"),
+    *("sudo raspi-config", "sudo usermod -aG i2c $USER", "/dev/i2c-*"),
     *("sudo systemctl stop ModemManager", "robot", "./face", "myrig.yaml.bak-20260131-235958"),
     *("sleep_until", "retune", "faults", "_obey", "camera.latest", "head_turn_residual"),
 }
