@@ -23,11 +23,11 @@ class DeviceFaults(Protocol):
     wire: ActiveFaults
 
     def on(self, kind: str) -> bool:
-        """Tell whether echo, babble, unplug, deny or block is on now."""
+        """True if echo, babble, unplug, deny or block is on now."""
         ...
 
     def command(self, text: str) -> str:
-        """Carry out a line such as ``lose 3 count 2``; gives what was done.
+        """Carry out a line such as ``lose 3 count 2``; return what was done.
 
         Raises:
             ValueError: names the word that is wrong and what would be right.
@@ -42,16 +42,16 @@ class Device(Protocol):
 
     @property
     def heed_baud(self) -> bool:
-        """Tell whether only a client at its baud rate is heard."""
+        """True if only a client at its baud rate is heard."""
         ...
 
     @property
     def faults(self) -> DeviceFaults:
-        """Give the faults of the device and its line."""
+        """Return the faults of the device and its line."""
         ...
 
     def hears(self, client_baud: int) -> bool:
-        """Tell whether a client at this baud rate is understood."""
+        """True if a client at this baud rate is understood."""
         ...
 
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[Reply]:
@@ -67,5 +67,5 @@ class Device(Protocol):
         ...
 
     def positions_steps(self) -> tuple[float, ...]:
-        """Give the true positions now, in the order of its servos."""
+        """Return the true positions now, in the order of its servos."""
         ...

@@ -53,7 +53,7 @@ def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
 
 
 def _read(part: str) -> tuple[range, str, int]:
-    """Give the ids, the model and the start of one part."""
+    """Return the ids, the model and the start of one part."""
     found = _PART.fullmatch(part.strip())
     if found is None:
         raise SetupError(f"--servos {part!r}: not IDS:MODEL, for example {EXAMPLE}")

@@ -108,7 +108,7 @@ _KINDS: dict[str, type[Emulated]] = {
 
 
 def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
-    """Build a device on a clock; ``seed``: of the dice that its faults throw.
+    """Build a device on a clock; ``seed``: of the random numbers that its faults draw.
 
     Raises:
         ValueError: it cannot exist; names what is wrong and what would be right.
@@ -125,12 +125,12 @@ def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
 
 
 def packed(what: Emulated) -> dict[str, object]:
-    """Give a device as what JSON can carry."""
+    """Return a device as what JSON can carry."""
     return {"kind": what.kind, **asdict(what)}
 
 
 def unpacked(told: Mapping[str, Any]) -> Emulated:
-    """Give the device that ``packed`` was given; servos may be as short as [1, "xl330-m077"].
+    """Return the device that ``packed`` was given; servos may be as short as [1, "xl330-m077"].
 
     Raises:
         ValueError: there is no such kind of device.

@@ -73,7 +73,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._waiting += self.line.send(data, self.baudrate)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
-        """Give up to ``length`` bytes; fewer where no more will come before the deadline.
+        """Return up to ``length`` bytes; fewer where no more will come before the deadline.
 
         Raises:
             drivers.errors.BusLost: unplugged.
@@ -89,7 +89,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return taken
 
     def drain(self) -> int:
-        """Throw away what waits; gives the number of bytes."""
+        """Throw away what waits; return the number of bytes."""
         self._see()
         dropped = len(self._waiting)
         self._waiting = b""
@@ -155,17 +155,17 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return len(self._waiting)
 
     def readPort(self, length: int) -> bytes:
-        """Give up to ``length`` bytes."""
+        """Return up to ``length`` bytes."""
         return self.read_until(length, self.now_s())
 
     def writePort(self, packet: bytes | list[int]) -> int:
-        """Send bytes; gives their number."""
+        """Send bytes; return their number."""
         data = bytes(packet)
         self.write(data)
         return len(data)
 
     def getCurrentTime(self) -> float:
-        """Give the device's time in milliseconds."""
+        """Return the device's time in milliseconds."""
         return self.now_s() * 1000.0
 
     def setPacketTimeout(self, packet_length: int) -> None:

@@ -45,11 +45,11 @@ class ServoLine:
 
     @property
     def busy(self) -> bool:
-        """Tell whether bytes are still on their way, or may come by themselves."""
+        """True if bytes are still on their way, or may come by themselves."""
         return bool(self._late) or self.device.faults.on("babble")
 
     def next_due_s(self) -> float | None:
-        """Give when the next bytes arrive, None where none are on their way."""
+        """Return when the next bytes arrive, None where none are on their way."""
         return self._late[0][0] if self._late else None
 
     def forget(self) -> None:
@@ -58,7 +58,7 @@ class ServoLine:
         self._host_free_s = self._line_free_s = 0.0
 
     def arrived(self) -> bytes:
-        """Give the bytes that have arrived by now and were not given before."""
+        """Return the bytes that have arrived by now and were not given before."""
         now_s = self.device.now_s()
         out = [self.device.faults.wire.babble(now_s)] if self.device.faults.wire.any else []
         while self._late and self._late[0][0] <= now_s:
@@ -66,7 +66,7 @@ class ServoLine:
         return b"".join(out)
 
     def send(self, data: bytes, baud: int, now_s: float | None = None) -> bytes:
-        """Send the host's bytes now, or at ``now_s``; gives what arrives at once."""
+        """Send the host's bytes now, or at ``now_s``; return what arrives at once."""
         faulty = self.device.faults.wire.any
         if faulty:
             data = self.device.faults.wire.roughened(data, self.device.now_s())

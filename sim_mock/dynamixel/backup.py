@@ -19,7 +19,7 @@ class Backup:
 
     @property
     def ready(self) -> bool:
-        """Tell whether there is something to restore."""
+        """True if there is something to restore."""
         return bool(self._stored)
 
     def store(self, memory: DynamixelMemory) -> None:

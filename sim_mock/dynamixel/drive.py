@@ -100,16 +100,16 @@ class Drive:
 
     @property
     def position_steps(self) -> float:
-        """Give the true position of the shaft in the registers' terms, finer than they are."""
+        """Return the true position of the shaft in the registers' terms, finer than they are."""
         return self._side * self.shaft.x + self._shift
 
     @property
     def joint_steps(self) -> float:
-        """Give the position of the joint behind the play, in the registers' terms."""
+        """Return the position of the joint behind the play, in the registers' terms."""
         return self._side * self.shaft.joint + self._shift
 
     def sensed(self, now_ms: int) -> tuple[int, int, int]:
-        """Give present current, velocity and position in register units."""
+        """Return present current, velocity and position in register units."""
         shaft, side = self.shaft, self._side
         at = round(side * shaft.x + self._shift)
         current = side * shaft.effort * self._current_full
@@ -122,7 +122,7 @@ class Drive:
         return max(-self._most, min(self._most, amps)), speed, at
 
     def live(self, tick_ms: int, now_ms: int, voltage: int, temperature: int) -> Live:
-        """Give everything that lives."""
+        """Return everything that lives."""
         shaft, side, sensed = self.shaft, self._side, self.sensed(now_ms)
         profile = shaft.profile
         running = self.torque and profile.running and profile.v != profile.goal
@@ -259,7 +259,7 @@ class Drive:
         return max(-HOMING_ACTS_STEPS, min(HOMING_ACTS_STEPS, offset))
 
     def clear_turns(self) -> bool:
-        """Bring a multi-turn position back into one turn; gives False while moving."""
+        """Bring a multi-turn position back into one turn; return False while moving."""
         if self.shaft.v or (self.torque and self.shaft.profile.running):
             return False
         turns = int(self.position_steps // STEPS_PER_TURN)

@@ -21,7 +21,7 @@ def fast_reply(
     now_ms: int,
     fed_ms: int,
 ) -> bytes:
-    """Give the packet up to the first servo that is silent; nothing where that is the first."""
+    """Return the packet up to the first servo that is silent; nothing where that is the first."""
     parts = [HEAD.pack(HEADER, BROADCAST, length, STATUS)]
     crc = umts(parts[0])
     for servo_id, address, size in rows:

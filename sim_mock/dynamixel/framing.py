@@ -45,5 +45,5 @@ def _intact(packet: bytes) -> bool:
 
 
 def _unstuffed(packet: bytes) -> bool:
-    """Tell whether a header stands among the parameters."""
+    """True if a header stands among the parameters."""
     return RAW in packet[7:-2].replace(STUFFED, b"")

@@ -40,21 +40,21 @@ def carry_out(servo: DynamixelServo, code: int, params: bytes) -> Said:
 
 
 def answered_from(servo: DynamixelServo, code: int) -> int:
-    """Give the Status Return Level from which a servo answers an instruction."""
+    """Return the Status Return Level from which a servo answers an instruction."""
     if code == REBOOT and servo.quirks.mute_reboot:
         return NEVER
     return 0 if code == PING else 1 if code == READ else 2
 
 
 def touches_eeprom(code: int, params: bytes) -> bool:
-    """Tell whether an instruction may change id, baud rate, return delay or secondary id."""
+    """True if an instruction may change id, baud rate, return delay or secondary id."""
     if code in (WRITE, REG_WRITE):
         return int.from_bytes(params[:2], "little") < EEPROM_END
     return code in (ACTION, FACTORY_RESET, BACKUP)
 
 
 def obeys_broadcast(servo: DynamixelServo, code: int, params: bytes) -> bool:
-    """Tell whether a servo carries out an instruction that goes to all."""
+    """True if a servo carries out an instruction that goes to all."""
     reset = code == FACTORY_RESET and params == RESET_ALL
     return not reset or servo.firmware < NO_BROADCAST_RESET_SINCE
 

@@ -64,7 +64,7 @@ class DynamixelMemory:
                 self.put(register, register.initial)
 
     def get(self, name: str) -> int:
-        """Give a register's value."""
+        """Return a register's value."""
         register = self._by_name[name]
         end = register.address + register.size
         return int.from_bytes(self.bytes[register.address : end], "little", signed=register.signed)
@@ -74,15 +74,15 @@ class DynamixelMemory:
         self.put(self._by_name[name], value)
 
     def has(self, name: str) -> bool:
-        """Tell whether this model has a register."""
+        """True if this model has a register."""
         return name in self._by_name
 
     def named(self, name: str) -> Register:
-        """Give a register by its name."""
+        """Return a register by its name."""
         return self._by_name[name]
 
     def writable(self) -> Iterator[Register]:
-        """List the registers that may be written; through a window one writes to others."""
+        """Return the registers that may be written; through a window one writes to others."""
         for register in self._by_address.values():
             if register.access == "rw" and not register.name.startswith("indirect_data"):
                 yield register
@@ -96,7 +96,7 @@ class DynamixelMemory:
             self._gathers.clear()
 
     def read(self, address: int, length: int) -> bytes | None:
-        """Give bytes as they are on the wire, None where an address is not defined."""
+        """Return bytes as they are on the wire, None where an address is not defined."""
         end = address + length
         defined = self._defined[address:end]
         if length == 0 or len(defined) != length or 0 in defined:
@@ -107,7 +107,7 @@ class DynamixelMemory:
         return b"".join([content[run] for run in self.gather(address, length).runs])
 
     def gather(self, address: int, length: int) -> Gather:
-        """Give what stands behind a range; kept, as a control loop reads the same ever again."""
+        """Return what stands behind a range; kept, as a control loop reads the same ever again."""
         found = self._gathers.get((address, length))
         if found is None:
             found = self._gathers[address, length] = self._gather(address, address + length)
@@ -125,7 +125,7 @@ class DynamixelMemory:
         return Gather(tuple(slice(low, high) for low, high in runs), profiled)
 
     def real(self, address: int) -> int:
-        """Give the address an indirect data byte stands for, others unchanged."""
+        """Return the address an indirect data byte stands for, others unchanged."""
         for low, high, pointers in self._windows:
             if low <= address < high:
                 at = pointers + 2 * (address - low)
@@ -153,7 +153,7 @@ class DynamixelMemory:
         return tuple(out)
 
     def _layout(self, address: int, length: int) -> tuple[Register, ...] | int:
-        """List the registers that a write covers exactly, or give the error number."""
+        """Return the registers that a write covers exactly, or give the error number."""
         key = (address, length)
         if key not in self._layouts:
             self._layouts[key] = self._lay_out(address, length)
@@ -199,5 +199,5 @@ def _window_registers(blocks: tuple[IndirectBlock, ...]) -> Iterator[Register]:
 
 
 def in_eeprom(register: Register) -> bool:
-    """Tell whether a register is kept without power."""
+    """True if a register is kept without power."""
     return register.address < EEPROM_END

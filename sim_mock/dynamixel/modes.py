@@ -36,12 +36,12 @@ Get = Callable[[str], int]
 
 
 def modes_of(model: Model) -> tuple[int, ...]:
-    """List the operating modes a model has."""
+    """Return the operating modes a model has."""
     return MODES_WITHOUT_CURRENT if model.current_limit is None else MODES
 
 
 def loop_of(get: Get, model: Model, side: int) -> Loop:
-    """Give the controller that the registers describe; ``side`` is -1 in reverse mode."""
+    """Return the controller that the registers describe; ``side`` is -1 in reverse mode."""
     mode = get("operating_mode")
     slew = inf
     if model.family == "x330":
@@ -76,6 +76,6 @@ def loop_of(get: Get, model: Model, side: int) -> Loop:
 
 
 def _torque_limit(get: Get, model: Model) -> float:
-    """Give the torque that the goal current and its limit allow, as a share of stall."""
+    """Return the torque that the goal current and its limit allow, as a share of stall."""
     units = min(abs(get("goal_current")), get("current_limit"))
     return units * model.current_unit_ma / 1000.0 / model.stall_current_a

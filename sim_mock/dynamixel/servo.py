@@ -87,7 +87,7 @@ class DynamixelServo(SmartServo):
         )
 
     def _boot(self) -> None:
-        """Give the RAM area its start values, torque off unless it is to start with it."""
+        """Return the RAM area its start values, torque off unless it is to start with it."""
         memory = self.memory
         memory.restore(lambda register: not in_eeprom(register))
         self._watchdog_ms = 0
@@ -120,11 +120,11 @@ class DynamixelServo(SmartServo):
 
     @property
     def joint_steps(self) -> float:
-        """Give the position of the joint behind the play, in the registers' terms."""
+        """Return the position of the joint behind the play, in the registers' terms."""
         return self.drive.joint_steps
 
     def read(self, address: int, length: int) -> bytes | None:
-        """Give bytes of the control table, None where an address is not defined."""
+        """Return bytes of the control table, None where an address is not defined."""
         if address == SENSED_AT and length == SENSED.size:
             return SENSED.pack(*self.drive.sensed(self._ms))
         if address + length > LIVE_AT:
@@ -143,7 +143,7 @@ class DynamixelServo(SmartServo):
     # --- writing
 
     def write(self, address: int, data: bytes) -> int:
-        """Write bytes as an instruction does; gives the error number, 0 when done."""
+        """Write bytes as an instruction does; return the error number, 0 when done."""
         if address == _GOAL_AT and len(data) == _GOAL_SIZE and self.drive.follows:
             return self._take_goal(data)
         fields = self._rules.permitted(address, data)
@@ -215,7 +215,7 @@ class DynamixelServo(SmartServo):
     # --- instructions
 
     def register(self, address: int, data: bytes) -> int:
-        """Keep a write for Action; gives the error number."""
+        """Keep a write for Action; return the error number."""
         fields = self._rules.permitted(address, data)
         if isinstance(fields, int):
             return fields
@@ -224,7 +224,7 @@ class DynamixelServo(SmartServo):
         return 0
 
     def action(self) -> int:
-        """Carry out the kept write; gives the error number."""
+        """Carry out the kept write; return the error number."""
         if self._pending is None:
             return INSTRUCTION_ERROR
         address, data = self._pending
@@ -253,7 +253,7 @@ class DynamixelServo(SmartServo):
         return 0 if self.drive.clear_turns() else RESULT_FAIL
 
     def backup(self) -> int:
-        """Store the control table; gives the error number, 1 while the torque is on."""
+        """Store the control table; return the error number, 1 while the torque is on."""
         if not self._new:
             return INSTRUCTION_ERROR
         if self.torque:
@@ -263,7 +263,7 @@ class DynamixelServo(SmartServo):
         return 0
 
     def restore(self) -> int:
-        """Put the stored control table back and restart; gives the error number."""
+        """Put the stored control table back and restart; return the error number."""
         if not self._new:
             return INSTRUCTION_ERROR
         if self.torque or not self._backup.ready:
@@ -298,19 +298,19 @@ class DynamixelServo(SmartServo):
 
     @property
     def error_flag(self) -> int:
-        """Give the alert bit as it stands on every status."""
+        """Return the alert bit as it stands on every status."""
         return ALERT if self.errors else 0
 
     # --- for the line
 
     @property
     def baud(self) -> int:
-        """Give bit/s by register 8; a new one acts after the status of its write has gone out."""
+        """Return bit/s by register 8; a new one acts after the status of its write has gone out."""
         return BAUD_RATES[self.memory.get("baud_rate")]
 
     @property
     def return_delay_s(self) -> float:
-        """Give the pause before a status, by register 9."""
+        """Return the pause before a status, by register 9."""
         return self.memory.get("return_delay_time") * RETURN_DELAY_UNIT_S
 
     @property

@@ -30,7 +30,7 @@ class Rules:
             self.goal_range = get("min_position_limit"), get("max_position_limit")
 
     def permitted(self, address: int, data: bytes) -> Fields | int:
-        """Give the registers that bytes would be written to, or the error number."""
+        """Return the registers that bytes would be written to, or the error number."""
         fields = self._memory.fields(address, data)
         if isinstance(fields, int):
             return fields
@@ -41,7 +41,7 @@ class Rules:
         return fields
 
     def goal_error(self, goal: int) -> int:
-        """Give the error number for a goal position, 0 where it may be written."""
+        """Return the error number for a goal position, 0 where it may be written."""
         if self._memory.bytes[WATCHDOG_AT] == TRIPPED:
             return DATA_RANGE
         low, high = self.goal_range

@@ -35,7 +35,7 @@ class Fault:
     until_s: float | None = None
 
     def lasts(self, now_s: float) -> bool:
-        """Tell whether it is not over."""
+        """True if it is not over."""
         return self.left != 0 and (self.until_s is None or now_s < self.until_s)
 
 
@@ -49,7 +49,7 @@ class ActiveFaults:
     def __init__(self, seed: int, header: bytes) -> None:
         self._header = header
         self._faults: list[Fault] = []
-        self._dice = Random(seed)
+        self._rng = Random(seed)
         self._babbled_s = 0.0
         self.any = False
 
@@ -59,7 +59,7 @@ class ActiveFaults:
         self.any = True
 
     def remove(self, kind: str | None = None, servo_id: int | None = None) -> int:
-        """End faults of a kind (None: all kinds) and servo (None: all); gives how many."""
+        """End faults of a kind (None: all kinds) and servo (None: all); return how many."""
         before = len(self._faults)
         self._faults = [
             fault
@@ -71,12 +71,12 @@ class ActiveFaults:
         return before - len(self._faults)
 
     def listed(self, now_s: float) -> tuple[Fault, ...]:
-        """Give the faults in force, oldest first."""
+        """Return the faults in force, oldest first."""
         self._forget(now_s)
         return tuple(self._faults)
 
     def on(self, kind: str, now_s: float) -> bool:
-        """Tell whether a fault of this kind is in force."""
+        """True if a fault of this kind is in force."""
         return self.any and any(f.kind == kind and f.lasts(now_s) for f in self._faults)
 
     def take(self, kind: str, servo_id: int | None, now_s: float) -> Fault | None:
@@ -98,7 +98,7 @@ class ActiveFaults:
     # --- electrical noise, in both directions
 
     def roughened(self, data: bytes, now_s: float) -> bytes:
-        """Give bytes as they arrive over a noisy line: some changed, lost or added.
+        """Return bytes as they arrive over a noisy line: some changed, lost or added.
 
         The share of bytes that are hit is the fault's number; of four that are hit two are
         changed, one is lost, and one has another put before it.
@@ -106,9 +106,9 @@ class ActiveFaults:
         noise = next((f for f in self._faults if f.kind == "static" and f.lasts(now_s)), None)
         if noise is None:
             return data
-        rng, out, share, at = self._dice, bytearray(), noise.numbers[0], 0
+        rng, out, share, at = self._rng, bytearray(), noise.numbers[0], 0
         while True:
-            # The distance to the next byte hit, instead of dice for each byte.
+            # The distance to the next byte hit, instead of a draw for each byte.
             ahead = int(log(1.0 - rng.random()) / log(1.0 - share)) if share < 1.0 else 0
             out += data[at : at + ahead]
             at += ahead
@@ -166,11 +166,11 @@ class ActiveFaults:
         return self._amid_noise(out, pieces, now_s)
 
     def _damaged(self, piece: Piece, now_s: float) -> tuple[Piece, bool]:
-        """Give a piece as it arrives and whether its end is missing."""
+        """Return a piece as it arrives and whether its end is missing."""
         servo_id, data = piece.servo_id, bytearray(piece.data)
         flip = self.take("corrupt", servo_id, now_s)
         if flip is not None and data:
-            bit = int(flip.numbers[0]) if flip.numbers else self._dice.randrange(len(data) * 8)
+            bit = int(flip.numbers[0]) if flip.numbers else self._rng.randrange(len(data) * 8)
             bit %= len(data) * 8
             data[bit // 8] ^= 1 << bit % 8
         drop = self.take("drop", servo_id, now_s)
@@ -182,7 +182,7 @@ class ActiveFaults:
         return piece._replace(data=bytes(data)), cut is not None
 
     def _late(self, piece: Piece, now_s: float) -> list[Piece]:
-        """Give a piece later than it should be, or in two halves with a gap."""
+        """Return a piece later than it should be, or in two halves with a gap."""
         late = self.take("delay", piece.servo_id, now_s)
         if late is not None:
             piece = piece._replace(late_s=piece.late_s + late.numbers[0] / 1000.0)
@@ -208,10 +208,10 @@ class ActiveFaults:
         return out
 
     def _noise(self, fault: Fault) -> bytes:
-        return self._dice.randbytes(8) if fault.data is None else fault.data
+        return self._rng.randbytes(8) if fault.data is None else fault.data
 
     def babble(self, now_s: float) -> bytes:
-        """Give what a babbling node has sent since the last look: headers and noise."""
+        """Return what a babbling node has sent since the last look: headers and noise."""
         if not self.on("babble", now_s):
             self._babbled_s = now_s
             return b""
@@ -219,5 +219,5 @@ class ActiveFaults:
         if length > 0:
             self._babbled_s = now_s
         size = len(self._header) + 4
-        words = (self._header + self._dice.randbytes(4) for _ in range(length // size + 1))
+        words = (self._header + self._rng.randbytes(4) for _ in range(length // size + 1))
         return b"".join(words)[:length]

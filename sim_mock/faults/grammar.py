@@ -41,7 +41,7 @@ class Commands(NamedTuple):
     ids: str
 
     def obey(self, faults: object, text: str) -> str:
-        """Carry out one line; gives what was done.
+        """Carry out one line; return what was done.
 
         Raises:
             ValueError: names the word that is wrong and what would be right.

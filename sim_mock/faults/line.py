@@ -22,7 +22,7 @@ class Struck(Protocol):
     now_s: Callable[[], float]
 
     def here(self, servo_id: int) -> object:
-        """Give what has this id, brought up to now.
+        """Return what has this id, brought up to now.
 
         Raises:
             KeyError: nothing has it; the message lists those that there are.
@@ -40,7 +40,7 @@ class LineFaults(ABC):
     Args:
         chain: the device.
         commands: what can be asked for as text.
-        seed: of the dice that faults throw.
+        seed: of the random numbers that faults draw.
         header: what its packets begin with: ``fragment`` and ``babble`` send it.
     """
 
@@ -54,14 +54,14 @@ class LineFaults(ABC):
 
     @abstractmethod
     def reports(self) -> list[dict[str, object]]:
-        """Give the state of every servo, for ``status``."""
+        """Return the state of every servo, for ``status``."""
 
     def board(self) -> dict[str, object]:
-        """Give what else ``status`` tells, where there is more than servos."""
+        """Return what else ``status`` tells, where there is more than servos."""
         return {}
 
     def command(self, text: str) -> str:
-        """Carry out a line such as ``lose 3 count 2``; gives what was done.
+        """Carry out a line such as ``lose 3 count 2``; return what was done.
 
         Raises:
             ValueError: names the word that is wrong and what would be right.
@@ -135,7 +135,7 @@ class LineFaults(ABC):
         count: int | None = None,
         seconds: float | None = None,
     ) -> str:
-        """Flip one bit of answers, counted from the first byte's lowest; by dice where None."""
+        """Flip one bit of answers, counted from the first byte's lowest; at random where None."""
         numbers = () if bit is None else (float(bit),)
         says = f"a bit flips in what {self.who(servo_id)} answers"
         return self._begin("corrupt", servo_id, says, count, seconds, numbers)
@@ -285,7 +285,7 @@ class LineFaults(ABC):
     # --- all
 
     def on(self, kind: str) -> bool:
-        """Tell whether echo, babble, unplug, deny or block is on now."""
+        """True if echo, babble, unplug, deny or block is on now."""
         return self.wire.on(kind, self._chain.now_s())
 
     def choose(self, case: str, value: str) -> str:
@@ -302,7 +302,7 @@ class LineFaults(ABC):
         return f"{self.wire.remove(None, servo_id)} faults cleared"
 
     def status(self) -> str:
-        """Give all servos and the faults in force as one line of JSON."""
+        """Return all servos and the faults in force as one line of JSON."""
         faults = [
             f"{fault.kind} {'all' if fault.servo_id is None else fault.servo_id}"
             for fault in self.wire.listed(self._chain.now_s())

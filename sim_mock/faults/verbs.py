@@ -24,7 +24,7 @@ _N = Word("N", _BYTE_COUNT)
 
 # fmt: off
 def line_verbs(one: Word) -> dict[str, Verb]:
-    """Give what can be asked of any line; ``one`` reads an id."""
+    """Return what can be asked of any line; ``one`` reads an id."""
     who = Word(one.shown, or_all(one.read))
     return {
         "lose": Verb(LineFaults.lose, (who,), "stay silent though it obeys", BOTH),
@@ -33,7 +33,7 @@ def line_verbs(one: Word) -> dict[str, Verb]:
                          "only the first BYTES of an answer arrive", BOTH),
         "duplicate": Verb(LineFaults.duplicate, (who,), "answers arrive twice", BOTH),
         "corrupt": Verb(LineFaults.corrupt, (who, Word("BIT", whole(0, 8191, "a bit"), True)),
-                        "a bit flips, by dice where none is named", BOTH),
+                        "a bit flips, at random where none is named", BOTH),
         "drop": Verb(LineFaults.drop, (who, Word("BYTE", whole(-1024, 1023, "a byte"))),
                      "byte BYTE of an answer is lost; -1 the last", BOTH),
         "stall": Verb(LineFaults.stall, (who, MS), "stop half-way through an answer", BOTH),
@@ -47,7 +47,7 @@ def line_verbs(one: Word) -> dict[str, Verb]:
 
 
 def packet_verbs(one: Word) -> dict[str, Verb]:
-    """Give what can be asked where many servos answer with packets; ``one`` reads an id."""
+    """Return what can be asked where many servos answer with packets; ``one`` reads an id."""
     who = Word(one.shown, or_all(one.read))
     return {
         "fragment": Verb(LineFaults.fragment, (who._replace(optional=True),),
@@ -65,7 +65,7 @@ def packet_verbs(one: Word) -> dict[str, Verb]:
 
 
 def adapter_verbs() -> dict[str, Verb]:
-    """Give what can be asked of the line and adapter as a whole."""
+    """Return what can be asked of the line and adapter as a whole."""
     return {
         "echo": Verb(LineFaults.echo, (SWITCH,), "the host hears its own bytes", TIME),
         "babble": Verb(LineFaults.babble, (SWITCH,), "a broken node sends all the time", TIME),
@@ -77,7 +77,7 @@ def adapter_verbs() -> dict[str, Verb]:
 
 
 def closing_verbs(one: Word) -> dict[str, Verb]:
-    """Give what can be asked of every device; these stand last in its help."""
+    """Return what can be asked of every device; these stand last in its help."""
     return {
         "set": Verb(LineFaults.choose, (Word("CASE", anything), Word("VALUE", anything)),
                     "choose where documents and devices differ: see below"),

@@ -15,13 +15,13 @@ SYNC_READ, SYNC_WRITE = 0x82, 0x83
 
 
 def carry_out(servo: FeetechServo, code: int, params: bytes) -> bytes | None:
-    """Let a servo that is awake carry out an instruction; gives what it says, None for nothing."""
+    """Let a servo that is awake carry out an instruction; return what it says, None for nothing."""
     action = _ACTIONS.get(code)
     return None if action is None else action(servo, params)
 
 
 def answers(servo: FeetechServo, code: int) -> bool:
-    """Tell whether a servo answers an instruction to it alone."""
+    """True if a servo answers an instruction to it alone."""
     if code == REBOOT and servo.quirks.reboot == "mute":
         return False
     return code in (PING, READ) or servo.answers_all

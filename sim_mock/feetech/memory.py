@@ -182,7 +182,7 @@ class FeetechMemory:
         self.keep("max_speed", round(top_steps_s / SPEED_UNIT_STEPS_S))
 
     def power_up(self) -> None:
-        """Give the RAM its start values and the EEPROM area what was kept."""
+        """Return the RAM its start values and the EEPROM area what was kept."""
         for address in self._kept_at:
             self.bytes[address] = self._kept[address]
         for register in (*self.table.ram, self._registers["registered"]):
@@ -190,7 +190,7 @@ class FeetechMemory:
         self.set("torque_limit", self.get("max_torque"))
 
     def read(self, address: int, length: int) -> bytes:
-        """Give bytes as they are on the wire; what is no register is 0."""
+        """Return bytes as they are on the wire; what is no register is 0."""
         return bytes(self.bytes[address : min(SIZE, address + length)]).ljust(length, b"\0")
 
     def write(self, address: int, data: bytes, changed: Callable[[int], None]) -> None:

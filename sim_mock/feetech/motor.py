@@ -91,13 +91,13 @@ class FeetechDrive:
 
     @property
     def position_steps(self) -> float:
-        """Give the true position in the registers' terms, finer than they are."""
+        """Return the true position in the registers' terms, finer than they are."""
         at = self.shaft.x + self._shift
         goes_on = self.counts_turns or self.torque or self._last is not None
         return (at if goes_on else at % TURN) * self._scale
 
     def sensed(self, now_ms: int) -> Sensed:
-        """Give position, speed, load and current."""
+        """Return position, speed, load and current."""
         shaft = self.shaft
         at = round((shaft.x + self._shift) * self._scale)
         if self._last is not None:
@@ -113,13 +113,13 @@ class FeetechDrive:
 
     @property
     def moving(self) -> bool:
-        """Tell whether it is on its way, or turned."""
+        """True if it is on its way, or turned."""
         profile = self.shaft.profile
         led = self.torque and isinstance(profile, Profile) and profile.running
         return led or abs(self.shaft.v * self._scale * 1000.0 / self._speed_unit) > self._threshold
 
     def target(self) -> int:
-        """Give the position it is led to, in the registers' terms."""
+        """Return the position it is led to, in the registers' terms."""
         profile = self.shaft.profile
         if self.torque and isinstance(profile, Profile):
             return round((profile.goal + self._shift) * self._scale)
@@ -236,7 +236,7 @@ class FeetechDrive:
             self._lead(profile, profile.goal + signed(asked[1], 15) / self._scale, asked)
 
     def _place(self, goal: int) -> float:
-        """Give where a goal position is, within the limits."""
+        """Return where a goal position is, within the limits."""
         if self._range is not None:
             goal = max(self._range[0], min(self._range[1], goal))
         return goal / self._scale - self._shift

@@ -17,7 +17,7 @@ SHORTEST = 6
 
 
 def checksum(body: bytes) -> int:
-    """Give the checksum of all between header and checksum."""
+    """Return the checksum of all between header and checksum."""
     return ~sum(body) & 0xFF
 
 

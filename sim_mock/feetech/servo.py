@@ -116,7 +116,7 @@ class FeetechServo(SmartServo):
         return self.errors
 
     def read(self, address: int, length: int) -> bytes:
-        """Give bytes of the memory; what is no register is 0."""
+        """Return bytes of the memory; what is no register is 0."""
         if address < SENSED_END and address + length > SENSED_AT:
             self._refresh()
         return self.memory.read(address, length)
@@ -241,17 +241,17 @@ class FeetechServo(SmartServo):
 
     @property
     def answers_all(self) -> bool:
-        """Tell whether it answers more than ping and reads, by register 8."""
+        """True if it answers more than ping and reads, by register 8."""
         return self.memory.get("status_level") != 0
 
     @property
     def baud(self) -> int:
-        """Give bit/s by register 6; a new one acts after the status of its write has gone out."""
+        """Return bit/s by register 6; a new one acts after the status of its write has gone out."""
         return self.table.baud_rates[self.memory.get("baud_rate")]
 
     @property
     def return_delay_s(self) -> float:
-        """Give the pause before a status, by register 7."""
+        """Return the pause before a status, by register 7."""
         return self.memory.get("return_delay") * RETURN_DELAY_UNIT_S
 
     @property

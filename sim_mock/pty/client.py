@@ -24,7 +24,7 @@ class _Served:
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
     def _start(self, buses: Sequence[Mapping[str, object]]) -> list[str]:
-        """Start it for these settings of buses; gives the path of each."""
+        """Start it for these settings of buses; return the path of each."""
         self._folder = tempfile.TemporaryDirectory(prefix="servo-bus-")
         links = [str(Path(self._folder.name) / f"tty{k or ''}") for k in range(len(buses))]
         linked = [{**bus, "link": link} for bus, link in zip(buses, links, strict=True)]
@@ -46,13 +46,13 @@ class _Served:
 
     @property
     def pid(self) -> int:
-        """Give the server's process id."""
+        """Return the server's process id."""
         if self._server is None:
             raise RuntimeError("the emulated bus is not running: start it first")
         return self._server.pid
 
     def command(self, text: str, bus: str = "") -> str:
-        """Carry out a fault command in the server, on the bus of this name; gives what it did.
+        """Carry out a fault command in the server, on the bus of this name; return what it did.
 
         Raises:
             ValueError: names the word that is wrong and what would be right.
@@ -114,7 +114,7 @@ class PtyBus(_Served):
         turnaround_us: float = 0.0,
         choices: Mapping[str, str] | None = None,
     ) -> str:
-        """Start a server for Dynamixel servos; gives the path to open as a serial port.
+        """Start a server for Dynamixel servos; return the path to open as a serial port.
 
         The rest as for ``start_device``.
         """
@@ -129,7 +129,7 @@ class PtyBus(_Served):
         choices: Mapping[str, str] | None = None,
         seed: int = 0,
     ) -> str:
-        """Start a server for servos or a board; gives the path to open as a serial port.
+        """Start a server for servos or a board; return the path to open as a serial port.
 
         The path stays the same over ``unplug`` and ``plug``. The rest as in
         sim_mock.pty.line.BusSettings.
@@ -152,7 +152,7 @@ class PtyBuses(_Served):
     """All emulated buses of a rig in one process of their own, each on its terminal."""
 
     def start(self, devices: Mapping[str, Emulated]) -> dict[str, str]:
-        """Start a server for what is on every bus; gives the path of each, by the same names.
+        """Start a server for what is on every bus; return the path of each, by the same names.
 
         Raises:
             RuntimeError: the server did not start; its message is on standard error.

@@ -31,7 +31,7 @@ class BusSettings:
     wire_time, turnaround_us: as in sim_mock.wire
     link: name under which the terminal can be opened, also after it was unplugged
     choices: cases of the device by name
-    seed: of the dice that faults throw
+    seed: of the random numbers that faults draw
     """
 
     device: Emulated
@@ -75,11 +75,11 @@ class TerminalLine:
         self._warned: int | None = None
 
     def where(self) -> str:
-        """Give as JSON the path to open, the baud rate, and the name where there is one."""
+        """Return as JSON the path to open, the baud rate, and the name where there is one."""
         return self.labelled({"path": self.terminal.path, "baud": self.settings.device.baud})
 
     def labelled(self, told: Mapping[str, object]) -> str:
-        """Give as JSON what is told of this bus."""
+        """Return as JSON what is told of this bus."""
         name = self.settings.name
         return json.dumps(told if name is None else {"bus": name, **told})
 
@@ -90,12 +90,12 @@ class TerminalLine:
     # --- bytes
 
     def watched(self) -> list[int]:
-        """List the files that become readable when there is something to do."""
+        """Return the files that become readable when there is something to do."""
         watch = self.terminal.watch
         return [fd for fd in (self.terminal.master, -1 if watch is None else watch.fd) if fd >= 0]
 
     def patience_s(self) -> float:
-        """Give how long nothing needs to be done but for what arrives."""
+        """Return how long nothing needs to be done but for what arrives."""
         due_s = self.line.next_due_s()
         if due_s is not None:
             return max(0.0, due_s - SPIN_S - self._now_s())
@@ -116,7 +116,7 @@ class TerminalLine:
             self._plug()
 
     def _take_bytes(self, now_s: float) -> None:
-        """Give the client's bytes to the line, and back what is answered at once."""
+        """Return the client's bytes to the line, and back what is answered at once."""
         data = self.terminal.read()
         careful = self.device.heed_baud or self.line.wire_time
         baud = self.terminal.client_baud() if careful else 0
@@ -180,7 +180,7 @@ class TerminalLine:
     # --- commands
 
     def obey(self, text: str) -> str:
-        """Carry out a fault command; gives {"ok": ...} or {"error": ...} as JSON."""
+        """Carry out a fault command; return {"ok": ...} or {"error": ...} as JSON."""
         try:
             done = self.device.faults.command(text)
         except ValueError as error:
@@ -192,5 +192,5 @@ class TerminalLine:
 
 
 def _patience(device: Emulated) -> dict[str, str]:
-    """Give the choice that lets a device wait for the rest of a torn packet."""
+    """Return the choice that lets a device wait for the rest of a torn packet."""
     return {PACKET_GAP: str(GAP_MS)} if PACKET_GAP in CASES[device.kind] else {}

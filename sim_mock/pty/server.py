@@ -153,7 +153,7 @@ def say(line: str) -> None:
 
 
 def settings_of(told: Mapping[str, Any]) -> Settings:
-    """Give the settings that travelled as JSON.
+    """Return the settings that travelled as JSON.
 
     Raises:
         ValueError, TypeError: there is no such device, or it has no such setting.

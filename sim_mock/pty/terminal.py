@@ -5,6 +5,7 @@ new number each time. The slave side is kept open here, raw, else it would echo 
 between two clients.
 """
 
+import ctypes
 import errno
 import fcntl
 import os
@@ -14,13 +15,53 @@ import termios
 import tty
 from pathlib import Path
 
-from sim_mock.pty.watch import Watch
-
 # struct termios2 of asm-generic/termbits.h: 4 flag words, line, 19 control characters, 2 speeds
 _TERMIOS2 = struct.Struct("<4I20s2I")
 _TCGETS2, _TCSETS2 = 0x802C542A, 0x402C542B
 _ANY_BAUD, _BAUD_MASK = 0o010000, 0o010017
 _INPUT_SHIFT = 16
+
+_OPEN, _CLOSE_WRITE, _CLOSE_NOWRITE = 0x20, 0x08, 0x10
+_EVENT = struct.Struct("iIII")
+"""Of inotify(7), of which Python has no module."""
+
+
+class Watch:
+    """Counts those who open and close a file, from now on: the kernel's inotify(7).
+
+    Where the kernel cannot, ``fd`` is -1 and nobody is ever seen.
+    """
+
+    def __init__(self, path: str) -> None:
+        libc = ctypes.CDLL(None, use_errno=True)
+        self.fd = int(libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC))
+        self.opened = 0
+        if self.fd >= 0:
+            wanted = _OPEN | _CLOSE_WRITE | _CLOSE_NOWRITE
+            libc.inotify_add_watch(self.fd, path.encode(), wanted)
+
+    def look(self) -> bool:
+        """Take in what happened; True when the last one has gone."""
+        before = self.opened
+        gone = False
+        try:
+            data = os.read(self.fd, 4096)
+        except BlockingIOError:
+            return False
+        at = 0
+        while at < len(data):
+            _, mask, _, name_length = _EVENT.unpack_from(data, at)
+            at += _EVENT.size + name_length
+            self.opened += 1 if mask & _OPEN else -1
+            gone = gone or self.opened == 0
+        self.opened = max(0, self.opened)
+        return self.opened == 0 and (gone or before > 0)
+
+    def close(self) -> None:
+        """Stop looking."""
+        if self.fd >= 0:
+            os.close(self.fd)
+            self.fd = -1
 
 
 class Terminal:
@@ -45,7 +86,7 @@ class Terminal:
 
     @property
     def plugged(self) -> bool:
-        """Tell whether the terminal is there."""
+        """True if the terminal is there."""
         return self.master >= 0
 
     def plug(self) -> None:
@@ -79,7 +120,7 @@ class Terminal:
         self.master = self._slave = -1
 
     def read(self) -> bytes:
-        """Give what the client has sent, nothing where that was nothing."""
+        """Return what the client has sent, nothing where that was nothing."""
         try:
             return os.read(self.master, 4096)
         except BlockingIOError:
@@ -93,7 +134,7 @@ class Terminal:
             return
 
     def client_baud(self) -> int:
-        """Give the baud rate the client has set."""
+        """Return the baud rate the client has set."""
         words = fcntl.ioctl(self.master, _TCGETS2, bytes(_TERMIOS2.size))
         return int(_TERMIOS2.unpack(words)[-1])
 

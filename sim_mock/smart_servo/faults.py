@@ -91,7 +91,7 @@ class ServoFaults(LineFaults):
         return f"{self.who(servo_id)} has {volts:g} V"
 
     def temperature(self, servo_id: int | None, celsius: float) -> str:
-        """Give a servo's motor a temperature, from which it drifts on by itself."""
+        """Return a servo's motor a temperature, from which it drifts on by itself."""
         for servo in self._servos(servo_id):
             servo.temperature_c = celsius
         return f"{self.who(servo_id)} has {celsius:g} degC"

@@ -35,22 +35,22 @@ class Motor(Protocol):
 
     @property
     def stall_torque_nm(self) -> float:
-        """Give the torque that holds it still."""
+        """Return the torque that holds it still."""
         ...
 
     @property
     def stall_current_a(self) -> float:
-        """Give the current it draws then."""
+        """Return the current it draws then."""
         ...
 
     @property
     def no_load_rpm(self) -> float:
-        """Give the speed without load."""
+        """Return the speed without load."""
         ...
 
     @property
     def rated_v(self) -> float:
-        """Give the voltage that all this is for."""
+        """Return the voltage that all this is for."""
         ...
 
 
@@ -316,5 +316,5 @@ class Shaft:
 
     @property
     def speed_steps_s(self) -> float:
-        """Give the speed of the shaft."""
+        """Return the speed of the shaft."""
         return self.v / MS_S

@@ -90,7 +90,7 @@ class ServoSpec(NamedTuple):
 
 
 def checked(physics: Physics) -> Physics:
-    """Give the physics if it can exist.
+    """Return the physics if it can exist.
 
     Raises:
         ValueError: a number is out of its range, named with the range.

@@ -31,7 +31,7 @@ class Profile:
 
     @property
     def jumps(self) -> bool:
-        """Tell whether it has no speed to follow: Velocity Trajectory of a step is 0."""
+        """True if it has no speed to follow: Velocity Trajectory of a step is 0."""
         return self.kind == STEP
 
     def rest(self, position: float) -> None:
@@ -104,7 +104,7 @@ class Profile:
         self._slow = 0.5 * cruise / last if last > 0.0 else 0.0
 
     def ahead(self, ticks: int) -> list[float]:
-        """Give the positions of the next milliseconds and go on by them."""
+        """Return the positions of the next milliseconds and go on by them."""
         if not self.running:
             return [self.goal] * ticks
         begun, t1, t2, t3, goal = self._t, self._t1, self._t2, self._t3, self.goal
@@ -180,7 +180,7 @@ class SpeedProfile:
         self.running = speed != self.v or speed != 0.0
 
     def ahead(self, ticks: int) -> list[float]:
-        """Give the positions of the next milliseconds and go on by them."""
+        """Return the positions of the next milliseconds and go on by them."""
         r, v, goal, ramp, path = self.r, self.v, self.goal, self._ramp, []
         for _ in range(ticks):
             if v != goal:
