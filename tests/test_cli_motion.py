@@ -264,9 +264,9 @@ def test_look_at_tells_error_and_vergence() -> None:
 
 
 def test_monitor_as_lines_of_json() -> None:
-    done = run("monitor", "--mock", "--json", "--seconds", "0.45", "--rate", "10")
+    done = run("monitor", "--mock", "--json", "--seconds", "1.5", "--rate", "10")
     lines = [json.loads(line) for line in done.stdout.splitlines()]
-    assert done.exit_code == 0 and 2 <= len(lines) <= 5
+    assert done.exit_code == 0 and 2 <= len(lines) <= 16
     assert set(lines[0]["joints"]) == set(JOINTS)
     assert lines[-1]["t_s"] > lines[0]["t_s"] and lines[-1]["unanswered"] == 0
 

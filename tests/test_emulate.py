@@ -55,7 +55,7 @@ class Emulator:
 
     def end(self, number=signal.SIGINT):
         self.process.send_signal(number)
-        code = self.process.wait(10)
+        code = self.process.wait(60)
         for pipe in (self.process.stdin, self.process.stdout):
             if pipe is not None:
                 pipe.close()
@@ -181,7 +181,7 @@ def test_it_stays_without_standard_input_and_ends_on_sigterm(tmp_path):
 def test_it_ends_with_standard_input_when_told_to():
     emulator = Emulator("--servos", "1:xl330-m077", "--until-eof")
     emulator.process.stdin.close()
-    assert emulator.process.wait(10) == 0
+    assert emulator.process.wait(60) == 0
     emulator.process.stdout.close()
 
 

@@ -59,7 +59,7 @@ def test_the_server_says_its_path_and_ends_with_its_parents_pipe():
     terminal = json.loads(server.stdout.readline())["path"]
     assert Path(terminal).is_char_device()
     server.stdin.close()
-    assert server.wait(10) == 0
+    assert server.wait(60) == 0
     server.stdout.close()
 
 
@@ -72,7 +72,7 @@ def test_the_server_ignores_ctrl_c_and_heeds_sigterm():
     assert PacketHandler(2.0).ping(port, 1)[1] == COMM_SUCCESS
     port.closePort()
     server.terminate()
-    assert server.wait(10) == 0
+    assert server.wait(60) == 0
     assert not Path(terminal).exists()
     server.stdin.close()
     server.stdout.close()
@@ -208,7 +208,7 @@ def test_a_late_answer_comes_late(strict, client):
     client.write(bytes.fromhex("FFFFFD0001030001194E"))
     began = time.monotonic()
     assert client.read_until(14, began + 0.02) == b""
-    assert len(client.read_until(14, began + 5.0)) == 14
+    assert len(client.read_until(14, began + 30.0)) == 14
 
 
 def test_a_client_at_a_wrong_baud_rate_hears_nothing(strict, client):
@@ -236,8 +236,8 @@ def test_unplug_is_an_error_and_plug_brings_the_name_back(strict, client):
 def test_unplugged_for_a_time_it_comes_back_by_itself(strict, client):
     strict.command("unplug for 0.05")
     with pytest.raises(BusLost):
-        client.read_until(1, time.monotonic() + 5.0)
-    deadline = time.monotonic() + 5.0
+        client.read_until(1, time.monotonic() + 30.0)
+    deadline = time.monotonic() + 30.0
     while not Path(strict.path).exists() and time.monotonic() < deadline:
         time.sleep(0.005)
     client.setBaudRate(1_000_000)
@@ -271,7 +271,7 @@ def test_forbidding_takes_the_rights_of_the_terminal(strict):
 
 def test_babble_reaches_a_client_that_asks_nothing(strict, client):
     strict.command("babble on")
-    heard = client.read_until(500, time.monotonic() + 5.0)
+    heard = client.read_until(500, time.monotonic() + 30.0)
     strict.command("babble off")
     assert heard.count(b"\xff\xff\xfd\x00") > 50
     client.drain()
@@ -286,7 +286,7 @@ def test_with_wire_time_nothing_comes_before_it_is_due():
         for _ in range(5):
             began = port.now_s()
             port.write(read)
-            assert len(port.read_until(15, began + 5.0)) == 15
+            assert len(port.read_until(15, began + 30.0)) == 15
             assert port.now_s() - began >= (14 + 15) * 10 / 57_600 + 500e-6
         port.closePort()
 
