@@ -11,6 +11,7 @@ from drivers.host_lateness import BUSY, WITHIN_S, HostLateness
 from drivers.serial.port import BlockingPort
 
 KINDS = ("dynamixel", "feetech")
+SYNC_READ = 0x82
 
 
 def test_few_late_answers_are_no_busy_computer():
@@ -101,6 +102,25 @@ def test_servos_that_stood_still_for_a_while_are_no_bad_plug(kind, seconds):
     about = [text for text in outcome.said if "answer" in text or "check" in text]
     assert len(about) == 1, about
     assert "emulator stood still" in about[0]
+    assert outcome.wrong == 0
+
+
+def test_an_answer_that_may_be_to_an_older_question_is_confirmed_by_another():
+    noisy = Noisy("feetech")
+    noisy.start()
+    asked = []
+    write = noisy.port.write
+
+    def counted(data):
+        asked.append(data[4])
+        write(data)
+
+    noisy.port.write = counted
+    noisy.run("clear", 0.0, 20)
+    in_peace = asked.count(SYNC_READ)
+    asked.clear()
+    outcome = noisy.run("stall all 5 count 12", 0.0, 20)
+    assert asked.count(SYNC_READ) > in_peace + 20
     assert outcome.wrong == 0
 
 

@@ -286,8 +286,11 @@ class FeetechBus:
         if (damaged := self._line.errors["corrupt"]) != self._damaged:
             self._damaged = damaged
             places.damaged(now_s)
-        if heard and places.disturbed(now_s):
-            heard = self._confirmed(heard)
+        disturbed = places.disturbed(now_s)
+        doubtful = {i: h for i, h in heard.items() if disturbed or self._reader.owing(i, now_s)}
+        if doubtful:
+            sure = {i: h for i, h in heard.items() if i not in doubtful}
+            heard = sure | self._confirmed(doubtful)
         believed, dark = self._readings.all_believed(heard), not self._roll.group
         for servo_id, one in heard.items():
             slot = self._slot[servo_id]

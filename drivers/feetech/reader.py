@@ -18,6 +18,9 @@ from drivers.servo_bus.window_schedule import Turns
 MOST_GROUPS = 64
 """So many prepared exchanges are kept."""
 
+OWED_S = 0.5
+"""An answer may still come so long after waiting for it has ended."""
+
 
 class Heard(NamedTuple):
     """One servo's answer and when it arrived."""
@@ -48,6 +51,7 @@ class Reader:
         self.roll = roll
         self._together, self._alone, self._second = together, alone, second
         self._until_s = inf
+        self._unanswered_s: dict[int, float] = {}
         self._groups: dict[tuple[tuple[int, ...], int], Group] = {}
 
     def read(self, now_s: float) -> dict[int, Heard]:
@@ -65,6 +69,14 @@ class Reader:
         if due is not None and self._line.port.now_s() < self._until_s:
             self._read((due,), heard, now_s, self._alone)
         return heard
+
+    def owing(self, servo_id: int, now_s: float) -> bool:
+        """Tell whether a servo has left a question unanswered of late.
+
+        The answer that comes now may be to that one: an STS packet says nothing of when or
+        to what question it was given, and neither length nor silence tells.
+        """
+        return now_s - self._unanswered_s.get(servo_id, -inf) <= OWED_S
 
     def again(self, ids: Sequence[int]) -> dict[int, Heard]:
         """Ask some servos once more, in one exchange; who is not in the answer gave no good one.
@@ -124,6 +136,9 @@ class Reader:
                 heard[servo_id] = Heard(sample, at_s)
             if len(samples) == len(group.ids):
                 return
+            for servo_id in group.ids:
+                if servo_id not in samples:
+                    self._unanswered_s[servo_id] = now_s
             silent = silent_ones(group.ids, samples.keys() | damaged)
             if not samples and not damaged and HEADER in raw:
                 self._line.lateness.late_answer(now_s)  # that of an earlier question
