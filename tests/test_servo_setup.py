@@ -79,7 +79,7 @@ def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, b
     bench.chain.refresh()
     bench.port.setBaudRate(BAUD)
     assert kind.ping(bench.port, 7, BAUD, 1) is not None
-    assert kind.lock is None or bench.registers().read(7, kind.lock) == 1
+    assert kind.family.lock is None or bench.registers().read(7, kind.family.lock) == 1
 
 
 @each
@@ -170,7 +170,7 @@ def test_a_restart_ends_an_overload_and_takes_the_torque(kind):
     assert result.before.errors == ("overload",)
     assert (result.after.errors, result.after.torque) == ((), False)
     assert result.after.position == 2000 and 0.3 < result.away_s < 1.5
-    verb = "latched" if kind.latching else "reports"
+    verb = "latched" if kind.family.faults_latch else "reports"
     assert str(result.before).startswith(f"{verb}: overload, torque ")
 
 

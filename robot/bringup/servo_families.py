@@ -4,11 +4,13 @@ from collections.abc import Callable
 
 from drivers.dynamixel import control_table as dynamixel
 from drivers.dynamixel import discovery as dynamixel_scan
+from drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
 from drivers.dynamixel.registers import Registers
 from drivers.errors import SetupError
 from drivers.feetech import homing
 from drivers.feetech import memory_table as feetech
 from drivers.feetech import scan as feetech_scan
+from drivers.feetech.family import FEETECH as FEETECH_FAMILY
 from drivers.feetech.protocol import REBOOT, instruction
 from drivers.feetech.registers import StsRegisters
 from drivers.serial.port import BusPort
@@ -68,6 +70,7 @@ def _reboot_feetech(port: BusPort, servo_id: int) -> None:
 DYNAMIXEL = ServoKind(
     name="dynamixel",
     title="Dynamixel",
+    family=DYNAMIXEL_FAMILY,
     models=dynamixel.MODELS,
     rates=dynamixel_scan.COMMON_FIRST,
     baud_rates=dynamixel.BAUD_RATES,
@@ -76,11 +79,6 @@ DYNAMIXEL = ServoKind(
     no_reply="is the servo supply on? does each servo's LED flash once when it comes on? is the "
     "adaptor's plug the TTL one (3 pins), and the first cable in?",
     notes=(),
-    error_status="hardware_error_status",
-    latching=True,
-    answers_all=2,
-    watchdog_unit_s=dynamixel.WATCHDOG_UNIT_S,
-    lock=None,
     driving=Driving(
         settings=(Setting("operating_mode", 3), Setting("drive_mode", 0)),
         offset="homing_offset",
@@ -89,8 +87,6 @@ DYNAMIXEL = ServoKind(
         gentle=_gentle_dynamixel,
         load=_dynamixel_load,
     ),
-    lasting=lambda name: dynamixel.REGISTERS[name].area == "eeprom",
-    name_errors=dynamixel.name_errors,
     version=str,
     registers=Registers,
     scan_ids=dynamixel_scan.everybody,
@@ -103,6 +99,7 @@ DYNAMIXEL = ServoKind(
 FEETECH = ServoKind(
     name="feetech",
     title="Feetech STS",
+    family=FEETECH_FAMILY,
     models=feetech.MODELS,
     rates=feetech_scan.COMMON_FIRST,
     baud_rates=feetech.BAUD_RATES,
@@ -114,11 +111,6 @@ FEETECH = ServoKind(
         "an STS has no bus watchdog: if the cable or the computer dies it holds its last goal; "
         "keep the switch of the servo supply at hand",
     ),
-    error_status="status",
-    latching=False,
-    answers_all=1,
-    watchdog_unit_s=None,
-    lock="lock",
     driving=Driving(
         settings=(
             Setting("operating_mode", 0),
@@ -131,8 +123,6 @@ FEETECH = ServoKind(
         gentle=_gentle_feetech,
         load=_feetech_load,
     ),
-    lasting=lambda name: feetech.REGISTERS[name].area == "eeprom",
-    name_errors=feetech.name_errors,
     version=lambda firmware: f"{firmware // 100}.{firmware % 100}",
     registers=StsRegisters,
     scan_ids=feetech_scan.everybody,

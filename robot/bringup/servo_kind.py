@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from drivers.serial.port import BusPort
+from drivers.servo_bus.family import Family, Identity
 from drivers.servo_models import BusKind
 
 Tell = Callable[[str], None]
@@ -66,20 +67,6 @@ class ServoModel(Protocol):
     @property
     def rated_v(self) -> float:
         """Return the voltage that it is made for."""
-        ...
-
-
-class Identity(Protocol):
-    """What a servo calls itself."""
-
-    @property
-    def model_number(self) -> int:
-        """Return the number of its model."""
-        ...
-
-    @property
-    def firmware(self) -> int:
-        """Return its firmware as its kind counts it."""
         ...
 
 
@@ -151,15 +138,12 @@ class ServoKind(NamedTuple):
     """One kind of smart servo; ports are open at the baud rate that is given or was found.
 
     title: as people call it
+    family: what the engine must know of it
+    models: by name, with what a doctor must know of them
     rates: every baud rate, the usual ones first; factory_baud: of a new servo, whose id is 1
     baud_rates: by the value of the servo's register
     no_reply: what to look at where no servo answers
     notes: what must be known of all of them
-    error_status: register of its errors; latching: they stay until a restart
-    answers_all: Status Return Level at which everything is confirmed
-    watchdog_unit_s: unit of its bus watchdog, None where it has none
-    lock: register that opens the memory which outlives the power, None where the torque does
-    lasting: whether a register is kept without power
     version: writes a firmware number as the maker does
     registers: makes access to single registers, of a port and a number of tries
     scan_ids: asks all ids; returns who answered, and the number of bytes that made no sense
@@ -171,6 +155,7 @@ class ServoKind(NamedTuple):
 
     name: BusKind
     title: str
+    family: Family
     models: Mapping[str, ServoModel]
     rates: tuple[int, ...]
     baud_rates: tuple[int, ...]
@@ -178,14 +163,7 @@ class ServoKind(NamedTuple):
     highest_id: int
     no_reply: str
     notes: tuple[str, ...]
-    error_status: str
-    latching: bool
-    answers_all: int
-    watchdog_unit_s: float | None
-    lock: str | None
     driving: Driving
-    lasting: Callable[[str], bool]
-    name_errors: Callable[[int], tuple[str, ...]]
     version: Callable[[int], str]
     registers: Callable[[BusPort, int], Registers]
     scan_ids: Callable[[BusPort, int], tuple[tuple[Found, ...], int]]
@@ -195,20 +173,16 @@ class ServoKind(NamedTuple):
     reboot: Callable[[BusPort, int], None]
     set_middle: Callable[[BusPort, int], int] | None = None
 
-    def model_name(self, number: int) -> str:
-        """Return the name of a model by its number, "model number 1029" where it is unknown."""
-        names = (name for name, model in self.models.items() if model.number == number)
-        return next(names, f"model number {number}")
-
     def write_lasting(self, registers: Registers, servo_id: int, name: str, value: int) -> bool:
         """Write a register so that it outlives the power, where it is one that can.
 
         Where there is a lock it is open for this alone. Returns whether the servo has the value.
         """
-        if self.lock is None or not self.lasting(name):
+        lock = self.family.lock
+        if lock is None or self.family.registers[name].area != "eeprom":
             return registers.settle(servo_id, name, value)
-        if not registers.write(servo_id, self.lock, 0):
+        if not registers.write(servo_id, lock, 0):
             return False
         written = registers.write(servo_id, name, value)
-        closed = registers.write(servo_id, self.lock, 1)
+        closed = registers.write(servo_id, lock, 1)
         return closed and written and registers.read(servo_id, name) == value

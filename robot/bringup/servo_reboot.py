@@ -65,15 +65,15 @@ def standing(port: BusPort, kind: ServoKind, servo_id: int) -> Standing:
         drivers.errors.BusLost: the port is gone.
     """
     registers = kind.registers(port, TRIES)
-    status = registers.read(servo_id, kind.error_status)
+    status = registers.read(servo_id, kind.family.error_register)
     torque = registers.read(servo_id, "torque_enable")
     volts = registers.read(servo_id, "present_input_voltage")
     return Standing(
-        kind.name_errors(status or 0),
+        kind.family.name_errors(status or 0),
         None if torque is None else bool(torque),
         registers.read(servo_id, "present_position"),
         None if volts is None else volts / 10.0,
-        kind.latching,
+        kind.family.faults_latch,
     )
 
 

@@ -136,14 +136,14 @@ class _Assignment:
                 f"{self._port.port_name}: the servo does not answer as id {self._id} at "
                 f"{self._baud} bit/s: gazerig scan tells where it is"
             )
-        if kind.lock is not None and not registers.settle(self._id, kind.lock, 1):
+        if kind.family.lock is not None and not registers.settle(self._id, kind.family.lock, 1):
             raise self._refused("close its lock")
         return SetUp(self._found, seen, tuple(self._done))
 
     def _torque_off(self) -> None:
         """Make the servo confirm all that it is told, and switch its torque off."""
         registers = self._registers
-        registers.write_all((self._id,), "status_return_level", self._kind.answers_all)
+        registers.write_all((self._id,), "status_return_level", self._kind.family.answer_level)
         if registers.read(self._id, "torque_enable"):
             if not registers.write(self._id, "torque_enable", 0):
                 raise self._refused("let its torque go")
@@ -168,7 +168,7 @@ class _Assignment:
         self._open(baud)
 
     def _unlock(self) -> None:
-        lock = self._kind.lock
+        lock = self._kind.family.lock
         if lock is not None and not self._registers.write(self._id, lock, 0):
             raise self._refused("open its lock")
 

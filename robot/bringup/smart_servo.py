@@ -14,8 +14,6 @@ from robot.bringup.servo_kind import TRIES
 WATCHDOG_S = 0.3
 """Three readings that were lost in a row must not let it trip."""
 
-STEPS_PER_TURN = 4096
-
 LIMITS = ("min_position_limit", "max_position_limit")
 
 
@@ -31,8 +29,9 @@ class SmartServo:
     def __init__(self, name: str, servo_id: int, model: str, port: BusPort) -> None:
         self.who = f"{name} (servo {servo_id})"
         self._kind = kind_of(model)
+        self._family = self._kind.family
         self.alone = ""
-        if self._kind.watchdog_unit_s is None:
+        if self._family.watchdog_unit_s is None:
             self.alone = (
                 "these servos have no watchdog: if this program is killed, it holds its last goal "
                 "weakly until the servo power is cut"
@@ -45,10 +44,10 @@ class SmartServo:
     def check(self) -> Found:
         """See that it is the right servo, sound, and in position mode; see OneServo."""
         # A servo may be set to answer questions alone; this takes no answer and ends that.
-        self._registers.write_all((self._id,), "status_return_level", self._kind.answers_all)
+        self._registers.write_all((self._id,), "status_return_level", self._family.answer_level)
         firmware = self._refuse_another()
         value, driving = self._asked.value, self._kind.driving
-        self._refuse_errors(value(self._kind.error_status))
+        self._refuse_errors(value(self._family.error_register))
         low, high = (value(name) for name in LIMITS)
         for setting in driving.settings:
             now = value(setting.register)
@@ -71,9 +70,9 @@ class SmartServo:
         found = self._registers.identify(self._id)
         if found is None:
             raise ServoMissing(f"{self.who} does not answer: check power, cable, id and baud rate")
-        if found.model_number != self._kind.models[self._model].number:
+        if found.model_number != self._family.models[self._model].number:
             raise ServoMissing(
-                f"{self.who} is {self._kind.model_name(found.model_number)}, "
+                f"{self.who} is {self._family.model_name(found.model_number)}, "
                 f"not {self._model}: correct the rig file, or check the ids"
             )
         return found.firmware
@@ -82,10 +81,10 @@ class SmartServo:
         if status:
             remedy = (
                 f"find the cause, then gazerig reboot {self._id}"
-                if self._kind.latching
+                if self._family.faults_latch
                 else "let it cool, free it, check its supply"
             )
-            names = " and ".join(self._kind.name_errors(status))
+            names = " and ".join(self._family.name_errors(status))
             raise ServoFault(f"{self.who}: {names}: {remedy}")
 
     def clear_offset(self) -> int:
@@ -114,7 +113,7 @@ class SmartServo:
         Raises:
             drivers.errors.ServoFault: it is not.
         """
-        if self._kind.watchdog_unit_s is not None:
+        if self._family.watchdog_unit_s is not None:
             self._asked.put("bus_watchdog", 0)
         self._asked.put("torque_enable", 0)
         if self._asked.value("torque_enable"):
@@ -132,11 +131,11 @@ class SmartServo:
         """Switch the torque on where it is, weak and slow; see OneServo."""
         value, put = self._asked.value, self._asked.put
         self.let_go()
-        if self._kind.lock is not None:
-            put(self._kind.lock, 1)
+        if self._family.lock is not None:
+            put(self._family.lock, 1)
         self._borrow(strength, speed_steps_s)
         before = self.position()
-        if not 0 <= before < STEPS_PER_TURN:
+        if not 0 <= before < self._family.steps_per_turn:
             raise ServoMissing(
                 f"{self.who} has been turned over the seam of its encoder (it reads {before}): "
                 "turn it back, or switch the servo power off and on, and begin anew"
@@ -146,9 +145,9 @@ class SmartServo:
         now = self.position()
         if not value("torque_enable"):
             raise ServoFault(f"{self.who}: the torque does not come on: gazerig doctor says why")
-        if abs(now - before) > STEPS_PER_TURN // 4:
+        if abs(now - before) > self._family.steps_per_turn // 4:
             raise ServoFault(f"{self.who}: its position jumped from {before} to {now}")
-        unit_s = self._kind.watchdog_unit_s
+        unit_s = self._family.watchdog_unit_s
         if unit_s is not None:
             put("bus_watchdog", round(WATCHDOG_S / unit_s))
 
@@ -156,7 +155,7 @@ class SmartServo:
         """Let goals lead anywhere in the turn, weak and slow; the stops alone are to be found."""
         value, driving = self._asked.value, self._kind.driving
         wanted = {
-            **dict(zip(LIMITS, (0, STEPS_PER_TURN - 1), strict=True)),
+            **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),
             **driving.gentle(value, strength, speed_steps_s),
         }
         was = {name: value(name) for name in wanted}

@@ -104,7 +104,7 @@ def _mute(state: ServoState) -> Iterator[Verdict]:
             "error",
             "answers pings and nothing else (Status Return Level 0)",
             FIX,
-            (("status_return_level", state.checks.kind.answers_all),),
+            (("status_return_level", state.checks.kind.family.answer_level),),
         )
     else:
         yield from _unread(state)
@@ -132,9 +132,9 @@ def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
     """
     registers, servo_id = kind.registers(port, TRIES), fix.servo_id
     torque = registers.read(servo_id, "torque_enable")
-    if not torque and registers.read(servo_id, "status_return_level") != kind.answers_all:
+    if not torque and registers.read(servo_id, "status_return_level") != kind.family.answer_level:
         # A servo that answers questions or pings alone confirms nothing of what follows.
-        registers.write_all((servo_id,), "status_return_level", kind.answers_all)
+        registers.write_all((servo_id,), "status_return_level", kind.family.answer_level)
         torque = registers.read(servo_id, "torque_enable")
     if torque:
         return "its torque is on"

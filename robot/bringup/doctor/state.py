@@ -23,13 +23,13 @@ MEANT = 0.875
 
 def _errors(state: ServoState) -> Iterator[Verdict]:
     kind = state.checks.kind
-    verb = "has latched" if kind.latching else "reports"
-    for error in kind.name_errors(state.values[kind.error_status] or 0):
+    verb = "has latched" if kind.family.faults_latch else "reports"
+    for error in kind.family.name_errors(state.values[kind.family.error_register] or 0):
         look = f"look it up in {state.checks.manual}"
         remedy = state.checks.error_remedies.get(error, look)
         if not remedy:
             continue
-        if kind.latching:
+        if kind.family.faults_latch:
             remedy += "; then gazerig reboot {id}"
         yield Verdict("error", f"{verb}: {error}", remedy.format(id=state.setup.id))
 
@@ -100,7 +100,7 @@ def _torque(state: ServoState) -> Iterator[Verdict]:
 
 
 def _watchdog(state: ServoState) -> Iterator[Verdict]:
-    if state.checks.kind.watchdog_unit_s is None:
+    if state.checks.kind.family.watchdog_unit_s is None:
         return
     if state.values["bus_watchdog"] == TRIPPED:
         yield Verdict(
@@ -112,7 +112,7 @@ def _watchdog(state: ServoState) -> Iterator[Verdict]:
 
 
 def _lock(state: ServoState) -> Iterator[Verdict]:
-    lock = state.checks.kind.lock
+    lock = state.checks.kind.family.lock
     if lock is not None and state.values[lock] == 0:
         yield Verdict(
             "warn",
