@@ -13,6 +13,7 @@ from drivers.i2c import port as i2c_port
 from drivers.i2c.bridge import ASK_STATUS, Part, commands, read, write
 from drivers.i2c.port import I2cPort, explain, port_of
 from drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from drivers.pca9685.probe import probe
 from drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
 from drivers.pca9685.release import stop_pulses
 from drivers.serial.port import BlockingPort
@@ -170,6 +171,18 @@ def test_two_boards_are_one_bus():
     assert world.chip(0x43).counts(1) and not world.chip(0x43).counts(2)
     world.bus.release()
     assert world.widths() == [0, 0]
+
+
+def test_a_scan_finds_the_boards_and_no_other_chip():
+    world = World((2, 17), replace(QUICK, further_addresses=(0x43,)), (0x40, 0x43))
+    before = [bytes(chip._registers) for chip in world.device.body.chips.values()]
+    assert probe(world.port, QUICK) == (0x40, 0x43)
+    assert [bytes(chip._registers) for chip in world.device.body.chips.values()] == before
+    world.command("foreign on")
+    assert probe(world.port, QUICK) == ()
+    world.command("stuck on")
+    assert probe(world.port, QUICK) == ()
+    assert world.bus.health().errors == {}
 
 
 # --- moving

@@ -6,7 +6,6 @@ goal that is not followed up stands. What a servo's id is: sixteen times its boa
 
 from collections import defaultdict
 from collections.abc import Sequence
-from math import ceil, floor
 
 from drivers.errors import ServoMissing
 from drivers.event_log import EventLog
@@ -35,10 +34,12 @@ from drivers.pca9685.registers import (
     TOTEM_POLE,
     US_STEPS,
     counts_of,
+    counts_within,
     output,
     plausible,
     prescale_of,
     pulse,
+    runs,
     steps_per_count,
 )
 from drivers.serial.port import BusPort
@@ -174,6 +175,13 @@ class Pca9685Board:
                 f"{where}the board at {address:#x} was set to an external clock: switch its logic "
                 "supply off and on"
             )
+
+    def answers(self, address: int) -> bool:
+        """Return whether something at an address is by its registers a PCA9685."""
+        if self.line.ask([(bridge.read(address, MODE1, 1), 1)]) is None:
+            return False
+        found = self._registers(address)
+        return found is not None and plausible(*found)
 
     def _registers(self, address: int) -> tuple[bytes, bytes, int] | None:
         """Read all registers of a board one by one, which needs no setting of it."""
@@ -361,11 +369,7 @@ class Pca9685Board:
         """Return where a channel is on its way: in counts inside its limits, and in steps."""
         steps, setup = round(channel.ramp.pulse_steps), channel.setup
         grain = self._steps(1, self._prescale)
-        counts = round(steps / grain)
-        if setup.min_steps <= steps <= setup.max_steps:
-            least, most = ceil(setup.min_steps / grain), floor(setup.max_steps / grain)
-            counts = min(max(counts, least), most) if least <= most else counts
-        return counts, steps
+        return counts_within(steps, setup.min_steps, setup.max_steps, grain), steps
 
     def lead(self, channels: Sequence[Channel]) -> None:
         """Send pulses that are on their way a little farther, where no goals come."""
@@ -392,15 +396,3 @@ class Pca9685Board:
     def wait(self, until_s: float) -> None:
         """Let time pass."""
         self.line.wait(until_s)
-
-
-def runs(channels: Sequence[int]) -> list[list[int]]:
-    """Part ascending channels into runs of neighbours that fit into a bridge's buffer."""
-    longest = CHANNELS - 1
-    parted: list[list[int]] = []
-    for channel in channels:
-        if parted and parted[-1][-1] == channel - 1 and len(parted[-1]) < longest:
-            parted[-1].append(channel)
-        else:
-            parted.append([channel])
-    return parted

@@ -3,6 +3,9 @@
 Source: NXP, PCA9685 data sheet, rev. 4, section 7.3.
 """
 
+from collections.abc import Sequence
+from math import ceil, floor
+
 MODE1, MODE2 = 0x00, 0x01
 LED0, ALL_LED, PRESCALE = 0x06, 0xFA, 0xFE
 BYTES = 4
@@ -66,3 +69,31 @@ def plausible(first_six: bytes, outputs: bytes, prescale: int) -> bool:
     low_bits = any(address & 1 for address in first_six[2:])
     high_bits = first_six[1] & 0xE0 or any(byte & 0xE0 for byte in outputs[1::2])
     return not low_bits and not high_bits and prescale >= LEAST_PRESCALE
+
+
+def counts_within(steps: int, low_steps: int, high_steps: int, grain_steps: float) -> int:
+    """Return the counts nearest to a pulse; of one inside limits such as are inside, too.
+
+    Args:
+        steps: the pulse, quarter microseconds.
+        low_steps: shortest pulse.
+        high_steps: longest pulse.
+        grain_steps: what one count is.
+    """
+    counts = round(steps / grain_steps)
+    least, most = ceil(low_steps / grain_steps), floor(high_steps / grain_steps)
+    if not low_steps <= steps <= high_steps or least > most:
+        return counts
+    return min(max(counts, least), most)
+
+
+def runs(channels: Sequence[int]) -> list[list[int]]:
+    """Part ascending channels into runs of neighbours that fit into a bridge's buffer."""
+    longest = CHANNELS - 1
+    parted: list[list[int]] = []
+    for channel in channels:
+        if parted and parted[-1][-1] == channel - 1 and len(parted[-1]) < longest:
+            parted[-1].append(channel)
+        else:
+            parted.append([channel])
+    return parted

@@ -3,6 +3,7 @@
 import contextlib
 import json
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,9 +14,11 @@ from rich.table import Table
 from config.schema import load_rig
 from drivers.errors import SetupError
 from drivers.i2c.port import port_of
+from drivers.pca9685.params import Pca9685Params
+from drivers.pca9685.probe import probe
 from drivers.serial.list_ports import SerialPort
 from drivers.serial.port import BusPort
-from drivers.serial.port_owner import POLOLU
+from drivers.serial.port_owner import POLOLU, is_i2c
 from drivers.servo_models import BusKind
 from robot.bringup.doctor.port import name_ports
 from robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
@@ -36,8 +39,8 @@ def scan(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="dynamixel, feetech, maestro or all; default: one after the other until one "
-            "answers. Name it where a Maestro only listens on the line."
+            help="dynamixel, feetech, maestro, pca9685 or all; default: one after the other until "
+            "one answers, and of an I2C bus pca9685. Name it where a Maestro only listens."
         ),
     ] = None,
     bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",
@@ -58,7 +61,12 @@ def scan(
         if not as_json:
             _show_ports(found_ports)
         with _paths(rig, mock, port, found_ports) as paths:
-            somebody = [_one(path, kinds, rates, thorough, kind, as_json) for path in paths]
+            somebody = [
+                _boards(path, as_json)
+                if i2c or kind == "pca9685"
+                else _one(path, kinds, rates, thorough, kind, as_json)
+                for path, i2c in paths
+            ]
     if not any(somebody):
         raise typer.Exit(FAULT)
 
@@ -66,13 +74,40 @@ def scan(
 @contextlib.contextmanager
 def _paths(
     rig: str, mock: bool, port: str | None, found: Sequence[SerialPort]
-) -> Iterator[list[str]]:
-    """Give the ports to search: those of an emulated rig, or one."""
+) -> Iterator[list[tuple[str, bool]]]:
+    """Give the ports to search, a rig's or one, and whether each is an I2C bus."""
     if not mock:
-        yield [port if port is not None else _only_port(found)]
+        path = port if port is not None else _only_port(found)
+        yield [(path, is_i2c(path))]
         return
-    with wires(load_rig(rig), True, port) as wired:
-        yield list(wired.paths.values())
+    model = load_rig(rig)
+    with wires(model, True, port) as wired:
+        yield [
+            (path, model.bus_named(name).kind == "pca9685") for name, path in wired.paths.items()
+        ]
+
+
+def _boards(path: str, as_json: bool) -> bool:
+    """Search one I2C bus and show what was found; returns whether any board answered.
+
+    Of a serial port it is asked only where that was named: to a Maestro such bytes are commands.
+    """
+    with bench.to_open(path) as line:
+        found = [f"{address:#x}" for address in probe(line, Pca9685Params())]
+    if as_json:
+        boards = [{"kind": "pca9685", "address": address} for address in found]
+        print(json.dumps({"port": path, "servos": [], "boards": boards}))
+        return bool(found)
+    out = console()
+    for address in found:
+        out.print(f"{path}: PCA9685 at {address}, 16 channels", markup=False)
+    if not found:
+        out.print(
+            f"{path}: no PCA9685 answers from 0x40 to 0x77: has it its logic supply (VCC)? check "
+            "SDA, SCL and ground",
+            markup=False,
+        )
+    return bool(found)
 
 
 def _parse_kind(text: str) -> tuple[BusKind, ...]:
@@ -165,6 +200,8 @@ def _search(
 
 
 def _show_ports(ports: Sequence[SerialPort]) -> None:
+    for bus in sorted(Path("/dev").glob("i2c-*")):
+        say(f"I2C bus {bus}")
     for port in ports:
         alias = f", lasting name {port.by_id}" if port.by_id else ""
         say(f"port {port.device}: {port.description}{f' [{port.usb}]' if port.usb else ''}{alias}")
