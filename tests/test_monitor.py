@@ -6,10 +6,10 @@ from math import radians
 
 import pytest
 
-from drivers.dynamixel.control_table import MODELS
 from drivers.dynamixel.registers import Registers
 from robot.bringup.monitor import Monitor, as_json
-from robot.bringup.telemetry import DynamixelLooks, load_share, look
+from robot.bringup.servo_families import DYNAMIXEL
+from robot.bringup.telemetry import DynamixelLooks, look
 from robot.clock import SimulatedClock
 from robot.joint import JointParams
 from sim_mock.dynamixel.chain import build_dynamixel
@@ -95,8 +95,8 @@ def test_a_silent_servo_is_none_and_counted() -> None:
 
 
 def test_load_is_a_share_of_the_stall() -> None:
-    assert load_share(MODELS["xl330-m077"], -147) == pytest.approx(-0.1)
-    assert load_share(MODELS["xl430-w250"], 250) == pytest.approx(0.25)
+    assert DYNAMIXEL.driving.load("xl330-m077", -147) == pytest.approx(-0.1)
+    assert DYNAMIXEL.driving.load("xl430-w250", 250) == pytest.approx(0.25)
 
 
 def test_registers_are_taken_apart_at_their_places() -> None:

@@ -10,8 +10,7 @@ from dataclasses import replace
 from math import degrees
 from typing import NamedTuple, Protocol
 
-from drivers.dynamixel.control_table import MODELS as DYNAMIXEL
-from drivers.dynamixel.control_table import REGISTERS, VELOCITY_UNIT_STEPS_S, Model
+from drivers.dynamixel.control_table import REGISTERS, VELOCITY_UNIT_STEPS_S
 from drivers.dynamixel.control_table import name_errors as name_dynamixel
 from drivers.dynamixel.registers import Registers
 from drivers.feetech.memory_table import LOAD_UNIT
@@ -26,15 +25,13 @@ from drivers.maestro.params import MaestroParams
 from drivers.pca9685.board import Pca9685Board
 from drivers.pca9685.params import Pca9685Params
 from drivers.serial.port import BusPort
+from robot.bringup.servo_families import DYNAMIXEL
 from robot.joint import JointParams
 
 # 116 goal position | 120 tick, 122 moving, 123 status, 124 pwm | 126 current, 128 velocity,
 # 132 position | 136, 140 trajectory | 144 voltage, 146 temperature: no gap between them
 _LIVE = struct.Struct("<i6xhii8xHB")
 _LIVE_AT = REGISTERS["goal_position"].address
-
-XL430_LOAD_FULL = 1000.0
-"""Models without current measurement give their load in 0.1 % of the stall torque there."""
 
 
 class Look(NamedTuple):
@@ -102,19 +99,12 @@ def look(joint: JointParams, live: bytes, torque: bool, latched: int) -> Look:
         degrees(joint.angle_rad(position)),
         position,
         degrees(velocity * VELOCITY_UNIT_STEPS_S * joint.made().rate_rad(position)),
-        load_share(DYNAMIXEL[joint.model], effort),
+        DYNAMIXEL.driving.load(joint.model, effort),
         temperature,
         voltage / 10.0,
         torque,
         name_dynamixel(latched),
     )
-
-
-def load_share(model: Model, register_126: int) -> float:
-    """Give Present Current, or Present Load where the model has that, as a share of the stall."""
-    if model.current_limit is None:
-        return register_126 / XL430_LOAD_FULL
-    return register_126 * model.current_unit_ma / (1000.0 * model.stall_current_a)
 
 
 class FeetechLooks:
