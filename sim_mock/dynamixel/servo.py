@@ -205,6 +205,7 @@ class DynamixelServo(SmartServo):
         get = self.memory.get
         self._calm = False
         self.status_level = get("status_return_level")
+        self.answers_reads = self.status_level >= 1
         shadow = get("secondary_id")
         self.shadow_id = None if shadow >= SHADOW_OFF else shadow
         self.protection.limits = self._limits()
@@ -312,8 +313,3 @@ class DynamixelServo(SmartServo):
     def return_delay_s(self) -> float:
         """Return the pause before a status, by register 9."""
         return self.memory.get("return_delay_time") * RETURN_DELAY_UNIT_S
-
-    @property
-    def answers_reads(self) -> bool:
-        """True if it answers more than a ping, by register 68."""
-        return self.status_level >= 1

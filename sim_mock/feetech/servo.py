@@ -254,11 +254,6 @@ class FeetechServo(SmartServo):
         """Return the pause before a status, by register 7."""
         return self.memory.get("return_delay") * RETURN_DELAY_UNIT_S
 
-    @property
-    def answers_reads(self) -> bool:
-        """True: it always answers reads."""
-        return True
-
     # --- from outside
 
     def fail(self, error: str) -> str:

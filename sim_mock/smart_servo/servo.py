@@ -61,6 +61,8 @@ class SmartServo(ABC):
     memory: Memory
     drive: Drive
     id: int
+    answers_reads = True
+    """Whether it answers more than a ping."""
     shadow_id: int | None = None
     """An id under which it carries out writes to RAM and never answers."""
 
@@ -169,11 +171,6 @@ class SmartServo(ABC):
     @abstractmethod
     def return_delay_s(self) -> float:
         """The pause before a status, by its register."""
-
-    @property
-    @abstractmethod
-    def answers_reads(self) -> bool:
-        """True if it answers more than a ping."""
 
     @abstractmethod
     def read(self, address: int, length: int) -> bytes | None:
