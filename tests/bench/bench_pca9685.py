@@ -1,0 +1,90 @@
+"""What one tick of six servos costs on a PCA9685: this driver beside Adafruit's library.
+
+Both over smbus2's methods on the emulated bus. Adafruit's library is not installed with this
+project: pip install --no-deps --target DIR adafruit-circuitpython-pca9685
+adafruit-circuitpython-busdevice adafruit-circuitpython-register, and DIR in PYTHONPATH.
+
+Run from the repository: PYTHONPATH=.:tests python tests/bench/bench_pca9685.py
+"""
+
+import sys
+import time
+from types import SimpleNamespace
+
+from test_pca9685_chip import Bench, CircuitPythonI2C
+
+from drivers.i2c.port import I2cPort
+from drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from drivers.types import ServoSetup
+
+TICKS, CHANNELS, I2C_HZ = 2000, 6, 100_000.0
+
+
+class Counted:
+    """A bus that counts transfers and the bytes on its wires, addresses among them."""
+
+    def __init__(self, bus):
+        self.bus, self.fd, self.transfers, self.bytes = bus, None, 0, 0
+
+    def i2c_rdwr(self, *messages):
+        self.transfers += 1
+        self.bytes += sum(1 + message.len for message in messages)
+        self.bus.i2c_rdwr(*messages)
+
+    def close(self):
+        """Stay open."""
+
+
+def measured(name, bus, bench, tick):
+    bus.transfers = bus.bytes = 0
+    spent_s = 0.0
+    for k in range(TICKS):
+        began = time.process_time()
+        tick(5900 + k % 200)
+        spent_s += time.process_time() - began
+        bench.wait(0.01)
+    wire_ms = bus.bytes / TICKS * 9.0 / I2C_HZ * 1e3
+    print(
+        f"{name:34} {bus.transfers / TICKS:5.1f} transfers {bus.bytes / TICKS:5.1f} bytes "
+        f"{wire_ms:4.1f} ms at 100 kHz {spent_s / TICKS * 1e3:6.3f} ms of processor"
+    )
+
+
+def ours():
+    bench = Bench()
+    bus = Counted(bench.bus)
+    setups = [ServoSetup(i, "hobby", 4400, 7600, 1e5, rest_steps=6000) for i in range(CHANNELS)]
+    made = Pca9685Bus(
+        I2cPort("/dev/i2c-1", open_bus=lambda path: bus), setups, Pca9685Params(stagger_ms=0.0)
+    )
+    made.open()
+    made.engage()
+
+    def tick(steps):
+        made.read(time.monotonic())
+        made.write([steps] * CHANNELS)
+
+    measured("ours: goals, mode, one channel", bus, bench, tick)
+
+
+def adafruits():
+    names = dict.fromkeys(("I2C", "ReadableBuffer", "WriteableBuffer", "I2CDeviceDriver"), object)
+    for module in ("busio", "circuitpython_typing", "circuitpython_typing.device_drivers"):
+        sys.modules[module] = SimpleNamespace(**names)
+    import adafruit_pca9685
+
+    bench = Bench()
+    bus = Counted(bench.bus)
+    board = adafruit_pca9685.PCA9685(CircuitPythonI2C(bus), address=0x40)
+    board.frequency = 50
+
+    def tick(steps):
+        for k in range(CHANNELS):
+            board.channels[k].duty_cycle = round(steps / 4 / 20_000 * 0xFFFF)
+
+    measured("Adafruit's: goals alone", bus, bench, tick)
+
+
+if __name__ == "__main__":
+    ours()
+    adafruits()
