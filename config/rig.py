@@ -9,10 +9,10 @@ from math import inf
 
 from drivers.camera.oak_params import OakParams
 from drivers.camera.params import CameraCareParams, WebcamParams
+from drivers.dynamixel.params import DynamixelParams
 from drivers.feetech.params import FeetechParams
 from drivers.maestro.params import MaestroParams
 from drivers.pca9685.params import Pca9685Params
-from drivers.servo_bus.bus import DynamixelParams
 from drivers.servo_models import BUS_KINDS
 from drivers.vision.face_params import FaceDetectorParams
 from drivers.vision.motion.params import MotionParams

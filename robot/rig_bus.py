@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from config.schema import Rig
+from drivers.dynamixel.bus import DynamixelBus
 from drivers.errors import SetupError
 from drivers.feetech.bus import FeetechBus
 from drivers.i2c.port import port_of
@@ -10,7 +11,6 @@ from drivers.maestro.bus import MaestroBus
 from drivers.multi_bus import MixedBus, Share
 from drivers.pca9685.bus import Pca9685Bus
 from drivers.serial.port import BusPort
-from drivers.servo_bus.bus import DynamixelBus
 from drivers.servo_models import BUS_KINDS
 from drivers.types import ServoBus, ServoSetup
 from robot.body import setups

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.hobby_board.channel import Channel
 from drivers.maestro.bus import MaestroBus, MaestroParams
@@ -14,7 +15,6 @@ from drivers.multi_bus import MixedBus, Share
 from drivers.pca9685.board import Pca9685Board
 from drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from drivers.serial.port import BlockingPort, BusPort
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from sim_mock.device import Device
 from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line, build

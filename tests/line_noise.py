@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import pi, sin
 
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.errors import DriverError
 from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.maestro.bus import MaestroBus, MaestroParams
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoReading, ServoSetup
 from sim_mock.device import Device
 from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build

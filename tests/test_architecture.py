@@ -139,6 +139,21 @@ def test_arrows(module: str, path: Path) -> None:
             assert module.startswith(owners), f"{module} must not import {package}"
 
 
+MAKES = tuple(
+    f"drivers.{m}." for m in ("dynamixel", "feetech", "maestro", "pca9685", "hobby_board")
+)
+
+
+def test_the_servo_engine_knows_no_make_of_servo() -> None:
+    shared = ("drivers.servo_bus.", "drivers.serial.", "drivers.event_log")
+    for module, path in modules():
+        if module.startswith(shared):
+            makes = {
+                w for w in imports(path) if w.startswith("drivers.") and w.split(".")[1] in MAKES
+            }
+            assert not makes, f"{module} must not import {makes}"
+
+
 def test_gaze_stands_on_numpy_alone() -> None:
     standard = set(sys.stdlib_module_names) | {"numpy", "gaze"}
     for module, path in modules():

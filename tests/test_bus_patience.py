@@ -4,16 +4,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.dynamixel.control_table import MODELS, indirect_blocks
-from drivers.event_log import MOST, EventLog, register_label
-from drivers.serial.reopening import Reconnect
-from drivers.servo_bus.adaptive_timeout import WINDOW, Patience
-from drivers.servo_bus.faults import AGAIN_AND_AGAIN, Health
-from drivers.servo_bus.read_windows import (
+from drivers.dynamixel.read_windows import (
     INDIRECT_MAP,
     alone_turns,
     direct_turns,
     indirect_turns,
 )
+from drivers.event_log import MOST, EventLog, register_label
+from drivers.serial.reopening import Reconnect
+from drivers.servo_bus.adaptive_timeout import WINDOW, Patience
+from drivers.servo_bus.faults import AGAIN_AND_AGAIN, Health
 from drivers.servo_bus.window_schedule import CALM_S
 from drivers.servo_models import servo_label
 from drivers.types import ServoSetup

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import pytest
 from dynamixel_sdk import PacketHandler
 
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.dynamixel.protocol import instruction
 from drivers.errors import ServoMissing
 from drivers.serial.port import BlockingPort
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort

@@ -4,9 +4,9 @@ import struct
 
 import pytest
 
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.dynamixel.protocol import instruction
 from drivers.errors import BusLost, ServoFault, ServoMissing
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.dynamixel.packets import status

@@ -4,9 +4,9 @@ import struct
 
 import pytest
 
+from drivers.dynamixel.read_windows import DIRECT, direct_turns
 from drivers.dynamixel.sync_packets import FastGroup, PlainGroup
 from drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
-from drivers.servo_bus.read_windows import DIRECT, direct_turns
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.dynamixel.packets import status
 

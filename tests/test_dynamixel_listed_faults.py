@@ -61,8 +61,8 @@ from moving_bus import (
     live_through_missing_ids,
 )
 
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from drivers.types import ServoSetup
 from sim_mock.dynamixel.chain import build_dynamixel

@@ -3,10 +3,10 @@
 import pytest
 from dynamixel_sdk import PacketHandler
 
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.dynamixel.protocol import HEADER
 from drivers.dynamixel.registers import Registers
 from drivers.errors import PortError, ServoMissing
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.dynamixel.packets import status

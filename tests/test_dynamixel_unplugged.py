@@ -8,8 +8,8 @@ import sys
 import time
 from pathlib import Path
 
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.serial.port import BlockingPort
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
 from sim_mock.pty.client import PtyBus
 from sim_mock.smart_servo.physics import ServoSpec
@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 
 DRIVER = """
 import sys, time
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.serial.port import BlockingPort
 from drivers.types import ServoSetup
 setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 200.0) for i in (1, 2, 3)]

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.schema import Rig, load_rig
+from drivers.dynamixel.bus import DynamixelBus
 from drivers.errors import SetupError
-from drivers.servo_bus.bus import DynamixelBus
 from robot.assemble import gaze_parts
 from robot.body import Body
 from robot.bringup.applied import Step

@@ -124,6 +124,8 @@ DYNAMIXEL = Family(
     single_turn=False,
     broadcast_ping=True,
     arming=Arming("profile_velocity", speed=True),
+    most_goals=253,
+    usual_bauds="57600 or 1000000",
     fault_cure="then restart the servo power",
     jump_cure="set its Homing Offset to 0",
 )

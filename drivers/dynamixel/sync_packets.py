@@ -22,7 +22,8 @@ from drivers.dynamixel.protocol import (
     statuses,
     sync_read,
 )
-from drivers.servo_bus.read_windows import Sample, View
+from drivers.dynamixel.read_windows import Sample, View
+from drivers.servo_bus.sync_read import Pieces
 
 Values = tuple[Any, ...]
 """All numbers of a whole answer; ``Group.columns`` says which are whose."""
@@ -39,19 +40,6 @@ class Columns(NamedTuple):
     hardware_error: slice | None = None
     temperature: slice | None = None
     voltage: slice | None = None
-
-
-class Pieces(NamedTuple):
-    """What could be saved of an answer.
-
-    samples: proved values by id
-    damaged: servos whose bytes were spoilt
-    unproved: servos whose bytes cannot be judged because of a damaged one before them
-    """
-
-    samples: dict[int, Sample]
-    damaged: frozenset[int]
-    unproved: frozenset[int] = frozenset()
 
 
 class PlainGroup:
@@ -82,6 +70,10 @@ class PlainGroup:
                 return None
         return values
 
+    def each(self, raw: bytes, values: Values) -> dict[int, Sample]:
+        """Return a faultless answer servo by servo."""
+        return self.pieces(raw).samples
+
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""
         count = len(self.ids)
@@ -94,7 +86,7 @@ class PlainGroup:
         there = len(fits.intersection(self.ids))
         return bytes_missing(raw, len(found) + count - there, length)
 
-    def pieces(self, raw: bytes) -> Pieces:
+    def pieces(self, raw: bytes) -> Pieces[Sample]:
         """Save what can be proved right."""
         samples: dict[int, Sample] = {}
         damaged, twofold = set[int](), set[int]()
@@ -151,6 +143,10 @@ class FastGroup:
                 return None
         return values
 
+    def each(self, raw: bytes, values: Values) -> dict[int, Sample]:
+        """Return a faultless answer servo by servo."""
+        return self.pieces(raw).samples
+
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""
         at = raw.find(self._head)
@@ -159,7 +155,7 @@ class FastGroup:
             at = _past_packet(raw)
         return max(0, at + self.reply_length - len(raw))
 
-    def pieces(self, raw: bytes) -> Pieces:
+    def pieces(self, raw: bytes) -> Pieces[Sample]:
         """Save what can be proved right.
 
         Every block's CRC continues from the CRC before it as it was sent, so a damaged
@@ -192,7 +188,6 @@ class FastGroup:
 
 
 Group = PlainGroup | FastGroup
-
 
 _OTHERS = HEADER + bytes((BROADCAST,))
 

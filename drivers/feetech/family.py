@@ -13,7 +13,7 @@ from drivers.feetech.memory_table import (
     name_errors,
     speed_units,
 )
-from drivers.feetech.protocol import GoalWrite
+from drivers.feetech.protocol import MOST_GOALS, GoalWrite
 from drivers.feetech.registers import StsRegisters
 from drivers.feetech.scan import everybody
 from drivers.serial.port import BusPort
@@ -85,6 +85,8 @@ FEETECH = Family(
     single_turn=True,
     broadcast_ping=False,
     arming=Arming("acceleration", speed=False),
+    most_goals=MOST_GOALS,
+    usual_bauds="115200 or 1000000",
     fault_cure="check its supply",
     jump_cure="restart the servo power",
 )

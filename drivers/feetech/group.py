@@ -5,7 +5,6 @@ be proved right is taken out piece by piece, so that a bad servo costs only itse
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from drivers.feetech.protocol import (
     HEADER,
@@ -16,13 +15,7 @@ from drivers.feetech.protocol import (
     sync_read,
 )
 from drivers.feetech.views import Sample, View
-
-
-class Pieces(NamedTuple):
-    """What could be saved of an answer: proved values by id, and whose bytes were spoilt."""
-
-    samples: dict[int, Sample]
-    damaged: frozenset[int]
+from drivers.servo_bus.sync_read import Pieces
 
 
 class Group:
@@ -47,6 +40,10 @@ class Group:
             samples[servo_id] = self.view.sample(status[4], status[5:-1])
         return samples
 
+    def each(self, raw: bytes, values: dict[int, Sample]) -> dict[int, Sample]:
+        """Return a faultless answer servo by servo."""
+        return values
+
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""
         count, length = len(self.ids), self.view.length
@@ -58,7 +55,7 @@ class Group:
         there = {s.id for s in found if len(s.params) == length}.intersection(self.ids)
         return bytes_missing(raw, len(found) + count - len(there), length)
 
-    def pieces(self, raw: bytes) -> Pieces:
+    def pieces(self, raw: bytes) -> Pieces[Sample]:
         """Save what can be proved right."""
         samples: dict[int, Sample] = {}
         damaged, twofold = set[int](), set[int]()

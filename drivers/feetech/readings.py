@@ -9,8 +9,9 @@ the same.
 from collections.abc import Mapping, Sequence
 
 from drivers.feetech.memory_table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
-from drivers.feetech.reader import Heard
+from drivers.feetech.views import Sample
 from drivers.plausibility import Plausibility
+from drivers.servo_bus.sync_read import Heard
 from drivers.servo_bus.turn import nearest_turn
 from drivers.types import ServoReading, ServoSetup
 
@@ -29,7 +30,7 @@ class Readings:
 
     def __init__(self, setups: Sequence[ServoSetup]) -> None:
         count = len(setups)
-        self.want(setups)
+        self.set_limits(setups)
         self._ids = tuple(setup.id for setup in setups)
         self.places = Plausibility(
             [MODELS[s.model].no_load_rpm / 60.0 * STEPS_PER_TURN for s in setups]
@@ -39,7 +40,7 @@ class Readings:
         self._warm: list[float | None] = [None] * count
         self._volts: list[float | None] = [None] * count
 
-    def want(self, setups: Sequence[ServoSetup]) -> None:
+    def set_limits(self, setups: Sequence[ServoSetup]) -> None:
         """Take other ranges for the same servos."""
         self._ranges = [(setup.min_steps, setup.max_steps) for setup in setups]
 
@@ -51,12 +52,12 @@ class Readings:
         """Note what a servo suffers from, "" for nothing."""
         self._fault[slot] = fault
 
-    def believes(self, slot: int, heard: Heard) -> bool:
+    def believes(self, slot: int, heard: Heard[Sample]) -> bool:
         """Tell whether one servo's answer can be true; to be asked once for every answer."""
         position = nearest_turn(heard.sample.position, *self._ranges[slot], STEPS_PER_TURN)
         return self.places.one(slot, position, heard.at_s)
 
-    def all_believed(self, heard: Mapping[int, Heard]) -> bool:
+    def all_believed(self, heard: Mapping[int, Heard[Sample]]) -> bool:
         """Tell whether everybody has answered in one exchange, and all of it can be true."""
         if len(heard) < len(self._ranges):
             return False
@@ -70,7 +71,9 @@ class Readings:
         ]
         return self.places.whole(positions, at_s)
 
-    def confirmed(self, slot: int, first: Heard, second: Heard) -> Heard | None:
+    def confirmed(
+        self, slot: int, first: Heard[Sample], second: Heard[Sample]
+    ) -> Heard[Sample] | None:
         """Give what two answers right after one another both say; None where they differ."""
         one, other = first.sample, second.sample
         alike = (
@@ -91,7 +94,7 @@ class Readings:
             )
         )
 
-    def one(self, slot: int, heard: Heard) -> ServoReading:
+    def one(self, slot: int, heard: Heard[Sample]) -> ServoReading:
         """Take one servo's answer."""
         sample = heard.sample
         position = nearest_turn(sample.position, *self._ranges[slot], STEPS_PER_TURN)

@@ -1,66 +1,126 @@
-"""Dynamixel X servos on one serial bus (Protocol 2.0): one read and one write a tick."""
+"""Smart servos of one family on one serial bus: one read and one write a tick."""
 
-from collections.abc import Mapping, Sequence
-from math import ceil
-from struct import pack
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping, Sequence
+from typing import Protocol
 
-from drivers.dynamixel.control_table import (
-    FAST_READ_SINCE,
-    MODELS,
-    WATCHDOG_UNIT_S,
-    IndirectBlock,
-    indirect_blocks,
-)
-from drivers.dynamixel.family import DYNAMIXEL
-from drivers.dynamixel.params import DynamixelParams as DynamixelParams
-from drivers.dynamixel.protocol import ERROR_NUMBER
-from drivers.dynamixel.registers import Registers
 from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from drivers.event_log import EventLog, servo_label
 from drivers.serial.port import BusPort
 from drivers.serial.reconnect import LastingPort
 from drivers.servo_bus.discovery import find
+from drivers.servo_bus.family import Family
 from drivers.servo_bus.faults import Health
-from drivers.servo_bus.feedback import Readings
 from drivers.servo_bus.goals import clipped
 from drivers.servo_bus.poll_list import Roll
 from drivers.servo_bus.provisioning import AddressMap, Provisioning
-from drivers.servo_bus.read_windows import INDIRECT_MAP, alone_turns, direct_turns, indirect_turns
 from drivers.servo_bus.recovery import Recovery
-from drivers.servo_bus.supervisor import Care
-from drivers.servo_bus.sync_read import Heard, Reader, Whole
 from drivers.servo_bus.torque import switch_off
-from drivers.servo_bus.transaction import Line
+from drivers.servo_bus.transaction import TRIES, Line
 from drivers.types import BusHealth, ServoReading, ServoSetup
 
 RESTART_S = 0.1
-"""Servos that were all silent for so long may all have restarted: their power was cut."""
+"""Servos that were silent for so long may have restarted: their power was cut."""
+
+CUT = "cut the servo power"
 
 
-class DynamixelBus:
-    """A chain of Dynamixel servos in position mode; implements drivers.types.ServoBus.
+class BusParams(Protocol):
+    """What a rig file chooses for a bus of any family."""
+
+    @property
+    def baud(self) -> int:
+        """Bit/s."""
+
+    @property
+    def reply_timeout_ms(self) -> float:
+        """Longest patience for an answer beyond its time on the wire."""
+
+    @property
+    def prompt_timeout_ms(self) -> float:
+        """Shortest patience."""
+
+    @property
+    def give_up_s(self) -> float:
+        """How long port or servos may be gone."""
+
+
+class Supervisor(Protocol):
+    """What the bus asks of whoever looks after its servos.
+
+    engaged: the torque is on
+    """
+
+    engaged: bool
+
+    def take_on(self, entering: Collection[int]) -> None:
+        """Begin to look after servos under torque; some of them are outside their limits."""
+
+    def let_go(self) -> None:
+        """Leave servos without torque alone."""
+
+    def suspect_all(self) -> None:
+        """Trust no servo to be as it was left."""
+
+
+class Limited(Protocol):
+    """What makes readings of answers."""
+
+    def set_limits(self, setups: Sequence[ServoSetup]) -> None:
+        """Take other limits for the same servos."""
+
+
+class Polled(Protocol):
+    """What reads all servos of a poll list."""
+
+    roll: Roll
+
+
+class SmartServoBus(ABC):
+    """A chain of smart servos in position mode; implements drivers.types.ServoBus.
+
+    A family's own bus says how an answer becomes readings, and who looks after the servos.
 
     Args:
         port: drivers.serial.port.BlockingPort, or an emulated port with its methods.
         setups: the servos, in the order of every sequence given and taken.
+        family: the make of the servos.
         params: how to speak with them.
+        watchdog: Bus Watchdog to arm, in its units; 0 for none.
+
+    Raises:
+        ValueError: more servos than one packet of goals can hold, or a range beyond one turn.
     """
 
+    _care: Supervisor
+    _reader: Polled
+    _readings: Limited
+
     def __init__(
-        self, port: BusPort, setups: Sequence[ServoSetup], params: DynamixelParams
+        self,
+        port: BusPort,
+        setups: Sequence[ServoSetup],
+        family: Family,
+        params: BusParams,
+        watchdog: int = 0,
     ) -> None:
+        if len(setups) > family.most_goals:
+            raise ValueError(
+                f"{len(setups)} servos are too many for one bus: {family.most_goals} at most"
+            )
+        self._family, self._watchdog = family, watchdog
+        self._check_ranges(setups)
         self._port = port
         self._setups = self._wanted = tuple(setups)
-        self._params = params
+        self._bus_params = params
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
-        self._goals = DYNAMIXEL.goals(self._ids)
-        self._watchdog = ceil(params.watchdog_ms / 1000.0 / WATCHDOG_UNIT_S)
+        self._goals = family.goals(self._ids)
         self._log = EventLog()
         self._line = Line(
             port,
-            DYNAMIXEL,
+            family,
             params.prompt_timeout_ms / 1000.0,
             params.reply_timeout_ms / 1000.0,
             params.baud,
@@ -68,35 +128,53 @@ class DynamixelBus:
         )
         self._opened = False
         self._now_s = 0.0
-        self._assemble(None, False)
+        self._block: AddressMap | None = None
+        self._assemble(None)
 
-    def _assemble(self, block: IndirectBlock | None, fast: bool) -> None:
-        """Make the parts, with a clean sheet, for what the servos can do."""
+    def _assemble(self, firmware: Mapping[int, int] | None) -> None:
+        """Make the parts, with a clean sheet, for what the servos can do.
+
+        firmware: of each servo, None before it is known
+        """
+        line, log = self._line, self._log
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
-        self._fast, self._block = fast, block
         self._link = LastingPort(
-            self._port, self._params.baud, self._params.give_up_s, self._log, self._trust_nobody
+            self._port, self._bus_params.baud, self._bus_params.give_up_s, log, self._trust_nobody
         )
         self._roll = Roll(self._ids)
-        self._readings = Readings(self._setups)
-        self._health = Health(by_id, self._log)
-        together = indirect_turns(block) if block else direct_turns()
-        self._reader = Reader(self._line, self._roll, together, alone_turns(), fast)
-        self._provisioning = Provisioning(
-            self._line, Registers(self._port, tries=1), self._setups, self._log, _address_map(block)
-        )
+        self._health = Health(by_id, log)
+        self._block = self._address_map(firmware)
+        single = self._family.single(self._port, 1)
+        self._provisioning = Provisioning(line, single, self._setups, log, self._block)
         self._recovery = Recovery(
-            self._line, self._provisioning, by_id, self._watchdog, self._health, self._log
+            line, self._provisioning, by_id, self._watchdog, self._health, log
         )
-        self._care = Care(
-            self._line,
-            by_id,
-            self._watchdog,
-            self._recovery,
-            self._health,
-            self._readings,
-            covered=block is not None,
-        )
+        self._speeds = self._recovery.speeds(self._ids, ())
+        self._assemble_family(firmware)
+
+    @abstractmethod
+    def _assemble_family(self, firmware: Mapping[int, int] | None) -> None:
+        """Make the parts that differ from family to family."""
+
+    def _address_map(self, firmware: Mapping[int, int] | None) -> AddressMap | None:
+        """Return what indirect blocks must hold, None where there are none."""
+        return None
+
+    @abstractmethod
+    def _read(self, now_s: float) -> list[ServoReading | None]:
+        """Read all servos while the port is there."""
+
+    def _send(self, goals: Sequence[int]) -> None:
+        """Send goals, each within its limits."""
+        self._line.send(self._goals.packet(goals, self._speeds))
+
+    @abstractmethod
+    def _first_look(self) -> None:
+        """Look at servos that have just been prepared."""
+
+    @abstractmethod
+    def _cannot_release(self) -> str:
+        """Say what servos do that cannot be told to let go."""
 
     # --- the bus as others see it
 
@@ -108,20 +186,20 @@ class DynamixelBus:
             drivers.errors.ServoMissing: servos are absent, of another model or refuse.
         """
         self._take_wanted()
-        where, baud = self._port.port_name, self._params.baud
+        where, baud = self._port.port_name, self._bus_params.baud
         if not self._port.setBaudRate(baud):
-            raise PortError(f"{where} cannot run at {baud} bit/s: choose 57600 or 1000000")
-        registers = Registers(self._port)
+            raise PortError(
+                f"{where} cannot run at {baud} bit/s: choose {self._family.usual_bauds}"
+            )
+        registers = self._family.single(self._port, TRIES)
         try:
             firmware = find(self._line, registers, self._setups, self._log)
-            self._assemble(self._common_block(firmware), self._all_fast(firmware))
-            provisioning = Provisioning(
-                self._line, registers, self._setups, self._log, _address_map(self._block)
-            )
-            provisioning.disable(self._ids)
-            provisioning.apply(self._ids)
+            self._assemble(firmware)
+            first = Provisioning(self._line, registers, self._setups, self._log, self._block)
+            first.disable(self._ids)
+            first.apply(self._ids)
             self._line.starved = False
-            self._care.find_alerts(self._ids)
+            self._first_look()
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
@@ -143,7 +221,7 @@ class DynamixelBus:
         if self._link.release_due and not self._caught_up():
             return (None,) * len(self._ids)
         try:
-            readings = self._read(now_s)
+            readings = tuple(self._read(now_s))
         except BusLost as lost:
             self._lose(lost)
             return (None,) * len(self._ids)
@@ -160,7 +238,8 @@ class DynamixelBus:
         Raises:
             drivers.errors.BusLost: the port is gone.
             drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
-            drivers.errors.ServoFault: a servo has latched an error or lost its zero.
+            drivers.errors.ServoFault: a servo has latched an error, refuses its torque, or
+                stands beyond its encoder's zero, from where it would go the wrong way.
         """
         try:
             self._take_wanted()
@@ -175,14 +254,14 @@ class DynamixelBus:
             raise
         self._link.release_due = False
         self._care.take_on(outside)
+        self._speeds = self._recovery.speeds(self._ids, ())
         return goals
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo in one packet; goals are clipped to the limits.
 
-        Sends nothing while the torque is off, the port is gone, or servos that stopped by
-        themselves have not been given their present positions as goals yet: the next
-        read sees to that.
+        Sends nothing while the torque is off or the port is gone, and nothing to servos that
+        stopped by themselves or may have restarted: the next reads set those up first.
 
         Raises:
             ValueError: a goal is not a number, or there are not as many as servos.
@@ -191,7 +270,7 @@ class DynamixelBus:
         if not self._care.engaged or self._link.down or self._line.starved:
             return
         try:
-            self._line.send(self._goals.packet(goals, ()))
+            self._send(goals)
         except BusLost as lost:
             self._lose(lost)
 
@@ -202,11 +281,12 @@ class DynamixelBus:
         so under torque everything stays as it is.
 
         Raises:
-            ValueError: these are other servos.
+            ValueError: these are other servos, or a range is beyond one turn.
         """
         same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
         if not same:
             raise ValueError("other servos need another bus: ids and models must stay")
+        self._check_ranges(setups)
         self._wanted = tuple(setups)
 
     def _take_wanted(self) -> None:
@@ -217,6 +297,7 @@ class DynamixelBus:
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in self._setups)
         self._by_id.update({setup.id: setup for setup in self._setups})
         self._provisioning.set_target(self._setups)
+        self._readings.set_limits(self._setups)
 
     def faults(self) -> tuple[str, ...]:
         """Name every fault that servos suffer from now, e.g. "neck_yaw (servo 7): overload"."""
@@ -268,7 +349,7 @@ class DynamixelBus:
         for kind, ids in (("still reports torque", released.holding), ("mute", released.mute)):
             for servo_id in ids:
                 what = kind if kind != "mute" else "does not confirm that its torque is off"
-                self._log.add(f"{self._line.who(servo_id)} {what}: cut the servo power")
+                self._log.add(f"{self._line.who(servo_id)} {what}: {CUT}")
 
     def health(self) -> BusHealth:
         """Give byte and error counts of all exchanges."""
@@ -281,63 +362,6 @@ class DynamixelBus:
         self._care.let_go()
         self._port.closePort()
 
-    # --- what the servos can do
-
-    def _all_fast(self, firmware: Mapping[int, int]) -> bool:
-        """Tell whether everybody understands fast sync read."""
-        return self._params.fast_sync_read and all(
-            firmware[setup.id] >= FAST_READ_SINCE[MODELS[setup.model].family]
-            for setup in self._setups
-        )
-
-    def _common_block(self, firmware: Mapping[int, int]) -> IndirectBlock | None:
-        """Give the indirect block that all have in the same place, None where there is none."""
-        if not self._params.indirect_block:
-            return None
-        blocks = [indirect_blocks(MODELS[s.model], firmware[s.id])[0] for s in self._setups]
-        same = len({(block.address_base, block.data_base) for block in blocks}) == 1
-        return blocks[0] if same else None
-
-    # --- reading
-
-    def _read(self, now_s: float) -> tuple[ServoReading | None, ...]:
-        if self._line.starved:
-            self._care.heal(self._roll.group)
-        answer = self._reader.read(now_s)
-        readings = self._readings.whole(answer) if isinstance(answer, Whole) else None
-        if readings is None:
-            readings = self._take(answer, now_s)
-        elif self._health.returning:
-            self._health.heard_again(now_s, self._line.lateness)
-        self._care.tend(readings, self._roll.group, now_s)
-        return tuple(readings)
-
-    def _take(self, answer: Whole | dict[int, Heard], now_s: float) -> list[ServoReading | None]:
-        """Take an answer servo by servo, each with its errors."""
-        heard = answer.each() if isinstance(answer, Whole) else answer
-        readings: list[ServoReading | None] = [None] * len(self._ids)
-        if heard and self._health.silent_for_s(now_s) >= RESTART_S:
-            self._care.suspect_all()
-        dark = not self._roll.group
-        for servo_id, one in heard.items():
-            slot = self._slot[servo_id]
-            was_out = self._roll.answered(servo_id)
-            believed = self._care.judge(servo_id, one.sample)
-            if was_out and self._care.engaged:
-                self._care.check(servo_id)
-            if one.sample.error & ERROR_NUMBER:
-                self._line.errors["refused"] += 1
-            elif was_out and dark:
-                continue  # the first answer after long silence may be an old one
-            elif believed and self._readings.believes(slot, one):
-                readings[slot] = self._readings.one(slot, one)
-            elif believed:
-                self._line.errors["implausible"] += 1
-        self._health.note_silent(
-            self._roll.out, now_s, self._roll.garbling, self._line.lateness, bool(heard)
-        )
-        return readings
-
     def _mind_silence(self, now_s: float) -> None:
         """Give up where nobody has answered for too long.
 
@@ -345,13 +369,11 @@ class DynamixelBus:
             drivers.errors.BusLost: so it is.
         """
         silent_s = self._health.silent_for_s(now_s)
-        if silent_s >= self._params.give_up_s:
+        if silent_s >= self._bus_params.give_up_s:
             raise BusLost(
                 f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s: "
                 "check servo power and the cable"
             )
-
-    # --- a port that goes away
 
     def _lose(self, lost: BusLost) -> None:
         self._link.lose(lost, self._now_s)
@@ -362,22 +384,16 @@ class DynamixelBus:
         self._line.starved = False
         self._care.suspect_all()
 
-    def _cannot_release(self) -> str:
-        """Say what servos do that cannot be told to let go."""
-        rest = (
-            f"their bus watchdog stops them within {self._watchdog * WATCHDOG_UNIT_S:.2f} s "
-            "and they hold their place"
-            if self._watchdog
-            else "they go on to their last goal and hold it"
-        )
-        return (
-            f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
-            f"power keep their torque, {rest}: cut the servo power to free them"
-        )
+    def _check_ranges(self, setups: Sequence[ServoSetup]) -> None:
+        """See that ranges lie within one turn: beyond, positions mean nothing after a restart.
 
-
-def _address_map(block: IndirectBlock | None) -> AddressMap | None:
-    """Return what the addresses of an indirect block must be."""
-    if block is None:
-        return None
-    return AddressMap(block.address_base, pack(f"<{len(INDIRECT_MAP)}H", *INDIRECT_MAP))
+        Raises:
+            ValueError: one does not.
+        """
+        turn = self._family.steps_per_turn
+        for setup in setups if self._family.single_turn else ():
+            if not 0 <= setup.min_steps <= setup.max_steps < turn:
+                raise ValueError(
+                    f"{servo_label(setup)}: {setup.min_steps}..{setup.max_steps} is no range "
+                    f"within 0..{turn - 1} steps"
+                )

@@ -168,6 +168,8 @@ class Family:
         single_turn: beyond its encoder's zero a servo would go the long way round
         broadcast_ping: a ping to all is answered one after the other
         arming: what is written before the torque comes on
+        most_goals: so many servos' goals fit into one packet
+        usual_bauds: bit/s to choose where an adaptor cannot run at another
         fault_cure, jump_cure: what helps where torque is refused, or a position jumps
     """
 
@@ -195,6 +197,8 @@ class Family:
     single_turn: bool
     broadcast_ping: bool
     arming: Arming
+    most_goals: int
+    usual_bauds: str
     fault_cure: str
     jump_cure: str
 

@@ -4,63 +4,123 @@ A servo that keeps silent or garbles costs only itself: those whose answers were
 its own are asked again at once without it.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from math import inf
-from typing import NamedTuple
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from drivers.dynamixel.protocol import HEADER
-from drivers.dynamixel.sync_packets import FastGroup, Group, PlainGroup, Values
 from drivers.servo_bus.poll_list import Roll, silent_ones
-from drivers.servo_bus.read_windows import Sample, View
 from drivers.servo_bus.transaction import Line
 from drivers.servo_bus.window_schedule import Turns
 
 MOST_GROUPS = 64
 """So many prepared exchanges are kept."""
 
+OWED_S = 0.5
+"""An answer may still come so long after waiting for it has ended."""
 
-class Heard(NamedTuple):
+Sample = TypeVar("Sample")
+
+
+class Window(Protocol):
+    """Bytes read from every servo."""
+
+    @property
+    def address(self) -> int:
+        """First byte."""
+
+    @property
+    def length(self) -> int:
+        """Number of bytes."""
+
+
+View = TypeVar("View", bound=Window)
+
+
+class Pieces(NamedTuple, Generic[Sample]):
+    """What could be saved of an answer.
+
+    samples: proved values by id
+    damaged: servos whose bytes were spoilt
+    unproved: servos whose bytes cannot be judged because of a damaged one before them
+    """
+
+    samples: dict[int, Sample]
+    damaged: frozenset[int]
+    unproved: frozenset[int] = frozenset()
+
+
+class Group(Protocol[Sample]):
+    """A read of some servos with everything fixed beforehand."""
+
+    ids: tuple[int, ...]
+    request: bytes
+    reply_length: int
+
+    def whole(self, raw: bytes) -> Any | None:
+        """Return all values, None where anything at all is not as it should be."""
+
+    def missing(self, raw: bytes) -> int:
+        """Return how many bytes are still to come."""
+
+    def pieces(self, raw: bytes) -> Pieces[Sample]:
+        """Save what can be proved right."""
+
+    def each(self, raw: bytes, values: Any) -> Mapping[int, Sample]:
+        """Return a faultless answer servo by servo."""
+
+
+class Heard(NamedTuple, Generic[Sample]):
     """One servo's answer and when it arrived."""
 
     sample: Sample
     at_s: float
 
 
-class Whole(NamedTuple):
+class Whole(NamedTuple, Generic[Sample]):
     """A faultless answer of everybody, and when it arrived."""
 
-    group: Group
+    group: Any
     raw: bytes
-    values: Values
+    values: Any
     at_s: float
 
-    def each(self) -> dict[int, Heard]:
-        """Give the answer servo by servo."""
-        samples = self.group.pieces(self.raw).samples
+    def each(self) -> dict[int, Heard[Sample]]:
+        """Return the answer servo by servo."""
+        samples: Mapping[int, Sample] = self.group.each(self.raw, self.values)
         return {servo_id: Heard(sample, self.at_s) for servo_id, sample in samples.items()}
 
 
-class Reader:
-    """Reads all servos of a roll.
+class Reader(Generic[View, Sample]):
+    """Reads all servos of a poll list.
 
     Args:
         line: the bus.
         roll: who is asked; told who failed.
         together, alone: the views of the group's reading, and of servos asked alone.
-        fast: ask for one packet of all instead of one status each.
+        kind: makes the read of some servos with a view.
+        header: first bytes of every answer.
+        second: views of readings that confirm others, and have other lengths than they.
     """
 
     def __init__(
-        self, line: Line, roll: Roll, together: Turns[View], alone: Turns[View], fast: bool
+        self,
+        line: Line,
+        roll: Roll,
+        together: Turns[View],
+        alone: Turns[View],
+        kind: Callable[[Sequence[int], View], Group[Sample]],
+        header: bytes,
+        second: Turns[View] | None = None,
     ) -> None:
         self._line = line
         self.roll = roll
-        self._together, self._alone = together, alone
-        self._kind = FastGroup if fast else PlainGroup
+        self._together, self._alone, self._second = together, alone, second or alone
+        self._kind, self._header = kind, header
         self._until_s = inf
-        self._groups: dict[tuple[tuple[int, ...], int, int], Group] = {}
+        self._unanswered_s: dict[int, float] = {}
+        self._groups: dict[tuple[tuple[int, ...], int, int], Group[Sample]] = {}
 
-    def read(self, now_s: float) -> Whole | dict[int, Heard]:
+    def read(self, now_s: float) -> Whole[Sample] | dict[int, Heard[Sample]]:
         """Read everybody who is asked now; who is not in the answer gave no good one.
 
         Raises:
@@ -77,13 +137,40 @@ class Reader:
         values = group.whole(raw)
         if values is not None:
             return Whole(group, raw, values, at_s)
-        heard: dict[int, Heard] = {}
+        heard: dict[int, Heard[Sample]] = {}
         self._save(group, raw, at_s, heard, now_s, self._together)
         return heard
 
-    def _with_care(self, now_s: float) -> dict[int, Heard]:
+    def owing(self, servo_id: int, now_s: float) -> bool:
+        """Return whether a servo has left a question unanswered of late.
+
+        The answer that comes now may be to that one where a packet says nothing of when or to
+        what question it was given, and neither length nor silence tells.
+        """
+        return now_s - self._unanswered_s.get(servo_id, -inf) <= OWED_S
+
+    def any_owing(self, now_s: float) -> bool:
+        """Return whether any servo has left a question unanswered of late."""
+        unanswered_s = self._unanswered_s
+        return bool(unanswered_s) and now_s - max(unanswered_s.values()) <= OWED_S
+
+    def again(self, ids: Sequence[int]) -> dict[int, Heard[Sample]]:
+        """Ask some servos once more, in one exchange; who is not in the answer gave no good one.
+
+        Raises:
+            drivers.errors.BusLost: the port is gone.
+        """
+        group = self._group(tuple(ids), self._second)
+        raw, at_s = self._line.exchange(group.request, group.reply_length)
+        raw = self._line.complete(raw, group.missing, self._line.deadline_s)
+        samples = group.pieces(raw).samples
+        if len(samples) < len(group.ids) and not self._line.quiet:
+            self._line.drain(self._line.patience.seconds)
+        return {servo_id: Heard(sample, at_s) for servo_id, sample in samples.items()}
+
+    def _with_care(self, now_s: float) -> dict[int, Heard[Sample]]:
         """Read the group, and one of those who are out of it."""
-        heard: dict[int, Heard] = {}
+        heard: dict[int, Heard[Sample]] = {}
         together, due = self.roll.group, self.roll.due(now_s)
         self._until_s = inf
         self._read(together, heard, now_s, self._together)
@@ -92,7 +179,11 @@ class Reader:
         return heard
 
     def _read(
-        self, ids: tuple[int, ...], heard: dict[int, Heard], now_s: float, turns: Turns[View]
+        self,
+        ids: tuple[int, ...],
+        heard: dict[int, Heard[Sample]],
+        now_s: float,
+        turns: Turns[View],
     ) -> None:
         if not ids:
             return
@@ -102,8 +193,8 @@ class Reader:
         self._until_s = min(self._until_s, self._line.whole_s + self._line.most_s)
         self._save(group, raw, at_s, heard, now_s, turns)
 
-    def _group(self, ids: tuple[int, ...], turns: Turns[View]) -> Group:
-        """Give the prepared exchange for some servos."""
+    def _group(self, ids: tuple[int, ...], turns: Turns[View]) -> Group[Sample]:
+        """Return the prepared exchange for some servos."""
         view = turns.next()
         key = ids, view.address, view.length
         group = self._groups.get(key)
@@ -115,10 +206,10 @@ class Reader:
 
     def _save(
         self,
-        group: Group,
+        group: Group[Sample],
         raw: bytes,
         at_s: float,
-        heard: dict[int, Heard],
+        heard: dict[int, Heard[Sample]],
         now_s: float,
         turns: Turns[View],
     ) -> None:
@@ -130,8 +221,11 @@ class Reader:
                 heard[servo_id] = Heard(sample, at_s)
             if len(samples) == len(group.ids):
                 return
+            for servo_id in group.ids:
+                if servo_id not in samples:
+                    self._unanswered_s[servo_id] = now_s
             silent = silent_ones(group.ids, samples.keys() | damaged | unproved)
-            if not samples and not damaged and HEADER in raw:
+            if not samples and not damaged and self._header in raw:
                 self._line.lateness.late_answer(now_s)  # that of an earlier question
             self._blame(damaged, silent, now_s, turns)
             done = heard.keys() | damaged | frozenset(silent)

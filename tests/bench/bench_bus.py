@@ -21,8 +21,8 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Xl330PyController
 
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.serial.port import BlockingPort
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoSetup
 from sim_mock.dynamixel.chain import build_dynamixel
 from sim_mock.in_process_port import InProcessPort

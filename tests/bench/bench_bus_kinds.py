@@ -24,11 +24,11 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Sts3215PyController, Xl330PyController
 
+from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from drivers.feetech.bus import FeetechBus, FeetechParams
 from drivers.maestro.bus import MaestroBus, MaestroParams
 from drivers.multi_bus import MixedBus, Share
 from drivers.serial.port import BlockingPort, BusPort
-from drivers.servo_bus.bus import DynamixelBus, DynamixelParams
 from drivers.types import ServoBus, ServoSetup
 from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
 from sim_mock.hobby_servo import HobbySpec

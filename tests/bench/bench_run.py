@@ -19,7 +19,7 @@ from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler
 from fastcrc import crc16
 
 from config.schema import load_rig
-from drivers.servo_bus.bus import DynamixelBus
+from drivers.dynamixel.bus import DynamixelBus
 from robot.assemble import Assembly, Choice, assemble
 from robot.loop import run
 from robot.summary import Summary

@@ -4,10 +4,10 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import inf
 
 from drivers.dynamixel.control_table import REGISTERS, WATCHDOG_UNIT_S, name_errors, speed_units
+from drivers.dynamixel.feedback import Readings
 from drivers.dynamixel.protocol import ALERT
+from drivers.dynamixel.read_windows import Sample
 from drivers.servo_bus.faults import Health
-from drivers.servo_bus.feedback import Readings
-from drivers.servo_bus.read_windows import Sample
 from drivers.servo_bus.recovery import Recovery
 from drivers.servo_bus.torque import TRIPPED, heal_tripped
 from drivers.servo_bus.transaction import TRIES, Line

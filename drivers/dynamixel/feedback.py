@@ -5,6 +5,7 @@ from math import copysign
 
 from drivers.dynamixel.control_table import MODELS, VELOCITY_UNIT_STEPS_S
 from drivers.dynamixel.protocol import ALERT
+from drivers.dynamixel.read_windows import Sample
 from drivers.plausibility import Plausibility
 from drivers.servo_bus.sync_read import Heard, Whole
 from drivers.types import ServoReading, ServoSetup
@@ -38,6 +39,9 @@ class Readings:
         self._engaged = False
         self._armed: tuple[int, ...] = (0,) * count
 
+    def set_limits(self, setups: Sequence[ServoSetup]) -> None:
+        """Take other limits for the same servos: positions do not depend on them."""
+
     def expect_torque(self, on: bool) -> None:
         """Note that the torque has been switched for all."""
         self._engaged = on
@@ -57,7 +61,7 @@ class Readings:
         self._volts = [*self._volts[:slot], 0.1 * tenth_volts, *self._volts[slot + 1 :]]
         self._warm = [*self._warm[:slot], float(temperature_c), *self._warm[slot + 1 :]]
 
-    def whole(self, answer: Whole) -> list[ServoReading | None] | None:
+    def whole(self, answer: Whole[Sample]) -> list[ServoReading | None] | None:
         """Take an answer in which nothing is amiss; None where anything must be looked at."""
         values, at, at_s = answer.values, answer.group.columns, answer.at_s
         positions = values[at.position]
@@ -110,11 +114,11 @@ class Readings:
             )
         ]
 
-    def believes(self, slot: int, heard: Heard) -> bool:
+    def believes(self, slot: int, heard: Heard[Sample]) -> bool:
         """Tell whether one servo's answer can be true; to be asked once for every answer."""
         return self.places.one(slot, heard.sample.position, heard.at_s)
 
-    def one(self, slot: int, heard: Heard) -> ServoReading:
+    def one(self, slot: int, heard: Heard[Sample]) -> ServoReading:
         """Take one servo's answer, which was not refused."""
         sample = heard.sample
         if sample.torque is not None:
