@@ -8,7 +8,7 @@ from drivers.feetech.group import Group
 from drivers.feetech.protocol import checksum
 from drivers.feetech.readings import Readings
 from drivers.feetech.views import ARMED, SENSED, View, alone_turns, together_turns
-from drivers.servo_bus.sync_read import Heard
+from drivers.servo_bus.sync_read import Heard, Whole
 from drivers.types import ServoSetup
 
 BLOCK = struct.pack("<HHHBBBBB2xH", 0x8006, 0x8064, 0x052C, 74, 31, 0, 0x20, 1, 0x8002)
@@ -58,11 +58,36 @@ def test_after_trouble_no_reading_has_the_length_of_the_one_before():
 def test_a_whole_answer_and_its_pieces_say_the_same():
     group = Group((2, 5), SENSED)
     raw = status(2, BLOCK) + status(5, BLOCK, 4)
-    assert group.whole(raw) == group.pieces(raw).samples
+    assert group.each(raw, group.whole(raw)) == group.pieces(raw).samples
     assert group.whole(raw[:-1]) is None
     assert group.whole(status(5, BLOCK) + status(2, BLOCK)) is None
     assert group.missing(raw) == 0
     assert group.missing(raw[:30]) == len(raw) - 30
+
+
+@pytest.mark.parametrize("at", range(42))
+def test_any_single_damaged_byte_of_a_whole_answer_is_found(at):
+    group = Group((2, 5), SENSED)
+    raw = status(2, BLOCK) + status(5, BLOCK)
+    assert group.whole(raw) is not None
+    assert group.whole(raw[:at] + bytes([raw[at] ^ 0x40]) + raw[at + 1 :]) is None
+
+
+def test_a_whole_answer_at_once_reads_as_servo_by_servo():
+    setups = [ServoSetup(i, "sts3215", 0, 4095, 3000.0) for i in (2, 5)]
+    group = Group((2, 5), SENSED)
+    for velocity, load, current in ((0x8064, 0x052C, 0x8002), (100, 0x7FF, 7), (0, 0x3FF, 0)):
+        block = struct.pack("<HHHBBBBB2xH", 906, velocity, load, 74, 31, 0, 0, 1, current)
+        raw = status(2, block) + status(5, block)
+        one, other = Readings(setups), Readings(setups)
+        for readings in (one, other):
+            readings.expect_torque(True)
+            for slot in (0, 1):
+                readings.places.place(slot, 900, 0.99)
+            assert readings.places.one(0, 900, 1.0) and readings.places.one(1, 900, 1.0)
+        whole = Whole(group, raw, group.whole(raw), 1.01)
+        each = whole.each()
+        assert one.whole(whole) == [other.one(k, each[i]) for k, i in enumerate((2, 5))]
 
 
 def test_twice_the_same_is_an_echo_and_two_that_differ_are_nobodys():

@@ -63,8 +63,16 @@ class FeetechBus(SmartServoBus):
 
     def _read(self, now_s: float) -> list[ServoReading | None]:
         answer = self._reader.read(now_s)
-        heard = answer.each() if isinstance(answer, Whole) else answer
-        readings = self._take(heard, now_s)
+        readings = None
+        if isinstance(answer, Whole):
+            doubtful = self._disturbed(now_s) or self._reader.any_owing(now_s)
+            if self._care.at_ease and not doubtful:
+                readings = self._readings.whole(answer)
+        if readings is None:
+            heard = answer.each() if isinstance(answer, Whole) else answer
+            readings = self._take(heard, now_s)
+        elif self._health.returning:
+            self._health.heard_again(now_s, self._line.lateness)
         self._care.tend(readings, self._roll.group, now_s)
         return readings
 
@@ -74,11 +82,7 @@ class FeetechBus(SmartServoBus):
         if heard and self._health.silent_for_s(now_s) >= RESTART_S:
             # All were silent together: their power may have been cut.
             self._care.suspect_all()
-        places = self._readings.places
-        if (damaged := self._line.errors["corrupt"]) != self._damaged:
-            self._damaged = damaged
-            places.damaged(now_s)
-        disturbed = places.disturbed(now_s)
+        disturbed = self._disturbed(now_s)
         doubtful = {i: h for i, h in heard.items() if disturbed or self._reader.owing(i, now_s)}
         if doubtful:
             sure = {i: h for i, h in heard.items() if i not in doubtful}
@@ -98,6 +102,14 @@ class FeetechBus(SmartServoBus):
             self._roll.out, now_s, self._roll.garbling, self._line.lateness, bool(heard)
         )
         return readings
+
+    def _disturbed(self, now_s: float) -> bool:
+        """Return whether answers have been damaged of late."""
+        places = self._readings.places
+        if (damaged := self._line.errors["corrupt"]) != self._damaged:
+            self._damaged = damaged
+            places.damaged(now_s)
+        return places.disturbed(now_s)
 
     def _confirmed(self, heard: dict[int, Heard[Sample]]) -> dict[int, Heard[Sample]]:
         """Ask everybody who answered once more, and keep what both answers say.

@@ -92,6 +92,11 @@ class Care:
         self._revive_at_s = -inf
         self._readings.places.forget()
 
+    @property
+    def at_ease(self) -> bool:
+        """Return whether nothing is known of any servo that an answer could change."""
+        return not (self._seen_s or self._health.faults or any(self._told_before.values()))
+
     def withheld(self, now_s: float) -> frozenset[int]:
         """Name the servos that must get no goals now.
 

@@ -4,18 +4,36 @@ Where the whole answer is right every servo's bytes are at their place; otherwis
 be proved right is taken out piece by piece, so that a bad servo costs only itself.
 """
 
+import struct
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 from drivers.feetech.protocol import (
     HEADER,
     STATUS_OVERHEAD,
     bytes_missing,
-    checksum,
     statuses,
     sync_read,
 )
 from drivers.feetech.views import Sample, View
 from drivers.servo_bus.sync_read import Pieces
+
+Values = tuple[Any, ...]
+"""All numbers of a whole answer; ``Group.columns`` says which are whose."""
+
+
+class Columns(NamedTuple):
+    """Slices of a whole answer: one number a servo, in the order asked, signs not decoded."""
+
+    error: slice
+    position: slice
+    velocity: slice
+    load: slice
+    voltage: slice
+    temperature: slice
+    status: slice
+    moving: slice
+    current: slice
 
 
 class Group:
@@ -27,22 +45,34 @@ class Group:
         self.request = sync_read(ids, view.address, view.length)
         self.reply_length = self._size * len(ids)
         self._heads = tuple(HEADER + bytes((i, view.length + 2)) for i in ids)
+        self._layout = struct.Struct("<" + f"4sB{view.layout}B" * len(ids))
+        self._stride = 3 + view.numbers
+        self._spans = [slice(k * self._size + 2, (k + 1) * self._size) for k in range(len(ids))]
+        self.columns = Columns(
+            slice(1, None, self._stride),
+            *(slice(view.numbers - 6 + i, None, self._stride) for i in range(8)),
+        )
 
-    def whole(self, raw: bytes) -> dict[int, Sample] | None:
-        """Give everybody's values, None where anything at all is not as it should be."""
-        size, samples = self._size, dict[int, Sample]()
+    def whole(self, raw: bytes) -> Values | None:
+        """Return all values, None where anything at all is not as it should be."""
         if len(raw) != self.reply_length:
             return None
-        for k, servo_id in enumerate(self.ids):
-            status = raw[k * size : (k + 1) * size]
-            if status[:4] != self._heads[k] or checksum(status[2:-1]) != status[-1]:
+        values = self._layout.unpack(raw)
+        if values[0 :: self._stride] != self._heads:
+            return None
+        for span in self._spans:
+            # From the id to the check byte, which is the inverse of the sum before it.
+            if sum(raw[span]) & 0xFF != 0xFF:
                 return None
-            samples[servo_id] = self.view.sample(status[4], status[5:-1])
-        return samples
-
-    def each(self, raw: bytes, values: dict[int, Sample]) -> dict[int, Sample]:
-        """Return a faultless answer servo by servo."""
         return values
+
+    def each(self, raw: bytes, values: Values) -> dict[int, Sample]:
+        """Return a faultless answer servo by servo."""
+        size = self._size
+        return {
+            servo_id: self.view.sample(raw[k * size + 4], raw[k * size + 5 : (k + 1) * size - 1])
+            for k, servo_id in enumerate(self.ids)
+        }
 
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from drivers.feetech.memory_table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
 from drivers.feetech.views import Sample
 from drivers.plausibility import Plausibility
-from drivers.servo_bus.sync_read import Heard
+from drivers.servo_bus.sync_read import Heard, Whole
 from drivers.servo_bus.turn import nearest_turn
 from drivers.types import ServoReading, ServoSetup
 
@@ -20,6 +20,9 @@ ALIKE_C, ALIKE_TENTH_V = 3, 10
 
 MOST_CELSIUS = 125
 """A temperature above is none."""
+
+
+_new = tuple.__new__
 
 
 class Readings:
@@ -51,6 +54,59 @@ class Readings:
     def name_fault(self, slot: int, fault: str) -> None:
         """Note what a servo suffers from, "" for nothing."""
         self._fault[slot] = fault
+
+    def whole(self, answer: Whole[Sample]) -> list[ServoReading | None] | None:
+        """Take an answer in which nothing is amiss; None where anything must be looked at.
+
+        One that tells torque and armed limits is always looked at.
+        """
+        if answer.group.view.armed:
+            return None
+        values, at, at_s = answer.values, answer.group.columns, answer.at_s
+        positions, warm = values[at.position], values[at.temperature]
+        if any(values[at.error]) or any(values[at.status]) or max(warm) > MOST_CELSIUS:
+            return None
+        if max(positions) & 0x8000:
+            return None
+        places = [
+            p if low <= p <= high else nearest_turn(p, low, high, STEPS_PER_TURN)
+            for p, (low, high) in zip(positions, self._ranges, strict=True)
+        ]
+        if not self.places.whole(places, at_s):
+            return None
+        self._warm = [float(t) for t in warm]
+        self._volts = [0.1 * tenths for tenths in values[at.voltage]]
+        # One tuple a servo and no call: this runs every tick.
+        return [
+            _new(
+                ServoReading,
+                (
+                    p,
+                    float(v if v < 0x8000 else 0x8000 - v),
+                    (c if c < 0x8000 else 0x8000 - c) * CURRENT_UNIT_MA,
+                    at_s,
+                    False,
+                    on,
+                    fault,
+                    max(-1.0, min(1.0, (-(x & 0x3FF) if x & 0x400 else x & 0x3FF) * LOAD_UNIT)),
+                    t,
+                    u,
+                    False,
+                    True,
+                ),
+            )
+            for p, v, c, x, on, fault, t, u in zip(
+                places,
+                values[at.velocity],
+                values[at.current],
+                values[at.load],
+                self._torque,
+                self._fault,
+                self._warm,
+                self._volts,
+                strict=True,
+            )
+        ]
 
     def believes(self, slot: int, heard: Heard[Sample]) -> bool:
         """Tell whether one servo's answer can be true; to be asked once for every answer."""

@@ -52,6 +52,7 @@ class View:
         self.armed = address <= self._ARMED_AT
         pad = (self._ARMED_AT if self.armed else self._SENSED_AT) - address
         layout = f"<{pad}x" + (self._ARMED if self.armed else "") + self._SENSED
+        self.layout, self.numbers = layout[1:], 11 if self.armed else 8
         self._layout = struct.Struct(layout)
 
     def sample(self, error: int, data: bytes) -> Sample:
