@@ -19,8 +19,6 @@ is not found out: with such a one on the line name the kind that is wished.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from drivers.dynamixel import discovery as dynamixel_scan
-from drivers.feetech import scan as feetech_scan
 from drivers.maestro.params import MaestroParams
 from drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from drivers.serial.port import BusPort
@@ -116,18 +114,8 @@ def search(
 def _look(port: BusPort, usb: str, kind: BusKind, baud: int, thorough: bool) -> Looked:
     if kind == "maestro":
         return _board(port, usb, baud)
-    if kind == "feetech":
-        return _sts(port, baud, thorough)
-    (one,) = dynamixel_scan.scan(port, (baud,), thorough)
+    one = KINDS[kind].scan(port, baud, thorough)
     return Looked(kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1)
-
-
-def _sts(port: BusPort, baud: int, thorough: bool) -> Looked:
-    """Ask STS servos; all ids take a second or more, so unless thorough somebody must be there."""
-    if not thorough and port.setBaudRate(baud) and not feetech_scan.anybody(port):
-        return Looked("feetech", baud)
-    (sts,) = feetech_scan.scan(port, (baud,))
-    return Looked("feetech", baud, sts.possible, sts.found, sts.junk, sts.shared)
 
 
 def _board(port: BusPort, usb: str, baud: int) -> Looked:

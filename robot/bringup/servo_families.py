@@ -15,7 +15,7 @@ from drivers.feetech.protocol import REBOOT, instruction
 from drivers.feetech.registers import StsRegisters
 from drivers.serial.port import BusPort
 from drivers.servo_models import SERVOS
-from robot.bringup.servo_kind import Driving, ServoKind, Setting
+from robot.bringup.servo_kind import Driving, Scanned, ServoKind, Setting
 
 XL430_LOAD_FULL = 1000.0
 """Models without current measurement give their load in 0.1 % of the stall torque there."""
@@ -59,6 +59,19 @@ def _gentle_feetech(
     }
 
 
+def _scan_dynamixel(port: BusPort, baud: int, thorough: bool) -> Scanned:
+    (one,) = dynamixel_scan.scan(port, (baud,), thorough)
+    return Scanned(one.possible, one.found, one.junk, one.shared, one.protocol_1)
+
+
+def _scan_feetech(port: BusPort, baud: int, thorough: bool) -> Scanned:
+    """Ask all ids, which takes a second or more; unless thorough only where any servo answers."""
+    if not thorough and port.setBaudRate(baud) and not feetech_scan.anybody(port):
+        return Scanned(True, (), 0, ())
+    (one,) = feetech_scan.scan(port, (baud,))
+    return Scanned(one.possible, one.found, one.junk, one.shared)
+
+
 def _reboot_feetech(port: BusPort, servo_id: int) -> None:
     """Tell a servo to restart; whether it has is seen by asking it afterwards."""
     port.drain()
@@ -90,6 +103,7 @@ DYNAMIXEL = ServoKind(
     version=str,
     registers=Registers,
     scan_ids=dynamixel_scan.everybody,
+    scan=_scan_dynamixel,
     any_reply=lambda port: True,
     ping=dynamixel_scan.ping,
     corrupt=dynamixel_scan.garbled,
@@ -126,6 +140,7 @@ FEETECH = ServoKind(
     version=lambda firmware: f"{firmware // 100}.{firmware % 100}",
     registers=StsRegisters,
     scan_ids=feetech_scan.everybody,
+    scan=_scan_feetech,
     any_reply=feetech_scan.anybody,
     ping=feetech_scan.ping,
     corrupt=feetech_scan.garbled,

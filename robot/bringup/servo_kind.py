@@ -103,6 +103,20 @@ class Registers(Protocol):
         ...
 
 
+class Scanned(NamedTuple):
+    """What asking all ids at one baud rate has brought.
+
+    possible: the adaptor can run at it; junk: bytes that made no sense
+    shared: ids that two servos seem to have; protocol_1: ids that answer to the old protocol
+    """
+
+    possible: bool
+    found: tuple[Found, ...]
+    junk: int
+    shared: tuple[int, ...]
+    protocol_1: tuple[int, ...] = ()
+
+
 class Setting(NamedTuple):
     """A register that must have a value where it is calibrated; ``mask`` chooses its bits."""
 
@@ -147,6 +161,7 @@ class ServoKind(NamedTuple):
     version: writes a firmware number as the maker does
     registers: makes access to single registers, of a port and a number of tries
     scan_ids: asks all ids; returns who answered, and the number of bytes that made no sense
+    scan: the same of a port that may be closed, at a baud rate; thorough: with long patience
     any_reply: whether any servo answers, quickly; True where only ``scan_ids`` can tell
     ping: asks one id at the baud rate given; corrupt: how many of some answers came in pieces
     reboot: tells a servo to restart
@@ -167,6 +182,7 @@ class ServoKind(NamedTuple):
     version: Callable[[int], str]
     registers: Callable[[BusPort, int], Registers]
     scan_ids: Callable[[BusPort, int], tuple[tuple[Found, ...], int]]
+    scan: Callable[[BusPort, int, bool], Scanned]
     any_reply: Callable[[BusPort], bool]
     ping: Callable[[BusPort, int, int, int], Found | None]
     corrupt: Callable[[BusPort, int, int], int]
