@@ -129,7 +129,9 @@ def _steered(
         (idle.rest_distance_m, 0.0, idle.rest_height_m),
     )
     made.robot.attention = steering
-    keys = PageKeys(TerminalKeys() if not scripted and sys.stdin.isatty() else LineKeys(lines))
+    # What comes through a pipe is a script, too: nobody is there to give up.
+    scripted = scripted or not sys.stdin.isatty()
+    keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
     steer = Steer(BUTTONS, keys.press, lambda: shown(steering))
     audience = Audience(made, Wished(page=page), None, page is None, say, status, steer)
     door = StopDoor(
@@ -241,7 +243,7 @@ class _Sitting:
             self._ready_s = now_s
         if self._scripted and now_s - self._ready_s > _SCRIPT_WAITS_S:
             what = "no face is seen" if self._steering.face is None else "the eyes cannot reach it"
-            raise SetupError(f"{what} for {_SCRIPT_WAITS_S:g} s: answers from a file end here")
+            raise SetupError(f"{what} for {_SCRIPT_WAITS_S:g} s: keys from a file or a pipe end here")
 
     def _tell(self, what: str | None) -> None:
         if what is not None:
