@@ -391,3 +391,12 @@ def test_while_buttons_lead_the_page_can_only_stop_and_resume() -> None:
         with pytest.raises(ValueError, match="lead the head now"):
             order(asked)
     assert given == [Stop("a test"), Resume()]
+
+
+def test_eyes_on_one_linkage_meet_a_part_by_their_mean_line_of_sight(tmp_path: Path) -> None:
+    answers, rig = tmp_path / "keys.txt", tmp_path / "mine.yaml"
+    answers.write_text("\nend\n")
+    words = ["face", "maker", "--mock", "--yes", "--out", str(rig)]
+    made = CliRunner().invoke(app, [*words, "--answers", str(answers)])
+    assert made.exit_code == 0, made.output
+    assert "N:" in rig.read_text()

@@ -7,11 +7,11 @@ model, guard, servos.
 
 from math import degrees, inf
 
-from gaze.angles import angle_between, norm, sub
-from gaze.field_of_view import line_of_sight
+from gaze.angles import norm, sub
 from gaze.top_down import TopDown
 from gaze.types import Face, GazeState, Percept, Target, Vec3
 from robot.calibrate.face_calibration import FaceCalibration, Key, point_world_m, pressed
+from robot.gaze_error import gaze_error
 from robot.loop import Tick
 
 AIMED_DEG = 1.0
@@ -34,11 +34,22 @@ class FaceSteering:
 
     state: how far the person has come
     face: the face that is looked at, None while none is seen
-    error_deg: how far the worse eye is from the part, as measured; inf while unknown
+    error_deg: how far the worse eye is from the part, as measured, or the mean line of sight
+        of eyes that one linkage turns to the sides; inf while unknown
     """
 
-    def __init__(self, state: FaceCalibration, top_down: TopDown, rest_world_m: Vec3) -> None:
-        """Take where to begin, the behaviours, which rest, and where to look with nobody there."""
+    def __init__(
+        self,
+        state: FaceCalibration,
+        top_down: TopDown,
+        rest_world_m: Vec3,
+        converges: bool = True,
+    ) -> None:
+        """Take where to begin, the behaviours, which rest, and where to look with nobody there.
+
+        converges: each eye turns to the sides by itself
+        """
+        self._converges = converges
         self.top_down = top_down
         self._begin = state
         self._rest = rest_world_m
@@ -93,7 +104,7 @@ class FaceSteering:
 
     def note(self, tick: Tick) -> str | None:
         """See where the eyes are; give why a waiting Enter was dropped."""
-        self.error_deg = _off_deg(tick.pose, tick.target.p_world_m)
+        self.error_deg = self._off_deg(tick)
         if tick.target.kind != "part" or tick.gaze.phase == "saccade":
             self.error_deg = inf
         if self._entered_s is None:
@@ -104,12 +115,16 @@ class FaceSteering:
             self.error_deg = inf
         elif tick.t_s - self._entered_s > WAIT_S:
             self._entered_s = None
-            off = _off_deg(tick.pose, tick.target.p_world_m)
+            off = self._off_deg(tick)
             return (
                 f"not taken: the eyes are {off:.1f} deg off the point, as far as they can turn; "
                 "come before the robot, nearer to where its head points"
             )
         return None
+
+    def _off_deg(self, tick: Tick) -> float:
+        """Return how far beside the part the eyes look, as well as they can meet it at all."""
+        return degrees(gaze_error(tick.target.p_world_m, tick.pose, self._converges).whole)
 
     def _nearest(self, percept: Percept | None, p_head: Vec3, t_s: float) -> Face | None:
         """Give the face looked at for as long as it is seen, else the nearest."""
@@ -132,10 +147,3 @@ class FaceSteering:
         """Count a shift whenever another point is looked at."""
         self._shift += identity != self._identity
         self._identity = identity
-
-
-def _off_deg(pose: GazeState, p_world_m: Vec3) -> float:
-    """Give how far the worse eye looks past a point."""
-    left = angle_between(line_of_sight(pose, left=True), sub(p_world_m, pose.p_world_eye_left_m))
-    right = angle_between(line_of_sight(pose, left=False), sub(p_world_m, pose.p_world_eye_right_m))
-    return degrees(max(left, right))

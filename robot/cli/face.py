@@ -127,6 +127,7 @@ def _steered(
         begun(rig.face_parts_mm),
         made.robot.attention.top_down,
         (idle.rest_distance_m, 0.0, idle.rest_height_m),
+        "eyes_pan" not in rig.joints,
     )
     made.robot.attention = steering
     # What comes through a pipe is a script, too: nobody is there to give up.
@@ -243,7 +244,7 @@ class _Sitting:
             self._ready_s = now_s
         if self._scripted and now_s - self._ready_s > _SCRIPT_WAITS_S:
             what = "no face is seen" if self._steering.face is None else "the eyes cannot reach it"
-            raise SetupError(f"{what} for {_SCRIPT_WAITS_S:g} s: keys from a file or a pipe end here")
+            raise SetupError(f"{what} for {_SCRIPT_WAITS_S:g} s: keys from a file or pipe end here")
 
     def _tell(self, what: str | None) -> None:
         if what is not None:
