@@ -23,7 +23,7 @@ from drivers.dynamixel.read_windows import (
     direct_turns,
     indirect_turns,
 )
-from drivers.dynamixel.supervisor import Care
+from drivers.dynamixel.supervisor import DynamixelSupervisor
 from drivers.dynamixel.sync_packets import FastGroup, PlainGroup
 from drivers.serial.port import BusPort
 from drivers.servo_bus.bus import CUT, RESTART_S, SmartServoBus
@@ -41,7 +41,7 @@ class DynamixelBus(SmartServoBus):
         params: how to speak with them.
     """
 
-    _care: Care
+    _supervisor: DynamixelSupervisor
     _readings: Readings
 
     def __init__(
@@ -60,7 +60,7 @@ class DynamixelBus(SmartServoBus):
         self._reader: Reader[View, Sample] = Reader(
             self._line, self._roll, together, alone_turns(), group, HEADER
         )
-        self._care = Care(
+        self._supervisor = DynamixelSupervisor(
             self._line,
             self._by_id,
             self._watchdog,
@@ -71,7 +71,7 @@ class DynamixelBus(SmartServoBus):
         )
 
     def _first_look(self) -> None:
-        self._care.find_alerts(self._ids)
+        self._supervisor.find_alerts(self._ids)
 
     def _all_fast(self, firmware: Mapping[int, int] | None) -> bool:
         """Return whether all understand fast sync read."""
@@ -98,14 +98,14 @@ class DynamixelBus(SmartServoBus):
 
     def _read(self, now_s: float) -> list[ServoReading | None]:
         if self._line.starved:
-            self._care.heal(self._roll.group)
+            self._supervisor.recover_tripped(self._roll.group)
         answer = self._reader.read(now_s)
         readings = self._readings.whole(answer) if isinstance(answer, Whole) else None
         if readings is None:
             readings = self._take(answer, now_s)
         elif self._health.returning:
             self._health.heard_again(now_s, self._line.lateness)
-        self._care.tend(readings, self._roll.group, now_s)
+        self._supervisor.service(readings, self._roll.group, now_s)
         return readings
 
     def _take(
@@ -115,14 +115,14 @@ class DynamixelBus(SmartServoBus):
         heard = answer.each() if isinstance(answer, Whole) else answer
         readings: list[ServoReading | None] = [None] * len(self._ids)
         if heard and self._health.silent_for_s(now_s) >= RESTART_S:
-            self._care.suspect_all()
+            self._supervisor.mark_all_for_recovery()
         dark = not self._roll.group
         for servo_id, one in heard.items():
             slot = self._slot[servo_id]
             was_out = self._roll.answered(servo_id)
-            believed = self._care.judge(servo_id, one.sample)
-            if was_out and self._care.engaged:
-                self._care.check(servo_id)
+            believed = self._supervisor.check_status(servo_id, one.sample)
+            if was_out and self._supervisor.engaged:
+                self._supervisor.check(servo_id)
             if one.sample.error & ERROR_NUMBER:
                 self._line.errors["refused"] += 1
             elif was_out and dark:

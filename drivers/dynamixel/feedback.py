@@ -21,7 +21,6 @@ class Readings:
 
     def __init__(self, setups: Sequence[ServoSetup]) -> None:
         models = [MODELS[setup.model] for setup in setups]
-        self._slot = {setup.id: i for i, setup in enumerate(setups)}
         self._units_ma = tuple(model.current_unit_ma for model in models)
         # Models without a current sensor report load in 0.1 %.
         self._units_load = tuple(
@@ -48,9 +47,9 @@ class Readings:
         self._armed = (int(on),) * len(self._torque)
         self._torque = [on] * len(self._torque)
 
-    def name_fault(self, servo_id: int, fault: str) -> None:
+    def name_fault(self, slot: int, fault: str) -> None:
         """Note what a servo suffers from, "" for nothing."""
-        self._fault[self._slot[servo_id]] = fault
+        self._fault[slot] = fault
 
     def torque(self, slot: int, on: int) -> None:
         """Note a servo's torque."""

@@ -9,9 +9,9 @@ from drivers.dynamixel.protocol import ALERT
 from drivers.dynamixel.read_windows import Sample
 from drivers.servo_bus.faults import Health
 from drivers.servo_bus.recovery import Recovery
+from drivers.servo_bus.supervisor import AGAIN_S, Supervisor
 from drivers.servo_bus.torque import TRIPPED, heal_tripped
 from drivers.servo_bus.transaction import TRIES, Line
-from drivers.slow_entry import SlowEntry
 from drivers.types import ServoReading, ServoSetup
 
 CHECK_S = 1.0
@@ -20,15 +20,11 @@ CHECK_S = 1.0
 SLOW_S = 0.05
 """So often one servo is asked for what a group reading does not cover, each in turn."""
 
-AGAIN_S = 0.25
-"""Time between attempts to learn what an alert is about, or to set a servo up again."""
 
+class DynamixelSupervisor(Supervisor):
+    """What is done about the servos' health."""
 
-class Care:
-    """What is done about the servos' health.
-
-    engaged: the torque is on
-    """
+    _readings: Readings
 
     def __init__(
         self,
@@ -41,27 +37,19 @@ class Care:
         covered: bool,
     ) -> None:
         """Take the bus and those who know; ``covered``: group readings tell all there is."""
-        self._line = line
-        self._setups = setups
-        self._ids = tuple(setups)
+        super().__init__(line, setups, recovery, health)
         self._watchdog = watchdog
-        self._recovery = recovery
-        self._health = health
         self._readings = readings
         self._covered = covered
-        self.engaged = False
-        self._entry = SlowEntry(setups)
         self._unnamed: set[int] = set()
-        self._suspects: set[int] = set()
-        self._rearmed: set[int] = set()
-        self._name_at_s = self._check_at_s = self._slow_at_s = self._revive_at_s = -inf
+        self._name_at_s = self._check_at_s = self._slow_at_s = -inf
         self._due_s = -inf
         self._checked = self._slow = 0
 
     def take_on(self, entering: Collection[int]) -> None:
         """Begin to look after servos under torque; some of them are outside their limits."""
         self.engaged = True
-        self._entry.begin(entering)
+        self.entering.begin(entering)
         self._line.starving_s, self._line.tries = self._watchdog * WATCHDOG_UNIT_S or inf, 1
         self._readings.expect_torque(True)
         self._readings.places.forget()
@@ -69,17 +57,16 @@ class Care:
     def let_go(self) -> None:
         """Leave servos without torque alone."""
         self.engaged = False
-        self._entry.clear()
+        self.entering.clear()
         self._suspects.clear()
         self._rearmed.clear()
         self._line.starving_s, self._line.starved, self._line.tries = inf, False, TRIES
         self._readings.expect_torque(False)
 
-    def suspect_all(self) -> None:
+    def mark_all_for_recovery(self) -> None:
         """Trust no servo to be as it was left."""
-        self._suspects.update(self._ids)
-        self._revive_at_s = self._due_s = -inf
-        self._readings.places.forget()
+        super().mark_all_for_recovery()
+        self._due_s = -inf
 
     def alert(self, servo_id: int) -> None:
         """Note that a servo has raised the alert bit."""
@@ -87,7 +74,7 @@ class Care:
             self._unnamed.add(servo_id)
             self._due_s = -inf
 
-    def judge(self, servo_id: int, sample: Sample) -> bool:
+    def check_status(self, servo_id: int, sample: Sample) -> bool:
         """Look at one servo's answer; gives whether its values can be believed."""
         error, torque = sample.hardware_error, sample.torque
         if error:
@@ -113,11 +100,11 @@ class Care:
     def _latched(self, servo_id: int, status: int) -> None:
         if self._health.latched(servo_id, name_errors(status)):
             self._line.errors["alert"] += 1
-            self._readings.name_fault(servo_id, self._health.faults[servo_id])
+            self._readings.name_fault(self._slot[servo_id], self._health.faults[servo_id])
 
     # --- after every read
 
-    def tend(
+    def service(
         self, readings: list[ServoReading | None], group: Collection[int], now_s: float
     ) -> None:
         """Do what is due after a read; servos that are well again get their reading here.
@@ -127,7 +114,7 @@ class Care:
         """
         if now_s >= self._due_s:
             self._do_due(readings, group, now_s)
-        if self._entry:
+        if self.entering:
             self._mind_entry(readings, now_s)
         if self._rearmed:
             self._mark_rearmed(readings)
@@ -135,8 +122,8 @@ class Care:
     def _do_due(
         self, readings: list[ServoReading | None], group: Collection[int], now_s: float
     ) -> None:
-        if self._suspects and now_s >= self._revive_at_s:
-            self._revive(readings, group, now_s)
+        if self._suspects and now_s >= self._recover_at_s:
+            self._recover(readings, group, now_s)
         if self._unnamed and now_s >= self._name_at_s:
             self._name_at_s = now_s + AGAIN_S
             self.find_alerts(tuple(self._unnamed))
@@ -145,7 +132,7 @@ class Care:
         if not self._covered and now_s >= self._slow_at_s:
             self._ask_slow(group, now_s)
         self._due_s = min(
-            self._revive_at_s if self._suspects else inf,
+            self._recover_at_s if self._suspects else inf,
             self._name_at_s if self._unnamed else inf,
             self._check_at_s if self.engaged else inf,
             inf if self._covered else self._slow_at_s,
@@ -154,36 +141,6 @@ class Care:
     def wake(self) -> None:
         """Look for what is due at the next read."""
         self._due_s = -inf
-
-    def _revive(
-        self, readings: list[ServoReading | None], group: Collection[int], now_s: float
-    ) -> None:
-        """Set up again who has restarted and answers; tried again later where that fails."""
-        ids = tuple(i for i in self._ids if i in self._suspects and i in group)
-        if not ids:
-            return
-        self._revive_at_s = now_s + AGAIN_S
-        found = self._recovery.recover(ids, self.engaged, now_s)
-        if found is None:
-            return
-        self._suspects.difference_update(ids)
-        at_s = self._line.port.now_s()
-        for servo_id in ids:
-            self._readings.name_fault(servo_id, self._health.faults.get(servo_id, ""))
-        for servo_id, position in found.items():
-            self._line.errors["rearmed"] += 1
-            slot = self._ids.index(servo_id)
-            readings[slot] = self._readings.held(slot, position, at_s, self.engaged)
-            if self.engaged:
-                self._rearmed.add(servo_id)
-                self._entry.add_outside(servo_id, position)
-
-    def _mark_rearmed(self, readings: list[ServoReading | None]) -> None:
-        for i, servo_id in enumerate(self._ids):
-            reading = readings[i]
-            if servo_id in self._rearmed and reading is not None:
-                self._rearmed.discard(servo_id)
-                readings[i] = reading._replace(rearmed=True)
 
     def find_alerts(self, ids: Sequence[int]) -> None:
         """Ask servos whether they have latched an error, and which."""
@@ -198,11 +155,11 @@ class Care:
 
     def _mind_entry(self, readings: list[ServoReading | None], now_s: float) -> None:
         """Give back its speed, confirmed, to every joint that has come inside its limits."""
-        for servo_id in self._entry.arrived(self._ids, readings, now_s):
+        for servo_id in self.entering.arrived(self._ids, readings, now_s):
             speed = speed_units(self._setups[servo_id].max_speed_steps_s)
             self._line.write_all((servo_id,), "profile_velocity", (speed,))
             if self._line.ask((servo_id,), "profile_velocity").get(servo_id) == speed:
-                self._entry.end(servo_id)
+                self.entering.end(servo_id)
 
     # --- asking in turn
 
@@ -242,7 +199,7 @@ class Care:
                 if self._limp(servo_id, torque):
                     self._suspect(servo_id)
 
-    def heal(self, group: Iterable[int]) -> None:
+    def recover_tripped(self, group: Iterable[int]) -> None:
         """Bring servos back whose own watchdog has stopped them."""
         self._line.starved = False
         ids = tuple(group)

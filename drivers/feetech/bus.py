@@ -17,12 +17,12 @@ Faults do not latch: their bits come and go, and so do the names in ``faults``.
 
 from collections.abc import Mapping, Sequence
 
-from drivers.feetech.care import Care
 from drivers.feetech.family import FEETECH
 from drivers.feetech.group import Group
 from drivers.feetech.params import FeetechParams as FeetechParams
 from drivers.feetech.protocol import HEADER, GoalWrite
 from drivers.feetech.readings import Readings
+from drivers.feetech.supervisor import FeetechSupervisor
 from drivers.feetech.views import Sample, View, again_turns, alone_turns, together_turns
 from drivers.serial.port import BusPort
 from drivers.servo_bus.bus import CUT, RESTART_S, SmartServoBus
@@ -42,7 +42,7 @@ class FeetechBus(SmartServoBus):
         ValueError: more servos than one packet of goals can hold, or a range beyond one turn.
     """
 
-    _care: Care
+    _supervisor: FeetechSupervisor
     _readings: Readings
 
     def __init__(self, port: BusPort, setups: Sequence[ServoSetup], params: FeetechParams) -> None:
@@ -56,7 +56,9 @@ class FeetechBus(SmartServoBus):
         self._reader: Reader[View, Sample] = Reader(
             self._line, self._roll, turns, alone_turns(), Group, HEADER, again_turns()
         )
-        self._care = Care(self._line, self._by_id, self._recovery, self._health, self._readings)
+        self._supervisor = FeetechSupervisor(
+            self._line, self._by_id, self._recovery, self._health, self._readings
+        )
 
     def _first_look(self) -> None:
         """Every answer tells its faults: there is nothing to ask for."""
@@ -66,14 +68,14 @@ class FeetechBus(SmartServoBus):
         readings = None
         if isinstance(answer, Whole):
             doubtful = self._disturbed(now_s) or self._reader.any_owing(now_s)
-            if self._care.at_ease and not doubtful:
+            if self._supervisor.at_ease and not doubtful:
                 readings = self._readings.whole(answer)
         if readings is None:
             heard = answer.each() if isinstance(answer, Whole) else answer
             readings = self._take(heard, now_s)
         elif self._health.returning:
             self._health.heard_again(now_s, self._line.lateness)
-        self._care.tend(readings, self._roll.group, now_s)
+        self._supervisor.service(readings, self._roll.group, now_s)
         return readings
 
     def _take(self, heard: dict[int, Heard[Sample]], now_s: float) -> list[ServoReading | None]:
@@ -81,7 +83,7 @@ class FeetechBus(SmartServoBus):
         readings: list[ServoReading | None] = [None] * len(self._ids)
         if heard and self._health.silent_for_s(now_s) >= RESTART_S:
             # All were silent together: their power may have been cut.
-            self._care.suspect_all()
+            self._supervisor.mark_all_for_recovery()
         disturbed = self._disturbed(now_s)
         doubtful = {i: h for i, h in heard.items() if disturbed or self._reader.owing(i, now_s)}
         if doubtful:
@@ -93,11 +95,11 @@ class FeetechBus(SmartServoBus):
             if self._roll.answered(servo_id) and dark:
                 continue  # the first answer after long silence may be an old one
             if believed or self._readings.believes(slot, one):
-                self._care.judge(servo_id, one.sample, now_s)
+                self._supervisor.check_status(servo_id, one.sample, now_s)
                 readings[slot] = self._readings.one(slot, one)
             else:
                 self._line.errors["implausible"] += 1
-        self._care.note_out(self._roll.out, now_s)
+        self._supervisor.note_out(self._roll.out, now_s)
         self._health.note_silent(
             self._roll.out, now_s, self._roll.garbling, self._line.lateness, bool(heard)
         )
@@ -135,10 +137,10 @@ class FeetechBus(SmartServoBus):
         Raises:
             drivers.errors.BusLost: the port is gone.
         """
-        entering, speeds = self._care.entering, self._speeds
+        entering, speeds = self._supervisor.entering, self._speeds
         if entering:
             speeds = self._recovery.speeds(self._ids, entering.ids)
-        withheld = self._care.withheld(self._now_s)
+        withheld = self._supervisor.withheld(self._now_s)
         if not withheld:
             self._line.send(self._goals.packet(goals, speeds))
             return

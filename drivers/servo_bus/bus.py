@@ -45,7 +45,7 @@ class BusParams(Protocol):
         """How long port or servos may be gone."""
 
 
-class Supervisor(Protocol):
+class Supervising(Protocol):
     """What the bus asks of whoever looks after its servos.
 
     engaged: the torque is on
@@ -59,7 +59,7 @@ class Supervisor(Protocol):
     def let_go(self) -> None:
         """Leave servos without torque alone."""
 
-    def suspect_all(self) -> None:
+    def mark_all_for_recovery(self) -> None:
         """Trust no servo to be as it was left."""
 
 
@@ -92,7 +92,7 @@ class SmartServoBus(ABC):
         ValueError: more servos than one packet of goals can hold, or a range beyond one turn.
     """
 
-    _care: Supervisor
+    _supervisor: Supervising
     _reader: Polled
     _readings: Limited
 
@@ -253,7 +253,7 @@ class SmartServoBus(ABC):
             self._link.refused_release()  # some may have their torque already
             raise
         self._link.release_due = False
-        self._care.take_on(outside)
+        self._supervisor.take_on(outside)
         self._speeds = self._recovery.speeds(self._ids, ())
         return goals
 
@@ -267,7 +267,7 @@ class SmartServoBus(ABC):
             ValueError: a goal is not a number, or there are not as many as servos.
         """
         goals = clipped(goals_steps, self._limits)
-        if not self._care.engaged or self._link.down or self._line.starved:
+        if not self._supervisor.engaged or self._link.down or self._line.starved:
             return
         try:
             self._send(goals)
@@ -316,7 +316,7 @@ class SmartServoBus(ABC):
             drivers.errors.BusLost: the port is gone, and stays so when tried once more; the
                 torque is taken off by the first read after it is back.
         """
-        self._care.let_go()
+        self._supervisor.let_go()
         if not self._opened:
             return
         if self._link.down and not self._link.open_once_more(self._now_s):
@@ -359,7 +359,7 @@ class SmartServoBus(ABC):
     def close(self) -> None:
         """Close the port; safe to call twice."""
         self._opened = False
-        self._care.let_go()
+        self._supervisor.let_go()
         self._port.closePort()
 
     def _mind_silence(self, now_s: float) -> None:
@@ -382,7 +382,7 @@ class SmartServoBus(ABC):
         """Begin anew with a port that was away."""
         self._roll = self._reader.roll = Roll(self._ids)
         self._line.starved = False
-        self._care.suspect_all()
+        self._supervisor.mark_all_for_recovery()
 
     def _check_ranges(self, setups: Sequence[ServoSetup]) -> None:
         """See that ranges lie within one turn: beyond, positions mean nothing after a restart.

@@ -8,12 +8,9 @@ from drivers.feetech.readings import Readings
 from drivers.feetech.views import ARMED, Sample
 from drivers.servo_bus.faults import Health
 from drivers.servo_bus.recovery import FAR_SIDE, Recovery
+from drivers.servo_bus.supervisor import Supervisor
 from drivers.servo_bus.transaction import TRIES, Line
-from drivers.slow_entry import SlowEntry
 from drivers.types import ServoReading, ServoSetup
-
-AGAIN_S = 0.25
-"""Time between attempts to set a servo up again."""
 
 CHECK_S = 0.1
 """On a disturbed line one servo's settings are compared so often, each in turn."""
@@ -28,12 +25,10 @@ TAKES_TORQUE = REGISTERS["unloading_condition"].initial or 0
 """Faults that take the torque away, as from the factory."""
 
 
-class Care:
-    """What is done about the servos' health.
+class FeetechSupervisor(Supervisor):
+    """What is done about the servos' health."""
 
-    engaged: the torque is on
-    entering: servos on their slow way into their limits
-    """
+    _readings: Readings
 
     def __init__(
         self,
@@ -43,23 +38,14 @@ class Care:
         health: Health,
         readings: Readings,
     ) -> None:
-        self._line = line
-        self._setups = setups
-        self._ids = tuple(setups)
-        self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
-        self._recovery = recovery
-        self._health = health
+        super().__init__(line, setups, recovery, health)
         self._readings = readings
-        self.engaged = False
-        self.entering = SlowEntry(setups)
-        self._suspects: set[int] = set()
-        self._rearmed: set[int] = set()
         self._limp: set[int] = set()
         self._out_since_s: dict[int, float] = {}
         self._seen_s: dict[int, dict[int, float]] = {}
         self._told_before: dict[int, int] = {}
         self._doubted: set[int] = set()
-        self._revive_at_s = self._check_at_s = -inf
+        self._check_at_s = -inf
         self._checked = 0
 
     def take_on(self, entering: Collection[int]) -> None:
@@ -86,12 +72,6 @@ class Care:
         self._line.tries = TRIES
         self._readings.expect_torque(False)
 
-    def suspect_all(self) -> None:
-        """Trust no servo to be as it was left."""
-        self._suspects.update(self._ids)
-        self._revive_at_s = -inf
-        self._readings.places.forget()
-
     @property
     def at_ease(self) -> bool:
         """Return whether nothing is known of any servo that an answer could change."""
@@ -111,7 +91,10 @@ class Care:
 
     # --- one servo's answer
 
-    def judge(self, servo_id: int, sample: Sample, now_s: float) -> None:
+    def _recovered(self, servo_id: int) -> None:
+        self._limp.discard(servo_id)
+
+    def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
         """Look at one servo's answer: its faults, and whether it is armed as it should be."""
         # Damaged bytes may pass for a fault, which ends a run: it must be told twice in a row.
         told = sample.error & self._told_before.get(servo_id, 0)
@@ -234,7 +217,7 @@ class Care:
 
     # --- after every read
 
-    def tend(
+    def service(
         self, readings: list[ServoReading | None], group: Collection[int], now_s: float
     ) -> None:
         """Do what is due after a read; servos that are well again get their reading here.
@@ -246,41 +229,10 @@ class Care:
             self._check_next(group, now_s)
         if self._doubted and group:
             self._look_again(group)
-        if self._suspects and now_s >= self._revive_at_s:
-            self._revive(readings, group, now_s)
+        if self._suspects and now_s >= self._recover_at_s:
+            self._recover(readings, group, now_s)
         if self.entering:
             for servo_id in self.entering.arrived(self._ids, readings, now_s):
                 self.entering.end(servo_id)
         if self._rearmed:
             self._mark_rearmed(readings)
-
-    def _revive(
-        self, readings: list[ServoReading | None], group: Collection[int], now_s: float
-    ) -> None:
-        """Set up again who may have restarted and answers; tried again later where that fails."""
-        ids = tuple(i for i in self._ids if i in self._suspects and i in group)
-        if not ids:
-            return
-        self._revive_at_s = now_s + AGAIN_S
-        found = self._recovery.recover(ids, self.engaged, now_s)
-        if found is None:
-            return
-        self._suspects.difference_update(ids)
-        at_s = self._line.port.now_s()
-        for servo_id in ids:
-            self._readings.name_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
-        for servo_id, position in found.items():
-            self._line.errors["rearmed"] += 1
-            slot = self._slot[servo_id]
-            readings[slot] = self._readings.held(slot, position, at_s, self.engaged)
-            self._limp.discard(servo_id)
-            if self.engaged:
-                self._rearmed.add(servo_id)
-                self.entering.add_outside(servo_id, position)
-
-    def _mark_rearmed(self, readings: list[ServoReading | None]) -> None:
-        for i, servo_id in enumerate(self._ids):
-            reading = readings[i]
-            if servo_id in self._rearmed and reading is not None:
-                self._rearmed.discard(servo_id)
-                readings[i] = reading._replace(rearmed=True)
