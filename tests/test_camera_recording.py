@@ -1,5 +1,6 @@
 """What a camera gives goes into a file and comes out the same, whatever happens to the writer."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -362,3 +363,13 @@ def test_killed_program_leaves_what_it_wrote(tmp_path):
     assert len(recording.times_s) >= last + 1  # every picture that was written is there
     assert int(recording.shot(last).picture[0, 0, 0]) == last
     assert "was not closed" in recording.note
+
+
+def test_flipped_bits_in_what_the_file_says_of_itself_are_one_clear_line(file):
+    data = file.read_bytes()
+    for bit in range(8 * 8, 8 * 300, 5):
+        hurt = bytearray(data)
+        hurt[bit // 8] ^= 1 << bit % 8
+        file.write_bytes(hurt)
+        with contextlib.suppress(CameraError):
+            Recording(file).close()

@@ -1,5 +1,6 @@
 """A camera recording as a list of pictures; what a killed program left counts up to its end."""
 
+import struct
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
@@ -83,7 +84,7 @@ class Recording:
                 fmt.lens(self._data(places[fmt.LENS])) if fmt.LENS in places else None,
                 fmt.faces(self._data(places[fmt.FACES])) if fmt.FACES in places else None,
             )
-        except (fmt.BadMessage, McapError, OSError, KeyError) as error:
+        except (fmt.BadMessage, McapError, OSError, KeyError, ValueError) as error:
             raise CameraError(
                 f"picture {index + 1} of {self._path} is damaged ({error}): copy the file anew"
             ) from error
@@ -101,6 +102,17 @@ class Recording:
         return bytes(Message.read(ReadDataStream(BytesIO(content)), place.length).data)
 
     def _index(self) -> bool:
+        """Note where the pictures are; tell whether the file was closed as it should.
+
+        Raises:
+            drivers.errors.CameraError: a record says what none can.
+        """
+        try:
+            return self._indexed()
+        except (McapError, ValueError, struct.error) as error:
+            raise CameraError(f"{self._path} is damaged: copy the file anew") from error
+
+    def _indexed(self) -> bool:
         """Note where the pictures are; tell whether the file was closed as it should."""
         waiting: dict[str, _Place] = {}
         stamp_ns = -1
