@@ -1,6 +1,7 @@
 """What all tests share: steady examples, compiled modules, one thread a process.
 
-Property tests draw the same examples every time; HYPOTHESIS_PROFILE=search draws others.
+Property tests draw the same examples every time; HYPOTHESIS_PROFILE=search draws others. None has a
+deadline: a busy machine is no fault.
 """
 
 import gc
@@ -13,8 +14,8 @@ import child_processes
 import pytest
 from hypothesis import settings
 
-settings.register_profile("steady", derandomize=True)
-settings.register_profile("search", derandomize=False)
+settings.register_profile("steady", derandomize=True, deadline=None)
+settings.register_profile("search", derandomize=False, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
 
 # Where Python is told to keep no compiled modules, every program that a test starts compiles
