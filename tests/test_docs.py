@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ from config.bounds import Shape, shapes_of
 from config.knobs import NEXT_TICK, changed, knobs, value_of
 from config.load import ConfigError, shipped_names
 from config.schema import Rig, load_rig
+from drivers.dynamixel.family import DYNAMIXEL
+from drivers.feetech.family import FEETECH
+from drivers.servo_bus.family import Family
 from drivers.servo_models import SERVOS
 from robot.cli.examples import EXAMPLES
 from robot.joint import JointParams
@@ -213,6 +217,7 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper == EMULATOR:
         return  # its tables are held against the emulator below
     words = {*keys(), *defined(), *SERVOS, *scenes(), *EXAMPLES, *_modes()}
+    words |= {field.name for field in fields(Family)} | {*DYNAMIXEL.registers, *FEETECH.registers}
     for span in spans(paper):
         if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):
             continue

@@ -55,7 +55,7 @@ def test_an_option_named_in_prose_is_one(paper: Path) -> None:
     for span in spans(paper):
         if not span.startswith("--"):
             continue
-        for option in re.findall(r"^(--[a-z-]+)|\s(--[a-z-]+)", span):
+        for option in re.findall(r"^(--[a-z0-9-]+)|\s(--[a-z0-9-]+)", span):
             assert "".join(option) in known, f"{paper.name}: {span}"
 
 

@@ -227,7 +227,10 @@ def test_adafruits_library_finds_a_board_that_does_as_a_real_one(bench, monkeypa
     names = dict.fromkeys(("I2C", "ReadableBuffer", "WriteableBuffer", "I2CDeviceDriver"), object)
     for module in ("busio", "circuitpython_typing", "circuitpython_typing.device_drivers"):
         monkeypatch.setitem(sys.modules, module, SimpleNamespace(**names))
-    adafruit = pytest.importorskip("adafruit_pca9685", reason="pip install --no-deps, see checks")
+    adafruit = pytest.importorskip(
+        "adafruit_pca9685",
+        reason="pip install --no-deps adafruit-circuitpython-pca9685, -busdevice and -register",
+    )
     monkeypatch.setattr("time.sleep", bench.wait)
     board = adafruit.PCA9685(CircuitPythonI2C(bench.bus), address=ADDRESS)
     board.frequency = 50
