@@ -140,12 +140,7 @@ def _run(
     observers.add("the summary", summary.note)
     observers.add("the watch for faults", faults.note)
     audience.join(observers)
-    if scene is not None and score is not None:
-        planner = Planner(scene.behaviour, robot.ask)
-        observers.add("the scene's planner", lambda tick: planner.note(tick.t_s))
-        observers.add("the scene's score", score.note)
-    if face_gaze is not None:
-        observers.add("the heat map", face_gaze.note)
+    _observe_scene(observers, made, score, face_gaze)
     _ask_all(robot, wanted)
 
     def tell(tick: Tick) -> None:
@@ -184,15 +179,28 @@ def _run(
             audience.give_up()
     faults.close()
     figures = _figures(made, summary, score, count, wall_s, faults)
-    if (unwritten := audience.unwritten()) is not None:
-        figures["not_written"] = str(unwritten)
+    unwritten = audience.unwritten()
     if face_gaze is not None and wanted.heatmap is not None:
         try:
             _draw_heatmap(face_gaze, wanted, wanted.heatmap, say)
         except SetupError as error:  # the figures of the run are still to be had
             say(str(error))
-            figures["not_written"] = str(wanted.heatmap)
+            unwritten = wanted.heatmap
+    if unwritten is not None:
+        figures["not_written"] = str(unwritten)
     return figures
+
+
+def _observe_scene(
+    observers: Observers, made: Assembly, score: Behaviours | None, face_gaze: FaceGaze | None
+) -> None:
+    """Add what a scene plans and scores, and the heat map, where there are any."""
+    if made.scene is not None and score is not None:
+        planner = Planner(made.scene.behaviour, made.robot.ask)
+        observers.add("the scene's planner", lambda tick: planner.note(tick.t_s))
+        observers.add("the scene's score", score.note)
+    if face_gaze is not None:
+        observers.add("the heat map", face_gaze.note)
 
 
 def _never_raising(say: Callable[[str], None]) -> Callable[[str], None]:
