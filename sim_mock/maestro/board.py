@@ -33,7 +33,7 @@ from sim_mock.maestro.commands import (
     Heard,
     word,
 )
-from sim_mock.maestro.faults import COMMANDS, BoardFaults
+from sim_mock.maestro.faults import COMMANDS, MaestroFaults
 from sim_mock.maestro.settings import LIMITS, Settings, chosen, width_steps
 from sim_mock.replies import Piece
 
@@ -61,7 +61,7 @@ class MaestroBoard:
     ) -> None:
         self.now_s = now_s
         self.body = Body(servos, now_s, settings or Settings())
-        self.faults = BoardFaults(self, COMMANDS, seed)
+        self.faults = MaestroFaults(self, COMMANDS, seed)
         self._wire = self.faults.wire
         self._ear = Ear(device, len(servos) > SIZES[0])
         self._told_baud: int | None = None

@@ -1,6 +1,6 @@
 """What can go wrong with an emulated Maestro and its servos, beside all that can on its line."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
 
 from sim_mock.faults.grammar import (
@@ -15,7 +15,7 @@ from sim_mock.faults.grammar import (
     or_all,
     whole,
 )
-from sim_mock.faults.line import LineFaults
+from sim_mock.faults.hobby import HobbyFaults
 from sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs
 from sim_mock.hobby_servo import HobbyServo
 from sim_mock.maestro.body import Body
@@ -42,10 +42,8 @@ class Board(Protocol):
         ...
 
 
-class BoardFaults(LineFaults):
+class MaestroFaults(HobbyFaults):
     """The faults of one board; an id is a channel."""
-
-    noun = "channel"
 
     def __init__(self, board: Board, commands: Commands, seed: int = 0) -> None:
         # A Maestro's packets begin with AA: what a loose header and a broken node send.
@@ -89,43 +87,6 @@ class BoardFaults(LineFaults):
         self._board.body.run_script(what)
         return f"a script swings channel {what} from end to end"
 
-    # --- what happens to servos
-
-    def power(self, on: bool = True) -> str:
-        """Give the servos their supply, or take it; the board notices nothing."""
-        self._board.body.advance()
-        self._board.body.servo_power = on
-        return f"the servos have {'their' if on else 'no'} supply"
-
-    def stick(self, channel: int | None) -> str:
-        """Jam a servo where it is."""
-        for servo in self._servos(channel):
-            servo.stuck = True
-        return f"{self.who(channel)} is stuck"
-
-    def free(self, channel: int | None) -> str:
-        """Let a jammed servo go."""
-        for servo in self._servos(channel):
-            servo.stuck = False
-        return f"{self.who(channel)} is free"
-
-    def turn(self, channel: int | None, steps: float) -> str:
-        """Turn a servo by hand.
-
-        Raises:
-            ValueError: it is stuck.
-        """
-        for servo in self._servos(channel):
-            servo.turn(steps)
-        return f"{self.who(channel)} was turned by {steps:g} quarter us"
-
-    def _servos(self, channel: int | None) -> Sequence[HobbyServo]:
-        """Give a servo, or all (None), brought up to now."""
-        if channel is not None:
-            return [self._board.here(channel)]
-        self._board.body.advance()
-        return self._board.body.servos
-
     # --- all
 
     def reports(self) -> list[dict[str, object]]:
@@ -163,21 +124,22 @@ _N = Word("N", count, True)
 # fmt: off
 VERBS: dict[str, Verb] = {
     **line_verbs(_CHANNEL),
-    "lose-writes": Verb(BoardFaults.lose_settings, (_N,),
+    "lose-writes": Verb(MaestroFaults.lose_settings, (_N,),
                         "the next N commands without an answer are lost on their way", TIME),
-    "lose-bytes": Verb(BoardFaults.lose_bytes, (_N,),
+    "lose-bytes": Verb(MaestroFaults.lose_bytes, (_N,),
                        "the next N bytes of the host are lost on their way", TIME),
     **adapter_verbs(),
-    "error": Verb(BoardFaults.error, (Word("NAME", one_of(*ERRORS)),),
+    "error": Verb(MaestroFaults.error, (Word("NAME", one_of(*ERRORS)),),
                   f"the board finds an error: {', '.join(ERRORS)}"),
-    "brown-out": Verb(BoardFaults.brown_out, (),
+    "brown-out": Verb(MaestroFaults.brown_out, (),
                       "the board restarts as a dip of its supply makes it"),
-    "script": Verb(BoardFaults.script, (Word("on|off|ID", _script),),
+    "script": Verb(MaestroFaults.script, (Word("on|off|ID", _script),),
                    "a script runs; with a channel it swings that from end to end"),
-    "power": Verb(BoardFaults.power, (SWITCH,), "supply of the servos; the board notices nothing"),
-    "stick": Verb(BoardFaults.stick, (_WHO,), "jam the servo where it is"),
-    "free": Verb(BoardFaults.free, (_WHO,), "let a jammed servo go"),
-    "turn": Verb(BoardFaults.turn, (_WHO, Word("STEPS", number(-1e5, 1e5, "quarter us"))),
+    "power": Verb(MaestroFaults.power, (SWITCH,),
+                  "supply of the servos; the board notices nothing"),
+    "stick": Verb(MaestroFaults.stick, (_WHO,), "jam the servo where it is"),
+    "free": Verb(MaestroFaults.free, (_WHO,), "let a jammed servo go"),
+    "turn": Verb(MaestroFaults.turn, (_WHO, Word("STEPS", number(-1e5, 1e5, "quarter us"))),
                  "turn the servo by hand; with pulses it goes back"),
     **closing_verbs(_CHANNEL),
 }

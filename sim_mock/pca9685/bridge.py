@@ -14,7 +14,7 @@ from sim_mock.faults.active import NOBODY
 from sim_mock.hobby_servo import HobbyServo, HobbySpec
 from sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
 from sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
-from sim_mock.pca9685.faults import CASES, COMMANDS, BoardFaults
+from sim_mock.pca9685.faults import CASES, COMMANDS, Pca9685Faults
 from sim_mock.replies import Piece
 
 START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")
@@ -50,7 +50,7 @@ class Bridge:
         self.now_s = now_s
         chips = {address: Chip(oscillator_hz) for address in addresses}
         self.body = Body(chips, servos, now_s)
-        self.faults = BoardFaults(self, COMMANDS, seed)
+        self.faults = Pca9685Faults(self, COMMANDS, seed)
         self._wire = self.faults.wire
         self._order = {address: board for board, address in enumerate(addresses)}
         self._unread = b""

@@ -1,6 +1,6 @@
 """What can go wrong with emulated PCA9685 boards and their servos, beside all on the line."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
 
 from sim_mock.faults.grammar import (
@@ -14,7 +14,7 @@ from sim_mock.faults.grammar import (
     or_all,
     whole,
 )
-from sim_mock.faults.line import LineFaults
+from sim_mock.faults.hobby import HobbyFaults
 from sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs
 from sim_mock.hobby_servo import HobbyServo
 from sim_mock.pca9685.body import Body
@@ -41,10 +41,8 @@ class Boards(Protocol):
         ...
 
 
-class BoardFaults(LineFaults):
+class Pca9685Faults(HobbyFaults):
     """The faults of one I2C bus; an id is a channel."""
-
-    noun = "channel"
 
     def __init__(self, boards: Boards, commands: Commands, seed: int = 0) -> None:
         super().__init__(boards, commands, seed, header=b"S")
@@ -72,47 +70,12 @@ class BoardFaults(LineFaults):
         """Put chips of another kind in place of the boards."""
         return self._switch("foreign", on, "another chip answers", seconds)
 
-    # --- what happens to the boards and servos
+    # --- what happens to the boards
 
     def brown_out(self) -> str:
         """Let the boards restart as a dip of the supply makes it: no answer tells."""
         self._boards.restart()
         return "the boards restart"
-
-    def power(self, on: bool = True) -> str:
-        """Give the servos their supply, or take it; the boards notice nothing."""
-        self._boards.body.advance()
-        self._boards.body.servo_power = on
-        return f"the servos have {'their' if on else 'no'} supply"
-
-    def stick(self, channel: int | None) -> str:
-        """Jam a servo where it is."""
-        for servo in self._servos(channel):
-            servo.stuck = True
-        return f"{self.who(channel)} is stuck"
-
-    def free(self, channel: int | None) -> str:
-        """Let a jammed servo go."""
-        for servo in self._servos(channel):
-            servo.stuck = False
-        return f"{self.who(channel)} is free"
-
-    def turn(self, channel: int | None, steps: float) -> str:
-        """Turn a servo by hand.
-
-        Raises:
-            ValueError: it is stuck.
-        """
-        for servo in self._servos(channel):
-            servo.turn(steps)
-        return f"{self.who(channel)} was turned by {steps:g} quarter us"
-
-    def _servos(self, channel: int | None) -> Sequence[HobbyServo]:
-        """Return a servo, or all (None), brought up to now."""
-        if channel is not None:
-            return [self._boards.here(channel)]
-        self._boards.body.advance()
-        return self._boards.body.servos
 
     # --- all
 
@@ -139,21 +102,23 @@ _N = Word("N", count, True)
 # fmt: off
 VERBS: dict[str, Verb] = {
     **line_verbs(_CHANNEL),
-    "lose-writes": Verb(BoardFaults.lose_writes, (_N,),
+    "lose-writes": Verb(Pca9685Faults.lose_writes, (_N,),
                         "the next N transfers that only write are lost on their way", TIME),
-    "lose-bytes": Verb(BoardFaults.lose_bytes, (_N,),
+    "lose-bytes": Verb(Pca9685Faults.lose_bytes, (_N,),
                        "the next N bytes of the host are lost on their way", TIME),
     **adapter_verbs(),
-    "nack": Verb(BoardFaults.nack, (_N,), "the next N transfers are not acknowledged", TIME),
-    "stuck": Verb(BoardFaults.stuck, (SWITCH,), "the data line is held down", TIME),
-    "absent": Verb(BoardFaults.absent, (SWITCH,), "the boards are off the bus, pulses go on", TIME),
-    "foreign": Verb(BoardFaults.foreign, (SWITCH,), "chips of another kind answer", TIME),
-    "brown-out": Verb(BoardFaults.brown_out, (),
+    "nack": Verb(Pca9685Faults.nack, (_N,), "the next N transfers are not acknowledged", TIME),
+    "stuck": Verb(Pca9685Faults.stuck, (SWITCH,), "the data line is held down", TIME),
+    "absent": Verb(Pca9685Faults.absent, (SWITCH,),
+                   "the boards are off the bus, pulses go on", TIME),
+    "foreign": Verb(Pca9685Faults.foreign, (SWITCH,), "chips of another kind answer", TIME),
+    "brown-out": Verb(Pca9685Faults.brown_out, (),
                       "the boards restart as a dip of their supply makes it"),
-    "power": Verb(BoardFaults.power, (SWITCH,), "supply of the servos; the boards notice nothing"),
-    "stick": Verb(BoardFaults.stick, (_WHO,), "jam the servo where it is"),
-    "free": Verb(BoardFaults.free, (_WHO,), "let a jammed servo go"),
-    "turn": Verb(BoardFaults.turn, (_WHO, Word("STEPS", number(-1e5, 1e5, "quarter us"))),
+    "power": Verb(Pca9685Faults.power, (SWITCH,),
+                  "supply of the servos; the boards notice nothing"),
+    "stick": Verb(Pca9685Faults.stick, (_WHO,), "jam the servo where it is"),
+    "free": Verb(Pca9685Faults.free, (_WHO,), "let a jammed servo go"),
+    "turn": Verb(Pca9685Faults.turn, (_WHO, Word("STEPS", number(-1e5, 1e5, "quarter us"))),
                  "turn the servo by hand; with pulses it goes back"),
     **closing_verbs(_CHANNEL),
 }
