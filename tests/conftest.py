@@ -6,6 +6,7 @@ deadline: a busy machine is no fault.
 
 import gc
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -22,6 +23,14 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
 # the whole source again: one second of processor time each, in more than a hundred programs.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# A shell that starts the tests in the background has them ignore Ctrl-C, and every program that
+# a test starts would inherit that.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+for number in (signal.SIGQUIT, signal.SIGHUP):
+    if signal.getsignal(number) == signal.SIG_IGN:
+        signal.signal(number, signal.SIG_DFL)
 
 # Tests run side by side, one worker a core: threads of a numeric library in each of them would
 # only wait for each other. Read when the library loads, so before any test imports it.
