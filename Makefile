@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 OTHER_SDK := dynamixel-sdk==3.8.4
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: run test check bench figures clean
+.PHONY: run test check bench links figures clean
 
 run: $(VENV)/.installed
 	$(BIN)/gazerig run --mock
@@ -15,7 +15,7 @@ run: $(VENV)/.installed
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
-check: $(VENV)/.installed-dev
+check: $(VENV)/.installed-dev links
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -33,11 +33,17 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_page.py
 	$(BIN)/python tests/bench/bench_recording.py
 
+# A folder with the packages under their import names, for what does not see through an install.
+links:
+	@mkdir -p .links/gazerig
+	@ln -sf ../../api/__init__.py ../../api/py.typed .links/gazerig/
+	@for room in config drivers gaze robot sim_mock; do ln -sfn ../../$$room .links/gazerig/$$room; done
+
 figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/make_figures.py
 
 clean:
-	rm -rf $(VENV) build *.egg-info
+	rm -rf $(VENV) .links build *.egg-info
 
 # $(call install,WHAT) makes the environment and installs WHAT into it.
 define install

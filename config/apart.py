@@ -10,17 +10,15 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from config.load import ConfigError, Fault
+from gazerig.config.load import ConfigError, Fault
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _LONGEST_S = 30.0
-_ROOT = str(Path(__file__).parents[1])
-_CHILD = "import sys; sys.path.insert(0, sys.argv[1]); from config.apart import serve; serve()"
+_CHILD = "from gazerig.config.apart import serve; serve()"
 
 
 def apart(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
@@ -30,12 +28,12 @@ def apart(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
     interpreter free. Paths mean the same there; values are copied both ways.
 
     Raises:
-        config.load.ConfigError: as ``work`` does, or the process failed.
+        gazerig.config.load.ConfigError: as ``work`` does, or the process failed.
     """
     # A session of its own: Ctrl-C is for this process, which ends it in order.
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _CHILD, _ROOT],
+            [sys.executable, "-P", "-c", _CHILD],
             input=pickle.dumps((work, words, named)),
             capture_output=True,
             start_new_session=True,

@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from config.load import ConfigError, Fault, shipped_names
+from gazerig.config.load import ConfigError, Fault, shipped_names
 
 _KIND_OF_KEY = {
     "gaze.scanpath.walk": "scanpaths",
@@ -37,7 +37,7 @@ class Confined:
             start: where relative paths begin; None: in the folder
 
         Raises:
-            config.load.ConfigError: the file lies elsewhere, links followed.
+            gazerig.config.load.ConfigError: the file lies elsewhere, links followed.
         """
         if kind and "/" not in given and not given.endswith(_YAML):
             if given in shipped_names(kind):
@@ -60,7 +60,7 @@ class Confined:
         Relative paths begin in the working folder, as they do where they are opened.
 
         Raises:
-            config.load.ConfigError: with every file that may not.
+            gazerig.config.load.ConfigError: with every file that may not.
         """
         faults: list[Fault] = []
         for key, value in _leaves("", changes):

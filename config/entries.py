@@ -14,9 +14,9 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from ruamel.yaml.reader import ReaderError
 
-from config.bounds import Step
-from config.export import closest, shown
-from drivers.file_input import FileTooLarge, NotRegularFile, read_limited
+from gazerig.config.bounds import Step
+from gazerig.config.export import closest, shown
+from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
 
 Scalar = str | int | float | bool | None
 

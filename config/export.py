@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from pydantic_core import ErrorDetails
 
-from config.bounds import Shape, Step, model_of, shapes_of
+from gazerig.config.bounds import Shape, Step, model_of, shapes_of
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

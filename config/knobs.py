@@ -14,13 +14,13 @@ from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from config.bounds import Form, Shape, judge, shapes_of
-from config.export import closest, shown
-from config.load import ConfigError, Entry, Fault, weighed
-from config.schema import RULES, Rig
-from gaze.types import PARTS
-from robot.orders import Value
-from robot.types import in_order
+from gazerig.config.bounds import Form, Shape, judge, shapes_of
+from gazerig.config.export import closest, shown
+from gazerig.config.load import ConfigError, Entry, Fault, weighed
+from gazerig.config.schema import RULES, Rig
+from gazerig.gaze.types import PARTS
+from gazerig.robot.orders import Value
+from gazerig.robot.types import in_order
 
 NEXT_TICK = "next tick"
 NEXT_START = "next start"
@@ -89,7 +89,7 @@ def value_of(rig: Rig, key: str) -> Value:
     """Give the value at a dotted key; of a group, a mapping.
 
     Raises:
-        config.load.ConfigError: there is no such key; the message says which there are.
+        gazerig.config.load.ConfigError: there is no such key; the message says which there are.
     """
     value: Any = rig
     for done, step in enumerate(steps := key.split(".")):
@@ -132,7 +132,7 @@ def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     mapping whose entries cannot be null.
 
     Raises:
-        config.load.ConfigError: with every fault, in the words of loading a file.
+        gazerig.config.load.ConfigError: with every fault, in the words of loading a file.
     """
     made = _judged(rig, changes)
     return made if made is not None else _weighed(rig, changes)

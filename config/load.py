@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from config.bounds import Step, filled, judge, shapes_of
-from config.entries import ConfigError as ConfigError
-from config.entries import Entry as Entry
-from config.entries import Fault as Fault
-from config.entries import read
-from config.export import Complaint, closest, complaint, shown
+from gazerig.config.bounds import Step, filled, judge, shapes_of
+from gazerig.config.entries import ConfigError as ConfigError
+from gazerig.config.entries import Entry as Entry
+from gazerig.config.entries import Fault as Fault
+from gazerig.config.entries import read
+from gazerig.config.export import Complaint, closest, complaint, shown
 
 T = TypeVar("T")
 Check = Callable[[T], Iterable[tuple[str, str]]]
@@ -118,7 +118,7 @@ def shipped(kind: str, name: str) -> Path:
     """
     names = shipped_names(kind)
     if name in names:
-        return Path(str(importlib.resources.files("config"))) / kind / f"{name}.yaml"
+        return Path(str(importlib.resources.files("gazerig.config"))) / kind / f"{name}.yaml"
     known = f"there are {', '.join(names)}" if names else "there are none of this kind"
     rule = f"nothing named {name!r} is shipped{closest(name, names) or ';'} {known}"
     raise ConfigError([Fault(f"config/{kind}", None, "", repr(name), rule)])
@@ -126,7 +126,7 @@ def shipped(kind: str, name: str) -> Path:
 
 def shipped_names(kind: str) -> tuple[str, ...]:
     """List the names that ``shipped`` knows of a kind, sorted."""
-    folder = importlib.resources.files("config") / kind
+    folder = importlib.resources.files("gazerig.config") / kind
     if not folder.is_dir():
         return ()
     files = (entry.name for entry in folder.iterdir())

@@ -1,41 +1,41 @@
 """What a rig file holds: the Params of every room, in one place.
 
-Bounds stand with the values, in the rooms; the rules between sections in config.rig_rules.
+Bounds stand with the values, in the rooms; the rules between sections in gazerig.config.rig_rules.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 
-from drivers.camera.oak_params import OakParams
-from drivers.camera.params import CameraCareParams, WebcamParams
-from drivers.dynamixel.params import DynamixelParams
-from drivers.feetech.params import FeetechParams
-from drivers.maestro.params import MaestroParams
-from drivers.pca9685.params import Pca9685Params
-from drivers.servo_models import BUS_KINDS
-from drivers.vision.face_params import FaceDetectorParams
-from drivers.vision.motion.params import MotionParams
-from gaze.attention import AttentionParams
-from gaze.aversion import AversionParams
-from gaze.bottom_up import BottomUpParams
-from gaze.breathing import BreathingParams
-from gaze.field_of_view import FieldOfViewParams
-from gaze.head import HeadParams
-from gaze.idle import IdleParams
-from gaze.lids import LidParams
-from gaze.oculomotor import OculomotorParams
-from gaze.pursuit import PursuitParams
-from gaze.saccade import SaccadeParams
-from gaze.scanpath import ScanpathParams
-from gaze.top_down import TopDownParams
-from robot.frames import CameraParams
-from robot.joint import JointParams
-from robot.kinematics import LIDS, GeometryParams
-from robot.loop import LoopParams
-from robot.safety.guard import GuardParams
-from robot.seeing.tracks import TrackParams
-from robot.types import in_order
+from gazerig.drivers.camera.oak_params import OakParams
+from gazerig.drivers.camera.params import CameraCareParams, WebcamParams
+from gazerig.drivers.dynamixel.params import DynamixelParams
+from gazerig.drivers.feetech.params import FeetechParams
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.servo_models import BUS_KINDS
+from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.gaze.attention import AttentionParams
+from gazerig.gaze.aversion import AversionParams
+from gazerig.gaze.bottom_up import BottomUpParams
+from gazerig.gaze.breathing import BreathingParams
+from gazerig.gaze.field_of_view import FieldOfViewParams
+from gazerig.gaze.head import HeadParams
+from gazerig.gaze.idle import IdleParams
+from gazerig.gaze.lids import LidParams
+from gazerig.gaze.oculomotor import OculomotorParams
+from gazerig.gaze.pursuit import PursuitParams
+from gazerig.gaze.saccade import SaccadeParams
+from gazerig.gaze.scanpath import ScanpathParams
+from gazerig.gaze.top_down import TopDownParams
+from gazerig.robot.frames import CameraParams
+from gazerig.robot.joint import JointParams
+from gazerig.robot.kinematics import LIDS, GeometryParams
+from gazerig.robot.loop import LoopParams
+from gazerig.robot.safety.guard import GuardParams
+from gazerig.robot.seeing.tracks import TrackParams
+from gazerig.robot.types import in_order
 
 
 @dataclass(frozen=True)

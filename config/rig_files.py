@@ -11,12 +11,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from config.load import ConfigError, Fault, shipped_names
-from config.save import Saved, copy_shipped, rig_file, save
-from config.schema import Rig, layers_of, load_rig
-from drivers.file_input import read_limited
+from gazerig.config.load import ConfigError, Fault, shipped_names
+from gazerig.config.save import Saved, copy_shipped, rig_file, save
+from gazerig.config.schema import Rig, layers_of, load_rig
+from gazerig.drivers.file_input import read_limited
 
-_LARGEST = 1_000_000  # bytes, as config.entries reads
+_LARGEST = 1_000_000  # bytes, as gazerig.config.entries reads
 
 
 class Layers(NamedTuple):
@@ -50,7 +50,7 @@ def read_all(layers: Layers) -> tuple[Rig, RigFiles]:
     """Read a rig, and return it with the files that it is made of.
 
     Raises:
-        config.load.ConfigError: see config.schema.load_rig.
+        gazerig.config.load.ConfigError: see gazerig.config.schema.load_rig.
     """
     paths = tuple(layers_of(*layers))
     texts = _texts(paths)
@@ -73,7 +73,7 @@ def save_over(
         What was written, and the files that the rig is made of now.
 
     Raises:
-        config.load.ConfigError: see config.save.save.
+        gazerig.config.load.ConfigError: see gazerig.config.save.save.
     """
     check = partial(load_rig, character=layers.character, profile=layers.profile)
     saved = save(Path(layers.name), wanted, now, check, Rig, None if _is_good(layers) else good)
@@ -90,7 +90,8 @@ def save_copy(
         What ``save_over`` gives.
 
     Raises:
-        config.load.ConfigError: see config.save.save; or ``to`` exists or is no YAML file.
+        gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is no
+        YAML file.
     """
     if not to.endswith((".yaml", ".yml")):
         raise ConfigError([Fault(to, None, "", "", "a rig's file ends in .yaml; name it so")])

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable
 
-from config.rig import Rig
-from drivers.servo_models import SERVOS
-from gaze.types import PARTS
-from robot.kinematics import LIDS
-from robot.safety.guard import Guard
-from robot.types import JOINTS
+from gazerig.config.rig import Rig
+from gazerig.drivers.servo_models import SERVOS
+from gazerig.gaze.types import PARTS
+from gazerig.robot.kinematics import LIDS
+from gazerig.robot.safety.guard import Guard
+from gazerig.robot.types import JOINTS
 
 
 def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:

@@ -16,14 +16,14 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from config.bounds import shapes_of
-from config.load import ConfigError, Document, Fault, read_yaml, shipped
-from config.save_text import Unchangeable, Value, edited, written
-from config.schema import Rig, load_rig
-from drivers.file_input import read_limited
+from gazerig.config.bounds import shapes_of
+from gazerig.config.load import ConfigError, Document, Fault, read_yaml, shipped
+from gazerig.config.save_text import Unchangeable, Value, edited, written
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.file_input import read_limited
 
 Check = Callable[[str], Any]
-"""Loads a file by its path and gives what it holds; raises config.load.ConfigError."""
+"""Loads a file by its path and gives what it holds; raises gazerig.config.load.ConfigError."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,16 +57,16 @@ def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> S
     path: the file; the name of a shipped rig is understood too, to be refused with the cure
 
     Raises:
-        config.load.ConfigError: see ``save``.
+        gazerig.config.load.ConfigError: see ``save``.
     """
     return save(rig_file(path), changes, now, load_rig, Rig)
 
 
 def rig_file(name_or_path: Path | str) -> Path:
-    """Give the file behind a rig's name or path, as ``config.schema.load_rig`` takes it.
+    """Give the file behind a rig's name or path, as ``gazerig.config.schema.load_rig`` takes it.
 
     Raises:
-        config.load.ConfigError: no rig of that name is shipped.
+        gazerig.config.load.ConfigError: no rig of that name is shipped.
     """
     text = str(name_or_path)
     if isinstance(name_or_path, Path) or "/" in text or text.endswith((".yaml", ".yml")):
@@ -89,12 +89,12 @@ def save(
     value in it; on any error the file is as it was.
 
     now: goes into the backup's name, ``rig.yaml.bak-20260131-235959``
-    check: loads a file by path, as ``config.schema.load_rig`` does
+    check: loads a file by path, as ``gazerig.config.schema.load_rig`` does
     into: the Params dataclass of the file, whose fields explain added keys
     base: text to write the values into, in the place of a file that has faults or is gone
 
     Raises:
-        config.load.ConfigError: the file is shipped, unreadable or not writable, a value
+        gazerig.config.load.ConfigError: the file is shipped, unreadable or not writable, a value
             is refused, or another layer overrides it.
     """
     target = Path(os.path.realpath(path))
@@ -117,7 +117,7 @@ def propose(path: Path | str, changes: Mapping[str, Value], into: type = Rig) ->
     """List what ``save`` would change; nothing is written.
 
     Raises:
-        config.load.ConfigError: the file cannot be read, or a value cannot be written.
+        gazerig.config.load.ConfigError: the file cannot be read, or a value cannot be written.
     """
     return _proposal(Path(os.path.realpath(path)), changes, into)[2]
 
@@ -126,7 +126,7 @@ def copy_shipped(name: str, to: Path | str, kind: str = "rigs") -> Path:
     """Copy a file that comes with the package, to be changed; never over another file.
 
     Raises:
-        config.load.ConfigError: none of that name is shipped, or ``to`` exists or cannot
+        gazerig.config.load.ConfigError: none of that name is shipped, or ``to`` exists or cannot
             be written.
     """
     source, target = shipped(kind, name), Path(to)
@@ -244,7 +244,7 @@ def _same(held: Any, value: Value) -> bool:
 
 def _refuse_shipped(target: Path) -> None:
     """Refuse a file inside the installed package: an update would overwrite it."""
-    package = Path(os.path.realpath(str(importlib.resources.files("config"))))
+    package = Path(os.path.realpath(str(importlib.resources.files("gazerig.config"))))
     if package in target.parents:
         raise _fault(
             target,

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from config.bounds import Shape, shapes_of
+from gazerig.config.bounds import Shape, shapes_of
 
 Value = str | int | float | bool | None | tuple["Value", ...] | list["Value"]
 WIDTH = 100

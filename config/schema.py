@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from config.bounds import shapes_of
-from config.load import load, read_yaml, shipped
-from config.rig import LidJoints as LidJoints
-from config.rig import Rig as Rig
-from config.rig_rules import RULES as RULES
-from gaze.scanpath import Walk
-from gaze.top_down import TopDownParams
+from gazerig.config.bounds import shapes_of
+from gazerig.config.load import load, read_yaml, shipped
+from gazerig.config.rig import LidJoints as LidJoints
+from gazerig.config.rig import Rig as Rig
+from gazerig.config.rig_rules import RULES as RULES
+from gazerig.gaze.scanpath import Walk
+from gazerig.gaze.top_down import TopDownParams
 
 
 def load_rig(name_or_path: str, character: str | None = None, profile: str | None = None) -> Rig:
@@ -18,7 +18,7 @@ def load_rig(name_or_path: str, character: str | None = None, profile: str | Non
     character: name or path of a file with differences, laid over both
 
     Raises:
-        config.load.ConfigError: with every fault.
+        gazerig.config.load.ConfigError: with every fault.
     """
     layers = layers_of(name_or_path, character, profile)
     return load(layers[-1], Rig, defaults=layers[:-1], checks=RULES)
@@ -30,7 +30,7 @@ def layers_of(
     """List the files that ``load_rig`` lays one over the other, the rig's own first.
 
     Raises:
-        config.load.ConfigError: none of that name is shipped, or the rig cannot be read.
+        gazerig.config.load.ConfigError: none of that name is shipped, or the rig cannot be read.
     """
     layers = [_find("rigs", name_or_path)]
     named = profile or read_yaml(layers[0], tuple(shapes_of(Rig))).data.get("profile")
@@ -45,7 +45,7 @@ def load_rules(name_or_path: str) -> TopDownParams:
     """Read a rule set, behaviour -> what to look at, by shipped name or by path.
 
     Raises:
-        config.load.ConfigError: with every fault.
+        gazerig.config.load.ConfigError: with every fault.
     """
     return load(_find("rules", name_or_path), TopDownParams)
 
@@ -54,7 +54,7 @@ def load_walk(name_or_path: str) -> Walk:
     """Read a scanpath walk by shipped name or by path.
 
     Raises:
-        config.load.ConfigError: with every fault.
+        gazerig.config.load.ConfigError: with every fault.
     """
     return load(_find("scanpaths", name_or_path), Walk)
 

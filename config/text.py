@@ -1,14 +1,14 @@
 """A configuration written as one YAML text that stands for all its layers.
 
-It is read back with ``config.load.load``; values come back exactly.
+It is read back with ``gazerig.config.load.load``; values come back exactly.
 """
 
 from collections.abc import Iterator
 from typing import Any
 
-from config.knobs import plain
-from config.save_text import written
-from config.schema import Rig, load_walk
+from gazerig.config.knobs import plain
+from gazerig.config.save_text import written
+from gazerig.config.schema import Rig, load_walk
 
 
 def rig_text(rig: Rig) -> str:
@@ -20,7 +20,7 @@ def walk_text(name_or_path: str) -> str:
     """Write the walk over a face that a rig names.
 
     Raises:
-        config.load.ConfigError: the walk is at fault.
+        gazerig.config.load.ConfigError: the walk is at fault.
     """
     return "".join(_lines(plain(load_walk(name_or_path))))
 

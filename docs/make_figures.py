@@ -15,23 +15,23 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen before
 
-from config.schema import load_rig, load_walk  # noqa: E402
-from gaze.binocular import (  # noqa: E402
+from gazerig.config.schema import load_rig, load_walk  # noqa: E402
+from gazerig.gaze.binocular import (  # noqa: E402
     AT_REST,
     BinocularController,
     BinocularParams,
     HeadMotion,
 )
-from gaze.head import Head, HeadParams  # noqa: E402
-from gaze.lids import LidParams, Lids  # noqa: E402
-from gaze.saccade import Saccade, SaccadeParams  # noqa: E402
-from gaze.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
-from gaze.types import PART_NAMES  # noqa: E402
-from robot.assemble import assemble, gaze_parts  # noqa: E402
-from robot.choice import Choice  # noqa: E402
-from robot.loop import Tick, run  # noqa: E402
-from sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
-from sim_mock.true_gaze import (  # noqa: E402
+from gazerig.gaze.head import Head, HeadParams  # noqa: E402
+from gazerig.gaze.lids import LidParams, Lids  # noqa: E402
+from gazerig.gaze.saccade import Saccade, SaccadeParams  # noqa: E402
+from gazerig.gaze.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
+from gazerig.gaze.types import PART_NAMES  # noqa: E402
+from gazerig.robot.assemble import assemble, gaze_parts  # noqa: E402
+from gazerig.robot.choice import Choice  # noqa: E402
+from gazerig.robot.loop import Tick, run  # noqa: E402
+from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
+from gazerig.sim_mock.true_gaze import (  # noqa: E402
     angles_of_place,
     gaze_angles,
     gaze_off_rad,

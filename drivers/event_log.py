@@ -5,7 +5,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # the guardian, which names servos too, starts without numpy
-    from drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoSetup
 
 MOST = 200
 """More than so many lines that nobody has asked for are not kept."""

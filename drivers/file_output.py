@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, TextIO
 
-from drivers.errors import SetupError
+from gazerig.drivers.errors import SetupError
 
 
 def refuse_existing(*paths: Path, force: bool = False) -> None:
@@ -23,7 +23,7 @@ def refuse_existing(*paths: Path, force: bool = False) -> None:
     Pipes and devices (``/dev/stdout``) hold nothing that could be lost, and pass.
 
     Raises:
-        drivers.errors.SetupError: a file is there and not forced, or is a directory, or its
+        SetupError: a file is there and not forced, or is a directory, or its
             folder is absent or not writable.
     """
     for path in paths:
@@ -50,7 +50,7 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
         force: Replace a file that is there; else it is refused.
 
     Raises:
-        drivers.errors.SetupError: it is there already, or cannot be written; what was there is
+        SetupError: it is there already, or cannot be written; what was there is
             as it was.
     """
     refuse_existing(path, force=force)
@@ -76,7 +76,7 @@ def output_text(path: Path, force: bool = False) -> Iterator[TextIO]:
     """Give a text file to write to, UTF-8 and with the line ends as written.
 
     Raises:
-        drivers.errors.SetupError: see ``output_file``.
+        SetupError: see ``output_file``.
     """
     with output_file(path, force) as raw:
         text = io.TextIOWrapper(raw, encoding="utf-8", newline="")
@@ -92,7 +92,7 @@ def write_file(path: Path, content: str | bytes, force: bool = False) -> None:
     """Write a whole file; see ``output_file``.
 
     Raises:
-        drivers.errors.SetupError: see ``output_file``.
+        SetupError: see ``output_file``.
     """
     with output_file(path, force) as file:
         file.write(content.encode() if isinstance(content, str) else content)
@@ -102,7 +102,7 @@ def make_folder(path: Path) -> None:
     """Make a folder, with those above it, where it is not there.
 
     Raises:
-        drivers.errors.SetupError: it cannot be made.
+        SetupError: it cannot be made.
     """
     with _clear(path):
         path.mkdir(parents=True, exist_ok=True)

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
-from drivers.errors import BusLost
-from drivers.types import BusHealth, ServoBus, ServoReading, ServoSetup
+from gazerig.drivers.errors import BusLost
+from gazerig.drivers.types import BusHealth, ServoBus, ServoReading, ServoSetup
 
 IN_A_ROW = 3
 """So many reads may stay without any answer before a bus is asked less often."""
@@ -73,8 +73,8 @@ class MixedBus:
         """Open every bus; where one cannot be opened, those before it are closed again.
 
         Raises:
-            drivers.errors.PortError: a port cannot be opened.
-            drivers.errors.ServoMissing: servos are absent or of another model.
+            PortError: a port cannot be opened.
+            ServoMissing: servos are absent or of another model.
         """
         self._patience = [_Patience() for _ in self._shares]
         opened: list[Share] = []
@@ -94,7 +94,7 @@ class MixedBus:
         servos of the others are not to wait for it.
 
         Raises:
-            drivers.errors.BusLost: nobody has answered on a bus for longer than its patience.
+            BusLost: nobody has answered on a bus for longer than its patience.
         """
         whole: list[ServoReading | None] = [None] * self._count
         lost: list[BusLost] = []
@@ -119,7 +119,7 @@ class MixedBus:
         Returns the goals that are now in force, in steps.
 
         Raises:
-            drivers.errors.DriverError: as the bus at fault raises it.
+            DriverError: as the bus at fault raises it.
         """
         goals = [0] * self._count
         try:
@@ -170,7 +170,7 @@ class MixedBus:
         """Torque off on every bus, whatever befalls the others.
 
         Raises:
-            drivers.errors.BusLost: ports are gone; the message names each.
+            BusLost: ports are gone; the message names each.
         """
         lost = []
         for share in self._shares:

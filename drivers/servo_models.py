@@ -3,14 +3,14 @@
 from math import inf
 from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
-from drivers.dynamixel.control_table import MODELS as DYNAMIXEL
-from drivers.dynamixel.control_table import STEPS_PER_TURN
-from drivers.event_log import servo_label as label_with
-from drivers.feetech.memory_table import MODELS as FEETECH
-from drivers.hobby_board.models import HOBBY, US_STEPS
+from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
+from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
+from gazerig.drivers.event_log import servo_label as label_with
+from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
+from gazerig.drivers.hobby_board.models import HOBBY, US_STEPS
 
 if TYPE_CHECKING:
-    from drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoSetup
 
 BusKind = Literal["dynamixel", "feetech", "maestro", "pca9685"]
 BUS_KINDS: tuple[BusKind, ...] = get_args(BusKind)

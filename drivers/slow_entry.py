@@ -9,7 +9,7 @@ its readings is marked ``rearmed``, which makes plans begin where it is.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 ENTRY_DEG_S = 30.0
 """Speed at a joint that is brought inside its limits."""

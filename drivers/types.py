@@ -2,7 +2,7 @@
 
 A servo bus speaks its servos' own steps (Dynamixel, Feetech STS: 4096 a turn, 0.088 deg;
 a hobby servo on a Maestro: a quarter of a microsecond of pulse width); what a step means
-at a joint is known by robot.body alone. Times are host monotonic seconds.
+at a joint is known by gazerig.robot.body alone. Times are host monotonic seconds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -108,8 +108,8 @@ class ServoBus(Protocol):
         """Open the port, find every servo, check and prepare it; torque stays off.
 
         Raises:
-            drivers.errors.PortError: the port cannot be opened.
-            drivers.errors.ServoMissing: servos are absent or of another model.
+            PortError: the port cannot be opened.
+            ServoMissing: servos are absent or of another model.
         """
         ...
 
@@ -120,7 +120,7 @@ class ServoBus(Protocol):
         when it is back the servos hold where they are, marked ``rearmed``.
 
         Raises:
-            drivers.errors.BusLost: nobody has answered for longer than the bus's patience.
+            BusLost: nobody has answered for longer than the bus's patience.
         """
         ...
 
@@ -252,7 +252,7 @@ class Camera(Protocol):
         """Start looking.
 
         Raises:
-            drivers.errors.CameraError: it cannot; the message names the thing and the cure.
+            CameraError: it cannot; the message names the thing and the cure.
         """
         ...
 
@@ -260,7 +260,7 @@ class Camera(Protocol):
         """Give the newest detections available at ``now_s``, or None before the first.
 
         Raises:
-            drivers.errors.CameraError: the source has failed for good.
+            CameraError: the source has failed for good.
         """
         ...
 

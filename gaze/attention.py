@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.angles import add, scale, sub
-from gaze.bottom_up import BottomUp, Pulls
-from gaze.field_of_view import FieldOfView, line_of_sight
-from gaze.habituation import Habituation, HabituationParams
-from gaze.idle import Idle
-from gaze.top_down import TopDown, Wanted
-from gaze.types import Bodies, Floats, GazeState, Percept, Pull, Target, Vec3
+from gazerig.gaze.angles import add, scale, sub
+from gazerig.gaze.bottom_up import BottomUp, Pulls
+from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
+from gazerig.gaze.habituation import Habituation, HabituationParams
+from gazerig.gaze.idle import Idle
+from gazerig.gaze.top_down import TopDown, Wanted
+from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Pull, Target, Vec3
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _POINT = ("point", -1)

@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 
-from gaze.angles import add, cross, norm, scale, sub, unit
-from gaze.types import Target, Vec3
+from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
+from gazerig.gaze.types import Target, Vec3
 
 AversionMode = Literal["none", "talk", "listen", "think"]
 MODES: tuple[AversionMode, ...] = ("none", "talk", "listen", "think")

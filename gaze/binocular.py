@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from math import radians
 from typing import NamedTuple
 
-from gaze.angles import clip
-from gaze.channels import Conjugate, Leak, Vergence
-from gaze.vestibular import Canals, distance_m, translational_rad_s
+from gazerig.gaze.angles import clip
+from gazerig.gaze.channels import Conjugate, Leak, Vergence
+from gazerig.gaze.vestibular import Canals, distance_m, translational_rad_s
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.field_of_view import BLOCK, columns
-from gaze.types import Bodies, Floats, Vec3
+from gazerig.gaze.field_of_view import BLOCK, columns
+from gazerig.gaze.types import Bodies, Floats, Vec3
 
 Ids = NDArray[np.int64]
 

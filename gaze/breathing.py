@@ -8,8 +8,8 @@ take whatever the head does not, they compensate it and the gaze stays where it 
 from dataclasses import dataclass, field
 from math import cos, pi, radians, sin
 
-from gaze.saccade import min_jerk
-from gaze.types import Angles3
+from gazerig.gaze.saccade import min_jerk
+from gazerig.gaze.types import Angles3
 
 _STILL: Angles3 = (0.0, 0.0, 0.0)
 _GLIDE_S = 1.0  # time in which a breath that is retuned falls into its new depth

@@ -8,7 +8,7 @@ Kd = rho - chi. Angles and rates in radians; the period comes with each step.
 
 from math import exp
 
-from gaze.angles import clip
+from gazerig.gaze.angles import clip
 
 
 class Leak:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.angles import compose, direction, rotate, rotation
-from gaze.types import Angles2, Bodies, Floats, GazeState, Mat3, Vec3
+from gazerig.gaze.angles import compose, direction, rotate, rotation
+from gazerig.gaze.types import Angles2, Bodies, Floats, GazeState, Mat3, Vec3
 
 BLOCK = 8192
 """Bodies computed at once: their intermediate results stay in the processor's cache."""

@@ -7,9 +7,18 @@ motion moves neither end; the nearness, and with it vergence, goes by the same p
 
 import numpy as np
 
-from gaze.angles import add, along_great_circle, angle_between, beside, norm, scale, sub, unit
-from gaze.saccade import Saccade
-from gaze.types import Vec3
+from gazerig.gaze.angles import (
+    add,
+    along_great_circle,
+    angle_between,
+    beside,
+    norm,
+    scale,
+    sub,
+    unit,
+)
+from gazerig.gaze.saccade import Saccade
+from gazerig.gaze.types import Vec3
 
 
 class Flight:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gaze.types import Floats, Vec3
+from gazerig.gaze.types import Floats, Vec3
 
 
 @dataclass(frozen=True)

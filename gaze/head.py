@@ -12,9 +12,9 @@ makes no step.
 from dataclasses import dataclass, field
 from math import degrees, exp, hypot, radians
 
-from gaze.angles import angle_between, direction, shortened, yaw_pitch
-from gaze.quintic import Quintic
-from gaze.types import Angles2, Angles3, Target
+from gazerig.gaze.angles import angle_between, direction, shortened, yaw_pitch
+from gazerig.gaze.quintic import Quintic
+from gazerig.gaze.types import Angles2, Angles3, Target
 
 
 @dataclass(frozen=True)

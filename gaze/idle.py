@@ -16,8 +16,8 @@ from math import exp, hypot, log, radians, sqrt
 
 import numpy as np
 
-from gaze.angles import add, direction, norm, scale, sub, wrap, yaw_pitch
-from gaze.types import Angles2, Target, Vec3
+from gazerig.gaze.angles import add, direction, norm, scale, sub, wrap, yaw_pitch
+from gazerig.gaze.types import Angles2, Target, Vec3
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make no more than 3 to 4 a second

@@ -6,7 +6,7 @@ meanwhile, a closing goes on to its end as it began, and what is over stays over
 
 from typing import NamedTuple
 
-from gaze.saccade import min_jerk
+from gazerig.gaze.saccade import min_jerk
 
 
 def closure(since_onset_s: float, close_s: float, hold_s: float, open_s: float) -> float:

@@ -4,7 +4,7 @@ from math import exp, inf, log, sqrt
 
 import numpy as np
 
-from gaze.lid_params import LidParams
+from gazerig.gaze.lid_params import LidParams
 
 
 def pause_s(params: LidParams, per_min: float, length_s: float, rng: np.random.Generator) -> float:

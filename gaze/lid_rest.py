@@ -7,8 +7,8 @@ narrows (Read 2006: from 9.7 to 6.4 mm at 40 deg down). Nothing here throws dice
 
 from typing import NamedTuple
 
-from gaze.lid_params import LidParams
-from gaze.saccade import min_jerk
+from gazerig.gaze.lid_params import LidParams
+from gazerig.gaze.saccade import min_jerk
 
 _DROOP_S = 1.0  # time in which lids sink or rise when the sleepiness changes
 _GLIDE_S = 0.3  # and when what they do at rest is retuned

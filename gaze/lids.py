@@ -12,10 +12,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gaze.lid_closing import Closing, closure
-from gaze.lid_dice import depth, doubled, evokes, pause_s
-from gaze.lid_params import LidParams as LidParams
-from gaze.lid_rest import LidsAtRest, Pair
+from gazerig.gaze.lid_closing import Closing, closure
+from gazerig.gaze.lid_dice import depth, doubled, evokes, pause_s
+from gazerig.gaze.lid_params import LidParams as LidParams
+from gazerig.gaze.lid_rest import LidsAtRest, Pair
 
 Side = Literal["left", "right"]
 LidMode = Literal["rest", "conversation"]

@@ -11,15 +11,15 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
-from gaze.field_of_view import line_of_sight
-from gaze.flight import Flight, scattered
-from gaze.head import Head
-from gaze.lids import Lids, Openings
-from gaze.pursuit import Pursuit
-from gaze.saccade import Saccade
-from gaze.shift import ShiftParams, ShiftRule
-from gaze.types import (
+from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.flight import Flight, scattered
+from gazerig.gaze.head import Head
+from gazerig.gaze.lids import Lids, Openings
+from gazerig.gaze.pursuit import Pursuit
+from gazerig.gaze.saccade import Saccade
+from gazerig.gaze.shift import ShiftParams, ShiftRule
+from gazerig.gaze.types import (
     Angles2,
     Angles3,
     GazeCommand,

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 from math import exp, radians
 from typing import NamedTuple
 
-from gaze.angles import add, norm, scale, sub, unit
-from gaze.types import Vec3
+from gazerig.gaze.angles import add, norm, scale, sub, unit
+from gazerig.gaze.types import Vec3
 
 _FARTHEST_1_M = 0.01
 """Nearness below which the lines of sight are as good as parallel (100 m)."""

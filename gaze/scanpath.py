@@ -11,16 +11,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gaze.angles import add, sub
-from gaze.scanpath_dwell import LAWS, Draw, dwell_law
-from gaze.scanpath_models import (
+from gazerig.gaze.angles import add, sub
+from gazerig.gaze.scanpath_dwell import LAWS, Draw, dwell_law
+from gazerig.gaze.scanpath_models import (
     FaceLooks,
     FaceTracking,
     MarkovWalk,
     RandomAngles,
     SimpleCycle,
 )
-from gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
+from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
 
 _OTHER_SIDE = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}
 # A measured and rounded row may miss 1 by this and still count as a row that sums to 1.

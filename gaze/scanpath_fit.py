@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gaze.types import PART_NAMES, PARTS, Floats
+from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 
 SMOOTHINGS = ("none", "laplace", "bootstrap")
 

@@ -15,9 +15,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from gaze.angles import add, direction, norm, rotate, rotation, scale, sub, yaw_pitch
-from gaze.scanpath_dwell import Draw
-from gaze.types import PARTS, Angles2, Face, Floats, Vec3
+from gazerig.gaze.angles import add, direction, norm, rotate, rotation, scale, sub, yaw_pitch
+from gazerig.gaze.scanpath_dwell import Draw
+from gazerig.gaze.types import PARTS, Angles2, Face, Floats, Vec3
 
 
 class Look(NamedTuple):

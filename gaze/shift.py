@@ -13,8 +13,8 @@ refractory time, and none starts while another is in flight.
 from dataclasses import dataclass, field
 from math import inf, radians
 
-from gaze.angles import dot, norm
-from gaze.pursuit import Slip
+from gazerig.gaze.angles import dot, norm
+from gazerig.gaze.pursuit import Slip
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.types import Bodies, Floats, Vec3
+from gazerig.gaze.types import Bodies, Floats, Vec3
 
 _BY_ID = "id:"
 _POINT = "point"

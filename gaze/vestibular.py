@@ -8,7 +8,7 @@ motions exactly (the gaze-feedback hypothesis, Daye 2015). Radians, metres, seco
 from collections import deque
 from math import cos, degrees, exp, inf, sin
 
-from gaze.types import Angles2, Angles3
+from gazerig.gaze.types import Angles2, Angles3
 
 
 class Canals:

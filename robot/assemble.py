@@ -8,49 +8,49 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from config.schema import Rig, load_rules, load_walk
-from drivers.camera.depth_roi import depth_at
-from drivers.camera.pose_buffer import PoseRing
-from drivers.errors import SetupError
-from drivers.serial.list_ports import serial_ports
-from drivers.serial.port_owner import refuse_owner
-from drivers.types import ServoBus
-from gaze.attention import Attention
-from gaze.aversion import Aversion
-from gaze.bottom_up import BottomUp
-from gaze.breathing import Breathing
-from gaze.field_of_view import FieldOfView
-from gaze.head import Head
-from gaze.idle import Idle
-from gaze.lids import Lids
-from gaze.oculomotor import Oculomotor
-from gaze.pursuit import Pursuit
-from gaze.saccade import Saccade, SaccadeParams
-from gaze.scanpath import Scanpath, ScanpathParams, row_sums_note
-from gaze.top_down import TopDown
-from gaze.types import Angles3, Mat3, Vec3
-from robot.body import Body
-from robot.cameras import HeadPose, real_camera, scene_camera
-from robot.choice import Choice
-from robot.clock import Clock, RealClock, SimulatedClock
-from robot.emulated_rig import emulated_lines, place_of
-from robot.frames import CameraMount, CameraParams, NewestPose, PoseHistory, standing_still
-from robot.kinematics import NECK, Kinematics
-from robot.loop import LoopParams, Robot
-from robot.page.snapshot import ShownRig
-from robot.retune import Parts, Placed, Retuner
-from robot.rig_angles import eye_limits, head_limits, lid_ends, limits, own_parts, park_rad
-from robot.rig_bus import guarded_rig_bus, ports_of, rig_bus
-from robot.safety.guard import Guard
-from robot.seeing.perception import Perception
-from robot.seeing.tracks import Tracker
-from robot.types import JointAngles
-from sim_mock.device import Device
-from sim_mock.devices import build
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.pty.client import PtyBuses
-from sim_mock.scenes.registry import scenes
-from sim_mock.scenes.scene import Scene
+from gazerig.config.schema import Rig, load_rules, load_walk
+from gazerig.drivers.camera.depth_roi import depth_at
+from gazerig.drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.serial.list_ports import serial_ports
+from gazerig.drivers.serial.port_owner import refuse_owner
+from gazerig.drivers.types import ServoBus
+from gazerig.gaze.attention import Attention
+from gazerig.gaze.aversion import Aversion
+from gazerig.gaze.bottom_up import BottomUp
+from gazerig.gaze.breathing import Breathing
+from gazerig.gaze.field_of_view import FieldOfView
+from gazerig.gaze.head import Head
+from gazerig.gaze.idle import Idle
+from gazerig.gaze.lids import Lids
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.pursuit import Pursuit
+from gazerig.gaze.saccade import Saccade, SaccadeParams
+from gazerig.gaze.scanpath import Scanpath, ScanpathParams, row_sums_note
+from gazerig.gaze.top_down import TopDown
+from gazerig.gaze.types import Angles3, Mat3, Vec3
+from gazerig.robot.body import Body
+from gazerig.robot.cameras import HeadPose, real_camera, scene_camera
+from gazerig.robot.choice import Choice
+from gazerig.robot.clock import Clock, RealClock, SimulatedClock
+from gazerig.robot.emulated_rig import emulated_lines, place_of
+from gazerig.robot.frames import CameraMount, CameraParams, NewestPose, PoseHistory, standing_still
+from gazerig.robot.kinematics import NECK, Kinematics
+from gazerig.robot.loop import LoopParams, Robot
+from gazerig.robot.page.snapshot import ShownRig
+from gazerig.robot.retune import Parts, Placed, Retuner
+from gazerig.robot.rig_angles import eye_limits, head_limits, lid_ends, limits, own_parts, park_rad
+from gazerig.robot.rig_bus import guarded_rig_bus, ports_of, rig_bus
+from gazerig.robot.safety.guard import Guard
+from gazerig.robot.seeing.perception import Perception
+from gazerig.robot.seeing.tracks import Tracker
+from gazerig.robot.types import JointAngles
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.pty.client import PtyBuses
+from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.sim_mock.scenes.scene import Scene
 
 P = TypeVar("P", ScanpathParams, SaccadeParams)
 
@@ -118,8 +118,8 @@ def assemble(rig: Rig, choice: Choice) -> Assembly:
     """Build the robot of a rig; nothing is opened but the emulated bus.
 
     Raises:
-        config.load.ConfigError: the profile or walk that the rig names is at fault.
-        drivers.errors.SetupError: a film or model file cannot be used.
+        gazerig.config.load.ConfigError: the profile or walk that the rig names is at fault.
+        SetupError: a film or model file cannot be used.
     """
     rig = _as_chosen(rig, choice)
     scene = _scene(rig, choice.scene) if choice.scene is not None else None
@@ -329,7 +329,7 @@ def chosen(params: P, key: str, value: str, option: str) -> P:
     """Replace one key that has choices, as an option of the command line asks.
 
     Raises:
-        drivers.errors.SetupError: the value is none of the choices.
+        SetupError: the value is none of the choices.
     """
     (declared,) = (f for f in fields(params) if f.name == key)
     choices = declared.metadata["choices"]

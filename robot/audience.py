@@ -10,29 +10,29 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from robot.assemble import Assembly
-from robot.loop import LoopCount, Tick
-from robot.observers import Observers, left_out
-from robot.orders import Order, Resume, Stop, Tune
-from robot.page.feed import Fed, TuningFeed
-from robot.page.hear import Confined, PageHear
-from robot.page.link import Page
-from robot.page.onlooker import InForce, Onlooker
-from robot.page.picking import Picking
-from robot.page.snapshot import Snapshots
-from robot.recording.recorder import Recorder
-from robot.recording.run_info import RunInfo
-from robot.remote.live_control import FileTuning, LiveControl
-from robot.reply import OrderTaker, Ticket
+from gazerig.robot.assemble import Assembly
+from gazerig.robot.loop import LoopCount, Tick
+from gazerig.robot.observers import Observers, left_out
+from gazerig.robot.orders import Order, Resume, Stop, Tune
+from gazerig.robot.page.feed import Fed, TuningFeed
+from gazerig.robot.page.hear import Confined, PageHear
+from gazerig.robot.page.link import Page
+from gazerig.robot.page.onlooker import InForce, Onlooker
+from gazerig.robot.page.picking import Picking
+from gazerig.robot.page.snapshot import Snapshots
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunInfo
+from gazerig.robot.remote.live_control import FileTuning, LiveControl
+from gazerig.robot.reply import OrderTaker, Ticket
 
 _SWITCH_S = 0.0003
 
 STEER = "steer"
-"""The menu of this name is the page's steps of a calibration (robot.page.controls)."""
+"""The menu of this name is the page's steps of a calibration (gazerig.robot.page.controls)."""
 
 
 class LiveTuning(FileTuning, Fed, Protocol):
-    """The parameters of the running rig, as robot.tuning.Tuning has them."""
+    """The parameters of the running rig, as gazerig.robot.tuning.Tuning has them."""
 
     @property
     def confined(self) -> Confined:
@@ -178,7 +178,7 @@ class Audience:
         """Create what is written, before anything moves.
 
         Raises:
-            drivers.errors.SetupError: it exists already or cannot be made.
+            SetupError: it exists already or cannot be made.
         """
         if self._recorder is not None:
             self._recorder.open()

@@ -15,8 +15,8 @@ from math import dist
 from statistics import median
 from typing import Literal, NamedTuple, Protocol
 
-from gaze.types import Vec3
-from robot.loop import Tick
+from gazerig.gaze.types import Vec3
+from gazerig.robot.loop import Tick
 
 
 class Happening(Protocol):

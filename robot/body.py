@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from math import inf
 
-from drivers.errors import BusLost, DriverError
-from drivers.slow_entry import ENTRY_DEG_S
-from drivers.types import ServoBus, ServoReading, ServoSetup
-from robot.joint import JointParams
-from robot.safety.motion import JointLimit
-from robot.types import JointAngles, JointState, in_order
+from gazerig.drivers.errors import BusLost, DriverError
+from gazerig.drivers.slow_entry import ENTRY_DEG_S
+from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
+from gazerig.robot.joint import JointParams
+from gazerig.robot.safety.motion import JointLimit
+from gazerig.robot.types import JointAngles, JointState, in_order
 
 
 def setups(
@@ -92,7 +92,7 @@ class Body:
         """Open the bus and switch torque on where the joints are; give the goals in force.
 
         Raises:
-            drivers.errors.SetupError: port or servos are not as configured.
+            SetupError: port or servos are not as configured.
         """
         self.bus.open()
         try:
@@ -105,7 +105,7 @@ class Body:
         """Read all joints; one that does not answer keeps its last value and its age.
 
         Raises:
-            drivers.errors.BusLost: nobody has answered for too long, and torque was not let
+            BusLost: nobody has answered for too long, and torque was not let
                 go of; after that the bus may stay away for as long as it likes.
         """
         try:
@@ -150,7 +150,7 @@ class Body:
         """Torque off at once; the bus stays open and readings go on.
 
         Raises:
-            drivers.errors.BusLost: the port is gone; the torque is taken off when it is back.
+            BusLost: the port is gone; the torque is taken off when it is back.
         """
         self._let_go = True
         self.bus.release()
@@ -159,8 +159,8 @@ class Body:
         """Torque on again where the joints are; give the goals in force.
 
         Raises:
-            drivers.errors.SetupError: a servo does not answer, refuses or has latched a fault.
-            drivers.errors.BusLost: the port is gone.
+            SetupError: a servo does not answer, refuses or has latched a fault.
+            BusLost: the port is gone.
         """
         goals = self.bus.engage()
         self._let_go = False

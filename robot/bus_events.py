@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 
-from robot.bringup.servo_report import runs
+from gazerig.robot.bringup.servo_report import runs
 
 _SERVO = re.compile(r"servo (\d+)")
 

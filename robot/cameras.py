@@ -6,30 +6,30 @@ from math import radians
 
 import numpy as np
 
-from config.schema import Rig
-from drivers.camera.oak import OakSource
-from drivers.camera.playback import CameraReplay
-from drivers.camera.pose_buffer import PoseRing
-from drivers.camera.process import CameraProcess
-from drivers.camera.source import PictureSource
-from drivers.camera.video_file import VideoFile
-from drivers.camera.webcam import Webcam
-from drivers.camera.worker import CameraParts
-from drivers.errors import SetupError
-from drivers.types import Camera, MovingBlob
-from drivers.vision.face_detector import face_detector
-from drivers.vision.motion.detector import MotionDetector, turned_between
-from drivers.vision.motion.params import MotionParams
-from gaze.types import Mat3, Vec3
-from robot.choice import Choice
-from robot.clock import Clock
-from robot.frames import CameraMount, CameraParams
-from robot.seeing.intrinsics import Intrinsics
-from robot.seeing.motion_finder import motion_finder, retuned
-from sim_mock.cameras.detections import SceneCamera, SceneCameraParams
-from sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams
-from sim_mock.cameras.video import FilmCamera
-from sim_mock.scenes.scene import Scene
+from gazerig.config.schema import Rig
+from gazerig.drivers.camera.oak import OakSource
+from gazerig.drivers.camera.playback import CameraReplay
+from gazerig.drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.source import PictureSource
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.camera.webcam import Webcam
+from gazerig.drivers.camera.worker import CameraParts
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import Camera, MovingBlob
+from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.choice import Choice
+from gazerig.robot.clock import Clock
+from gazerig.robot.frames import CameraMount, CameraParams
+from gazerig.robot.seeing.intrinsics import Intrinsics
+from gazerig.robot.seeing.motion_finder import motion_finder, retuned
+from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams
+from gazerig.sim_mock.cameras.video import FilmCamera
+from gazerig.sim_mock.scenes.scene import Scene
 
 HeadPose = Callable[[float], tuple[Mat3, Vec3]]
 """Gives R_world_head and p_world_head_m at a time."""
@@ -62,7 +62,7 @@ def real_camera(
     turns: how the camera was turned when; None where it stands still
 
     Raises:
-        drivers.errors.SetupError: a film, recording or model file cannot be used.
+        SetupError: a film, recording or model file cannot be used.
     """
     detector = partial(face_detector, rig.detector)
     field_rad = radians(placed.horizontal_field_deg)

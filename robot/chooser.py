@@ -2,8 +2,8 @@
 
 from typing import Protocol
 
-from gaze.top_down import TopDown
-from gaze.types import GazeState, Percept, Target
+from gazerig.gaze.top_down import TopDown
+from gazerig.gaze.types import GazeState, Percept, Target
 
 
 class Chooser(Protocol):

@@ -2,13 +2,13 @@
 
 from math import pi, radians
 
-from config.schema import Rig
-from drivers.servo_models import HOBBY_KINDS
-from robot.joint import JointParams
-from robot.rig_bus import bus_names, joints_on
-from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.config.schema import Rig
+from gazerig.drivers.servo_models import HOBBY_KINDS
+from gazerig.robot.joint import JointParams
+from gazerig.robot.rig_bus import bus_names, joints_on
+from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 _CROOKED_DEG = {"left_eye_pan": 6.0, "right_eye_pan": -4.0, "neck_yaw": -12.0, "neck_pitch": -8.0}
 """Emulated joints start a little crooked, as a head that somebody has moved by hand does."""

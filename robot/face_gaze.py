@@ -1,9 +1,9 @@
 """Where on the face the gaze goes, as measured: points in the face's own frame."""
 
-from gaze.angles import add, dot, rotate, rotate_back, scale, sub
-from gaze.types import Mat3, Vec3
-from robot.loop import Tick
-from robot.summary import cyclopean
+from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.loop import Tick
+from gazerig.robot.summary import cyclopean
 
 _PLANE_M = -0.028
 """The plane between the nose tip and the eyes and mouth, along the face's own x axis."""

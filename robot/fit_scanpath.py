@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drivers.errors import SetupError
-from drivers.file_output import refuse_existing, write_file
-from gaze.scanpath import Walk
-from gaze.scanpath_fit import SMOOTHINGS, FitParams, Fixation, Interval, WalkFit, fit_walk
-from gaze.types import PART_NAMES, PARTS
-from robot.fixations import FixationParams, PartBoxes, fixations_of, labelled, usual_side
-from robot.gaze_recording import Samples, read_recording
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import refuse_existing, write_file
+from gazerig.gaze.scanpath import Walk
+from gazerig.gaze.scanpath_fit import SMOOTHINGS, FitParams, Fixation, Interval, WalkFit, fit_walk
+from gazerig.gaze.types import PART_NAMES, PARTS
+from gazerig.robot.fixations import FixationParams, PartBoxes, fixations_of, labelled, usual_side
+from gazerig.robot.gaze_recording import Samples, read_recording
 
 
 class _Source(NamedTuple):
@@ -37,7 +37,7 @@ def fit(
     force: replace a file that is there
 
     Raises:
-        drivers.errors.SetupError: a file cannot be read, trusted or written.
+        SetupError: a file cannot be read, trusted or written.
     """
     if smoothing not in SMOOTHINGS:
         raise SetupError(f"no smoothing {smoothing!r}; there are {', '.join(SMOOTHINGS)}")

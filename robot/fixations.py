@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drivers.errors import SetupError
-from gaze.scanpath_fit import Fixation
-from gaze.types import PARTS, Floats
-from robot.gaze_recording import FixationTable, Samples
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.scanpath_fit import Fixation
+from gazerig.gaze.types import PARTS, Floats
+from gazerig.robot.gaze_recording import FixationTable, Samples
 
 Box = tuple[float, float, float, float]
 """x0, y0, x1, y1 with x0 < x1 and y0 < y1."""
@@ -110,7 +110,7 @@ def fixations_of(
     """Find the fixations and the part each lies on.
 
     Raises:
-        drivers.errors.SetupError: pymovements is not installed, or there are too few samples.
+        SetupError: pymovements is not installed, or there are too few samples.
     """
     seen = np.isfinite(samples.x)
     if np.count_nonzero(seen) < 3:
@@ -134,7 +134,7 @@ def labelled(table: FixationTable, boxes: PartBoxes | None) -> tuple[Fixation, .
     """Give the fixations of a table, by their labels or else by the boxes they lie in.
 
     Raises:
-        drivers.errors.SetupError: there are neither labels nor boxes.
+        SetupError: there are neither labels nor boxes.
     """
     if not table.labelled and boxes is None:
         raise SetupError("fixations without a part column need the rectangles of the parts")

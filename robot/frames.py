@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import degrees, inf, radians
 
-from gaze.angles import add, angles_of, compose, rotate, rotation
-from gaze.types import Angles3, HeadGeometry, Mat3, Vec3
+from gazerig.gaze.angles import add, angles_of, compose, rotate, rotation
+from gazerig.gaze.types import Angles3, HeadGeometry, Mat3, Vec3
 
 _OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 """Maps camera optical axes (x right, y down, z forward) to x forward, y left, z up."""

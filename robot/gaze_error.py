@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from gaze.angles import add, angle_between, sub
-from gaze.field_of_view import line_of_sight
-from gaze.types import GazeState, Vec3
+from gazerig.gaze.angles import add, angle_between, sub
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import GazeState, Vec3
 
 
 class GazeError(NamedTuple):

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drivers.errors import SetupError
-from drivers.file_input import read_limited
-from gaze.types import PART_NAMES, PARTS, Floats
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_input import read_limited
+from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 
 _NAMES = {
     "time": ("time", "t", "timestamp"),
@@ -86,7 +86,7 @@ def read_recording(path: Path) -> Samples | FixationTable:
     """Read samples or fixations.
 
     Raises:
-        drivers.errors.SetupError: naming file, line and column, and what is wrong.
+        SetupError: naming file, line and column, and what is wrong.
     """
     table = _read(path)
     if _find(table, "duration") is not None:

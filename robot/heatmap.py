@@ -11,15 +11,15 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drivers.errors import SetupError
-from drivers.file_input import read_limited
-from drivers.file_output import write_file
-from drivers.vision.face_detector import face_detector
-from drivers.vision.face_params import FaceDetectorParams
-from gaze.types import PARTS, Floats
-from robot.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
-from robot.heatmap_legend import with_legend
-from robot.seeing.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.file_output import write_file
+from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.gaze.types import PARTS, Floats
+from gazerig.robot.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.heatmap_legend import with_legend
+from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
 
 Picture = NDArray[np.uint8]
 
@@ -62,7 +62,7 @@ def heatmap(
     picture: a photograph of one face from its front; force: replace a file that is there
 
     Raises:
-        drivers.errors.SetupError: no face in the picture, or a file cannot be read or written.
+        SetupError: no face in the picture, or a file cannot be read or written.
         ValueError: as of ``share_per_part``.
     """
     points, times = _checked(points_face_m, seconds)
@@ -93,7 +93,7 @@ def face_from(picture: Path) -> Picture:
     """Bring the largest face of a photograph to the canvas, by its eyes and mouth.
 
     Raises:
-        drivers.errors.SetupError: it cannot be read, or no face is found in it.
+        SetupError: it cannot be read, or no face is found in it.
     """
     try:
         data = np.frombuffer(read_limited(picture, _LARGEST), np.uint8)

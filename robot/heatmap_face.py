@@ -1,7 +1,7 @@
 """A plain frontal face drawn to measure, so that a gaze point lies on the part it was meant for.
 
 The canvas shows y to the owner's left rightwards and z up upwards, as one sees a person who
-faces one; its measures are those of robot.seeing.face_pose.
+faces one; its measures are those of gazerig.robot.seeing.face_pose.
 """
 
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.types import Floats
-from robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.gaze.types import Floats
+from gazerig.robot.seeing.face_pose import PARTS_FACE_M
 
 WIDTH_PX, HEIGHT_PX = 720, 860
 PX_PER_M = 3000.0

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.types import PART_NAMES
+from gazerig.gaze.types import PART_NAMES
 
 Picture = NDArray[np.uint8]
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any, Self
 
-from robot.clock import RealClock
+from gazerig.robot.clock import RealClock
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 """Ctrl-C, a request to end, a terminal that was closed, and Ctrl-backslash."""

@@ -3,11 +3,11 @@
 from dataclasses import dataclass, field
 from math import ceil, floor, pi, radians
 
-from drivers.servo_models import SERVOS, ServoFacts
-from drivers.slow_entry import ENTRY_DEG_S
-from drivers.types import ServoSetup
-from robot.linkage import Curve, Linkage, Straight
-from robot.safety.motion import JointLimit
+from gazerig.drivers.servo_models import SERVOS, ServoFacts
+from gazerig.drivers.slow_entry import ENTRY_DEG_S
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.linkage import Curve, Linkage, Straight
+from gazerig.robot.safety.motion import JointLimit
 
 
 @dataclass(frozen=True)

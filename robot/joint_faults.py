@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from robot.tick import Tick
+from gazerig.robot.tick import Tick
 
 FAULTS = frozenset(
     {"not moving", "overloaded", "hot", "voltage", "stale joints", "torque off", "not finite"}

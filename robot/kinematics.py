@@ -11,9 +11,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import asin, atan2, hypot, pi
 
-from gaze.angles import add, rotate, rotate_back, rotation, sub, yaw_pitch
-from gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
-from robot.types import JOINTS, JointAngles, JointState, in_order
+from gazerig.gaze.angles import add, rotate, rotate_back, rotation, sub, yaw_pitch
+from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
+from gazerig.robot.types import JOINTS, JointAngles, JointState, in_order
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ are those of the ticks and heartbeats are orders, so a recorded run lapses as it
 
 from math import degrees
 
-from gaze.types import Target, Vec3
-from robot.orders import Jog, LookAt, Renew
-from robot.types import JointAngles
+from gazerig.gaze.types import Target, Vec3
+from gazerig.robot.orders import Jog, LookAt, Renew
+from gazerig.robot.types import JointAngles
 
 HEARTBEAT_S = 1.0
 """A lead that is not to stay lapses when it was not renewed for so long."""

@@ -7,29 +7,29 @@ from dataclasses import dataclass, field
 from math import inf, radians
 from typing import NamedTuple
 
-from drivers.errors import DriverError
-from drivers.types import Camera
-from gaze.aversion import Aversion
-from gaze.lids import Lids
-from gaze.oculomotor import Oculomotor
-from gaze.scanpath import Scanpath
-from robot.body import Body
-from robot.chooser import Chooser
-from robot.clock import Clock
-from robot.frames import PoseHistory
-from robot.kinematics import Kinematics
-from robot.lead import Lead
-from robot.menus import Menus, refuse_absent, refuse_out_of_range, refuse_unknown
-from robot.order_queue import OrderQueue
-from robot.orders import Ask, Jog, LookAt, Order, Renew, Resume, Stop, Tune, check
-from robot.reach import jog_reply, look_reply
-from robot.reply import Reply, Ticket
-from robot.safety.guard import Guard
-from robot.seeing.perception import Perception
-from robot.stop_control import StopControl
-from robot.tick import Tick as Tick
-from robot.tick import at_rest
-from robot.types import JointAngles
+from gazerig.drivers.errors import DriverError
+from gazerig.drivers.types import Camera
+from gazerig.gaze.aversion import Aversion
+from gazerig.gaze.lids import Lids
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.scanpath import Scanpath
+from gazerig.robot.body import Body
+from gazerig.robot.chooser import Chooser
+from gazerig.robot.clock import Clock
+from gazerig.robot.frames import PoseHistory
+from gazerig.robot.kinematics import Kinematics
+from gazerig.robot.lead import Lead
+from gazerig.robot.menus import Menus, refuse_absent, refuse_out_of_range, refuse_unknown
+from gazerig.robot.order_queue import OrderQueue
+from gazerig.robot.orders import Ask, Jog, LookAt, Order, Renew, Resume, Stop, Tune, check
+from gazerig.robot.reach import jog_reply, look_reply
+from gazerig.robot.reply import Reply, Ticket
+from gazerig.robot.safety.guard import Guard
+from gazerig.robot.seeing.perception import Perception
+from gazerig.robot.stop_control import StopControl
+from gazerig.robot.tick import Tick as Tick
+from gazerig.robot.tick import at_rest
+from gazerig.robot.types import JointAngles
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class Robot:
         ready: called last before the torque comes on; what it raises ends the start
 
         Raises:
-            drivers.errors.SetupError: something is absent or not as configured.
+            SetupError: something is absent or not as configured.
         """
         # A full pass of the garbage collector over all that start-up made takes 20 ms, four
         # slots; what is there now stays, so later passes need not look at it. Before torque
@@ -189,7 +189,7 @@ class Robot:
         """Read, see, choose, plan, guard, write.
 
         Raises:
-            drivers.errors.DriverError: bus or camera are gone.
+            DriverError: bus or camera are gone.
         """
         orders = self._obey(t_s)
         joints = self.body.read(t_s)

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from math import degrees, radians
 
-from gaze.aversion import MODES, Aversion
-from gaze.lids import Lids
-from gaze.top_down import TopDown
-from robot.orders import Ask, Jog
-from robot.safety.motion import JointLimit
+from gazerig.gaze.aversion import MODES, Aversion
+from gazerig.gaze.lids import Lids
+from gazerig.gaze.top_down import TopDown
+from gazerig.robot.orders import Ask, Jog
+from gazerig.robot.safety.motion import JointLimit
 
 _NEAR_END_RAD = radians(0.05)
 """A slider at the end of a joint's range is rounded to a tenth of a degree."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from robot.tick import Tick
+from gazerig.robot.tick import Tick
 
 
 class _Observer(NamedTuple):

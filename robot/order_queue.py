@@ -4,8 +4,8 @@ from collections import deque
 from contextlib import suppress
 from typing import NamedTuple
 
-from robot.orders import Jog, LookAt, Order, Resume, Stop, Tune
-from robot.reply import Reply, Ticket
+from gazerig.robot.orders import Jog, LookAt, Order, Resume, Stop, Tune
+from gazerig.robot.reply import Reply, Ticket
 
 MAX_WAITING = 64
 MAX_PER_TICK = 8

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from math import pi
 from typing import NamedTuple
 
-from gaze.types import Vec3
-from robot.types import JOINTS
+from gazerig.gaze.types import Vec3
+from gazerig.robot.types import JOINTS
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """What a key of a rig's YAML can hold."""
@@ -27,7 +27,7 @@ class LookAt(NamedTuple):
 
     p_world_m: metres, x ahead, y left, z up of the neck base
     who: who asks, in words; stay: until told otherwise; else for as long as ``Renew`` comes
-        at least every ``robot.lead.HEARTBEAT_S``
+        at least every ``gazerig.robot.lead.HEARTBEAT_S``
     """
 
     p_world_m: Vec3 | None
@@ -63,7 +63,7 @@ class Stop(NamedTuple):
 class Resume(NamedTuple):
     """Put the torque on again after a stop, where the joints are, and go on slowly.
 
-    Obeyed by the rules of ``robot.stop_latch``: of the one who stopped, or confirmed.
+    Obeyed by the rules of ``gazerig.robot.stop_latch``: of the one who stopped, or confirmed.
 
     who: who asks, in words
     confirmed: a person has said that no hand is in the mechanism

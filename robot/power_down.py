@@ -14,8 +14,8 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Self, TypeVar
 
-from drivers.errors import DriverError
-from robot.interrupts import Interrupts
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.interrupts import Interrupts
 
 T = TypeVar("T")
 

@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 from math import pi, radians
 
-from gaze.angles import add, norm, scale, sub, unit
-from gaze.field_of_view import line_of_sight
-from gaze.oculomotor import Oculomotor
-from gaze.types import Angles2, Angles3, GazeCommand, Target
-from robot.gaze_error import gaze_error
-from robot.kinematics import NECK, Kinematics
-from robot.orders import Jog
-from robot.reply import JointReply, Reply
-from robot.safety.motion import JointLimit
-from robot.types import JointAngles, JointState
+from gazerig.gaze.angles import add, norm, scale, sub, unit
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.types import Angles2, Angles3, GazeCommand, Target
+from gazerig.robot.gaze_error import gaze_error
+from gazerig.robot.kinematics import NECK, Kinematics
+from gazerig.robot.orders import Jog
+from gazerig.robot.reply import JointReply, Reply
+from gazerig.robot.safety.motion import JointLimit
+from gazerig.robot.types import JointAngles, JointState
 
 _SAME_RAD = radians(0.1)
 _BESIDE_RAD = radians(0.5)

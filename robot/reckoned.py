@@ -7,7 +7,7 @@ by the speed that it is known to have: nobody sees it stick, slip or swing.
 from collections.abc import Callable, Collection
 from typing import Literal
 
-from robot.tick import Tick
+from gazerig.robot.tick import Tick
 
 Basis = Literal["measured", "partly reckoned", "reckoned"]
 

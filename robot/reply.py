@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping
 from math import degrees, radians
 from typing import Any, NamedTuple
 
-from gaze.types import Vec3
-from robot.orders import Order
+from gazerig.gaze.types import Vec3
+from gazerig.robot.orders import Order
 
 _BESIDE_DEG = 1.0
 """A gaze that rests nearer to its point than this looks there."""
@@ -144,4 +144,4 @@ class Ticket:
 
 
 OrderTaker = Callable[[Order], Ticket | None]
-"""Takes an order for the next tick, as robot.loop.Robot.order; None: nobody will reply to it."""
+"""Takes an order for the next tick, as Robot.order does; None: nobody will reply to it."""

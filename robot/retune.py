@@ -2,42 +2,42 @@
 
 Each part has a ``retune`` that takes its parameters and keeps what it knows. Only parts
 whose parameters differ are touched. What cannot change while the rig runs (see
-config.knobs) keeps the value it started with until the next start.
+gazerig.config.knobs) keeps the value it started with until the next start.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from config.knobs import NEXT_START, changed, differences, live
-from config.load import ConfigError
-from config.schema import Rig, load_walk
-from drivers.types import Camera
-from gaze.attention import Attention
-from gaze.aversion import Aversion
-from gaze.bottom_up import BottomUp
-from gaze.breathing import Breathing
-from gaze.field_of_view import FieldOfView
-from gaze.head import Head
-from gaze.idle import Idle
-from gaze.lids import Lids
-from gaze.oculomotor import Oculomotor
-from gaze.pursuit import Pursuit
-from gaze.saccade import Saccade
-from gaze.scanpath import Scanpath, Walk
-from gaze.top_down import TopDown
-from robot.body import Body
-from robot.cameras import retune_camera
-from robot.frames import CameraMount, CameraParams
-from robot.joint import JointParams
-from robot.kinematics import Kinematics
-from robot.loop import LoopParams
-from robot.orders import Tune, Value
-from robot.rig_angles import eye_limits, head_limits, lid_ends, limits, own_parts, park_pose
-from robot.safety.guard import Guard, JointLimit
-from robot.seeing.perception import Perception
-from robot.seeing.tracks import Tracker
-from robot.types import JointAngles
+from gazerig.config.knobs import NEXT_START, changed, differences, live
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import Rig, load_walk
+from gazerig.drivers.types import Camera
+from gazerig.gaze.attention import Attention
+from gazerig.gaze.aversion import Aversion
+from gazerig.gaze.bottom_up import BottomUp
+from gazerig.gaze.breathing import Breathing
+from gazerig.gaze.field_of_view import FieldOfView
+from gazerig.gaze.head import Head
+from gazerig.gaze.idle import Idle
+from gazerig.gaze.lids import Lids
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.pursuit import Pursuit
+from gazerig.gaze.saccade import Saccade
+from gazerig.gaze.scanpath import Scanpath, Walk
+from gazerig.gaze.top_down import TopDown
+from gazerig.robot.body import Body
+from gazerig.robot.cameras import retune_camera
+from gazerig.robot.frames import CameraMount, CameraParams
+from gazerig.robot.joint import JointParams
+from gazerig.robot.kinematics import Kinematics
+from gazerig.robot.loop import LoopParams
+from gazerig.robot.orders import Tune, Value
+from gazerig.robot.rig_angles import eye_limits, head_limits, lid_ends, limits, own_parts, park_pose
+from gazerig.robot.safety.guard import Guard, JointLimit
+from gazerig.robot.seeing.perception import Perception
+from gazerig.robot.seeing.tracks import Tracker
+from gazerig.robot.types import JointAngles
 
 
 class Parts(NamedTuple):
@@ -92,7 +92,7 @@ _ALIKE = (
 
 
 class Retuner:
-    """Puts changes into the parts of a robot; a robot.loop.Robot's ``tune``.
+    """Puts changes into the parts of a robot; a gazerig.robot.loop.Robot's ``tune``.
 
     rig: in force
     """
@@ -132,7 +132,7 @@ class Retuner:
         Its tick then need not check it. base: in force when the order comes
 
         Raises:
-            config.load.ConfigError: the walk that the rig names is at fault.
+            gazerig.config.load.ConfigError: the walk that the rig names is at fault.
         """
         order = Tune(tuple(differences(base, rig).items()))
         self._ready[id(order.changes)] = _ready(order, base, rig)
@@ -236,7 +236,7 @@ def _ready(order: Tune, base: Rig, rig: Rig) -> _Ready:
     """Put a checked change together, with the face walk where it is another one.
 
     Raises:
-        config.load.ConfigError: the walk that the rig names is at fault.
+        gazerig.config.load.ConfigError: the walk that the rig names is at fault.
     """
     name = rig.gaze.scanpath.walk
     walk = load_walk(name) if name != base.gaze.scanpath.walk else None

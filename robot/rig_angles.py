@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from math import radians
 
-from config.schema import Rig
-from gaze.types import Angles2, Vec3
-from robot.joint import JointParams
-from robot.kinematics import LIDS, LidEnds
-from robot.safety.motion import JointLimit
-from robot.types import JointAngles, in_order
+from gazerig.config.schema import Rig
+from gazerig.gaze.types import Angles2, Vec3
+from gazerig.robot.joint import JointParams
+from gazerig.robot.kinematics import LIDS, LidEnds
+from gazerig.robot.safety.motion import JointLimit
+from gazerig.robot.types import JointAngles, in_order
 
 EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
 """Of the left and the right eye: ((yaw low, high), (pitch low, high)), radians."""

@@ -2,22 +2,22 @@
 
 from collections.abc import Mapping
 
-from config.schema import Rig
-from drivers.dynamixel.bus import DynamixelBus
-from drivers.errors import SetupError
-from drivers.feetech.bus import FeetechBus
-from drivers.i2c.port import port_of
-from drivers.maestro.bus import MaestroBus
-from drivers.multi_bus import MixedBus, Share
-from drivers.pca9685.bus import Pca9685Bus
-from drivers.serial.port import BusPort
-from drivers.servo_models import BUS_KINDS
-from drivers.types import ServoBus, ServoSetup
-from robot.body import setups
-from robot.guardian.guarded_bus import GuardedBus
-from robot.guardian.guardian import Guardian
-from robot.guardian.release_plan import ReleasePlan
-from robot.rig_angles import park_rad
+from gazerig.config.schema import Rig
+from gazerig.drivers.dynamixel.bus import DynamixelBus
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.feetech.bus import FeetechBus
+from gazerig.drivers.i2c.port import port_of
+from gazerig.drivers.maestro.bus import MaestroBus
+from gazerig.drivers.multi_bus import MixedBus, Share
+from gazerig.drivers.pca9685.bus import Pca9685Bus
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_models import BUS_KINDS
+from gazerig.drivers.types import ServoBus, ServoSetup
+from gazerig.robot.body import setups
+from gazerig.robot.guardian.guarded_bus import GuardedBus
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.guardian.release_plan import ReleasePlan
+from gazerig.robot.rig_angles import park_rad
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
@@ -38,7 +38,7 @@ def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
         several with commas between
 
     Raises:
-        drivers.errors.SetupError: it names a bus that is not there.
+        SetupError: it names a bus that is not there.
     """
     ports = {name: rig.bus_named(name).port for name in bus_names(rig)}
     for one in given.split(",") if given is not None else ():

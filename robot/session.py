@@ -7,23 +7,23 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.errors import SetupError
-from robot.assemble import Assembly
-from robot.audience import Audience, Told, Wished
-from robot.behaviours import Behaviours
-from robot.bus_events import drawn_together
-from robot.choice import Choice
-from robot.clock import RealClock
-from robot.face_gaze import FaceGaze
-from robot.heatmap import heatmap
-from robot.interrupts import Interrupts
-from robot.joint_faults import JointFaults
-from robot.loop import LoopCount, Robot, Tick
-from robot.loop import run as run_loop
-from robot.observers import Observers
-from robot.planner import Planner
-from robot.power_down import Again, PowerDown
-from robot.summary import Summary
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.assemble import Assembly
+from gazerig.robot.audience import Audience, Told, Wished
+from gazerig.robot.behaviours import Behaviours
+from gazerig.robot.bus_events import drawn_together
+from gazerig.robot.choice import Choice
+from gazerig.robot.clock import RealClock
+from gazerig.robot.face_gaze import FaceGaze
+from gazerig.robot.heatmap import heatmap
+from gazerig.robot.interrupts import Interrupts
+from gazerig.robot.joint_faults import JointFaults
+from gazerig.robot.loop import LoopCount, Robot, Tick
+from gazerig.robot.loop import run as run_loop
+from gazerig.robot.observers import Observers
+from gazerig.robot.planner import Planner
+from gazerig.robot.power_down import Again, PowerDown
+from gazerig.robot.summary import Summary
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Wanted:
         """Give what to assemble.
 
         Raises:
-            drivers.errors.SetupError: the options do not fit together.
+            SetupError: the options do not fit together.
         """
         asked = [
             name
@@ -112,7 +112,7 @@ def run(
     rewrite the status line
     told: what tuning and recording need, None where there is neither
     Raises:
-        drivers.errors.SetupError: before anything moved.
+        SetupError: before anything moved.
     """
     try:
         return _run(made, wanted, stopped, say, status, told)
@@ -247,7 +247,7 @@ def leave(
     say: Callable[[str], None],
     interrupts: Interrupts | None = None,
 ) -> None:
-    """Park, torque off, close, and say what of it worked: the end of robot.power_down alone."""
+    """Park, torque off, close, and say what of it worked: power_down.py's end alone."""
     leaving = way_out(made, say, interrupts if interrupts is not None else Interrupts())
     leaving.cause = count.stopped_by
     leaving.leave()

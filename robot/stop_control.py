@@ -1,11 +1,11 @@
 """Carries out stops and their ends on the body; a stop that a lost bus refuses is remembered."""
 
-from drivers.errors import BusLost, DriverError, ServoFault, SetupError
-from robot.body import Body
-from robot.orders import Resume, Stop
-from robot.reply import Reply
-from robot.stop_latch import StopLatch
-from robot.types import JointAngles, JointState
+from gazerig.drivers.errors import BusLost, DriverError, ServoFault, SetupError
+from gazerig.robot.body import Body
+from gazerig.robot.orders import Resume, Stop
+from gazerig.robot.reply import Reply
+from gazerig.robot.stop_latch import StopLatch
+from gazerig.robot.types import JointAngles, JointState
 
 _RELEASE_AGAIN_S = 0.5
 """After a stop, servos that still report torque are told again so often."""

@@ -3,7 +3,7 @@
 Pure: times are those of the ticks, so a recorded run is stopped and resumed as it was.
 """
 
-from robot.orders import Resume, Stop
+from gazerig.robot.orders import Resume, Stop
 
 MIN_HOLD_S = 2.0
 """A stop lasts at least so long, whoever asks for its end."""

@@ -6,11 +6,11 @@ from math import degrees, radians
 
 import numpy as np
 
-from gaze.angles import add, angle_between, scale, sub, unit
-from gaze.field_of_view import line_of_sight
-from gaze.types import Vec3
-from robot.loop import Tick
-from robot.reckoned import reckoned_joints
+from gazerig.gaze.angles import add, angle_between, scale, sub, unit
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import Vec3
+from gazerig.robot.loop import Tick
+from gazerig.robot.reckoned import reckoned_joints
 
 _FIXATION_RAD_S = radians(40.0)
 """Slower is fixating; 30 is usual, and one servo step in a 5 ms tick is already 18 deg/s."""

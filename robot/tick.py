@@ -2,10 +2,10 @@
 
 from typing import NamedTuple
 
-from drivers.types import Detections
-from gaze.types import GazeCommand, GazeState, Percept, Target
-from robot.orders import Order
-from robot.types import JointAngles, JointState, Verdict
+from gazerig.drivers.types import Detections
+from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target
+from gazerig.robot.orders import Order
+from gazerig.robot.types import JointAngles, JointState, Verdict
 
 
 class Tick(NamedTuple):

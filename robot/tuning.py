@@ -16,9 +16,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from config.apart import apart
-from config.confined import Confined
-from config.knobs import (
+from gazerig.config.apart import apart
+from gazerig.config.confined import Confined
+from gazerig.config.knobs import (
     NEXT_START,
     Knob,
     changed,
@@ -29,15 +29,15 @@ from config.knobs import (
     values,
     values_after,
 )
-from config.knobs import knobs as knobs_of
-from config.load import ConfigError, Fault, shipped_names
-from config.rig_files import Layers, RigFiles, read_all, save_copy, save_over
-from config.save import Change, Saved, rig_file
-from config.save_text import Unchangeable, written
-from config.schema import Rig, load_rig
-from robot.orders import Value
-from robot.reply import OrderTaker
-from robot.retune import Retuner
+from gazerig.config.knobs import knobs as knobs_of
+from gazerig.config.load import ConfigError, Fault, shipped_names
+from gazerig.config.rig_files import Layers, RigFiles, read_all, save_copy, save_over
+from gazerig.config.save import Change, Saved, rig_file
+from gazerig.config.save_text import Unchangeable, written
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.orders import Value
+from gazerig.robot.reply import OrderTaker
+from gazerig.robot.retune import Retuner
 
 NO_CHARACTER = "none"
 _DEFAULTS = "desk"
@@ -81,13 +81,13 @@ class Tuning:
     ) -> None:
         """Take a rig as it was assembled, and the names of the files it was made of.
 
-        order: takes orders for the next tick, as robot.loop.Robot.order
+        order: takes orders for the next tick, as gazerig.robot.loop.Robot.order
         now: the time in the name of a backup
         elsewhere: calls a function that reads or writes rig files, so that the control loop
             does not feel it
 
         Raises:
-            config.load.ConfigError: the files have changed since, and are at fault now.
+            gazerig.config.load.ConfigError: the files have changed since, and are at fault now.
         """
         self._retuner, self._order = retuner, order
         self._profile, self._now, self._elsewhere = profile, now, elsewhere
@@ -143,7 +143,7 @@ class Tuning:
         """Give the values in force whose keys begin so.
 
         Raises:
-            config.load.ConfigError: there is none; the message says what is near.
+            gazerig.config.load.ConfigError: there is none; the message says what is near.
         """
         state = self._state
         found = {key: value for key, value in state.values.items() if key.startswith(prefix)}
@@ -155,7 +155,7 @@ class Tuning:
         Gives a line for each value that is another one now.
 
         Raises:
-            config.load.ConfigError: with every fault; what was in force stays.
+            gazerig.config.load.ConfigError: with every fault; what was in force stays.
         """
         with self._changing:
             return self._put(self._state, changed(self._state.rig, changes))
@@ -181,7 +181,7 @@ class Tuning:
         kept as a backup.
 
         Raises:
-            config.load.ConfigError: the rig is a shipped one and no path is given, the path
+            gazerig.config.load.ConfigError: the rig is a shipped one and no path is given, the path
                 exists or cannot be written, or another layer overrides a value.
         """
         with self._changing:
@@ -218,7 +218,7 @@ class Tuning:
         name: of a shipped one, a path, or "none"
 
         Raises:
-            config.load.ConfigError: there is no such character, or it does not fit the rig.
+            gazerig.config.load.ConfigError: there is no such character, or it does not fit the rig.
         """
         with self._changing:
             state = self._state
@@ -233,7 +233,7 @@ class Tuning:
         path: the one of the files that was edited
 
         Raises:
-            config.load.ConfigError: with every fault; what was in force stays.
+            gazerig.config.load.ConfigError: with every fault; what was in force stays.
         """
         with self._changing:
             return self._reload()

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from gaze.types import Mat3, Pull, Vec3
+from gazerig.gaze.types import Mat3, Pull, Vec3
 
 JOINTS = (
     "left_eye_pan",

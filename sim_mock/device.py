@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from sim_mock.faults.active import ActiveFaults
-from sim_mock.replies import Piece
+from gazerig.sim_mock.faults.active import ActiveFaults
+from gazerig.sim_mock.replies import Piece
 
 
 class Reply(NamedTuple):

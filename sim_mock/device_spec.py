@@ -3,10 +3,10 @@
 import re
 from collections.abc import Iterable
 
-from drivers.errors import SetupError
-from drivers.servo_models import SERVOS, BusKind
-from sim_mock.devices import DynamixelLine, FeetechLine
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.servo_models import SERVOS, BusKind
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 EXAMPLE = "1-6:xl330-m077,7-9:xc330-m288"
 MIDDLE = 2048
@@ -26,7 +26,7 @@ def line_of(text: str, firmware: int | None, baud: int) -> DynamixelLine | Feete
     """Read the servos of one line; ``firmware``: of all of them, None: as from the shop.
 
     Raises:
-        drivers.errors.SetupError: names the part that is wrong and what would be right.
+        SetupError: names the part that is wrong and what would be right.
     """
     specs = parse_servos(text, DEFAULT_FIRMWARE if firmware is None else firmware)
     return _LINES[SERVOS[specs[0].model].bus](specs, baud)
@@ -36,7 +36,7 @@ def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
     """Read servos such as ``1-6:sts3215`` or ``7:xc330-m288@1024`` (@: start in steps).
 
     Raises:
-        drivers.errors.SetupError: names the part that is wrong and what would be right.
+        SetupError: names the part that is wrong and what would be right.
     """
     specs: dict[int, ServoSpec] = {}
     for part in text.split(","):
@@ -73,7 +73,7 @@ def _see_one_kind(specs: Iterable[ServoSpec]) -> None:
     """Refuse servos that do not speak one language.
 
     Raises:
-        drivers.errors.SetupError: names one of each kind.
+        SetupError: names one of each kind.
     """
     one: dict[BusKind, ServoSpec] = {}
     for spec in specs:

@@ -4,22 +4,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar
 
-from drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
-from drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
-from drivers.maestro.params import MaestroParams
-from drivers.pca9685.params import BRIDGE_BAUD
-from drivers.servo_models import HOBBY_KINDS, BusKind
-from sim_mock.device import Device
-from sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.feetech.chain import COMMANDS as FEETECH
-from sim_mock.feetech.chain import build_feetech
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.maestro import settings as maestro_settings
-from sim_mock.maestro.board import build_board
-from sim_mock.pca9685.bridge import build_bridge
-from sim_mock.pca9685.faults import CASES as PCA9685_CASES
-from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
+from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
+from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.params import BRIDGE_BAUD
+from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.feetech.chain import COMMANDS as FEETECH
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.maestro import settings as maestro_settings
+from gazerig.sim_mock.maestro.board import build_board
+from gazerig.sim_mock.pca9685.bridge import build_bridge
+from gazerig.sim_mock.pca9685.faults import CASES as PCA9685_CASES
+from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 CASES: dict[BusKind, Mapping[str, str]] = {
     "dynamixel": DYNAMIXEL.cases,

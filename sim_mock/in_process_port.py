@@ -1,6 +1,6 @@
 """A serial port without a wire: over an emulated device in this process.
 
-Drivers use it as a drivers.serial.port.BusPort, ROBOTIS' SDK as its PortHandler. Time is
+Drivers use it as a gazerig.drivers.serial.port.BusPort, ROBOTIS' SDK as its PortHandler. Time is
 the device's: an answer that does not come costs none. Where the line has wire time or
 faults make answers late, they arrive when the device's clock gets there; ``sleep_until``
 lets waiting move that clock. Baud rate: that of ``setBaudRate``.
@@ -12,11 +12,11 @@ from collections.abc import Callable
 
 from dynamixel_sdk import PortHandler
 
-from drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
-from drivers.errors import BusLost, PortError
-from drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
-from sim_mock.device import Device
-from sim_mock.wire import ServoLine
+from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
+from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.wire import ServoLine
 
 KNOWN_BAUDS = frozenset((*DYNAMIXEL_BAUDS, *FEETECH_BAUDS))
 """Rates of servos, beside those that the SDK knows of adapters."""
@@ -62,7 +62,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Send bytes; what is answered waits to be read.
 
         Raises:
-            drivers.errors.BusLost: unplugged, or the adapter takes nothing.
+            BusLost: unplugged, or the adapter takes nothing.
         """
         self._see()
         if self._tap is not None:
@@ -76,7 +76,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Return up to ``length`` bytes; fewer where no more will come before the deadline.
 
         Raises:
-            drivers.errors.BusLost: unplugged.
+            BusLost: unplugged.
         """
         self._see()
         while len(self._waiting) < length and self._sleep_until is not None:
@@ -99,7 +99,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Take in what has arrived by now.
 
         Raises:
-            drivers.errors.BusLost: unplugged since it was opened.
+            BusLost: unplugged since it was opened.
         """
         if self.faults.wire.any and self.faults.on("unplug"):
             self._lost = True
@@ -127,7 +127,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Open at a baud rate.
 
         Raises:
-            drivers.errors.PortError: unplugged, or opening is forbidden.
+            PortError: unplugged, or opening is forbidden.
         """
         for fault, code in (("unplug", errno.ENOENT), ("deny", errno.EACCES)):
             if self.faults.on(fault):

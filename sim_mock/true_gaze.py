@@ -1,10 +1,10 @@
 """Where the gaze is against where the person truly is: what only a simulated world can tell."""
 
-from gaze.angles import add, angle_between, rotate, rotation, scale, sub, unit, yaw_pitch
-from gaze.field_of_view import line_of_sight
-from gaze.types import Angles2, GazeState, Vec3
-from robot.seeing.face_pose import PARTS_FACE_M
-from sim_mock.scenes.scene import Person
+from gazerig.gaze.angles import add, angle_between, rotate, rotation, scale, sub, unit, yaw_pitch
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import Angles2, GazeState, Vec3
+from gazerig.robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.sim_mock.scenes.scene import Person
 
 
 def true_part(person: Person, part: str | None) -> Vec3:

@@ -16,9 +16,9 @@ Dynamixel servos, is 0 unless asked for.
 
 from collections import deque
 
-from sim_mock.device import Device, Reply
-from sim_mock.faults.active import NOBODY
-from sim_mock.replies import Piece
+from gazerig.sim_mock.device import Device, Reply
+from gazerig.sim_mock.faults.active import NOBODY
+from gazerig.sim_mock.replies import Piece
 
 BITS_PER_BYTE = 10
 PACK_S = 0.001

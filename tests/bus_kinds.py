@@ -6,22 +6,29 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.feetech.bus import FeetechBus, FeetechParams
-from drivers.hobby_board.channel import Channel
-from drivers.maestro.bus import MaestroBus, MaestroParams
-from drivers.maestro.commands import Speech
-from drivers.multi_bus import MixedBus, Share
-from drivers.pca9685.board import Pca9685Board
-from drivers.pca9685.bus import Pca9685Bus, Pca9685Params
-from drivers.serial.port import BlockingPort, BusPort
-from drivers.types import ServoBus, ServoReading, ServoSetup
-from sim_mock.device import Device
-from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line, build
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.pty.client import PtyBuses
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.maestro.commands import Speech
+from gazerig.drivers.multi_bus import MixedBus, Share
+from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from gazerig.drivers.serial.port import BlockingPort, BusPort
+from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.devices import (
+    DynamixelLine,
+    Emulated,
+    FeetechLine,
+    MaestroLine,
+    Pca9685Line,
+    build,
+)
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.pty.client import PtyBuses
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 TICK_S = 0.01
 NAMES = ("eye", "jaw", "neck", "lid", "brow", "ear")

@@ -12,10 +12,10 @@ import pytest
 import typer
 from typer.core import TyperGroup
 
-from robot.cli.calibrations import DEFAULT, JointsUnlessNamed
-from robot.cli.main import app, main
+from gazerig.robot.cli.calibrations import DEFAULT, JointsUnlessNamed
+from gazerig.robot.cli.main import app, main
 
-_START = "import sys; from robot.cli.main import main; sys.argv[0] = 'gazerig'; main()"
+_START = "import sys; from gazerig.robot.cli.main import main; sys.argv[0] = 'gazerig'; main()"
 GAZERIG = [sys.executable, "-c", _START]
 
 

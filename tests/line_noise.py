@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import pi, sin
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.errors import DriverError
-from drivers.feetech.bus import FeetechBus, FeetechParams
-from drivers.maestro.bus import MaestroBus, MaestroParams
-from drivers.types import ServoBus, ServoReading, ServoSetup
-from sim_mock.device import Device
-from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.errors import DriverError
+from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 TICK_S = 0.005
 IDS = (1, 2, 3, 4, 5, 6)

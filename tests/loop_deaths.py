@@ -12,12 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from config.rig import Rig
-from config.schema import load_rig
-from drivers.serial.port import BlockingPort
-from robot.emulated_rig import emulated_lines
-from robot.rig_bus import guarded_rig_bus, ports_of, rig_bus, rig_setups
-from sim_mock.pty.client import PtyBuses
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.robot.rig_bus import guarded_rig_bus, ports_of, rig_bus, rig_setups
+from gazerig.sim_mock.pty.client import PtyBuses
 
 RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker"}
 SLOW_DEG_S = 4.0
@@ -97,7 +97,7 @@ class Driven(NamedTuple):
                     parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
                 except OSError:
                     continue
-                if b"robot.guardian.process" in words and parent == self.loop.pid:
+                if b"gazerig.robot.guardian.process" in words and parent == self.loop.pid:
                     found.append(int(entry.name))
         return found
 

@@ -13,19 +13,19 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 
-from config.schema import load_rig
-from config.text import rig_text, walk_text
-from drivers.errors import DriverError
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.cli.report import _recorded
-from robot.loop import run
-from robot.recording.frames import Frames
-from robot.recording.gaze_angles import trace_of
-from robot.recording.read import RunRecording, used
-from robot.recording.recorder import Recorder
-from robot.recording.rerun import rerun
-from robot.recording.run_info import RunInfo
+from gazerig.config.schema import load_rig
+from gazerig.config.text import rig_text, walk_text
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.cli.report import _recorded
+from gazerig.robot.loop import run
+from gazerig.robot.recording.frames import Frames
+from gazerig.robot.recording.gaze_angles import trace_of
+from gazerig.robot.recording.read import RunRecording, used
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.rerun import rerun
+from gazerig.robot.recording.run_info import RunInfo
 
 HEAD = 9
 

@@ -9,20 +9,20 @@ from dataclasses import replace
 from math import pi, radians, sin
 from typing import NamedTuple
 
-from config.rig import BusConfig
-from config.schema import Rig, load_rig
-from drivers.servo_models import HOBBY_KINDS, servo_label
-from robot.body import Body
-from robot.clock import SimulatedClock
-from robot.emulated_rig import emulated_lines, place_of
-from robot.rig_angles import limits, park_rad
-from robot.rig_bus import rig_bus, rig_setups
-from robot.safety.guard import Guard
-from sim_mock.device import Device
-from sim_mock.devices import build
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.maestro.board import MaestroBoard
-from sim_mock.pca9685.bridge import Bridge
+from gazerig.config.rig import BusConfig
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.servo_models import HOBBY_KINDS, servo_label
+from gazerig.robot.body import Body
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.emulated_rig import emulated_lines, place_of
+from gazerig.robot.rig_angles import limits, park_rad
+from gazerig.robot.rig_bus import rig_bus, rig_setups
+from gazerig.robot.safety.guard import Guard
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import MaestroBoard
+from gazerig.sim_mock.pca9685.bridge import Bridge
 
 STRUCK_S, PATIENCE_S = 1.0, 3.0
 FAST = 1.3
@@ -258,7 +258,7 @@ class Machine:
 
         Raises:
             Broken: a servo is or moves where none may.
-            drivers.errors.DriverError: as in a run.
+            DriverError: as in a run.
         """
         # Slots that were overrun are left out, as in the loop.
         slots = int((self.clock.now_s() - self._begin_s) / self.period_s + 1e-6) + 1

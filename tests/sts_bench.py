@@ -1,6 +1,6 @@
 """An emulated STS bus on a clock that is set by hand, and packets made apart from it."""
 
-from sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.feetech.chain import build_feetech
 
 PING, READ, WRITE, REG_WRITE, ACTION, RESTORE, REBOOT = 1, 2, 3, 4, 5, 6, 8
 RESET_TURNS, CALIBRATE, SYNC_READ, SYNC_WRITE = 10, 11, 0x82, 0x83

@@ -2,11 +2,11 @@
 
 from moving_bus import IDS, NAMES, MovingBus
 
-from drivers.feetech.bus import FeetechBus, FeetechParams
-from drivers.types import ServoSetup
-from sim_mock.feetech.chain import build_feetech
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SPEED = 3000.0
 

@@ -105,12 +105,13 @@ def modules() -> list[tuple[str, Path]]:
 def imports(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            yield from (alias.name.removeprefix("gazerig.") for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import"
             assert node.module is not None
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            wanted = node.module.removeprefix("gazerig.")
+            yield wanted
+            yield from (f"{wanted}.{alias.name}" for alias in node.names)
 
 
 def room_allowed(module: str, wanted: str) -> bool:

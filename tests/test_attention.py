@@ -8,13 +8,13 @@ from math import cos, exp, hypot, pi, radians, sin
 import numpy as np
 import pytest
 
-from gaze.angles import rotation
-from gaze.attention import Attention, AttentionParams
-from gaze.bottom_up import BottomUp, BottomUpParams, slide_loom_spin
-from gaze.field_of_view import FieldOfView, FieldOfViewParams
-from gaze.idle import Idle, IdleParams
-from gaze.top_down import Rule, TopDown, TopDownParams
-from gaze.types import Bodies, GazeState, Percept, Pull, Target
+from gazerig.gaze.angles import rotation
+from gazerig.gaze.attention import Attention, AttentionParams
+from gazerig.gaze.bottom_up import BottomUp, BottomUpParams, slide_loom_spin
+from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
+from gazerig.gaze.idle import Idle, IdleParams
+from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
+from gazerig.gaze.types import Bodies, GazeState, Percept, Pull, Target
 
 IDENTITY = rotation((0.0, 0.0, 0.0))
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gaze.angles import angle_between, sub, unit
-from gaze.aversion import DIRECTIONS_PERCENT, Aversion, AversionMode, AversionParams
-from gaze.types import Target, Vec3
+from gazerig.gaze.angles import angle_between, sub, unit
+from gazerig.gaze.aversion import DIRECTIONS_PERCENT, Aversion, AversionMode, AversionParams
+from gazerig.gaze.types import Target, Vec3
 
 DT = 0.02
 HEAD: Vec3 = (0.05, 0.0, 0.2)

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from config.schema import load_rig
-from gaze.types import Target, Vec3
-from robot.assemble import Assembly, Choice, assemble
-from robot.behaviours import Behaviours
-from robot.loop import Tick, run
-from sim_mock.cameras.detections import SceneCamera, SceneCameraParams
-from sim_mock.scenes.registry import scenes
-from sim_mock.scenes.scene import Event, Person, Scene, Thing, there_and_back
+from gazerig.config.schema import load_rig
+from gazerig.gaze.types import Target, Vec3
+from gazerig.robot.assemble import Assembly, Choice, assemble
+from gazerig.robot.behaviours import Behaviours
+from gazerig.robot.loop import Tick, run
+from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.sim_mock.scenes.scene import Event, Person, Scene, Thing, there_and_back
 
 FACE: Vec3 = (1.0, 0.0, 0.2)
 HAND: Vec3 = (0.7, 0.2, 0.1)

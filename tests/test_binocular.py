@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gaze.binocular import AT_REST, BinocularController, BinocularParams, HeadMotion
-from gaze.vestibular import gate
+from gazerig.gaze.binocular import AT_REST, BinocularController, BinocularParams, HeadMotion
+from gazerig.gaze.vestibular import gate
 
 DT = 0.005
 Where = Callable[[float], float | None]

@@ -12,8 +12,8 @@ from bus_kinds import BOARDS, GRAIN_STEPS, KINDS, PLACES, SHARES, Twin, in_proce
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.servo_models import servo_label
+from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.servo_models import servo_label
 
 TWINS = ("in-process", "pty")
 AWAY = (0.2, 0.8, 0.3, 0.7, 0.25, 0.75)

@@ -16,10 +16,10 @@ from copied import copied
 from mixed_rig import mixed_text
 from struck_rigs import CASES, RIGS, Case, Machine, pair_of, quick, rig_of
 
-import robot.assemble
-from config.schema import load_rig
-from robot.choice import Choice
-from robot.rig_angles import limits
+import gazerig.robot.assemble as assemble_module
+from gazerig.config.schema import load_rig
+from gazerig.robot.choice import Choice
+from gazerig.robot.rig_angles import limits
 
 LEFT = {
     "dynamixel": {
@@ -153,15 +153,15 @@ STRUCK = {
 
 @pytest.mark.parametrize("kind", RIGS)
 def test_a_robot_that_looks_at_people_goes_on_looking(monkeypatch, kind):
-    devices, build = [], robot.assemble.build
+    devices, build = [], assemble_module.build
 
     def seen(*given):
         devices.append(build(*given))
         return devices[-1]
 
-    monkeypatch.setattr(robot.assemble, "build", seen)
+    monkeypatch.setattr(assemble_module, "build", seen)
     rig = rig_of(kind)
-    made = robot.assemble.assemble(rig, Choice(mock=True, fast=True, seed=0, scene="visitor"))
+    made = assemble_module.assemble(rig, Choice(mock=True, fast=True, seed=0, scene="visitor"))
     clock, head = made.clock, made.robot
     head.start(clock)
     bounds, missed = limits(rig.joints), 0

@@ -3,20 +3,20 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.dynamixel.control_table import MODELS, indirect_blocks
-from drivers.dynamixel.read_windows import (
+from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks
+from gazerig.drivers.dynamixel.read_windows import (
     INDIRECT_MAP,
     alone_turns,
     direct_turns,
     indirect_turns,
 )
-from drivers.event_log import MOST, EventLog, register_label
-from drivers.serial.reopening import Reconnect
-from drivers.servo_bus.adaptive_timeout import WINDOW, Patience
-from drivers.servo_bus.faults import AGAIN_AND_AGAIN, Health
-from drivers.servo_bus.window_schedule import CALM_S
-from drivers.servo_models import servo_label
-from drivers.types import ServoSetup
+from gazerig.drivers.event_log import MOST, EventLog, register_label
+from gazerig.drivers.serial.reopening import Reconnect
+from gazerig.drivers.servo_bus.adaptive_timeout import WINDOW, Patience
+from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, Health
+from gazerig.drivers.servo_bus.window_schedule import CALM_S
+from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.types import ServoSetup
 
 
 def test_patience_begins_long_and_becomes_twice_the_worst_delay():

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from config.rig import LidJoints
-from robot.calibrate.calibration import (
+from gazerig.config.rig import LidJoints
+from gazerig.robot.calibrate.calibration import (
     Calibration,
     CalibrationRefused,
     Marks,
@@ -21,7 +21,7 @@ from robot.calibrate.calibration import (
     lid_keys,
     middle,
 )
-from robot.calibrate.stop_search import (
+from gazerig.robot.calibrate.stop_search import (
     STEPS_PER_DEG,
     Stop,
     StopSearch,
@@ -29,8 +29,8 @@ from robot.calibrate.stop_search import (
     go,
     search,
 )
-from robot.joint import JointParams
-from robot.types import JOINTS as EVERY
+from gazerig.robot.joint import JointParams
+from gazerig.robot.types import JOINTS as EVERY
 
 JOINT = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 TURN = 4096

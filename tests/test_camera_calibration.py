@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot.calibrate.board_views import Held, ViewParams, coverage, held
-from robot.calibrate.camera_calibration import (
+from gazerig.robot.calibrate.board_views import Held, ViewParams, coverage, held
+from gazerig.robot.calibrate.camera_calibration import (
     CameraCalibrationRefused,
     LensCalibration,
     LensCalibrationParams,
     calibrate_lens,
 )
-from robot.calibrate.charuco_board import CharucoBoard, SeenBoard
-from robot.seeing.intrinsics import Intrinsics, intrinsics_of_view, project
-from sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
-from sim_mock.cameras.charuco_scene import held_pose
+from gazerig.robot.calibrate.charuco_board import CharucoBoard, SeenBoard
+from gazerig.robot.seeing.intrinsics import Intrinsics, intrinsics_of_view, project
+from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
+from gazerig.sim_mock.cameras.charuco_scene import held_pose
 
 SIZE = (640, 400)
 BOARD = CharucoBoard()

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.camera.clock_sync import ClockBridge
+from gazerig.drivers.camera.clock_sync import ClockBridge
 
 RATE_HZ = 30.0
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from drivers.camera.depth_roi import depth_at, metres, millimetres, resized
+from gazerig.drivers.camera.depth_roi import depth_at, metres, millimetres, resized
 
 BOX = (20.0, 10.0, 40.0, 40.0)
 

@@ -6,7 +6,7 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 
-from drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.camera.pose_buffer import PoseRing
 
 
 def turn(deg: float) -> np.ndarray:

@@ -10,19 +10,19 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera.params import CameraCareParams
-from drivers.camera.playback import CameraReplay
-from drivers.camera.process import CameraProcess
-from drivers.camera.recording_writer import RecordingWriter
-from drivers.camera.shared_frames import SlotReader, SlotWriter
-from drivers.camera.silence import FIRST_PICTURE_S, PictureSilence
-from drivers.camera.source import Shot
-from drivers.camera.video_file import VideoFile
-from drivers.camera.worker import CameraParts
-from drivers.errors import CameraError, ModelFileError
-from drivers.types import PictureLens
-from drivers.vision.face_detector import face_detector
-from drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.playback import CameraReplay
+from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.recording_writer import RecordingWriter
+from gazerig.drivers.camera.shared_frames import SlotReader, SlotWriter
+from gazerig.drivers.camera.silence import FIRST_PICTURE_S, PictureSilence
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.camera.worker import CameraParts
+from gazerig.drivers.errors import CameraError, ModelFileError
+from gazerig.drivers.types import PictureLens
+from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.face_params import FaceDetectorParams
 
 PATIENCE_S = 40.0
 DETECTOR = partial(face_detector, FaceDetectorParams(work_width_px=64))

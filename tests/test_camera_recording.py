@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from drivers.camera import recording_format as fmt
-from drivers.camera import recording_writer as recording_write
-from drivers.camera.playback import CameraReplay
-from drivers.camera.recorder import CameraRecorder
-from drivers.camera.recording_reader import Recording
-from drivers.camera.recording_writer import RecordingWriter
-from drivers.camera.source import Shot
-from drivers.errors import CameraError
-from drivers.types import DetectedFace, PictureLens
+from gazerig.drivers.camera import recording_format as fmt
+from gazerig.drivers.camera import recording_writer as recording_write
+from gazerig.drivers.camera.playback import CameraReplay
+from gazerig.drivers.camera.recorder import CameraRecorder
+from gazerig.drivers.camera.recording_reader import Recording
+from gazerig.drivers.camera.recording_writer import RecordingWriter
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.errors import CameraError
+from gazerig.drivers.types import DetectedFace, PictureLens
 
 GO_ON = threading.Event()
 LENS = PictureLens(310.5, 311.25, 31.5, 23.5)
@@ -342,8 +342,8 @@ def test_killed_program_leaves_what_it_wrote(tmp_path):
     code = (
         "import sys, threading, time, numpy as np\n"
         "from pathlib import Path\n"
-        "from drivers.camera.source import Shot\n"
-        "from drivers.camera.recording_writer import RecordingWriter\n"
+        "from gazerig.drivers.camera.source import Shot\n"
+        "from gazerig.drivers.camera.recording_writer import RecordingWriter\n"
         "writer = RecordingWriter(Path(sys.argv[1]), {})\n"
         "for k in range(1000):\n"
         "    writer.write(Shot(1.0 + k / 30, k + 1, np.full((48, 64, 3), k % 256, np.uint8)))\n"

@@ -7,18 +7,21 @@ import numpy as np
 import pytest
 from desk import JOINTS, LIDS
 
-from drivers.camera.source import Shot
-from drivers.errors import CameraError
-from gaze.types import Angles3
-from robot.calibrate.board_views import ViewParams
-from robot.calibrate.camera_calibration import CameraCalibrationRefused, LensCalibrationParams
-from robot.calibrate.camera_steps import LensSteps, NeckStepParams, neck_angles, neck_steps
-from robot.calibrate.charuco_board import CharucoBoard
-from robot.calibrate.hand_eye import camera_on_head
-from robot.clock import SimulatedClock
-from robot.frames import CameraParams
-from robot.kinematics import GeometryParams, Kinematics
-from sim_mock.cameras.charuco_scene import BoardScene
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.errors import CameraError
+from gazerig.gaze.types import Angles3
+from gazerig.robot.calibrate.board_views import ViewParams
+from gazerig.robot.calibrate.camera_calibration import (
+    CameraCalibrationRefused,
+    LensCalibrationParams,
+)
+from gazerig.robot.calibrate.camera_steps import LensSteps, NeckStepParams, neck_angles, neck_steps
+from gazerig.robot.calibrate.charuco_board import CharucoBoard
+from gazerig.robot.calibrate.hand_eye import camera_on_head
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.frames import CameraParams
+from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 BOARD = CharucoBoard()
 KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), JOINTS, LIDS)

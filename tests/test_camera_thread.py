@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera.params import CameraCareParams
-from drivers.camera.source import Shot
-from drivers.camera.thread import CameraThread
-from drivers.camera.video_file import VideoFile
-from drivers.errors import CameraError
-from drivers.types import DetectedFace, MovingBlob, PictureLens
+from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.thread import CameraThread
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.errors import CameraError
+from gazerig.drivers.types import DetectedFace, MovingBlob, PictureLens
 
 PATIENCE_S = 20.0  # how long a test waits before it calls the thread stuck
 

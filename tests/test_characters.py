@@ -6,16 +6,16 @@ from math import pi, sin
 import numpy as np
 import pytest
 
-from config.load import load, read_yaml, shipped, shipped_names
-from config.rig import GazeConfig
-from config.schema import load_rig
-from gaze.angles import rotation
-from gaze.attention import Attention
-from gaze.bottom_up import BottomUp
-from gaze.field_of_view import FieldOfView
-from gaze.idle import Idle
-from gaze.top_down import Rule, TopDown, TopDownParams
-from gaze.types import Bodies, GazeState, Percept
+from gazerig.config.load import load, read_yaml, shipped, shipped_names
+from gazerig.config.rig import GazeConfig
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import rotation
+from gazerig.gaze.attention import Attention
+from gazerig.gaze.bottom_up import BottomUp
+from gazerig.gaze.field_of_view import FieldOfView
+from gazerig.gaze.idle import Idle
+from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
+from gazerig.gaze.types import Bodies, GazeState, Percept
 
 CHARACTERS = ("bold", "shy", "sleepy", "strong_boxer", "weak_boxer")
 AHEAD = GazeState(

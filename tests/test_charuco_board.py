@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from drivers.errors import SetupError
-from robot.calibrate.charuco_board import BoardParams, CharucoBoard
-from robot.calibrate.charuco_page import PAPERS_MM, RULER_MM, page, write_page
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.calibrate.charuco_board import BoardParams, CharucoBoard
+from gazerig.robot.calibrate.charuco_page import PAPERS_MM, RULER_MM, page, write_page
 
 BOARD = CharucoBoard()
 PX_PER_MM = 12

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from robot.cli.calibrations import app
-from robot.cli.main import app as whole
+from gazerig.robot.cli.calibrations import app
+from gazerig.robot.cli.main import app as whole
 
 
 def run(*words: str) -> Any:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from robot.cli.camera import app
+from gazerig.robot.cli.camera import app
 
 run = CliRunner().invoke
 

@@ -20,15 +20,15 @@ from hypothesis import strategies as st
 from page_visitor import Visitor
 from typer.testing import CliRunner
 
-from config.save import save_rig
-from config.schema import load_rig
-from drivers.errors import SetupError
-from robot.audience import only_stops
-from robot.cli import face as cli_face
-from robot.cli.calibrations import app
-from robot.cli.keys import BUTTONS, PageKeys, key_and_count, keys_of
-from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop
-from robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.config.save import save_rig
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.audience import only_stops
+from gazerig.robot.cli import face as cli_face
+from gazerig.robot.cli.calibrations import app
+from gazerig.robot.cli.keys import BUTTONS, PageKeys, key_and_count, keys_of
+from gazerig.robot.orders import Ask, Jog, LookAt, Order, Resume, Stop
+from gazerig.robot.seeing.face_pose import PARTS_FACE_M
 
 ROOT = Path(__file__).parents[1]
 DESK = ROOT / "config" / "rigs" / "desk.yaml"
@@ -203,7 +203,7 @@ class Sitting:
     """The command on a pseudo-terminal, and what it has written so far."""
 
     def __init__(self, rig: Path, *words: str) -> None:
-        code = "from robot.cli.main import main; main()"
+        code = "from gazerig.robot.cli.main import main; main()"
         words = ("calibrate", "face", str(rig), "--mock", "--yes", *words)
         self.said = ""
         self.pid, self.fd = pty.fork()

@@ -17,15 +17,15 @@ import pytest
 from desk import JOINTS
 from typer.testing import CliRunner
 
-from config.save import save_rig
-from config.schema import load_rig
-from robot.cli.motion import app
-from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.config.save import save_rig
+from gazerig.config.schema import load_rig
+from gazerig.robot.cli.motion import app
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 ROOT = Path(__file__).parents[1]
 DESK = ROOT / "config" / "rigs" / "desk.yaml"
-COMMAND = [sys.executable, "-c", "from robot.cli.motion import app; app()"]
+COMMAND = [sys.executable, "-c", "from gazerig.robot.cli.motion import app; app()"]
 
 
 def run(*words: str) -> Any:

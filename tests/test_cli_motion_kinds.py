@@ -10,12 +10,12 @@ import pytest
 from mixed_rig import mixed_text
 from typer.testing import CliRunner
 
-from config.load import shipped
-from config.schema import load_rig
-from robot.cli.motion import app
-from robot.cli.servo_words import holding, left_alone
-from robot.emulated_rig import emulated_lines
-from sim_mock.pty.client import PtyBuses
+from gazerig.config.load import shipped
+from gazerig.config.schema import load_rig
+from gazerig.robot.cli.motion import app
+from gazerig.robot.cli.servo_words import holding, left_alone
+from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.sim_mock.pty.client import PtyBuses
 
 
 def run(*words: str) -> Any:

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from drivers.camera.recording_reader import Recording
-from robot.cli.record import app
+from gazerig.drivers.camera.recording_reader import Recording
+from gazerig.robot.cli.record import app
 
 
 @pytest.fixture

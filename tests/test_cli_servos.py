@@ -8,14 +8,14 @@ import pytest
 from desk import JOINTS
 from typer.testing import CliRunner
 
-from config.save import copy_shipped, save_rig
-from drivers.dynamixel.registers import Registers
-from drivers.serial.list_ports import Host, SerialPort
-from drivers.serial.port import BlockingPort
-from robot.cli import bench
-from robot.cli import servos as cli_servos
-from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.config.save import copy_shipped, save_rig
+from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.serial.list_ports import Host, SerialPort
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.robot.cli import bench
+from gazerig.robot.cli import servos as cli_servos
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SMALL = [ServoSpec(1, "xl330-m077", 2048), ServoSpec(7, "xc330-m288", 2048)]
 

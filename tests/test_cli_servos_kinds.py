@@ -8,15 +8,15 @@ import pytest
 from mixed_rig import mixed_text
 from typer.testing import CliRunner
 
-from config.schema import load_rig
-from drivers.serial.list_ports import Host, SerialPort
-from drivers.serial.port import BlockingPort
-from robot.cli import bench
-from robot.cli import servos as cli_servos
-from robot.emulated_rig import emulated_lines
-from sim_mock.devices import FeetechLine, MaestroLine
-from sim_mock.pty.client import PtyBus, PtyBuses
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.config.schema import load_rig
+from gazerig.drivers.serial.list_ports import Host, SerialPort
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.robot.cli import bench
+from gazerig.robot.cli import servos as cli_servos
+from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.sim_mock.devices import FeetechLine, MaestroLine
+from gazerig.sim_mock.pty.client import PtyBus, PtyBuses
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
 def gazerig(*words, answers=""):
@@ -93,7 +93,7 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
         path = bus.start_device(MaestroLine(crc=True))
         board = SerialPort(path, "Pololu Mini Maestro", "1ffb:008a", None)
         monkeypatch.setattr(bench, "serial_ports", lambda host: (board,))
-        monkeypatch.setattr("robot.cli.wires.serial_ports", lambda: (board,))
+        monkeypatch.setattr("gazerig.robot.cli.wires.serial_ports", lambda: (board,))
         for words in (
             ("scan", "--port", path, "--kind", "feetech"),
             ("scan", "--port", path, "--kind", "dynamixel"),
@@ -223,7 +223,7 @@ def test_setup_of_a_board_that_is_too_small(monkeypatch):
         monkeypatch.setattr(bench, "serial_ports", lambda host: (board,))
         code, _, err = gazerig("setup", "maker", "--port", path, "--yes", "--joint", "eyes_pan")
         assert code == 0 and "USB Dual Port" in err
-        monkeypatch.setattr("robot.cli.setup_maestro.USB_CHANNELS", {"1ffb:0089": 2})
+        monkeypatch.setattr("gazerig.robot.cli.setup_maestro.USB_CHANNELS", {"1ffb:0089": 2})
         code, _, err = gazerig("setup", "maker", "--port", path, "--yes")
         assert code == 2 and "has channels 0..1, not those of left_upper_lid (channel 2)" in err
 

@@ -13,11 +13,11 @@ import typer
 from command_line import gazerig, parse, typed
 from typer.core import TyperGroup
 
-from drivers.serial.list_ports import SerialPort
-from robot.cli.examples import EXAMPLES
-from robot.cli.main import app
-from robot.cli.start import next_steps
-from robot.cli.terminal import DEBUG_LOGGER
+from gazerig.drivers.serial.list_ports import SerialPort
+from gazerig.robot.cli.examples import EXAMPLES
+from gazerig.robot.cli.main import app
+from gazerig.robot.cli.start import next_steps
+from gazerig.robot.cli.terminal import DEBUG_LOGGER
 
 ADAPTER = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-U2D2")
 ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)
@@ -121,7 +121,8 @@ def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(
 
 def test_what_nobody_thought_of_is_one_line_too() -> None:
     code = (
-        "import sys; from robot.cli import main as cli; sys.argv = ['gazerig', *sys.argv[1:]]\n"
+        "import sys; from gazerig.robot.cli import main as cli\n"
+        "sys.argv = ['gazerig', *sys.argv[1:]]\n"
         "cli.next_steps = lambda *a: 1 / 0\ncli.main()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)

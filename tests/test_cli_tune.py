@@ -21,26 +21,26 @@ from typing import Any, NamedTuple
 import pytest
 from typer.testing import CliRunner
 
-from config import knobs
-from config.load import ConfigError
-from config.save import copy_shipped
-from config.schema import load_rig
-from drivers.errors import SetupError
-from robot import stop_latch
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.cli.lead import app as lead_app
-from robot.cli.lead import read_point
-from robot.cli.quick import QUICK, is_quick
-from robot.cli.quick import main as quick_main
-from robot.cli.tune import app, read_pairs, read_value, state_lines
-from robot.loop import Tick
-from robot.loop import run as run_loop
-from robot.remote.live_control import LiveControl
-from robot.remote.running_rig import RunningRig, running
-from robot.tuning import Tuning
+from gazerig.config import knobs
+from gazerig.config.load import ConfigError
+from gazerig.config.save import copy_shipped
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.robot import stop_latch
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.cli.lead import app as lead_app
+from gazerig.robot.cli.lead import read_point
+from gazerig.robot.cli.quick import QUICK, is_quick
+from gazerig.robot.cli.quick import main as quick_main
+from gazerig.robot.cli.tune import app, read_pairs, read_value, state_lines
+from gazerig.robot.loop import Tick
+from gazerig.robot.loop import run as run_loop
+from gazerig.robot.remote.live_control import LiveControl
+from gazerig.robot.remote.running_rig import RunningRig, running
+from gazerig.robot.tuning import Tuning
 
-GAZERIG = "import sys; sys.argv[0] = 'gazerig'; from robot.cli.quick import main; main()"
+GAZERIG = "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.quick import main; main()"
 SPEED = "gaze.saccade.max_speed_deg_s"
 RATE = "loop.rate_hz"
 PACE_S = 0.02  # real seconds a tick
@@ -104,7 +104,7 @@ def a_rig() -> Iterator[Running]:
             stdout=subprocess.PIPE,
             stderr=said,
             text=True,
-            env={**os.environ, "XDG_RUNTIME_DIR": str(folder), "PYTHONPATH": str(ROOT)},
+            env={**os.environ, "XDG_RUNTIME_DIR": str(folder)},
         )
         try:
             assert process.stdout is not None
@@ -157,7 +157,7 @@ def whole_gazerig(*words: str, **environ: str) -> Done:
         [sys.executable, "-c", GAZERIG, *words],
         capture_output=True,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environ},
+        env={**os.environ, **environ},
         timeout=60.0,
         stdin=subprocess.DEVNULL,
     )
@@ -310,7 +310,7 @@ def a_rig_beside() -> Iterator[subprocess.Popen[str]]:
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env=dict(os.environ),
     )
     try:
         assert process.stdout is not None and process.stdout.readline() == "open\n"

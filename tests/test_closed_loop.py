@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from config.schema import load_rig
-from robot.assemble import assemble, gaze_parts
-from robot.choice import Choice
-from robot.frames import NewestPose, PoseHistory
-from robot.loop import Tick, run
-from sim_mock.cameras.rendered import PixelCameraParams
-from sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S
-from sim_mock.scenes.walks_past import HALF_WAY_M, WALK_M_S
-from sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
+from gazerig.config.schema import load_rig
+from gazerig.robot.assemble import assemble, gaze_parts
+from gazerig.robot.choice import Choice
+from gazerig.robot.frames import NewestPose, PoseHistory
+from gazerig.robot.loop import Tick, run
+from gazerig.sim_mock.cameras.rendered import PixelCameraParams
+from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S
+from gazerig.sim_mock.scenes.walks_past import HALF_WAY_M, WALK_M_S
+from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
 
 RIG = load_rig("desk")
 ARRIVED_S = STEP_AT_S + STEP_S

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from config.schema import load_rig
-from config.text import rig_text, walk_text
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.cli.report import app
-from robot.loop import run
-from robot.recording.read import RunRecording
-from robot.recording.recorder import Recorder
-from robot.recording.run_info import RunInfo, versions
-from robot.report import build
-from robot.report.about import About
-from robot.report.bands import BY_KEY
-from robot.report.compare import chance, compare, corrected, differences_of
-from robot.report.measured import Measured, mean, median
+from gazerig.config.schema import load_rig
+from gazerig.config.text import rig_text, walk_text
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.cli.report import app
+from gazerig.robot.loop import run
+from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunInfo, versions
+from gazerig.robot.report import build
+from gazerig.robot.report.about import About
+from gazerig.robot.report.bands import BY_KEY
+from gazerig.robot.report.compare import chance, compare, corrected, differences_of
+from gazerig.robot.report.measured import Measured, mean, median
 
 SECONDS = 16.0
 DICE = np.random.default_rng(11)

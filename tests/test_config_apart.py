@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from config.apart import apart
-from config.load import ConfigError
-from config.save import copy_shipped, save_rig
-from config.schema import load_rig
+from gazerig.config.apart import apart
+from gazerig.config.load import ConfigError
+from gazerig.config.save import copy_shipped, save_rig
+from gazerig.config.schema import load_rig
 
 
 def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -62,7 +62,8 @@ def here() -> tuple[int, int]:
 @pytest.fixture
 def importable(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the other process find the functions of this file."""
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    path = [str(Path(__file__).parent), *sys.path]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
     monkeypatch.setitem(sys.modules, "test_config_apart", sys.modules[__name__])
     for work in (fails, ends, sleeps, here):
         monkeypatch.setattr(work, "__module__", "test_config_apart")
@@ -80,7 +81,7 @@ def test_a_process_that_fails_is_an_error_in_one_line(
         apart(fails)
     with pytest.raises(ConfigError, match="process for ends: ended by itself: -9"):
         apart(ends)
-    monkeypatch.setattr("config.apart._LONGEST_S", 0.5)
+    monkeypatch.setattr("gazerig.config.apart._LONGEST_S", 0.5)
     with pytest.raises(ConfigError, match="took more than 0.5 s"):
         apart(sleeps)
     monkeypatch.setattr(sys, "executable", "/nonexistent/python")

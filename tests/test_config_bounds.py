@@ -6,8 +6,8 @@ from typing import Any, Literal
 
 import pytest
 
-from config.bounds import filled, judge, model_of
-from config.export import DIALECT, complaint, json_schema
+from gazerig.config.bounds import filled, judge, model_of
+from gazerig.config.export import DIALECT, complaint, json_schema
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from config.load import ConfigError, load, read_yaml, shipped, shipped_names
+from gazerig.config.load import ConfigError, load, read_yaml, shipped, shipped_names
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,7 @@ def test_a_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
     def refuse(path: Path, largest: int) -> bytes:
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr("config.entries.read_limited", refuse)  # the tests may run as root
+    monkeypatch.setattr("gazerig.config.entries.read_limited", refuse)  # the tests may run as root
     with pytest.raises(ConfigError, match=r"rig\.yaml: may not be read"):
         read_yaml(write(tmp_path, GOOD))
 
@@ -219,7 +219,7 @@ def test_an_unknown_shipped_name_lists_those_that_exist(
     (tmp_path / "rigs").mkdir()
     for name in ("shake.yaml", "nod.yaml", "notes.txt"):
         write(tmp_path / "rigs", GOOD, name)
-    monkeypatch.setattr("config.load.importlib.resources.files", lambda package: tmp_path)
+    monkeypatch.setattr("gazerig.config.load.importlib.resources.files", lambda package: tmp_path)
     assert shipped("rigs", "nod") == tmp_path / "rigs" / "nod.yaml"
     with pytest.raises(ConfigError) as caught:
         shipped("rigs", "nood")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from config.load import ConfigError, Fault, load
+from gazerig.config.load import ConfigError, Fault, load
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from config.load import ConfigError, load, read_yaml, shipped
-from config.save import Change, copy_shipped, propose, rig_file, save, save_rig
-from config.save_text import Unchangeable, edited, written
-from config.schema import Rig, load_rig
+from gazerig.config.load import ConfigError, load, read_yaml, shipped
+from gazerig.config.save import Change, copy_shipped, propose, rig_file, save, save_rig
+from gazerig.config.save_text import Unchangeable, edited, written
+from gazerig.config.schema import Rig, load_rig
 
 NOW = datetime(2026, 1, 31, 23, 59, 58)
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from config.confined import Confined
-from config.load import ConfigError
-from config.schema import load_rig
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.page.hear import PageHear
-from robot.tuning import Tuning
+from gazerig.config.confined import Confined
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.page.hear import PageHear
+from gazerig.robot.tuning import Tuning
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from command_line import typed
 from mcap.opcode import Opcode
 from recording_damage import USES, judge, recorded, records, with_bomb
 
-from drivers.errors import DriverError
-from robot.recording.read import BadRecording, RunRecording
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.recording.read import BadRecording, RunRecording
 
 
 @pytest.fixture(scope="module")

@@ -12,17 +12,17 @@ import pytest
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, each_of_papers, prose, spans
 from ruamel.yaml import YAML
 
-from config.bounds import Shape, shapes_of
-from config.knobs import NEXT_TICK, changed, knobs, value_of
-from config.load import ConfigError, shipped_names
-from config.schema import Rig, load_rig
-from drivers.dynamixel.family import DYNAMIXEL
-from drivers.feetech.family import FEETECH
-from drivers.servo_bus.family import Family
-from drivers.servo_models import SERVOS
-from robot.cli.examples import EXAMPLES
-from robot.joint import JointParams
-from sim_mock.scenes.registry import scenes
+from gazerig.config.bounds import Shape, shapes_of
+from gazerig.config.knobs import NEXT_TICK, changed, knobs, value_of
+from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.servo_bus.family import Family
+from gazerig.drivers.servo_models import SERVOS
+from gazerig.robot.cli.examples import EXAMPLES
+from gazerig.robot.joint import JointParams
+from gazerig.sim_mock.scenes.registry import scenes
 
 FOLDERS = ("config", "drivers", "gaze", "robot", "sim_mock")
 RIGS = {name: load_rig(name) for name in shipped_names("rigs")}

@@ -15,12 +15,12 @@ import pytest
 from command_line import options, parse, typed
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, each_of_papers, spans
 
-from robot.loop import Robot
-from robot.remote.running_rig import RunningRig
-from sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
-from sim_mock.feetech.chain import COMMANDS as STS
-from sim_mock.maestro.faults import COMMANDS as MAESTRO
-from sim_mock.pty.client import PtyBus
+from gazerig.robot.loop import Robot
+from gazerig.robot.remote.running_rig import RunningRig
+from gazerig.sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
+from gazerig.sim_mock.feetech.chain import COMMANDS as STS
+from gazerig.sim_mock.maestro.faults import COMMANDS as MAESTRO
+from gazerig.sim_mock.pty.client import PtyBus
 
 STANDS_FOR = {"NAME": "neck_yaw", "FILE": "a.mcap", "KEY": "seed"}
 """What to try where a paper has a word in capitals; 1 for all others."""

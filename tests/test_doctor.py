@@ -2,25 +2,25 @@
 
 import pytest
 
-from drivers.dynamixel.discovery import Found
-from drivers.errors import PortError
-from drivers.feetech.memory_table import REGISTERS, TABLE_END
-from drivers.serial.list_ports import Access, Host, SerialPort
-from drivers.types import ServoSetup
-from robot.bringup.doctor.checks import CHECKS, apply_fix, examine, take
-from robot.bringup.doctor.dynamixel import READ
-from robot.bringup.doctor.findings import Finding, Fix, worst
-from robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
-from robot.bringup.doctor.run import apply_fixes, check, check_all, fix_latency, look
-from robot.bringup.doctor.subject import ServoState
-from robot.bringup.scan_report import remarks
-from robot.bringup.searching import Looked
-from robot.bringup.servo_families import DYNAMIXEL, FEETECH
-from robot.bringup.servo_report import grouped, summed_up, together
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.feetech.chain import build_feetech
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.discovery import Found
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.feetech.memory_table import REGISTERS, TABLE_END
+from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.checks import CHECKS, apply_fix, examine, take
+from gazerig.robot.bringup.doctor.dynamixel import READ
+from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
+from gazerig.robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
+from gazerig.robot.bringup.doctor.run import apply_fixes, check, check_all, fix_latency, look
+from gazerig.robot.bringup.doctor.subject import ServoState
+from gazerig.robot.bringup.scan_report import remarks
+from gazerig.robot.bringup.searching import Looked
+from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH
+from gazerig.robot.bringup.servo_report import grouped, summed_up, together
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 RANGES = ((1, 1650, 2446, "left_eye_pan"), (2, 1650, 2446, "left_eye_tilt"),

@@ -4,14 +4,14 @@ from xml.etree.ElementTree import fromstring
 
 import pytest
 
-from drivers.errors import ServoMissing
-from drivers.maestro.line import Line
-from drivers.maestro.params import MaestroParams
-from drivers.types import ServoSetup
-from robot.bringup.doctor.findings import worst
-from robot.bringup.doctor.maestro import apply_fix, visit
-from robot.bringup.doctor.run import apply_fixes
-from robot.bringup.maestro_settings import (
+from gazerig.drivers.errors import ServoMissing
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.findings import worst
+from gazerig.robot.bringup.doctor.maestro import apply_fix, visit
+from gazerig.robot.bringup.doctor.run import apply_fixes
+from gazerig.robot.bringup.maestro_settings import (
     clipped,
     instructions,
     range_us,
@@ -19,9 +19,9 @@ from robot.bringup.maestro_settings import (
     start_limits,
     wide_range,
 )
-from robot.bringup.maestro_sweep import sent_home
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.maestro.board import build_board
+from gazerig.robot.bringup.maestro_sweep import sent_home
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import build_board
 
 PAN = ServoSetup(0, "hobby", 4400, 7600, 9000.0, "eyes_pan", rest_steps=6000)
 LID = ServoSetup(2, "hobby", 3600, 7200, 9000.0, "left_upper_lid", rest_steps=5000)

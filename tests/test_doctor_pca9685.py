@@ -5,15 +5,23 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from drivers.i2c import bridge
-from drivers.pca9685.params import Pca9685Params
-from drivers.pca9685.registers import AWAKE, LED0, MODE1, PRESCALE, SLEEP, prescale_of, pulse
-from drivers.types import ServoSetup
-from robot.bringup.doctor.findings import worst
-from robot.bringup.doctor.pca9685 import visit
-from robot.cli import servos as cli_servos
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.pca9685.bridge import build_bridge
+from gazerig.drivers.i2c import bridge
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.pca9685.registers import (
+    AWAKE,
+    LED0,
+    MODE1,
+    PRESCALE,
+    SLEEP,
+    prescale_of,
+    pulse,
+)
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.findings import worst
+from gazerig.robot.bringup.doctor.pca9685 import visit
+from gazerig.robot.cli import servos as cli_servos
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.pca9685.bridge import build_bridge
 
 SETUPS = (
     ServoSetup(0, "hobby", 4400, 7600, 12_000.0, "eyes_pan"),

@@ -7,15 +7,15 @@ from typing import NamedTuple
 import pytest
 from dynamixel_sdk import PacketHandler
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.dynamixel.protocol import instruction
-from drivers.errors import ServoMissing
-from drivers.serial.port import BlockingPort
-from drivers.types import ServoSetup
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.protocol import instruction
+from gazerig.drivers.errors import ServoMissing
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SPEED = 6000.0
 REBOOT = 8

@@ -2,11 +2,11 @@
 
 import pytest
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.types import ServoSetup
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3)
 STARTS = (2001, 2002, 2003)

@@ -4,14 +4,14 @@ import struct
 
 import pytest
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.dynamixel.protocol import instruction
-from drivers.errors import BusLost, ServoFault, ServoMissing
-from drivers.types import ServoSetup
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.dynamixel.packets import status
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.protocol import instruction
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3)
 GROUP_READS = (0x82, 0x8A)

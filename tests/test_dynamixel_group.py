@@ -4,11 +4,11 @@ import struct
 
 import pytest
 
-from drivers.dynamixel.read_windows import DIRECT, direct_turns
-from drivers.dynamixel.sync_packets import FastGroup, PlainGroup
-from drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.dynamixel.packets import status
+from gazerig.drivers.dynamixel.read_windows import DIRECT, direct_turns
+from gazerig.drivers.dynamixel.sync_packets import FastGroup, PlainGroup
+from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.dynamixel.packets import status
 
 IDS = (4, 1, 9)
 PLACES = {4: 1000, 1: 2000, 9: 3000}

@@ -61,13 +61,13 @@ from moving_bus import (
     live_through_missing_ids,
 )
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.servo_bus.faults import AGAIN_AND_AGAIN
-from drivers.types import ServoSetup
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
 class Rig(MovingBus):

@@ -5,14 +5,14 @@ import struct
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.dynamixel.protocol import (
+from gazerig.drivers.dynamixel.protocol import (
     SyncWrite,
     bytes_missing,
     instruction,
     statuses,
     sync_read,
 )
-from sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.dynamixel.packets import status
 
 
 def vector(text: str) -> bytes:

@@ -26,14 +26,14 @@ from itertools import pairwise
 import pytest
 from dynamixel_sdk import COMM_SUCCESS
 
-from drivers.dynamixel.protocol import instruction, statuses
-from drivers.dynamixel.registers import Identity, Registers
-from drivers.dynamixel.sdk_handler import SdkPackets
-from drivers.errors import BusLost
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.dynamixel.packets import status
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.protocol import instruction, statuses
+from gazerig.drivers.dynamixel.registers import Identity, Registers
+from gazerig.drivers.dynamixel.sdk_handler import SdkPackets
+from gazerig.drivers.errors import BusLost
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 HEADER = b"\xff\xff\xfd\x00"
 

@@ -3,15 +3,15 @@
 import pytest
 from dynamixel_sdk import PacketHandler
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.dynamixel.protocol import HEADER
-from drivers.dynamixel.registers import Registers
-from drivers.errors import PortError, ServoMissing
-from drivers.types import ServoSetup
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.dynamixel.packets import status
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.protocol import HEADER
+from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3)
 

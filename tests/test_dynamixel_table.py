@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from dynamixel_easy_sdk.control_table import CONTROL_TABLE_PATH, ControlTable
 
-from drivers.dynamixel.control_table import (
+from gazerig.drivers.dynamixel.control_table import (
     MODELS,
     REGISTERS,
     STEPS_PER_TURN,

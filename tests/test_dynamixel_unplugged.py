@@ -8,11 +8,11 @@ import sys
 import time
 from pathlib import Path
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.serial.port import BlockingPort
-from drivers.types import ServoSetup
-from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3)
 SPECS = [ServoSpec(i, "xl330-m077", 1200) for i in IDS]
@@ -21,9 +21,9 @@ ROOT = Path(__file__).parents[1]
 
 DRIVER = """
 import sys, time
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.serial.port import BlockingPort
-from drivers.types import ServoSetup
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.types import ServoSetup
 setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 200.0) for i in (1, 2, 3)]
 bus = DynamixelBus(BlockingPort(sys.argv[1]), setups, DynamixelParams(reply_timeout_ms=100.0))
 bus.open()

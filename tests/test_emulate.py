@@ -13,17 +13,17 @@ import pytest
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler
 from typer.testing import CliRunner
 
-from drivers.errors import SetupError
-from drivers.maestro.commands import Speech
-from drivers.serial.port import BlockingPort
-from robot.cli import emulate as command
-from robot.cli.emulate import app
-from sim_mock.device_spec import line_of, parse_servos
-from sim_mock.devices import DynamixelLine, FeetechLine
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.maestro.commands import Speech
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.robot.cli import emulate as command
+from gazerig.robot.cli.emulate import app
+from gazerig.sim_mock.device_spec import line_of, parse_servos
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 
 ROOT = Path(__file__).parents[1]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTTIN)
-COMMAND = [sys.executable, "-c", "from robot.cli.emulate import app; app()"]
+COMMAND = [sys.executable, "-c", "from gazerig.robot.cli.emulate import app; app()"]
 
 
 class Emulator:

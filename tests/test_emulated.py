@@ -5,7 +5,7 @@ from math import inf
 
 import pytest
 
-from sim_mock.devices import (
+from gazerig.sim_mock.devices import (
     BAUDS,
     CASES,
     DynamixelLine,
@@ -15,9 +15,9 @@ from sim_mock.devices import (
     packed,
     unpacked,
 )
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 BUILT = ServoSpec(7, "xl330-m288", 1000, 45, Physics(stop_low_steps=900.0), Quirks(True), 3)
 LINES = [

@@ -12,8 +12,8 @@ from fastcrc.crc16 import umts
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.feetech.chain import build_feetech
 
 ALL = 0xFE
 

@@ -4,12 +4,12 @@ import pytest
 from sts_bench import Bench
 from test_maestro_board import World, acceleration, speed, target
 
-from drivers.dynamixel.control_table import MODELS
-from sim_mock.dynamixel.servo import DynamixelServo
-from sim_mock.smart_servo.motor import PAUSE_MS, Loop, Shaft, long_pause
-from sim_mock.smart_servo.physics import Physics, ServoSpec
-from sim_mock.smart_servo.profile import Profile, SpeedProfile
-from sim_mock.smart_servo.protection import Protection
+from gazerig.drivers.dynamixel.control_table import MODELS
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.smart_servo.motor import PAUSE_MS, Loop, Shaft, long_pause
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
+from gazerig.sim_mock.smart_servo.protection import Protection
 
 HOUR_S = 3600.0
 GOAL, GOAL_SPEED, MODE = 42, 46, 33

@@ -14,21 +14,21 @@ import numpy as np
 import pytest
 from desk import JOINTS, LIDS
 
-from config.schema import load_rig
-from drivers.errors import SetupError
-from gaze.angles import rotation
-from gaze.types import GazeState
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.gaze_recording import FixationTable, read_recording
-from robot.kinematics import GeometryParams, Kinematics
-from robot.loop import Tick, run
-from robot.orders import Jog, Stop
-from robot.recording.export_bids import About, label_of, write_bids
-from robot.recording.export_csv import EVENTS, columns, write_csv
-from robot.recording.gaze_angles import Trace, in_space, trace_of
-from robot.recording.gaze_labels import Labels, Stretch, labels_of, lag_of, stretches_of
-from robot.types import JointState
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.angles import rotation
+from gazerig.gaze.types import GazeState
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.gaze_recording import FixationTable, read_recording
+from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.orders import Jog, Stop
+from gazerig.robot.recording.export_bids import About, label_of, write_bids
+from gazerig.robot.recording.export_csv import EVENTS, columns, write_csv
+from gazerig.robot.recording.gaze_angles import Trace, in_space, trace_of
+from gazerig.robot.recording.gaze_labels import Labels, Stretch, labels_of, lag_of, stretches_of
+from gazerig.robot.types import JointState
 
 RATE_HZ = 200.0
 SETTLED_S = 3.0  # at the start the guard lets the eyes follow the plan only slowly
@@ -407,6 +407,6 @@ def test_the_official_validator_has_nothing_to_say_against_it(bids: Path) -> Non
 
 
 def test_numbers_that_are_none_are_not_written() -> None:
-    from robot.recording.export_csv import number
+    from gazerig.robot.recording.export_csv import number
 
     assert number(None) == "" and number(float("nan")) == "" and number(1.25, 1) == "1.2"

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 from desk import JOINTS, LIDS
 
-from gaze.angles import add, scale, unit, yaw_pitch
-from gaze.field_of_view import line_of_sight
-from gaze.head import Head, HeadParams
-from gaze.lids import LidParams, Lids
-from gaze.oculomotor import Oculomotor, OculomotorParams
-from gaze.pursuit import Pursuit, PursuitParams
-from gaze.saccade import Saccade, SaccadeParams
-from gaze.types import Target, Vec3
-from robot.kinematics import GeometryParams, Kinematics
-from robot.types import JointState
+from gazerig.gaze.angles import add, scale, unit, yaw_pitch
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.head import Head, HeadParams
+from gazerig.gaze.lids import LidParams, Lids
+from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
+from gazerig.gaze.pursuit import Pursuit, PursuitParams
+from gazerig.gaze.saccade import Saccade, SaccadeParams
+from gazerig.gaze.types import Target, Vec3
+from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.types import JointState
 
 pymovements = pytest.importorskip("pymovements")
 

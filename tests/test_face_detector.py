@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from skimage import data
 
-from drivers.camera.video_file import VideoFile
-from drivers.errors import ModelFileError
-from drivers.types import DetectedFace, FaceDetector, Picture, Pixels
-from drivers.vision.face_detector import face_detector
-from drivers.vision.face_mtcnn import package_folder, read_model
-from drivers.vision.face_params import FaceDetectorParams
-from drivers.vision.face_preprocess import prepare
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.types import DetectedFace, FaceDetector, Picture, Pixels
+from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.face_mtcnn import package_folder, read_model
+from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face_preprocess import prepare
 
 SHARED = Path(__file__).parents[2] / "shared"
 YUNET_FILE = SHARED / "models" / "face_detection_yunet_2026may.onnx"

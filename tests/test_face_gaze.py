@@ -4,9 +4,9 @@ from math import cos, radians, sin
 
 import pytest
 
-from gaze.angles import rotation, sub, unit
-from robot.face_gaze import on_face
-from robot.planner import Planner
+from gazerig.gaze.angles import rotation, sub, unit
+from gazerig.robot.face_gaze import on_face
+from gazerig.robot.planner import Planner
 
 NOSE = (1.0, 0.2, 0.25)
 TOWARDS = rotation((radians(180.0), 0.0, 0.0))

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gaze.types import PARTS
-from robot.seeing.face_pose import (
+from gazerig.gaze.types import PARTS
+from gazerig.robot.seeing.face_pose import (
     LANDMARKS_FACE_M,
     PARTS_FACE_M,
     FacePose,

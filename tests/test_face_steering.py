@@ -6,16 +6,16 @@ from typing import Any
 
 import pytest
 
-from config.schema import load_rig
-from gaze.angles import angle_between, rotation, sub
-from gaze.field_of_view import line_of_sight
-from gaze.types import Bodies, Face, Percept, Target
-from robot.assemble import Assembly, assemble
-from robot.calibrate.face_calibration import begun, point_world_m
-from robot.calibrate.face_steering import AIMED_DEG, STALE_S, WAIT_S, FaceSteering
-from robot.choice import Choice
-from robot.loop import Tick
-from sim_mock.scenes.sits_still import SitsStill
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import angle_between, rotation, sub
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import Bodies, Face, Percept, Target
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.calibrate.face_calibration import begun, point_world_m
+from gazerig.robot.calibrate.face_steering import AIMED_DEG, STALE_S, WAIT_S, FaceSteering
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick
+from gazerig.sim_mock.scenes.sits_still import SitsStill
 
 RIG = load_rig("desk")
 REST = (1.5, 0.0, 0.2)

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from moving_bus import IDS
 from sts_rig import Rig
 
-from drivers.errors import ServoFault, ServoMissing
-from drivers.feetech.bus import FeetechBus, FeetechParams
-from drivers.serial.port import BlockingPort
-from drivers.types import ServoSetup
-from sim_mock.devices import FeetechLine
-from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.devices import FeetechLine
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = (
     ServoSpec(3, "sts3215", 1800),

@@ -21,11 +21,11 @@ from moving_bus import (
 )
 from sts_rig import Rig
 
-from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
-from drivers.servo_bus.faults import AGAIN_AND_AGAIN
-from drivers.servo_bus.recovery import FAR_SIDE
-from drivers.types import ServoSetup
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
+from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
+from gazerig.drivers.servo_bus.recovery import FAR_SIDE
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,12 @@ import struct
 
 import pytest
 
-from drivers.feetech.group import Group
-from drivers.feetech.protocol import checksum
-from drivers.feetech.readings import Readings
-from drivers.feetech.views import ARMED, SENSED, View, alone_turns, together_turns
-from drivers.servo_bus.sync_read import Heard, Whole
-from drivers.types import ServoSetup
+from gazerig.drivers.feetech.group import Group
+from gazerig.drivers.feetech.protocol import checksum
+from gazerig.drivers.feetech.readings import Readings
+from gazerig.drivers.feetech.views import ARMED, SENSED, View, alone_turns, together_turns
+from gazerig.drivers.servo_bus.sync_read import Heard, Whole
+from gazerig.drivers.types import ServoSetup
 
 BLOCK = struct.pack("<HHHBBBBB2xH", 0x8006, 0x8064, 0x052C, 74, 31, 0, 0x20, 1, 0x8002)
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.feetech.protocol import (
+from gazerig.drivers.feetech.protocol import (
     ACTION,
     BROADCAST,
     MOST_GOALS,

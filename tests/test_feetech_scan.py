@@ -3,12 +3,12 @@
 import pytest
 from sts_rig import Rig
 
-from drivers.errors import ServoFault, ServoMissing
-from drivers.feetech.homing import set_middle
-from drivers.feetech.memory_table import BAUD_RATES
-from drivers.feetech.registers import Identity, StsRegisters
-from drivers.feetech.scan import Found, everybody, garbled, ping, scan
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.feetech.homing import set_middle
+from gazerig.drivers.feetech.memory_table import BAUD_RATES
+from gazerig.drivers.feetech.registers import Identity, StsRegisters
+from gazerig.drivers.feetech.scan import Found, everybody, garbled, ping, scan
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
 def rig_at(baud, *ids):

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.feetech.memory_table import (
+from gazerig.drivers.feetech.memory_table import (
     BAUD_RATES,
     MODELS,
     REGISTERS,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robot.remote.file_watch import FileWatch
+from gazerig.robot.remote.file_watch import FileWatch
 
 OLD = "name: old\n"
 NEW = "name: new\n"

@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.camera.playback import CameraReplay
-from drivers.camera.recording_writer import RecordingWriter
-from drivers.camera.source import Shot
-from drivers.camera.video_file import VideoFile
-from drivers.errors import CameraError
-from drivers.types import DetectedFace, MovingBlob, PictureLens
-from drivers.vision.face_detector import face_detector
-from drivers.vision.face_params import FaceDetectorParams
-from sim_mock.cameras.video import FilmCamera
+from gazerig.drivers.camera.playback import CameraReplay
+from gazerig.drivers.camera.recording_writer import RecordingWriter
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.errors import CameraError
+from gazerig.drivers.types import DetectedFace, MovingBlob, PictureLens
+from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.sim_mock.cameras.video import FilmCamera
 
 FILM_FILE = Path(__file__).parents[2] / "shared" / "media" / "Megamind.avi"
 RATE_HZ = 25.0

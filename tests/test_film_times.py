@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.camera.frame_analysis import look
-from drivers.camera.video_file import VideoFile
-from drivers.camera.video_timestamps import FilmTimes, at_a_rate, by_table, rising
-from drivers.errors import CameraError
-from drivers.vision.face_detector import face_detector
-from drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.camera.frame_analysis import look
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.camera.video_timestamps import FilmTimes, at_a_rate, by_table, rising
+from gazerig.drivers.errors import CameraError
+from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.face_params import FaceDetectorParams
 
 UNEVEN = (0, 1, 2, 6, 7, 8, 12, 13, 14, 20, 21, 22, 23, 30, 31, 32, 40, 41, 42, 43)
 

@@ -6,13 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from config.load import ConfigError, load, shipped
-from drivers.errors import SetupError
-from gaze.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalised, row_sums_note
-from gaze.types import PARTS
-from robot.fit_scanpath import fit
-from robot.fixations import FixationParams, PartBoxes, fixations_of
-from robot.gaze_recording import Samples, read_recording
+from gazerig.config.load import ConfigError, load, shipped
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.scanpath import (
+    Scanpath,
+    ScanpathParams,
+    Walk,
+    markov_walk,
+    normalised,
+    row_sums_note,
+)
+from gazerig.gaze.types import PARTS
+from gazerig.robot.fit_scanpath import fit
+from gazerig.robot.fixations import FixationParams, PartBoxes, fixations_of
+from gazerig.robot.gaze_recording import Samples, read_recording
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 

@@ -8,10 +8,10 @@ from desk import JOINTS, LIDS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from config.load import ConfigError
-from config.schema import load_rig
-from gaze.angles import rotate
-from robot.frames import (
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import rotate
+from gazerig.robot.frames import (
     CameraMount,
     CameraParams,
     LensParams,
@@ -19,8 +19,8 @@ from robot.frames import (
     mounted_at,
     standing_still,
 )
-from robot.joint import JointParams
-from robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.joint import JointParams
+from gazerig.robot.kinematics import GeometryParams, Kinematics
 
 KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
 

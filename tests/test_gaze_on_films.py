@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from config.schema import load_rig
-from gaze.angles import add, angle_between, norm, scale, sub
-from gaze.types import Vec3
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.loop import Tick, run
-from robot.seeing.intrinsics import intrinsics_of_lens, project
-from robot.summary import cyclopean
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import add, angle_between, norm, scale, sub
+from gazerig.gaze.types import Vec3
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.seeing.intrinsics import intrinsics_of_lens, project
+from gazerig.robot.summary import cyclopean
 
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
 SECONDS, BEGIN_S, RATE_HZ = 24.0, 1.0, 10.0

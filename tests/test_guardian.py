@@ -14,16 +14,16 @@ from loop_deaths import PATIENCE_S, driven
 from mixed_rig import mixed_text
 from sts_rig import Rig as StsRig
 
-from config.schema import load_rig
-from drivers.errors import ServoFault, SetupError
-from robot.bringup.smart_servo import SmartServo
-from robot.guardian.guarded_bus import RETRY_S, GuardedBus
-from robot.guardian.guarded_servo import GuardedServo
-from robot.guardian.guardian import Guardian
-from robot.guardian.hang_detector import HANG_S, HangDetector
-from robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, SIZE, Heartbeat, shared_file
-from robot.guardian.release_plan import ReleasePlan, decode, describe, encode
-from robot.rig_bus import ports_of, release_plans
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import ServoFault, SetupError
+from gazerig.robot.bringup.smart_servo import SmartServo
+from gazerig.robot.guardian.guarded_bus import RETRY_S, GuardedBus
+from gazerig.robot.guardian.guarded_servo import GuardedServo
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.guardian.hang_detector import HANG_S, HangDetector
+from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, SIZE, Heartbeat, shared_file
+from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
+from gazerig.robot.rig_bus import ports_of, release_plans
 
 PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 
@@ -102,9 +102,11 @@ def test_plans_go_through_a_command_line():
 
 def test_the_guardian_is_light():
     code = (
-        "import sys; import robot.guardian.process; from robot.guardian.release_plan import *;"
-        "[releaser(ReleasePlan(k, '', 1, ())) for k in ('feetech', 'maestro', 'dynamixel')];"
-        "print([m for m in ('numpy', 'cv2', 'scipy', 'config', 'pydantic') if m in sys.modules])"
+        "import sys; import gazerig.robot.guardian.process;"
+        "from gazerig.robot.guardian.release_plan import *;"
+        "[releaser(ReleasePlan(k, '', 1, ())) for k in ('feetech', 'maestro', 'dynamixel')]\n"
+        "heavy = ('numpy', 'cv2', 'scipy', 'gazerig.config', 'pydantic')\n"
+        "print([m for m in heavy if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

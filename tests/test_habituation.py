@@ -6,14 +6,14 @@ from math import radians
 import numpy as np
 import pytest
 
-from gaze.angles import rotation
-from gaze.attention import Attention, AttentionParams
-from gaze.bottom_up import BottomUp, BottomUpParams
-from gaze.field_of_view import FieldOfView, FieldOfViewParams
-from gaze.habituation import Habituation, HabituationParams
-from gaze.idle import Idle, IdleParams
-from gaze.top_down import TopDown, TopDownParams
-from gaze.types import Bodies, GazeState, Percept, Target, Vec3
+from gazerig.gaze.angles import rotation
+from gazerig.gaze.attention import Attention, AttentionParams
+from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
+from gazerig.gaze.habituation import Habituation, HabituationParams
+from gazerig.gaze.idle import Idle, IdleParams
+from gazerig.gaze.top_down import TopDown, TopDownParams
+from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3
 
 AHEAD = GazeState(
     (0, 0, 0), (0, 0, 0), (0, 0), (0, 0), rotation((0.0, 0.0, 0.0)),

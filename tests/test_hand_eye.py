@@ -9,15 +9,21 @@ import numpy as np
 import pytest
 from desk import JOINTS, LIDS
 
-from gaze.types import Angles3
-from robot.calibrate.camera_calibration import CameraCalibrationRefused
-from robot.calibrate.camera_steps import neck_angles
-from robot.calibrate.charuco_board import CharucoBoard, SeenBoard
-from robot.calibrate.hand_eye import HandEye, HandEyeParams, NeckView, camera_on_head, turns_deg
-from robot.frames import CameraParams
-from robot.kinematics import GeometryParams, Kinematics
-from robot.seeing.intrinsics import project
-from sim_mock.cameras.charuco_scene import BoardScene
+from gazerig.gaze.types import Angles3
+from gazerig.robot.calibrate.camera_calibration import CameraCalibrationRefused
+from gazerig.robot.calibrate.camera_steps import neck_angles
+from gazerig.robot.calibrate.charuco_board import CharucoBoard, SeenBoard
+from gazerig.robot.calibrate.hand_eye import (
+    HandEye,
+    HandEyeParams,
+    NeckView,
+    camera_on_head,
+    turns_deg,
+)
+from gazerig.robot.frames import CameraParams
+from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.seeing.intrinsics import project
+from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 BOARD = CharucoBoard()
 KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), JOINTS, LIDS)

@@ -6,9 +6,9 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from gaze.head import Head, HeadParams
-from gaze.quintic import Quintic
-from gaze.types import Floats, Target
+from gazerig.gaze.head import Head, HeadParams
+from gazerig.gaze.quintic import Quintic
+from gazerig.gaze.types import Floats, Target
 
 NECK = ((-2.0, 2.0), (-1.0, 1.0))
 

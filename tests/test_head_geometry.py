@@ -8,11 +8,11 @@ from desk import JOINTS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gaze.angles import angle_between, angles_of, norm, rotate, rotate_back, rotation, sub
-from gaze.field_of_view import line_of_sight
-from gaze.types import GazeCommand
-from robot.kinematics import GeometryParams, Kinematics
-from robot.types import JointState
+from gazerig.gaze.angles import angle_between, angles_of, norm, rotate, rotate_back, rotation, sub
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import GazeCommand
+from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.types import JointState
 
 GEOMETRY = GeometryParams(62.0, 38.0, 51.0)
 KINEMATICS = Kinematics(

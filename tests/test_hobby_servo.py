@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_mock.hobby_servo import HobbyServo, HobbySpec
+from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
 
 
 def run(servo, width, steps):

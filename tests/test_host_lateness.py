@@ -5,10 +5,10 @@ import os
 import pytest
 from line_noise import Noisy
 
-from drivers.errors import PortError
-from drivers.event_log import SELDOM_S, EventLog, Seldom
-from drivers.host_lateness import BUSY, WITHIN_S, HostLateness
-from drivers.serial.port import BlockingPort
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.event_log import SELDOM_S, EventLog, Seldom
+from gazerig.drivers.host_lateness import BUSY, WITHIN_S, HostLateness
+from gazerig.drivers.serial.port import BlockingPort
 
 KINDS = ("dynamixel", "feetech")
 SYNC_READ = 0x82

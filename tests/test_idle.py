@@ -6,9 +6,9 @@ from math import degrees
 import numpy as np
 import pytest
 
-from gaze.angles import sub, yaw_pitch
-from gaze.idle import Idle, IdleParams
-from gaze.types import Target, Vec3
+from gazerig.gaze.angles import sub, yaw_pitch
+from gazerig.gaze.idle import Idle, IdleParams
+from gazerig.gaze.types import Target, Vec3
 
 DT = 0.01
 EYE: Vec3 = (0.0, 0.0, 0.2)

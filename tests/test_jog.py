@@ -8,19 +8,19 @@ from desk import JOINTS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from config.schema import Rig, load_rig
-from drivers.dynamixel.bus import DynamixelBus
-from drivers.errors import SetupError
-from robot.assemble import gaze_parts
-from robot.body import Body
-from robot.bringup.applied import Step
-from robot.bringup.jog import JogParams, ManualControl, duration_s
-from robot.bringup.look_at import ends_reached, look_at
-from robot.clock import SimulatedClock
-from robot.safety.guard import Guard
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.dynamixel.bus import DynamixelBus
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.assemble import gaze_parts
+from gazerig.robot.body import Body
+from gazerig.robot.bringup.applied import Step
+from gazerig.robot.bringup.jog import JogParams, ManualControl, duration_s
+from gazerig.robot.bringup.look_at import ends_reached, look_at
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.safety.guard import Guard
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 RIG = load_rig("desk")
 CROOKED = {"neck_yaw": -12.0, "left_eye_pan": 6.0, "neck_pitch": -8.0}

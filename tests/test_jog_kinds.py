@@ -7,18 +7,18 @@ from pathlib import Path
 import pytest
 from mixed_rig import mixed_text
 
-from config.schema import Rig, load_rig
-from robot.assemble import gaze_parts
-from robot.body import Body
-from robot.bringup.jog import JogParams, ManualControl
-from robot.bringup.look_at import ends_reached, look_at, met
-from robot.clock import SimulatedClock
-from robot.emulated_rig import emulated_lines, place_of
-from robot.rig_angles import limits, park_rad
-from robot.rig_bus import rig_bus
-from robot.safety.guard import Guard
-from sim_mock.devices import build
-from sim_mock.in_process_port import InProcessPort
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.assemble import gaze_parts
+from gazerig.robot.body import Body
+from gazerig.robot.bringup.jog import JogParams, ManualControl
+from gazerig.robot.bringup.look_at import ends_reached, look_at, met
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.emulated_rig import emulated_lines, place_of
+from gazerig.robot.rig_angles import limits, park_rad
+from gazerig.robot.rig_bus import rig_bus
+from gazerig.robot.safety.guard import Guard
+from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.in_process_port import InProcessPort
 
 MAKER, FEETECH = load_rig("maker"), load_rig("feetech")
 

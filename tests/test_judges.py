@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.pty.client import PtyBus
 
 ROOT = Path(__file__).parents[1]
 OTHER_SDK = ROOT / ".venv" / "other-sdk"

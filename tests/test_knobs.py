@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from config.knobs import (
+from gazerig.config.knobs import (
     NEXT_START,
     NEXT_TICK,
     changed,
@@ -18,10 +18,10 @@ from config.knobs import (
     values,
     values_after,
 )
-from config.load import ConfigError, shipped_names
-from config.schema import Rig, load_rig
-from robot.joint import JointParams
-from robot.orders import Value
+from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.joint import JointParams
+from gazerig.robot.orders import Value
 
 RIG = load_rig("desk")
 KNOBS = knobs(RIG, RIG)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gaze.lids import LidParams, Lids, Openings, Side
-from gaze.types import GazeCommand
-from robot.kinematics import GeometryParams, Kinematics
+from gazerig.gaze.lids import LidParams, Lids, Openings, Side
+from gazerig.gaze.types import GazeCommand
+from gazerig.robot.kinematics import GeometryParams, Kinematics
 
 DT = 0.005
 AWAKE = 0.8

@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from gaze.lid_closing import closure
-from gaze.lids import LidParams, Lids
+from gazerig.gaze.lid_closing import closure
+from gazerig.gaze.lids import LidParams, Lids
 
 DT = 0.005
 STEEPEST = 1.875  # slope of minimum jerk at its middle

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from desk import JOINTS, LIDS
 
-from gaze.head import Head, HeadParams
-from gaze.lids import LidMode, LidParams, Lids, Side
-from gaze.oculomotor import Oculomotor, OculomotorParams
-from gaze.pursuit import Pursuit, PursuitParams
-from gaze.saccade import Saccade, SaccadeParams
-from gaze.types import Target
-from robot.kinematics import GeometryParams, Kinematics
-from robot.types import JointState
+from gazerig.gaze.head import Head, HeadParams
+from gazerig.gaze.lids import LidMode, LidParams, Lids, Side
+from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
+from gazerig.gaze.pursuit import Pursuit, PursuitParams
+from gazerig.gaze.saccade import Saccade, SaccadeParams
+from gazerig.gaze.types import Target
+from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.types import JointState
 
 DT = 0.005
 AWAKE = 0.75

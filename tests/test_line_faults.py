@@ -8,10 +8,10 @@ from fastcrc.crc16 import umts
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.errors import BusLost, PortError
-from sim_mock.dynamixel.chain import COMMANDS, build_dynamixel
-from sim_mock.dynamixel.packets import status
-from sim_mock.in_process_port import InProcessPort
+from gazerig.drivers.errors import BusLost, PortError
+from gazerig.sim_mock.dynamixel.chain import COMMANDS, build_dynamixel
+from gazerig.sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.in_process_port import InProcessPort
 
 IDS = (1, 2, 3)
 GOLDEN_PING = bytes.fromhex("FFFFFD0001030001194E")

@@ -7,10 +7,10 @@ from fastcrc.crc16 import umts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.feetech.chain import build_feetech
-from sim_mock.maestro.board import build_board
-from sim_mock.wire import ServoLine
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.maestro.board import build_board
+from gazerig.sim_mock.wire import ServoLine
 
 
 def instruction(servo_id, code, params=b""):

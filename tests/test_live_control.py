@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from config.load import ConfigError, Fault
-from drivers.errors import SetupError
-from robot.clock import SimulatedClock
-from robot.orders import Order
-from robot.remote.live_control import LiveControl
-from robot.remote.running_rig import running
+from gazerig.config.load import ConfigError, Fault
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.orders import Order
+from gazerig.robot.remote.live_control import LiveControl
+from gazerig.robot.remote.running_rig import running
 
 
 class Robot:

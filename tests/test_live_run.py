@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from config.save import copy_shipped
-from config.schema import load_rig
-from drivers.errors import DriverError
-from robot.remote.running_rig import NoRig, Refused, RunningRig, running
-from robot.remote.sockets import folder, sockets
+from gazerig.config.save import copy_shipped
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.remote.running_rig import NoRig, Refused, RunningRig, running
+from gazerig.robot.remote.sockets import folder, sockets
 
 RATE = "loop.rate_hz"
 ROOT = Path(__file__).parents[1]
@@ -39,12 +39,12 @@ class Run:
         self.file, self.log = place / "my.yaml", place / "log"
         if not self.file.exists():
             copy_shipped("desk", self.file)
-        code = "from robot.cli.main import main; main()"
+        code = "from gazerig.robot.cli.main import main; main()"
         with self.log.open("w") as log:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", code, "run", str(self.file), "--mock", "--no-page"],
                 stderr=log,
-                env={**os.environ, "PYTHONPATH": str(ROOT)},
+                env=dict(os.environ),
             )
 
     def connected(self) -> RunningRig:

@@ -7,17 +7,23 @@ from pathlib import Path
 import pytest
 from mixed_rig import mixed_text
 
-from config.schema import Rig, load_rig
-from drivers.dynamixel.registers import Registers
-from drivers.feetech.registers import StsRegisters
-from drivers.maestro.commands import Speech
-from robot.bringup.monitor import Monitor, as_json
-from robot.bringup.telemetry import DynamixelLooks, FeetechLooks, Look, MaestroLooks, look_at_pulse
-from robot.clock import SimulatedClock
-from robot.emulated_rig import emulated_lines
-from robot.rig_bus import bus_names
-from sim_mock.devices import build
-from sim_mock.in_process_port import InProcessPort
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.feetech.registers import StsRegisters
+from gazerig.drivers.maestro.commands import Speech
+from gazerig.robot.bringup.monitor import Monitor, as_json
+from gazerig.robot.bringup.telemetry import (
+    DynamixelLooks,
+    FeetechLooks,
+    Look,
+    MaestroLooks,
+    look_at_pulse,
+)
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.robot.rig_bus import bus_names
+from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.in_process_port import InProcessPort
 
 FEETECH, MAKER = load_rig("feetech"), load_rig("maker")
 STS_WRITES = {0x03, 0x04, 0x05, 0x06, 0x08, 0x83}

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 from desk import JOINTS, LIDS
 
-from config.schema import load_rig
-from drivers.types import DetectedFace, Detections, MovingBlob
-from gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
-from gaze.types import PARTS
-from robot.assemble import Assembly, Choice, assemble
-from robot.clock import RealClock, SimulatedClock
-from robot.frames import CameraMount, CameraParams, PoseHistory
-from robot.kinematics import GeometryParams, Kinematics
-from robot.loop import LoopParams, Tick, run
-from robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
-from robot.seeing.perception import Perception
-from robot.seeing.tracks import Sighting, Tracker, TrackParams
-from robot.types import Verdict
-from sim_mock.scenes.visitor import Visitor
+from gazerig.config.schema import load_rig
+from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
+from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
+from gazerig.gaze.types import PARTS
+from gazerig.robot.assemble import Assembly, Choice, assemble
+from gazerig.robot.clock import RealClock, SimulatedClock
+from gazerig.robot.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.loop import LoopParams, Tick, run
+from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
+from gazerig.robot.seeing.perception import Perception
+from gazerig.robot.seeing.tracks import Sighting, Tracker, TrackParams
+from gazerig.robot.types import Verdict
+from gazerig.sim_mock.scenes.visitor import Visitor
 
 
 def made(seed: int = 0) -> Assembly:

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.errors import BusLost
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.maestro.board import SIZES, build_board
-from sim_mock.maestro.channel import Channel, brakes_within
-from sim_mock.maestro.commands import ERRORS, crc7
-from sim_mock.maestro.faults import COMMANDS
+from gazerig.drivers.errors import BusLost
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import SIZES, build_board
+from gazerig.sim_mock.maestro.channel import Channel, brakes_within
+from gazerig.sim_mock.maestro.commands import ERRORS, crc7
+from gazerig.sim_mock.maestro.faults import COMMANDS
 
 PROTOCOL = 1 << ERRORS.index("protocol")
 TIMEOUT = 1 << ERRORS.index("timeout")

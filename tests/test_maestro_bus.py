@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.maestro.bus import MaestroBus, MaestroParams
-from drivers.serial.port import BlockingPort
-from drivers.types import ServoSetup
-from sim_mock.devices import MaestroLine
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.maestro.board import build_board
-from sim_mock.pty.client import PtyBus
+from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.devices import MaestroLine
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import build_board
+from gazerig.sim_mock.pty.client import PtyBus
 
 CENTRE = 6000
 SPEED = 12_000.0

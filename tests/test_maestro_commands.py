@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.maestro.commands import Speech, crc7, name_errors, runs, split, words
+from gazerig.drivers.maestro.commands import Speech, crc7, name_errors, runs, split, words
 
 COMPACT = Speech()
 POLOLU = Speech("pololu")

@@ -2,11 +2,11 @@
 
 import pytest
 
-from drivers.hobby_board.channel import Channel
-from drivers.maestro.limits import SPEED_STEPS_S, speed_units
-from drivers.maestro.line import Line
-from drivers.maestro.params import MaestroParams
-from drivers.types import ServoSetup
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.maestro.limits import SPEED_STEPS_S, speed_units
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.types import ServoSetup
 
 SETUP = ServoSetup(3, "hobby", 4400, 7600, 12_000.0)
 

@@ -3,10 +3,10 @@
 import pytest
 from numpy.random import default_rng
 
-from drivers.maestro.bus import MaestroBus, MaestroParams
-from drivers.types import ServoSetup
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.maestro.board import build_board
+from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import build_board
 
 SPEED = 12_000.0
 LOW, HIGH = 4400, 7600

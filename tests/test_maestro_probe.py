@@ -2,11 +2,11 @@
 
 import pytest
 
-from drivers.errors import PortError
-from drivers.maestro.params import MaestroParams
-from drivers.maestro.probe import USB_CHANNELS, probe
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.maestro.board import build_board
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.probe import USB_CHANNELS, probe
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import build_board
 
 
 def make(channels=12, device=12, crc=False, chosen=()):

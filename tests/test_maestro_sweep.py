@@ -2,14 +2,14 @@
 
 import pytest
 
-from drivers.errors import BusLost, ServoFault, ServoMissing
-from drivers.maestro.line import Line
-from drivers.maestro.params import MaestroParams
-from drivers.types import ServoSetup
-from robot.bringup.maestro_sweep import SLOW_STEPS_S, Place, walk
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.maestro.board import build_board
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.maestro_sweep import SLOW_STEPS_S, Place, walk
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import build_board
 
 LID = ServoSetup(2, "hobby", 4400, 7600, 9000.0, "left_upper_lid", rest_steps=5000)
 PLACES = (5000, 4780, 5220, 5000)

@@ -5,9 +5,9 @@ from math import nan
 
 import pytest
 
-from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.multi_bus import AGAIN_S, IN_A_ROW, MixedBus, Share
-from drivers.types import BusHealth, ServoReading, ServoSetup
+from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.multi_bus import AGAIN_S, IN_A_ROW, MixedBus, Share
+from gazerig.drivers.types import BusHealth, ServoReading, ServoSetup
 
 WANTED = tuple(ServoSetup(i, "xl330-m077", 0, 4095, 100.0) for i in range(5))
 

@@ -6,15 +6,15 @@ from math import radians
 
 import pytest
 
-from drivers.dynamixel.registers import Registers
-from robot.bringup.monitor import Monitor, as_json
-from robot.bringup.servo_families import DYNAMIXEL
-from robot.bringup.telemetry import DynamixelLooks, look
-from robot.clock import SimulatedClock
-from robot.joint import JointParams
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.robot.bringup.monitor import Monitor, as_json
+from gazerig.robot.bringup.servo_families import DYNAMIXEL
+from gazerig.robot.bringup.telemetry import DynamixelLooks, look
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.joint import JointParams
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0, sign=-1, ratio=2.0, zero_step=2000)

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from drivers.types import MovingBlob
-from drivers.vision.motion.affine import affine_rest, flow_map, patch_motion
-from drivers.vision.motion.detector import MotionDetector
-from drivers.vision.motion.params import MotionParams
+from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.vision.motion.affine import affine_rest, flow_map, patch_motion
+from gazerig.drivers.vision.motion.detector import MotionDetector
+from gazerig.drivers.vision.motion.params import MotionParams
 
 WIDTH, HEIGHT, FOCAL, DT_S = 320, 240, 233.0, 1 / 30
 LENS = SimpleNamespace(fx_px=FOCAL, fy_px=FOCAL, cx_px=(WIDTH - 1) / 2, cy_px=(HEIGHT - 1) / 2)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.types import MovingBlob
-from drivers.vision.motion.detector import MotionDetector, turned_between
-from drivers.vision.motion.image import made_small
-from drivers.vision.motion.params import MotionParams
+from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
+from gazerig.drivers.vision.motion.image import made_small
+from gazerig.drivers.vision.motion.params import MotionParams
 
 DT_S = 1 / 30
 GRAIN = cv2.GaussianBlur(np.random.default_rng(0).standard_normal((700, 900)), (0, 0), 3.0)

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.vision.motion.detector import MotionDetector
-from drivers.vision.motion.params import MotionParams
+from gazerig.drivers.vision.motion.detector import MotionDetector
+from gazerig.drivers.vision.motion.params import MotionParams
 
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
 RATE_HZ, LEARN, LOOK = 10.0, 40, 40

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from drivers.vision.motion.clustering import gathered
-from drivers.vision.motion.params import MotionParams
-from drivers.vision.motion.segmentation import Things
-from drivers.vision.motion.tracking import Follow, MotionTracks
+from gazerig.drivers.vision.motion.clustering import gathered
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.drivers.vision.motion.segmentation import Things
+from gazerig.drivers.vision.motion.tracking import Follow, MotionTracks
 
 SHAPE = (240, 320)
 Box = tuple[int, int, int, int]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.types import MovingBlob
-from drivers.vision.motion.detector import MotionDetector, turned_between
-from drivers.vision.motion.params import MotionParams
+from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
+from gazerig.drivers.vision.motion.params import MotionParams
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 233.0
 LENS = SimpleNamespace(fx_px=FOCAL, fy_px=FOCAL, cx_px=(WIDTH - 1) / 2, cy_px=(HEIGHT - 1) / 2)

@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera.oak import OakSource
-from drivers.camera.oak_params import OakParams
-from drivers.camera.oak_pipeline import Outputs, device_nodes, read_archive
-from drivers.camera.oak_sdk import load_depthai
-from drivers.errors import CameraError
+from gazerig.drivers.camera.oak import OakSource
+from gazerig.drivers.camera.oak_params import OakParams
+from gazerig.drivers.camera.oak_pipeline import Outputs, device_nodes, read_archive
+from gazerig.drivers.camera.oak_sdk import load_depthai
+from gazerig.drivers.errors import CameraError
 
 GO_ON = threading.Event()
 PARAMS = OakParams(width_px=320, height_px=240, rate_hz=60.0, silence_ms=3000.0)
@@ -235,9 +235,9 @@ def test_face_model_must_be_an_archive(dai, tmp_path):
 
 def test_depthai_is_loaded_without_telemetry_and_without_a_word():
     code = (
-        "import sys, drivers.camera.oak\n"
+        "import sys, gazerig.drivers.camera.oak\n"
         "assert 'depthai' not in sys.modules\n"
-        "from drivers.camera.oak_sdk import load_depthai; load_depthai()\n"
+        "from gazerig.drivers.camera.oak_sdk import load_depthai; load_depthai()\n"
         "import os; assert os.environ['DEPTHAI_TELEMETRY'] == '0'"
     )
     environment = {k: v for k, v in os.environ.items() if not k.startswith("DEPTHAI")}

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from drivers.camera.oak import OakSource
-from drivers.camera.oak_discovery import UDEV_RULE, find_oak
-from drivers.camera.oak_params import OakParams
-from drivers.camera.oak_pipeline import Outputs
-from drivers.camera.oak_sdk import load_depthai
-from drivers.errors import CameraError
+from gazerig.drivers.camera.oak import OakSource
+from gazerig.drivers.camera.oak_discovery import UDEV_RULE, find_oak
+from gazerig.drivers.camera.oak_params import OakParams
+from gazerig.drivers.camera.oak_pipeline import Outputs
+from gazerig.drivers.camera.oak_sdk import load_depthai
+from gazerig.drivers.errors import CameraError
 
 real = load_depthai()
 

@@ -14,7 +14,7 @@ from desk import JOINTS, LIDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gaze.angles import (
+from gazerig.gaze.angles import (
     add,
     angle_between,
     cross,
@@ -26,16 +26,16 @@ from gaze.angles import (
     unit,
     yaw_pitch,
 )
-from gaze.breathing import Breathing, BreathingParams
-from gaze.field_of_view import line_of_sight
-from gaze.head import Head, HeadParams
-from gaze.lids import LidParams, Lids
-from gaze.oculomotor import Oculomotor, OculomotorParams
-from gaze.pursuit import Pursuit, PursuitParams
-from gaze.saccade import Saccade, SaccadeParams
-from gaze.types import Angles2, GazeCommand, GazeState, Target, Vec3
-from robot.kinematics import GeometryParams, Kinematics
-from robot.types import JointState
+from gazerig.gaze.breathing import Breathing, BreathingParams
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.head import Head, HeadParams
+from gazerig.gaze.lids import LidParams, Lids
+from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
+from gazerig.gaze.pursuit import Pursuit, PursuitParams
+from gazerig.gaze.saccade import Saccade, SaccadeParams
+from gazerig.gaze.types import Angles2, GazeCommand, GazeState, Target, Vec3
+from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.types import JointState
 
 DT = 0.005
 CENTRED = GeometryParams(0.0, 0.0, 0.0)

@@ -10,11 +10,11 @@ from desk import JOINTS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from config.schema import load_rig
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.loop import Tick, run
-from robot.orders import (
+from gazerig.config.schema import load_rig
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.orders import (
     Ask,
     Jog,
     LookAt,
@@ -27,7 +27,7 @@ from robot.orders import (
     check,
     from_json,
 )
-from robot.session import leave
+from gazerig.robot.session import leave
 
 YAW = JOINTS.index("neck_yaw")
 

@@ -31,10 +31,10 @@ from desk import JOINTS
 from six_joints import of_six
 from websockets.sync.client import connect
 
-from gaze.types import PART_NAMES, PARTS
-from robot.page.link import Page, pack, unpack
-from robot.page.picture import encode
-from robot.types import SeenBody, SeenFace, Snapshot
+from gazerig.gaze.types import PART_NAMES, PARTS
+from gazerig.robot.page.link import Page, pack, unpack
+from gazerig.robot.page.picture import encode
+from gazerig.robot.types import SeenBody, SeenFace, Snapshot
 
 T = TypeVar("T")
 PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes

@@ -20,19 +20,19 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
-from config.confined import Confined
-from config.load import ConfigError, shipped
-from config.schema import load_rig
-from gaze.types import Vec3
-from robot.assemble import assemble
-from robot.audience import Audience, Told, Wished
-from robot.choice import Choice
-from robot.loop import LoopCount, Tick
-from robot.orders import Ask, LookAt, Renew, Stop
-from robot.page.view import _HALF_WIDTH as HALF_WIDTH
-from robot.page.view import VIEWS
-from robot.recording.run_info import RunInfo
-from robot.tuning import Tuning
+from gazerig.config.confined import Confined
+from gazerig.config.load import ConfigError, shipped
+from gazerig.config.schema import load_rig
+from gazerig.gaze.types import Vec3
+from gazerig.robot.assemble import assemble
+from gazerig.robot.audience import Audience, Told, Wished
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import LoopCount, Tick
+from gazerig.robot.orders import Ask, LookAt, Renew, Stop
+from gazerig.robot.page.view import _HALF_WIDTH as HALF_WIDTH
+from gazerig.robot.page.view import VIEWS
+from gazerig.robot.recording.run_info import RunInfo
+from gazerig.robot.tuning import Tuning
 
 
 def load_browser() -> ModuleType:

@@ -17,16 +17,16 @@ import viser
 from desk import JOINTS
 from six_joints import SIX, of_six
 
-from config.knobs import knobs, values
-from config.schema import load_rig
-from gaze.types import Vec3
-from robot.orders import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_json
-from robot.page.controls import LeadView
-from robot.page.ear import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
-from robot.page.feed import TuningFeed
-from robot.page.hear import PAGE, PageHear
-from robot.page.jog import MEASURED, RECKONED, JogView, measured_table
-from robot.page.knob import (
+from gazerig.config.knobs import knobs, values
+from gazerig.config.schema import load_rig
+from gazerig.gaze.types import Vec3
+from gazerig.robot.orders import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_json
+from gazerig.robot.page.controls import LeadView
+from gazerig.robot.page.ear import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
+from gazerig.robot.page.feed import TuningFeed
+from gazerig.robot.page.hear import PAGE, PageHear
+from gazerig.robot.page.jog import MEASURED, RECKONED, JogView, measured_table
+from gazerig.robot.page.knob import (
     KnobControl,
     PageKnob,
     hint,
@@ -37,12 +37,12 @@ from robot.page.knob import (
     step_of,
     written,
 )
-from robot.page.link import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
-from robot.page.tell import Teller
-from robot.page.tuning import found, group_of
-from robot.page.view import News, drain
-from robot.remote.requests import plain
-from robot.types import Snapshot
+from gazerig.robot.page.link import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
+from gazerig.robot.page.tell import Teller
+from gazerig.robot.page.tuning import found, group_of
+from gazerig.robot.page.view import News, drain
+from gazerig.robot.remote.requests import plain
+from gazerig.robot.types import Snapshot
 
 PATIENCE_S = 20.0
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
-from gaze.types import PARTS
-from robot.heatmap_face import on_canvas
-from robot.page.dwell import BIN_S, BINS, Dwell
-from robot.page.face_map import HIGH_PX, SHRINK, WIDE_PX, FaceMap, gaze_on_face
-from robot.page.fields import field_edge
-from robot.page.saccades import KEPT, MainSequence
-from robot.page.timeline import STRIP_S, Timeline
-from robot.report.human import fastest_peak, slowest_peak
-from robot.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
+from gazerig.gaze.types import PARTS
+from gazerig.robot.heatmap_face import on_canvas
+from gazerig.robot.page.dwell import BIN_S, BINS, Dwell
+from gazerig.robot.page.face_map import HIGH_PX, SHRINK, WIDE_PX, FaceMap, gaze_on_face
+from gazerig.robot.page.fields import field_edge
+from gazerig.robot.page.saccades import KEPT, MainSequence
+from gazerig.robot.page.timeline import STRIP_S, Timeline
+from gazerig.robot.report.human import fastest_peak, slowest_peak
+from gazerig.robot.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 FACING = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))

@@ -10,10 +10,10 @@ import viser
 from desk import JOINTS
 from six_joints import SIX, TELLS_NOTHING, of_six
 
-from gaze.types import Pull
-from robot.page.ghost import GhostView
-from robot.page.head import HeadView
-from robot.page.health import (
+from gazerig.gaze.types import Pull
+from gazerig.robot.page.ghost import GhostView
+from gazerig.robot.page.head import HeadView
+from gazerig.robot.page.health import (
     NO_FEEDBACK,
     health,
     servo_table,
@@ -21,14 +21,14 @@ from robot.page.health import (
     strain_of_load,
     strain_of_voltage,
 )
-from robot.page.layers import Layers, LayersView
-from robot.page.panel import PanelView
-from robot.page.style import AMBER, RED
-from robot.page.tell import Teller
-from robot.page.traces import Traces, TracesView
-from robot.page.view import News, View
-from robot.page.why import pulls, winner
-from robot.types import (
+from gazerig.robot.page.layers import Layers, LayersView
+from gazerig.robot.page.panel import PanelView
+from gazerig.robot.page.style import AMBER, RED
+from gazerig.robot.page.tell import Teller
+from gazerig.robot.page.traces import Traces, TracesView
+from gazerig.robot.page.view import News, View
+from gazerig.robot.page.why import pulls, winner
+from gazerig.robot.types import (
     Ghost,
     SeenCamera,
     SeenFixation,

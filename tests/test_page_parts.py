@@ -9,12 +9,12 @@ import pytest
 from desk import JOINTS
 from six_joints import RECKONED_RAD, SIX, WISH_RAD, of_six
 
-from drivers.types import DetectedFace, Detections, MovingBlob
-from gaze.angles import rotation
-from robot.page.link import MESSAGE_BYTES
-from robot.page.mesh import Mesh, cap, ellipsoid, lid, ring, turned
-from robot.page.people import fixated_part
-from robot.page.picture import (
+from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
+from gazerig.gaze.angles import rotation
+from gazerig.robot.page.link import MESSAGE_BYTES
+from gazerig.robot.page.mesh import Mesh, cap, ellipsoid, lid, ring, turned
+from gazerig.robot.page.people import fixated_part
+from gazerig.robot.page.picture import (
     FARTHEST_M,
     NEAREST_M,
     PICTURE_WIDTH_PX,
@@ -23,11 +23,11 @@ from robot.page.picture import (
     encode,
     ground,
 )
-from robot.page.place import along, quaternion, turned_up, upright_along
-from robot.page.status import drawn_together, status
-from robot.page.traces import GROUPS, MOST_POINTS, Group, Traces, groups_of, mean_deg
-from robot.types import JOINTS as EVERY_JOINT
-from robot.types import SeenFace, Snapshot, Trail
+from gazerig.robot.page.place import along, quaternion, turned_up, upright_along
+from gazerig.robot.page.status import drawn_together, status
+from gazerig.robot.page.traces import GROUPS, MOST_POINTS, Group, Traces, groups_of, mean_deg
+from gazerig.robot.types import JOINTS as EVERY_JOINT
+from gazerig.robot.types import SeenFace, Snapshot, Trail
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

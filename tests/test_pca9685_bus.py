@@ -6,25 +6,25 @@ from dataclasses import replace
 import pytest
 from smbus2 import i2c_msg
 
-from config.load import shipped
-from config.schema import load_rig
-from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.i2c import port as i2c_port
-from drivers.i2c.bridge import ASK_STATUS, Part, commands, read, write
-from drivers.i2c.port import I2cPort, explain, port_of
-from drivers.pca9685.bus import Pca9685Bus, Pca9685Params
-from drivers.pca9685.probe import probe
-from drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
-from drivers.pca9685.release import stop_pulses
-from drivers.serial.port import BlockingPort
-from drivers.serial.port_owner import refuse_owner
-from drivers.types import ServoSetup
-from robot.assemble import assemble
-from robot.choice import Choice
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.pca9685.bridge import build_bridge
-from sim_mock.pca9685.smbus import EmulatedSMBus
+from gazerig.config.load import shipped
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.i2c import port as i2c_port
+from gazerig.drivers.i2c.bridge import ASK_STATUS, Part, commands, read, write
+from gazerig.drivers.i2c.port import I2cPort, explain, port_of
+from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from gazerig.drivers.pca9685.probe import probe
+from gazerig.drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
+from gazerig.drivers.pca9685.release import stop_pulses
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.serial.port_owner import refuse_owner
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.pca9685.bridge import build_bridge
+from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
 
 SPEED_STEPS_S = 4000.0
 GRAIN = 20

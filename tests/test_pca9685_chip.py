@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import pytest
 from smbus2 import i2c_msg
 
-from sim_mock.pca9685.body import Body
-from sim_mock.pca9685.bridge import build_bridge
-from sim_mock.pca9685.chip import AI, MODE1, MODE2, PRESCALE, RESTART, SLEEP, START_S
-from sim_mock.pca9685.smbus import EmulatedSMBus
+from gazerig.sim_mock.pca9685.body import Body
+from gazerig.sim_mock.pca9685.bridge import build_bridge
+from gazerig.sim_mock.pca9685.chip import AI, MODE1, MODE2, PRESCALE, RESTART, SLEEP, START_S
+from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
 
 ADDRESS = 0x40
 LED0, ALL_LED = 0x06, 0xFA

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
-from drivers.types import Detections
-from gaze.angles import norm, sub
-from gaze.types import Bodies, Face, Percept, Vec3
-from robot.frames import CameraMount, CameraParams, PoseHistory
-from robot.kinematics import GeometryParams, Kinematics
-from robot.loop import Tick
-from robot.page.picking import USUAL_M, Picking, distance_m
-from robot.seeing.intrinsics import intrinsics_of_view, project
+from gazerig.drivers.types import Detections
+from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.types import Bodies, Face, Percept, Vec3
+from gazerig.robot.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.loop import Tick
+from gazerig.robot.page.picking import USUAL_M, Picking, distance_m
+from gazerig.robot.seeing.intrinsics import intrinsics_of_view, project
 
 CAMERA = CameraParams(position_mm=(20.0, 0.0, 45.0), horizontal_field_deg=70.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -6,21 +6,33 @@ from math import radians
 import numpy as np
 import pytest
 
-from drivers.types import DetectedFace, Picture
-from drivers.vision.face_mtcnn import MtcnnDetector
-from drivers.vision.face_params import FaceDetectorParams
-from gaze.angles import angle_between, rotation, sub
-from gaze.types import Angles3, Mat3, Vec3
-from robot.frames import CameraMount, CameraParams, PoseHistory
-from robot.seeing.face_pose import LANDMARKS_FACE_M, face_pose
-from robot.seeing.intrinsics import intrinsics_of_view, project
-from robot.seeing.perception import Perception
-from robot.seeing.tracks import Tracker, TrackParams
-from sim_mock.cameras.canvas import Picture3d, Sheet
-from sim_mock.cameras.draw_person import LOOKS, draw_body, draw_head, draw_person, draw_thing
-from sim_mock.cameras.draw_room import draw_room
-from sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams, draw_scene, smeared
-from sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.drivers.vision.face_mtcnn import MtcnnDetector
+from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.gaze.angles import angle_between, rotation, sub
+from gazerig.gaze.types import Angles3, Mat3, Vec3
+from gazerig.robot.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M, face_pose
+from gazerig.robot.seeing.intrinsics import intrinsics_of_view, project
+from gazerig.robot.seeing.perception import Perception
+from gazerig.robot.seeing.tracks import Tracker, TrackParams
+from gazerig.sim_mock.cameras.canvas import Picture3d, Sheet
+from gazerig.sim_mock.cameras.draw_person import (
+    LOOKS,
+    draw_body,
+    draw_head,
+    draw_person,
+    draw_thing,
+)
+from gazerig.sim_mock.cameras.draw_room import draw_room
+from gazerig.sim_mock.cameras.rendered import (
+    Exposure,
+    PixelCamera,
+    PixelCameraParams,
+    draw_scene,
+    smeared,
+)
+from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
 WIDTH, HEIGHT = 640, 400
 LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)

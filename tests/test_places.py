@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from config.schema import load_rig
-from robot.calibrate.calibration import CalibrationRefused, changes
-from robot.calibrate.places import angle_now, between, likely_angle, places
-from robot.joint import JointParams
+from gazerig.config.schema import load_rig
+from gazerig.robot.calibrate.calibration import CalibrationRefused, changes
+from gazerig.robot.calibrate.places import angle_now, between, likely_angle, places
+from gazerig.robot.joint import JointParams
 
 MAKER = load_rig("maker")
 PAN, LID = MAKER.joints["eyes_pan"], MAKER.joints["left_lower_lid"]

@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import pytest
 
-from config.schema import load_rig
-from drivers.errors import BusLost, ServoMissing
-from drivers.maestro.commands import Speech
-from robot.bringup.hobby_servo import SPEED_US_S, OneHobby
-from robot.bringup.single_joint import Stopped
-from robot.calibrate.calibration import CalibrationRefused
-from robot.calibrate.placing import LEAD_US, HobbyPlacer, Steered, by_places
-from robot.clock import SimulatedClock
-from robot.emulated_rig import emulated_lines
-from sim_mock.devices import build
-from sim_mock.in_process_port import InProcessPort
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import BusLost, ServoMissing
+from gazerig.drivers.maestro.commands import Speech
+from gazerig.robot.bringup.hobby_servo import SPEED_US_S, OneHobby
+from gazerig.robot.bringup.single_joint import Stopped
+from gazerig.robot.calibrate.calibration import CalibrationRefused
+from gazerig.robot.calibrate.placing import LEAD_US, HobbyPlacer, Steered, by_places
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.in_process_port import InProcessPort
 
 RIG = load_rig("maker")
 BOARD = RIG.bus.maestro
@@ -59,7 +59,7 @@ class Bench:
         finally:
             self.hobby.let_go()
 
-    # robot.calibrate.placing.Steerer
+    # gazerig.robot.calibrate.placing.Steerer
 
     def tell(self, line: str) -> None:
         self.said.append(line)

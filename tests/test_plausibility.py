@@ -3,7 +3,7 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.plausibility import AGREEING, DISTURBED_S, Plausibility
+from gazerig.drivers.plausibility import AGREEING, DISTURBED_S, Plausibility
 
 SPEED = 4000.0
 STEP = 47_835 * 4096 // 360

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, GroupSyncWrite, PacketHandler
 
-from drivers.errors import BusLost, PortError
-from drivers.serial import port as serial_port
-from drivers.serial.port import BlockingPort
-from sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.pty.client import PtyBus, PtyBuses
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.serial import port as serial_port
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.pty.client import PtyBus, PtyBuses
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = [(1, "xl330-m288", 2048), (2, "xl330-m288", 1000), (3, "xl330-m288", 3000)]
 DEVICE = {"kind": "dynamixel", "servos": SPECS}
@@ -44,7 +44,7 @@ def start_server(**options) -> subprocess.Popen:
         [
             sys.executable,
             "-m",
-            "sim_mock.pty.server",
+            "gazerig.sim_mock.pty.server",
             json.dumps({"buses": [{"device": DEVICE}], "until_eof": True}),
         ],
         cwd=ROOT,
@@ -79,7 +79,7 @@ def test_the_server_ignores_ctrl_c_and_heeds_sigterm():
 
 
 def test_the_server_loads_nothing_heavy():
-    code = "import sys, sim_mock.pty.server; print(*sys.modules)"
+    code = "import sys, gazerig.sim_mock.pty.server; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.split()

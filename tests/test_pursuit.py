@@ -5,9 +5,9 @@ from math import atan2, degrees, exp, radians
 import numpy as np
 import pytest
 
-from gaze.angles import angle_between, direction, norm, scale
-from gaze.pursuit import Pursuit, PursuitParams
-from gaze.types import Vec3
+from gazerig.gaze.angles import angle_between, direction, norm, scale
+from gazerig.gaze.pursuit import Pursuit, PursuitParams
+from gazerig.gaze.types import Vec3
 
 DT = 0.005
 EYE = (0.0, 0.0, 0.0)

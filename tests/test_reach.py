@@ -7,18 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from config.schema import Rig, load_rig
-from gaze.angles import norm, sub
-from gaze.types import Target, Vec3
-from robot.assemble import assemble, gaze_parts
-from robot.choice import Choice
-from robot.gaze_error import gaze_error
-from robot.loop import run
-from robot.orders import Jog, LookAt
-from robot.reach import look_reply
-from robot.reply import Reply
-from robot.rig_angles import limits
-from robot.types import JointAngles, JointState
+from gazerig.config.schema import Rig, load_rig
+from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.types import Target, Vec3
+from gazerig.robot.assemble import assemble, gaze_parts
+from gazerig.robot.choice import Choice
+from gazerig.robot.gaze_error import gaze_error
+from gazerig.robot.loop import run
+from gazerig.robot.orders import Jog, LookAt
+from gazerig.robot.reach import look_reply
+from gazerig.robot.reply import Reply
+from gazerig.robot.rig_angles import limits
+from gazerig.robot.types import JointAngles, JointState
 
 RIGS = ("desk", "feetech", "maker")
 DT_S = 0.01

@@ -13,25 +13,25 @@ import pytest
 import viser
 from typer.testing import CliRunner
 
-from config.schema import load_rig
-from config.text import rig_text
-from drivers.errors import SetupError
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.cli import replay as cli_replay
-from robot.clock import SimulatedClock
-from robot.loop import Tick, run
-from robot.orders import Ask
-from robot.page.ear import MESSAGE_BYTES
-from robot.page.link import PICTURE, REPLAY, SNAPSHOT, unpack
-from robot.page.replay import ReplayView, clock, event_list, strip
-from robot.recording.frames import Frames
-from robot.recording.gaze_angles import trace_of
-from robot.recording.player import State
-from robot.recording.read import RunRecording
-from robot.recording.recorder import Recorder
-from robot.recording.replay import Replay, introduction
-from robot.recording.run_info import RunInfo, versions
+from gazerig.config.schema import load_rig
+from gazerig.config.text import rig_text
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.cli import replay as cli_replay
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.orders import Ask
+from gazerig.robot.page.ear import MESSAGE_BYTES
+from gazerig.robot.page.link import PICTURE, REPLAY, SNAPSHOT, unpack
+from gazerig.robot.page.replay import ReplayView, clock, event_list, strip
+from gazerig.robot.recording.frames import Frames
+from gazerig.robot.recording.gaze_angles import trace_of
+from gazerig.robot.recording.player import State
+from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.replay import Replay, introduction
+from gazerig.robot.recording.run_info import RunInfo, versions
 
 SECONDS = 6.0
 RATE_HZ = 200.0

@@ -12,24 +12,24 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from config.schema import Rig, load_rig, load_walk
-from drivers.errors import SetupError
-from gaze.types import PARTS
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.cli.report import app, page_file
-from robot.loop import run
-from robot.report import bands, build, face, human
-from robot.report.about import About
-from robot.report.build import DRAWINGS, found, measured, report_of
-from robot.report.canvas import COLOURS, Shown, png
-from robot.report.compare import differences_of
-from robot.report.compare_page import compare_page
-from robot.report.gathered import Gathered, Gathering, Row
-from robot.report.gaze_events import Blink, Commanded, Fixation, Saccade
-from robot.report.measured import Finding, Measured, judged, mean, median
-from robot.report.model import own, published
-from robot.report.page import band_words, gauge, number, report_page
+from gazerig.config.schema import Rig, load_rig, load_walk
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.types import PARTS
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.cli.report import app, page_file
+from gazerig.robot.loop import run
+from gazerig.robot.report import bands, build, face, human
+from gazerig.robot.report.about import About
+from gazerig.robot.report.build import DRAWINGS, found, measured, report_of
+from gazerig.robot.report.canvas import COLOURS, Shown, png
+from gazerig.robot.report.compare import differences_of
+from gazerig.robot.report.compare_page import compare_page
+from gazerig.robot.report.gathered import Gathered, Gathering, Row
+from gazerig.robot.report.gaze_events import Blink, Commanded, Fixation, Saccade
+from gazerig.robot.report.measured import Finding, Measured, judged, mean, median
+from gazerig.robot.report.model import own, published
+from gazerig.robot.report.page import band_words, gauge, number, report_page
 
 RIG = load_rig("desk")
 SLOWER = replace(RIG, loop=replace(RIG.loop, rate_hz=100.0))

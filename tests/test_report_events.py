@@ -6,18 +6,18 @@ from statistics import median
 import numpy as np
 import pytest
 
-from config.schema import load_rig
-from gaze.lids import LidParams, Lids
-from gaze.saccade import Saccade as Jumps
-from gaze.saccade import SaccadeParams
-from gaze.types import Vec3
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.loop import Tick, run
-from robot.report.blink_finder import BlinkFinder
-from robot.report.gathered import Gathered, Gathering
-from robot.report.gaze_events import Blink, Fixation, GazeEvents, Saccade
-from robot.report.saccade_finder import Jump, SaccadeFinder
+from gazerig.config.schema import load_rig
+from gazerig.gaze.lids import LidParams, Lids
+from gazerig.gaze.saccade import Saccade as Jumps
+from gazerig.gaze.saccade import SaccadeParams
+from gazerig.gaze.types import Vec3
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.report.blink_finder import BlinkFinder
+from gazerig.robot.report.gathered import Gathered, Gathering
+from gazerig.robot.report.gaze_events import Blink, Fixation, GazeEvents, Saccade
+from gazerig.robot.report.saccade_finder import Jump, SaccadeFinder
 
 SECONDS = 40.0
 STEP_DEG = 360.0 / 4096.0

@@ -9,23 +9,23 @@ from typing import NamedTuple
 
 import pytest
 
-from config.schema import load_rig
-from config.text import rig_text, walk_text
-from drivers.errors import SetupError
-from drivers.types import BusHealth
-from gaze.types import Percept
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.loop import Tick, run
-from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune
-from robot.recording.moment import Engaged, Measured, Moment, Refused
-from robot.recording.played_back import PlayedBody
-from robot.recording.read import RunRecording
-from robot.recording.recorder import Recorder
-from robot.recording.rerun import Rerun, recorded_rig, rerun
-from robot.recording.run_info import RunEnd, RunInfo, as_text
-from robot.recording.run_writer import RunWriter
-from robot.session import leave
+from gazerig.config.schema import load_rig
+from gazerig.config.text import rig_text, walk_text
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import BusHealth
+from gazerig.gaze.types import Percept
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune
+from gazerig.robot.recording.moment import Engaged, Measured, Moment, Refused
+from gazerig.robot.recording.played_back import PlayedBody
+from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.rerun import Rerun, recorded_rig, rerun
+from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text
+from gazerig.robot.recording.run_writer import RunWriter
+from gazerig.robot.session import leave
 
 NECK_YAW = 6
 Asked = dict[int, tuple[Order, ...]]

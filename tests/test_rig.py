@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from desk import JOINTS
 
-from config.load import ConfigError, shipped, shipped_names
-from config.schema import Rig, load_rig, load_rules, load_walk
+from gazerig.config.load import ConfigError, shipped, shipped_names
+from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
 
 DESK = shipped("rigs", "desk")
 

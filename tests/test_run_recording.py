@@ -18,29 +18,29 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from typer.testing import CliRunner
 
-from config.load import load
-from config.schema import Rig, load_rig
-from config.text import rig_text, walk_text
-from drivers.errors import SetupError
-from drivers.types import BusHealth, Detections
-from gaze.scanpath import Walk
-from gaze.types import Bodies, Face, Percept
-from robot import stop_latch
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.cli.main import app
-from robot.cli.terminal import BAD_INPUT, FAULT, _writer
-from robot.loop import Tick, run
-from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune
-from robot.page.picture import encode
-from robot.recording import moment as moments
-from robot.recording import run_format as fmt
-from robot.recording.picture_encoder import PictureEncoder
-from robot.recording.read import BadRecording, RunRecording
-from robot.recording.recorder import Recorder
-from robot.recording.run_info import RunEnd, RunInfo, as_text, end_of, info_of, versions
-from robot.recording.viewer_messages import quaternion
-from robot.recording.writer_process import PIECE_BYTES
+from gazerig.config.load import load
+from gazerig.config.schema import Rig, load_rig
+from gazerig.config.text import rig_text, walk_text
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import BusHealth, Detections
+from gazerig.gaze.scanpath import Walk
+from gazerig.gaze.types import Bodies, Face, Percept
+from gazerig.robot import stop_latch
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.cli.main import app
+from gazerig.robot.cli.terminal import BAD_INPUT, FAULT, _writer
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune
+from gazerig.robot.page.picture import encode
+from gazerig.robot.recording import moment as moments
+from gazerig.robot.recording import run_format as fmt
+from gazerig.robot.recording.picture_encoder import PictureEncoder
+from gazerig.robot.recording.read import BadRecording, RunRecording
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, end_of, info_of, versions
+from gazerig.robot.recording.viewer_messages import quaternion
+from gazerig.robot.recording.writer_process import PIECE_BYTES
 
 STARTED = "2026-01-31T23:59:59.250000+00:00"
 
@@ -535,7 +535,7 @@ def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) ->
 def test_what_the_queue_cannot_hold_is_lost_and_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("robot.recording.writer_link.QUEUE_BYTES", 150_000)
+    monkeypatch.setattr("gazerig.robot.recording.writer_link.QUEUE_BYTES", 150_000)
     made = assembly()
     path = tmp_path / "lost.mcap"
     recorder = Recorder(path, info_for(made), lambda: BusHealth(0, 0, {}))

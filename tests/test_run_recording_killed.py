@@ -9,19 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from robot.recording.read import RunRecording
+from gazerig.robot.recording.read import RunRecording
 
 ROOT = Path(__file__).parents[1]
 
 RIG = """
 import sys
 from pathlib import Path
-from config.schema import load_rig
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.clock import RealClock
-from robot.recording.recorder import Recorder
-from robot.recording.run_info import RunInfo
+from gazerig.config.schema import load_rig
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.clock import RealClock
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunInfo
 
 made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
 info = RunInfo("desk", "robot", "a: 1", 0, 200.0, "2026-01-31T00:00:00+00:00")

@@ -5,7 +5,7 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from gaze.saccade import MinJerk, Saccade, SaccadeParams, min_jerk
+from gazerig.gaze.saccade import MinJerk, Saccade, SaccadeParams, min_jerk
 
 SACCADE = Saccade(SaccadeParams())
 

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
-from robot.safety.collisions import CollisionParams
-from robot.types import JointState
+from gazerig.robot.safety.collisions import CollisionParams
+from gazerig.robot.types import JointState
 
 ROOM = Path(__file__).parents[1] / "robot" / "safety"
 PARTS = ("motion", "stuck", "health", "collisions", "late_ticks", "guard")
@@ -37,23 +37,23 @@ def _source(name: str) -> tuple[str, CodeType]:
 
 def built(part: str = "", old: str = "", new: str = "") -> ModuleType:
     """Load the guard's files from source, one of them changed, beside the real ones."""
-    real = {name: sys.modules.get(f"robot.safety.{name}") for name in PARTS}
+    real = {name: sys.modules.get(f"gazerig.robot.safety.{name}") for name in PARTS}
     try:
         for name in PARTS:
             source, code = _source(name)
             if name == part:
                 assert source.count(old) == 1, f"{old!r} stands {source.count(old)} times"
                 code = compile(source.replace(old, new), f"{name}.py", "exec")
-            module = ModuleType(f"robot.safety.{name}")
-            sys.modules[f"robot.safety.{name}"] = module
+            module = ModuleType(f"gazerig.robot.safety.{name}")
+            sys.modules[f"gazerig.robot.safety.{name}"] = module
             exec(code, module.__dict__)
         return module
     finally:
         for name, module_before in real.items():
             if module_before is not None:
-                sys.modules[f"robot.safety.{name}"] = module_before
+                sys.modules[f"gazerig.robot.safety.{name}"] = module_before
             else:
-                del sys.modules[f"robot.safety.{name}"]
+                del sys.modules[f"gazerig.robot.safety.{name}"]
 
 
 class Bench:

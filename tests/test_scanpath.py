@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from config.load import load, shipped
-from gaze.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalised
-from gaze.scanpath_models import MarkovWalk
-from gaze.types import PARTS, Bodies, Face, Percept, Target
+from gazerig.config.load import load, shipped
+from gazerig.gaze.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalised
+from gazerig.gaze.scanpath_models import MarkovWalk
+from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 NO_FLOOR = ScanpathParams(shortest_dwell_ms=0.0)

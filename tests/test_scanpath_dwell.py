@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from config.load import load, shipped
-from gaze.scanpath import Walk
-from gaze.scanpath_dwell import dwell_law
+from gazerig.config.load import load, shipped
+from gazerig.gaze.scanpath import Walk
+from gazerig.gaze.scanpath_dwell import dwell_law
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 TABLE_1 = list(zip(WALK.order, WALK.dwell_mean_s, WALK.dwell_sd_s, strict=True))

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from config.load import load, shipped
-from gaze.scanpath import ScanpathParams, Walk, markov_walk, normalised
-from gaze.scanpath_fit import FitParams, Fixation, fit_walk
-from gaze.types import PARTS
+from gazerig.config.load import load, shipped
+from gazerig.gaze.scanpath import ScanpathParams, Walk, markov_walk, normalised
+from gazerig.gaze.scanpath_fit import FitParams, Fixation, fit_walk
+from gazerig.gaze.types import PARTS
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from config.load import load, shipped
-from gaze.angles import add, angle_between, norm, rotation, scale, sub, yaw_pitch
-from gaze.angles import rotate_back as seen_from
-from gaze.scanpath import (
+from gazerig.config.load import load, shipped
+from gazerig.gaze.angles import add, angle_between, norm, rotation, scale, sub, yaw_pitch
+from gazerig.gaze.angles import rotate_back as seen_from
+from gazerig.gaze.scanpath import (
     Scanpath,
     ScanpathParams,
     Walk,
@@ -19,7 +19,7 @@ from gaze.scanpath import (
     row_sums_note,
     without_refixations,
 )
-from gaze.types import PARTS, Face, Percept, Target, Vec3
+from gazerig.gaze.types import PARTS, Face, Percept, Target, Vec3
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 HEAD: Vec3 = (0.02, -0.01, 0.25)

@@ -5,10 +5,10 @@ from math import atan2, degrees, dist, hypot
 import numpy as np
 import pytest
 
-from sim_mock.scenes.boxing import HALF_FIELD_RAD, HEAD_M, Boxing
-from sim_mock.scenes.face_to_face import FaceToFace
-from sim_mock.scenes.registry import scenes
-from sim_mock.scenes.scene import Event, Key, Scene, Thing, between, there_and_back
+from gazerig.sim_mock.scenes.boxing import HALF_FIELD_RAD, HEAD_M, Boxing
+from gazerig.sim_mock.scenes.face_to_face import FaceToFace
+from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.sim_mock.scenes.scene import Event, Key, Scene, Thing, between, there_and_back
 
 NAMES = ("boxing", "face-to-face", "sits-still", "steps-aside", "visitor", "walks-past")
 DT_S = 0.01

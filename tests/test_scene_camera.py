@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from drivers.types import Detections
-from gaze.types import Vec3
-from robot.frames import CameraMount, CameraParams
-from sim_mock.cameras.detections import SceneCamera, SceneCameraParams
-from sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.drivers.types import Detections
+from gazerig.gaze.types import Vec3
+from gazerig.robot.frames import CameraMount, CameraParams
+from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -6,9 +6,9 @@ import time
 import pytest
 from sts_bench import ALL, PING, READ, SYNC_READ, SYNC_WRITE, WRITE, Bench, instruction, packets
 
-from sim_mock.devices import FeetechLine
-from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.devices import FeetechLine
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 FOUND = {1: 1284, 2: 1284}

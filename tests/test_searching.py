@@ -2,8 +2,8 @@
 
 import pytest
 
-from drivers.dynamixel.discovery import COMMON_FIRST
-from robot.bringup.searching import (
+from gazerig.drivers.dynamixel.discovery import COMMON_FIRST
+from gazerig.robot.bringup.searching import (
     BOARD_RATES,
     Looked,
     found_of,
@@ -11,11 +11,11 @@ from robot.bringup.searching import (
     plan,
     search,
 )
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.feetech.chain import build_feetech
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.maestro.board import build_board
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import build_board
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 ALL = known_kinds("all")
 FEW = (1_000_000, 57_600)

@@ -10,9 +10,9 @@ import pytest
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
 from serial.tools import list_ports
 
-from drivers.errors import BusLost, PortError
-from drivers.serial import port as serial_port
-from drivers.serial.port import BlockingPort, explain
+from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.serial import port as serial_port
+from gazerig.drivers.serial.port import BlockingPort, explain
 
 
 @pytest.fixture

@@ -4,8 +4,8 @@ import struct
 
 import pytest
 
-from sim_mock.dynamixel.servo import DynamixelServo
-from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 
 class Bench:

@@ -7,9 +7,9 @@ from fastcrc.crc16 import umts
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
-from sim_mock.dynamixel.packets import status
-from sim_mock.smart_servo.physics import Quirks, ServoSpec
+from gazerig.sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
+from gazerig.sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 
 ALERT = 0x80
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from drivers.dynamixel.control_table import MODELS, indirect_blocks, registers_of
-from sim_mock.dynamixel.memory import ACCESS, DATA_LENGTH, DATA_RANGE, DynamixelMemory
-from sim_mock.dynamixel.servo import DynamixelServo
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks, registers_of
+from gazerig.sim_mock.dynamixel.memory import ACCESS, DATA_LENGTH, DATA_RANGE, DynamixelMemory
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 EVERY = pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
 

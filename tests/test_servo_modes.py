@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_mock.dynamixel.servo import DynamixelServo
-from sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 SIZE = {11: 1, 36: 2, 38: 2, 44: 4, 62: 1, 64: 1, 98: 1, 100: 2, 102: 2, 104: 4, 108: 4, 112: 4}
 

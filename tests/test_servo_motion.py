@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.dynamixel.control_table import MODELS
-from sim_mock.smart_servo.motor import LIMP, Loop, Shaft
-from sim_mock.smart_servo.physics import Physics, checked
+from gazerig.drivers.dynamixel.control_table import MODELS
+from gazerig.sim_mock.smart_servo.motor import LIMP, Loop, Shaft
+from gazerig.sim_mock.smart_servo.physics import Physics, checked
 
 DEG = 4096.0 / 360.0
 P, D = 800 / 128 / 885, 800 / 16 / 885

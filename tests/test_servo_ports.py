@@ -10,11 +10,11 @@ from dynamixel_sdk import (
     PacketHandler,
 )
 
-from drivers.errors import BusLost, PortError
-from sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine, build
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.errors import BusLost, PortError
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine, build
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 STEADY_STEPS = 12
 """Friction keeps a servo with factory gains so far from its goal."""

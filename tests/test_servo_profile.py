@@ -4,7 +4,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_mock.smart_servo.profile import RECTANGLE, STEP, TRAPEZOID, TRIANGLE, Profile, SpeedProfile
+from gazerig.sim_mock.smart_servo.profile import (
+    RECTANGLE,
+    STEP,
+    TRAPEZOID,
+    TRIANGLE,
+    Profile,
+    SpeedProfile,
+)
 
 
 def path(made: Profile, most: int = 200_000, stride: int = 1) -> list[float]:

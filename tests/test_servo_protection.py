@@ -2,8 +2,8 @@
 
 import pytest
 
-from sim_mock.dynamixel.servo import DynamixelServo
-from sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 
 class Bench:

@@ -2,8 +2,8 @@
 
 import os
 
-from drivers.dynamixel.control_table import BAUD_RATES
-from drivers.dynamixel.discovery import (
+from gazerig.drivers.dynamixel.control_table import BAUD_RATES
+from gazerig.drivers.dynamixel.discovery import (
     COMMON_FIRST,
     Found,
     ask_one,
@@ -14,7 +14,7 @@ from drivers.dynamixel.discovery import (
     ping,
     scan,
 )
-from drivers.serial.list_ports import (
+from gazerig.drivers.serial.list_ports import (
     Host,
     access,
     holders,
@@ -23,9 +23,9 @@ from drivers.serial.list_ports import (
     serial_ports,
     set_latency,
 )
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = (
     ServoSpec(9, "xc330-m288", 2100, 53),

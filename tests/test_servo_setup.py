@@ -2,18 +2,18 @@
 
 import pytest
 
-from drivers.dynamixel.control_table import BAUD_RATES
-from drivers.dynamixel.discovery import COMMON_FIRST, Found
-from drivers.errors import PortError, ServoFault, ServoMissing
-from drivers.types import ServoSetup
-from robot.bringup.servo_families import DYNAMIXEL, FEETECH
-from robot.bringup.servo_reboot import Standing, restart
-from robot.bringup.servo_setup import assign, find_alone, search_order
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.dynamixel.packets import status
-from sim_mock.feetech.chain import build_feetech
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.control_table import BAUD_RATES
+from gazerig.drivers.dynamixel.discovery import COMMON_FIRST, Found
+from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH
+from gazerig.robot.bringup.servo_reboot import Standing, restart
+from gazerig.robot.bringup.servo_setup import assign, find_alone, search_order
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 MODELS = {"dynamixel": "xc330-m288", "feetech": "sts3215"}

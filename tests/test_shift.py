@@ -4,8 +4,8 @@ from math import radians
 
 import pytest
 
-from gaze.pursuit import Slip
-from gaze.shift import ShiftParams, ShiftRule
+from gazerig.gaze.pursuit import Slip
+from gazerig.gaze.shift import ShiftParams, ShiftRule
 
 
 def slip(error_deg: float, slip_deg_s: float = 0.0) -> Slip:

@@ -5,20 +5,20 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.errors import BusLost, ServoFault, ServoMissing, SetupError
-from robot.bringup.servo_families import kind_of
-from robot.bringup.single_joint import SingleJoint, Stopped
-from robot.bringup.smart_servo import SmartServo
-from robot.calibrate.calibrating import by_hand, by_motion
-from robot.calibrate.calibration import CalibrationRefused
-from robot.calibrate.placing import HandPlacer, Steered, by_places
-from robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
-from robot.clock import SimulatedClock
-from robot.joint import JointParams
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.feetech.chain import build_feetech
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing, SetupError
+from gazerig.robot.bringup.servo_families import kind_of
+from gazerig.robot.bringup.single_joint import SingleJoint, Stopped
+from gazerig.robot.bringup.smart_servo import SmartServo
+from gazerig.robot.calibrate.calibrating import by_hand, by_motion
+from gazerig.robot.calibrate.calibration import CalibrationRefused
+from gazerig.robot.calibrate.placing import HandPlacer, Steered, by_places
+from gazerig.robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.joint import JointParams
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0)
@@ -73,7 +73,7 @@ class Bench:
         self.port.faults.command(text.format(id=self.id))
         self.clock.sleep_until(self.clock.now_s() + 0.1)
 
-    # robot.calibrate.calibrating.Person
+    # gazerig.robot.calibrate.calibrating.Person
 
     def tell(self, line: str) -> None:
         self.said.append(line)

@@ -9,15 +9,15 @@ import pytest
 from desk import JOINTS
 from six_joints import SIX
 
-from config.schema import Rig, load_rig
-from gaze.angles import angle_between
-from robot.assemble import Assembly, assemble, gaze_parts
-from robot.choice import Choice
-from robot.loop import Tick, run
-from robot.page.link import MESSAGE_BYTES, pack, unpack
-from robot.page.snapshot import Said, ShownRig, Snapshots, snapshot
-from robot.report.gaze_events import Blink, Fixation, GazeEvents, Saccade
-from robot.types import SeenBlink, SeenFixation, SeenSaccade, Snapshot
+from gazerig.config.schema import Rig, load_rig
+from gazerig.gaze.angles import angle_between
+from gazerig.robot.assemble import Assembly, assemble, gaze_parts
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.page.link import MESSAGE_BYTES, pack, unpack
+from gazerig.robot.page.snapshot import Said, ShownRig, Snapshots, snapshot
+from gazerig.robot.report.gaze_events import Blink, Fixation, GazeEvents, Saccade
+from gazerig.robot.types import SeenBlink, SeenFixation, SeenSaccade, Snapshot
 
 RATE_HZ = 200.0
 TICKS_BETWEEN = 8

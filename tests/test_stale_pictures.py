@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
-from config.schema import Rig, load_rig
-from drivers.types import Camera, Detections
-from gaze.angles import angle_between, sub
-from gaze.types import Vec3
-from robot import assemble as assembling
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.loop import Tick, run
-from sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.types import Camera, Detections
+from gazerig.gaze.angles import angle_between, sub
+from gazerig.gaze.types import Vec3
+from gazerig.robot import assemble as assembling
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
+from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
 GONE_S, BACK_S, END_S = 2.0, 9.0, 12.0
 LOST, FOUND = "camera lost: trying it again", "camera back after 7.0 s"

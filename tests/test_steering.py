@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from config.load import shipped
-from config.schema import load_rig
-from drivers.errors import SetupError
-from robot.bringup.single_joint import Stopped
-from robot.cli.person import Lines
-from robot.cli.steering import SteeringPerson
+from gazerig.config.load import shipped
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.bringup.single_joint import Stopped
+from gazerig.robot.cli.person import Lines
+from gazerig.robot.cli.steering import SteeringPerson
 
 ROOT = Path(__file__).parents[1]
 
@@ -77,7 +77,7 @@ class Terminal:
 
     def __init__(self, *words: str) -> None:
         self.said = ""
-        code = "from robot.cli.main import main; main()"
+        code = "from gazerig.robot.cli.main import main; main()"
         self.pid, self.fd = pty.fork()
         if self.pid == 0:
             os.chdir(ROOT)

@@ -6,12 +6,12 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from config.schema import load_rig
-from robot import assemble as assembling
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.loop import Tick, run
-from sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.config.schema import load_rig
+from gazerig.robot import assemble as assembling
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
+from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
 SECONDS = 3.0
 

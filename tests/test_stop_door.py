@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from test_cli_face import DESK, PATIENCE_S, Sitting
 
-from drivers.errors import DriverError
-from robot.remote.running_rig import Refused, RunningRig
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.remote.running_rig import Refused, RunningRig
 
 
 def goes_on(running: RunningRig) -> None:

@@ -9,14 +9,14 @@ import pytest
 from bus_kinds import KINDS, Twin, in_process
 from mixed_rig import mixed_text
 
-import robot.assemble
-from config.schema import Rig, load_rig
-from drivers.errors import BusLost
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.loop import Tick, run
-from robot.orders import Resume, Stop
-from sim_mock.device import Device
+import gazerig.robot.assemble as assemble_module
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import BusLost
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.orders import Resume, Stop
+from gazerig.sim_mock.device import Device
 
 RIGS = ("desk", "feetech", "maker", "mixed")
 
@@ -123,14 +123,14 @@ def machine(
 ) -> Iterator[Machine]:
     rig = _rig(request.param, tmp_path)
     devices: dict[str, Device] = {}
-    build: Callable[..., Device] = robot.assemble.build
+    build: Callable[..., Device] = assemble_module.build
 
     def kept(line: Any, now_s: Callable[[], float]) -> Device:
         device = build(line, now_s)
         devices[f"{len(devices)}"] = device
         return device
 
-    monkeypatch.setattr(robot.assemble, "build", kept)
+    monkeypatch.setattr(assemble_module, "build", kept)
     made = assemble(rig, Choice(mock=True, fast=True, seed=2, scene="face-to-face"))
     machine = Machine(made, devices)
     yield machine

@@ -20,11 +20,11 @@ from sts_bench import (
     packets,
 )
 
-from drivers.feetech import memory_table as feetech_table
-from sim_mock.device import Device
-from sim_mock.feetech import memory as sts_memory
-from sim_mock.feetech.chain import build_feetech
-from sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.drivers.feetech import memory_table as feetech_table
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.feetech import memory as sts_memory
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 FACTORY = {
     2: (1, 0), 3: (2, 777), 5: (1, 1), 6: (1, 0), 8: (1, 1), 9: (2, 0), 11: (2, 4095), 13: (1, 70),

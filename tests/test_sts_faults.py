@@ -3,7 +3,7 @@
 import pytest
 from sts_bench import ALL, PING, READ, SYNC_READ, Bench, instruction
 
-from sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 VOLTAGE, ANGLE, HEAT, CURRENT, OVERLOAD = 1, 2, 4, 8, 32
 

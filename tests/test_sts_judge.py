@@ -8,9 +8,9 @@ import time
 
 import pytest
 
-from sim_mock.devices import FeetechLine
-from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.devices import FeetechLine
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 IDS = [1, 2, 3]

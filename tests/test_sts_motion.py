@@ -3,7 +3,7 @@
 import pytest
 from sts_bench import CALIBRATE, RESET_TURNS, WRITE, Bench
 
-from sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 SMOOTH = Physics(coulomb_share=0.0, viscous_share=0.0, play_deg=0.0, supply_ohm=0.0)
 STEADY_STEPS = 2

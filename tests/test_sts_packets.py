@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sts_bench import Bench, instruction
 
-from sim_mock.feetech.packets import FeetechFraming, checksum, signed, status, unsigned
+from gazerig.sim_mock.feetech.packets import FeetechFraming, checksum, signed, status, unsigned
 
 MAKERS = {
     "ping": "FF FF 01 02 01 FB",

@@ -10,12 +10,12 @@ import typer
 from test_cli_servos import SMALL
 from typer.testing import CliRunner
 
-from config.schema import load_rig
-from robot.cli.main import app
-from robot.cli.suggestions import completed, speaking_of
-from robot.cli.terminal import _writer
-from robot.emulated_rig import emulated_lines
-from sim_mock.pty.client import PtyBus
+from gazerig.config.schema import load_rig
+from gazerig.robot.cli.main import app
+from gazerig.robot.cli.suggestions import completed, speaking_of
+from gazerig.robot.cli.terminal import _writer
+from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.sim_mock.pty.client import PtyBus
 
 DESK = Path(__file__).parents[1] / "config/rigs/desk.yaml"
 GIVEN = {"rig": "my rig.yaml", "port": "/dev/ttyACM3", "mock": False}

@@ -6,9 +6,9 @@ import select
 
 import pytest
 
-from sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
-from sim_mock.pty.line import BusSettings, TerminalLine
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
+from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 PING, PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
 STS = FeetechLine((ServoSpec(1, "sts3215"),))

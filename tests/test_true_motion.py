@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from mixed_rig import mixed_text
 from true_shafts import Bench, Judge, restless
 
-from config.schema import Rig, load_rig
-from robot.rig_angles import limits
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.rig_angles import limits
 
 NAMES = ("desk", "feetech", "maker", "mixed")
 BEYOND_DEG = 0.5

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from config.knobs import values
-from config.load import ConfigError
-from config.schema import load_rig
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.orders import Order, Tune
-from robot.tuning import Tuning
+from gazerig.config.knobs import values
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.orders import Order, Tune
+from gazerig.robot.tuning import Tuning
 
 DESK = Path("config/rigs/desk.yaml")
 NOW = datetime(2026, 1, 31, 23, 59, 59)
@@ -295,8 +295,8 @@ def test_a_dragged_slider_reads_no_file_and_makes_no_knob_anew(
     def read(*words: object) -> None:
         raise AssertionError(f"read: {words}")
 
-    monkeypatch.setattr("config.rig_files.layers_of", read)
-    monkeypatch.setattr("config.rig_files.load_rig", read)
+    monkeypatch.setattr("gazerig.config.rig_files.layers_of", read)
+    monkeypatch.setattr("gazerig.config.rig_files.load_rig", read)
     for step in range(3):
         bench.tuning.set({"gaze.lids.close_ms": 90.0 + step})
         assert bench.tuning.files() == files and bench.tuning.knobs() is knobs

@@ -10,15 +10,15 @@ from pathlib import Path
 import pytest
 from command_line import typed
 
-from config.load import ConfigError
-from config.schema import load_rig, load_rules, load_walk
-from drivers.errors import SetupError
-from drivers.file_input import FileTooLarge, NotRegularFile, read_limited
-from drivers.file_output import output_file, output_text, refuse_existing, write_file
-from robot.gaze_recording import read_recording
-from robot.heatmap import face_from
-from robot.remote.file_watch import look
-from robot.report.written import write_all
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig, load_rules, load_walk
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
+from gazerig.drivers.file_output import output_file, output_text, refuse_existing, write_file
+from gazerig.robot.gaze_recording import read_recording
+from gazerig.robot.heatmap import face_from
+from gazerig.robot.remote.file_watch import look
+from gazerig.robot.report.written import write_all
 
 SECRET = "root:$6$abcdefgh:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n"
 

@@ -4,8 +4,8 @@ from math import degrees, inf, radians
 
 import pytest
 
-from gaze.angles import angle_between, compose, direction, rotate, rotate_back, rotation
-from gaze.vestibular import (
+from gazerig.gaze.angles import angle_between, compose, direction, rotate, rotate_back, rotation
+from gazerig.gaze.vestibular import (
     Canals,
     distance_m,
     gate,

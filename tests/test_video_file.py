@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera.video_file import VideoFile
-from drivers.camera.video_reader import usable_rate_hz
-from drivers.errors import CameraError
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.camera.video_reader import usable_rate_hz
+from gazerig.drivers.errors import CameraError
 
 SHARED = Path(__file__).parents[2] / "shared"
 FILM_FILE = SHARED / "media" / "Megamind.avi"
@@ -178,8 +178,8 @@ def test_reader_is_silent_beside_the_error(tmp_path, film_file):
     (tmp_path / "cut.avi").write_bytes(content[: len(content) // 2])
     (tmp_path / "x.mp4").write_bytes(bytes(4) + b"ftypisom" + bytes(500))
     code = (
-        "import sys; from drivers.errors import CameraError\n"
-        "from drivers.camera.video_file import *\n"
+        "import sys; from gazerig.drivers.errors import CameraError\n"
+        "from gazerig.drivers.camera.video_file import *\n"
         "for path in sys.argv[1:]:\n"
         "    try: VideoFile(path).open()\n"
         "    except CameraError as error: print(error)\n"

@@ -13,19 +13,19 @@ from typing import Any
 import pytest
 from attack.ways_out import START, attack, bench
 
-import robot.assemble
-from config.schema import load_rig
-from drivers.errors import BusLost, SetupError
-from robot import session
-from robot.assemble import Assembly, assemble
-from robot.cli.line_writer import LineWriter
-from robot.cli.run import had_faults
-from robot.interrupts import SAME_REQUEST_S, Interrupts
-from robot.loop import Robot
-from robot.power_down import PowerDown
-from robot.summary import Summary
-from sim_mock.device import Device
-from sim_mock.devices import build
+import gazerig.robot.assemble as assemble_module
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import BusLost, SetupError
+from gazerig.robot import session
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.cli.line_writer import LineWriter
+from gazerig.robot.cli.run import had_faults
+from gazerig.robot.interrupts import SAME_REQUEST_S, Interrupts
+from gazerig.robot.loop import Robot
+from gazerig.robot.power_down import PowerDown
+from gazerig.robot.summary import Summary
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.devices import build
 
 # --- the door by itself
 
@@ -246,7 +246,7 @@ def devices(monkeypatch: pytest.MonkeyPatch) -> list[Device]:
         made.append(build(*words))
         return made[-1]
 
-    monkeypatch.setattr(robot.assemble, "build", built)
+    monkeypatch.setattr(assemble_module, "build", built)
     return made
 
 
@@ -372,7 +372,7 @@ def test_ctrl_c_in_the_first_second_is_one_line() -> None:
         )  # fmt: skip
         os.close(writes)
         # In the middle of the imports.
-        assert any("config.load" in line or "typer" in line for line in stderr)
+        assert any("gazerig.config.load" in line or "typer" in line for line in stderr)
         process.send_signal(signal.SIGINT)
         err = stderr.read()
         assert process.wait(60) == 130 and "Traceback" not in err

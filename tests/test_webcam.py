@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera.params import WebcamParams
-from drivers.camera.webcam import Webcam
-from drivers.errors import CameraError
+from gazerig.drivers.camera.params import WebcamParams
+from gazerig.drivers.camera.webcam import Webcam
+from gazerig.drivers.errors import CameraError
 
 GO_ON = threading.Event()
 

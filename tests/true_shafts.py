@@ -13,20 +13,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import robot.assemble
-from config.schema import Rig
-from robot.assemble import Assembly, assemble
-from robot.body import Body
-from robot.choice import Choice
-from robot.clock import SimulatedClock
-from robot.emulated_rig import emulated_lines, place_of
-from robot.rig_angles import limits, park_rad
-from robot.rig_bus import rig_bus
-from robot.safety.guard import Guard
-from robot.types import JointAngles
-from sim_mock.device import Device
-from sim_mock.devices import build
-from sim_mock.in_process_port import InProcessPort
+import gazerig.robot.assemble as assemble_module
+from gazerig.config.schema import Rig
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.body import Body
+from gazerig.robot.choice import Choice
+from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.emulated_rig import emulated_lines, place_of
+from gazerig.robot.rig_angles import limits, park_rad
+from gazerig.robot.rig_bus import rig_bus
+from gazerig.robot.safety.guard import Guard
+from gazerig.robot.types import JointAngles
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.in_process_port import InProcessPort
 
 MS_S = 0.001
 SPEED_MS, ACCEL_MS = 5, 10
@@ -164,7 +164,7 @@ def hardest(angles: NDArray[np.float64], over_ms: int) -> NDArray[np.float64]:
 def looked_at(rig: Rig, choice: Choice) -> Iterator[tuple[Assembly, Shafts]]:
     """Assemble a rig whose true shafts are looked at."""
     shafts = Shafts(rig)
-    was = robot.assemble.SimulatedClock, robot.assemble.build
+    was = assemble_module.SimulatedClock, assemble_module.build
 
     def built(line: object, now_s: Callable[[], float]) -> Device:
         device = build(line, now_s)  # type: ignore[arg-type]
@@ -173,11 +173,11 @@ def looked_at(rig: Rig, choice: Choice) -> Iterator[tuple[Assembly, Shafts]]:
         return device
 
     lines = emulated_lines(rig)
-    robot.assemble.SimulatedClock, robot.assemble.build = (lambda: shafts), built  # type: ignore
+    assemble_module.SimulatedClock, assemble_module.build = (lambda: shafts), built  # type: ignore
     try:
         made = assemble(rig, choice)
     finally:
-        robot.assemble.SimulatedClock, robot.assemble.build = was  # type: ignore[misc]
+        assemble_module.SimulatedClock, assemble_module.build = was  # type: ignore[misc]
     try:
         yield made, shafts
     finally:

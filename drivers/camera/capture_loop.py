@@ -3,11 +3,11 @@
 import threading
 from collections.abc import Callable
 
-from drivers.camera.frame_analysis import Motion, look
-from drivers.camera.params import CameraCareParams
-from drivers.camera.source import PictureSource, Shot
-from drivers.errors import CameraError
-from drivers.types import Detections, FaceDetector
+from gazerig.drivers.camera.frame_analysis import Motion, look
+from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.source import PictureSource, Shot
+from gazerig.drivers.errors import CameraError
+from gazerig.drivers.types import Detections, FaceDetector
 
 LOST, BACK = "camera lost", "camera back"
 """How lines begin that tell of a source that is tried again, and of its return."""
@@ -46,7 +46,7 @@ class CameraWatch:
         """Open the source and begin at picture 1.
 
         Raises:
-            drivers.errors.CameraError: the source cannot be opened.
+            CameraError: the source cannot be opened.
         """
         self._source.open()
         self._counted = self._number = 0
@@ -55,7 +55,7 @@ class CameraWatch:
         """Wait for the next picture and look at it; None where ``stop`` was set meanwhile.
 
         Raises:
-            drivers.errors.CameraError: the source is gone for good.
+            CameraError: the source is gone for good.
         """
         shot = self._take(stop)
         if shot is None:
@@ -76,7 +76,7 @@ class CameraWatch:
         detector: makes another one; motion: gives what finds motion from what did; None: as is
 
         Raises:
-            drivers.errors.SetupError: the detector cannot be made; the old one goes on.
+            SetupError: the detector cannot be made; the old one goes on.
         """
         if motion is not None:
             self._motion = motion(self._motion)

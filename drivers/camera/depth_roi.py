@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.types import Depth
+from gazerig.drivers.types import Depth
 
 _MM_PER_M = 1000.0
 # Nothing nearer is measured by any stereo camera with a baseline of a hand's breadth.

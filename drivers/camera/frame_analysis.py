@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from drivers.camera.source import Shot
-from drivers.types import Detections, FaceDetector, MovingBlob
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import Detections, FaceDetector, MovingBlob
 
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]
 """Finds what moves, from one picture to the next."""

@@ -5,14 +5,14 @@ from collections.abc import Callable
 from datetime import timedelta
 from typing import Any
 
-from drivers.camera.clock_sync import ClockBridge
-from drivers.camera.oak_discovery import find_oak
-from drivers.camera.oak_messages import depth_of, faces_of, lens_of, picture_of
-from drivers.camera.oak_params import OakParams
-from drivers.camera.oak_pipeline import COLOUR, MakeNodes, device_nodes, joined
-from drivers.camera.oak_sdk import load_depthai
-from drivers.camera.source import Shot
-from drivers.errors import CameraError
+from gazerig.drivers.camera.clock_sync import ClockBridge
+from gazerig.drivers.camera.oak_discovery import find_oak
+from gazerig.drivers.camera.oak_messages import depth_of, faces_of, lens_of, picture_of
+from gazerig.drivers.camera.oak_params import OakParams
+from gazerig.drivers.camera.oak_pipeline import COLOUR, MakeNodes, device_nodes, joined
+from gazerig.drivers.camera.oak_sdk import load_depthai
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.errors import CameraError
 
 _SLICE = timedelta(milliseconds=100)  # so long may a wish to stop be unheard
 # The camera's stamp in host time is believed if it is no older than this, nor of the future.
@@ -51,7 +51,7 @@ class OakSource:
         """Find the camera, start it, and make sure of its rate.
 
         Raises:
-            drivers.errors.CameraError: there is none, it may not be used, is busy, or hangs on
+            CameraError: there is none, it may not be used, is busy, or hangs on
                 USB 2 where that is refused.
         """
         self.close()
@@ -80,7 +80,7 @@ class OakSource:
         """Wait for the next picture; its time is the middle of its exposure.
 
         Raises:
-            drivers.errors.CameraError: the camera is not open, was unplugged or is silent.
+            CameraError: the camera is not open, was unplugged or is silent.
         """
         if self._queue is None:
             raise CameraError("the OAK camera is not open: call open() before taking")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from drivers.errors import CameraError
+from gazerig.drivers.errors import CameraError
 
 UDEV_RULE = 'SUBSYSTEM=="usb", ATTRS{idVendor}=="03e7", MODE="0666"'
 """What lets everybody use the camera (Luxonis documentation, troubleshooting)."""
@@ -26,7 +26,7 @@ def find_oak(dai: Any, wanted: str = "", usb: Path = Path("/sys/bus/usb/devices"
     wanted: device id or name (USB port, IP address); usb: where the system lists USB devices
 
     Raises:
-        drivers.errors.CameraError: there is none, or it cannot be used; the message says why.
+        CameraError: there is none, or it cannot be used; the message says why.
     """
     free = list(dai.Device.getAllAvailableDevices())
     for info in free:

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from drivers.camera.depth_roi import metres, resized
-from drivers.camera.oak_pipeline import COLOUR, DEPTH, FACES
-from drivers.camera.source import bgr
-from drivers.types import Depth, DetectedFace, Picture, PictureLens
+from gazerig.drivers.camera.depth_roi import metres, resized
+from gazerig.drivers.camera.oak_pipeline import COLOUR, DEPTH, FACES
+from gazerig.drivers.camera.source import bgr
+from gazerig.drivers.types import Depth, DetectedFace, Picture, PictureLens
 
 _LANDMARKS = 5
 # A frame that never saw a lens carries the unit matrix.

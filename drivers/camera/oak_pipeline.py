@@ -9,8 +9,8 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from drivers.camera.oak_params import OakParams
-from drivers.errors import CameraError
+from gazerig.drivers.camera.oak_params import OakParams
+from gazerig.drivers.errors import CameraError
 
 COLOUR, DEPTH, FACES = "colour", "depth", "faces"
 """Names of the messages in a group."""
@@ -37,7 +37,7 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
     """Make the nodes on the camera: colour without distortion, aligned depth, faces.
 
     Raises:
-        drivers.errors.CameraError: the face model cannot be read.
+        CameraError: the face model cannot be read.
     """
     socket = dai.CameraBoardSocket
     camera = pipeline.create(dai.node.Camera).build(socket.CAM_A)
@@ -60,7 +60,7 @@ def read_archive(dai: Any, path: str) -> Any:
     """Read a network for the camera from a local NNArchive.
 
     Raises:
-        drivers.errors.CameraError: there is no such file, or it is no archive.
+        CameraError: there is no such file, or it is no archive.
     """
     file = Path(path).expanduser()
     if not file.is_file():

@@ -8,14 +8,14 @@ wants its log sets DEPTHAI_LEVEL.
 import os
 from typing import Any
 
-from drivers.errors import CameraError
+from gazerig.drivers.errors import CameraError
 
 
 def load_depthai() -> Any:
     """Import depthai and give the module.
 
     Raises:
-        drivers.errors.CameraError: it is not installed or does not start here.
+        CameraError: it is not installed or does not start here.
     """
     os.environ["DEPTHAI_TELEMETRY"] = "0"
     os.environ.setdefault("DEPTHAI_LEVEL", "off")

@@ -5,11 +5,11 @@ from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 
-from drivers.camera.recording_reader import Recording
-from drivers.camera.source import Shot
-from drivers.camera.video_pacing import FilmPace
-from drivers.camera.video_timestamps import FilmTimes
-from drivers.errors import CameraError
+from gazerig.drivers.camera.recording_reader import Recording
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.video_pacing import FilmPace
+from gazerig.drivers.camera.video_timestamps import FilmTimes
+from gazerig.drivers.errors import CameraError
 
 _ALONE_S = 0.1  # how long a recording of one picture lasts
 
@@ -29,7 +29,7 @@ class CameraReplay:
         """Open the file, or open it anew at film time 0.
 
         Raises:
-            drivers.errors.CameraError: it is absent, no recording, or holds no picture.
+            CameraError: it is absent, no recording, or holds no picture.
         """
         self.close()
         self._recording = Recording(self._path)
@@ -54,7 +54,7 @@ class CameraReplay:
         """Read a picture by number, with the film time at which it is due.
 
         Raises:
-            drivers.errors.CameraError: the file is damaged there.
+            CameraError: the file is damaged there.
         """
         recording = self._opened()
         found = recording.shot((number - 1) % len(recording.times_s))
@@ -64,7 +64,7 @@ class CameraReplay:
         """Wait until the next picture is due, then read the newest; time starts here.
 
         Raises:
-            drivers.errors.CameraError: the file is damaged there.
+            CameraError: the file is damaged there.
         """
         self._opened()
         due = self._pace.wait(self._times, now_s, stop)

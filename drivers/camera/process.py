@@ -19,14 +19,14 @@ from multiprocessing.process import BaseProcess
 from select import select
 from typing import NamedTuple
 
-from drivers.camera.capture_loop import BACK, LOST
-from drivers.camera.frame_analysis import Motion
-from drivers.camera.params import CameraCareParams
-from drivers.camera.shared_frames import SlotReader
-from drivers.camera.silence import PictureSilence
-from drivers.camera.worker import LONGEST_END_S, CameraParts, Ended, Found, Retune, run
-from drivers.errors import CameraError, SetupError
-from drivers.types import Detections, FaceDetector
+from gazerig.drivers.camera.capture_loop import BACK, LOST
+from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.shared_frames import SlotReader
+from gazerig.drivers.camera.silence import PictureSilence
+from gazerig.drivers.camera.worker import LONGEST_END_S, CameraParts, Ended, Found, Retune, run
+from gazerig.drivers.errors import CameraError, SetupError
+from gazerig.drivers.types import Detections, FaceDetector
 
 _LONGEST_START_S = 60.0
 _LOOK_S = 0.1
@@ -90,8 +90,8 @@ class CameraProcess:
         """Start the process and wait until its source is open.
 
         Raises:
-            drivers.errors.CameraError: the source cannot be opened, or is open already.
-            drivers.errors.SetupError: the detector cannot be made.
+            CameraError: the source cannot be opened, or is open already.
+            SetupError: the detector cannot be made.
         """
         if self._process is not None:
             raise CameraError("the camera process runs already: close() it before opening it anew")
@@ -110,7 +110,7 @@ class CameraProcess:
         """Return what the newest picture showed, or None before the first.
 
         Raises:
-            drivers.errors.CameraError: the source has been gone for longer than ``give_up_s``.
+            CameraError: the source has been gone for longer than ``give_up_s``.
         """
         if self._failure:
             raise CameraError(self._failure)

@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from drivers.camera.recording_format import encoded
-from drivers.camera.recording_writer import RecordingWriter
-from drivers.camera.source import PictureSource, Shot
+from gazerig.drivers.camera.recording_format import encoded
+from gazerig.drivers.camera.recording_writer import RecordingWriter
+from gazerig.drivers.camera.source import PictureSource, Shot
 
 _ENCODERS = 2  # PNG of colour and depth takes most of a picture's time; OpenCV frees the others
 _MOST_WAITING = 30  # pictures; where the disk is slower than the camera, pictures are left out
@@ -68,7 +68,7 @@ class CameraRecorder:
         """Open the source and, the first time, create the file.
 
         Raises:
-            drivers.errors.CameraError: the source cannot be opened or the file not be made.
+            CameraError: the source cannot be opened or the file not be made.
         """
         self._source.open()
         if self._writer is None:
@@ -87,7 +87,7 @@ class CameraRecorder:
         """Wait for the next picture, and hand it to the recording.
 
         Raises:
-            drivers.errors.CameraError: there will be no more pictures.
+            CameraError: there will be no more pictures.
         """
         shot = self._source.take(now_s, stop)
         if shot is not None and not self.failure:

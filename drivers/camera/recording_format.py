@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.depth_roi import metres, millimetres
-from drivers.camera.source import Shot, bgr
-from drivers.types import Depth, DetectedFace, Picture, PictureLens
+from gazerig.drivers.camera.depth_roi import metres, millimetres
+from gazerig.drivers.camera.source import Shot, bgr
+from gazerig.drivers.types import Depth, DetectedFace, Picture, PictureLens
 
 PICTURE, DEPTH, LENS, FACES = "/camera/picture", "/camera/depth", "/camera/lens", "/camera/faces"
 """Topics."""

@@ -12,9 +12,9 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Message
 from mcap.stream_reader import MAGIC_SIZE, read_magic
 
-from drivers.camera import recording_format as fmt
-from drivers.camera.source import Shot
-from drivers.errors import CameraError
+from gazerig.drivers.camera import recording_format as fmt
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.errors import CameraError
 
 _HEAD = 9  # bytes of a record before its content: kind and length
 _LARGEST = 1 << 30  # bytes of a message; more is damage
@@ -46,7 +46,7 @@ class Recording:
         """Open the file and find its pictures.
 
         Raises:
-            drivers.errors.CameraError: it is absent, no recording, or holds no picture.
+            CameraError: it is absent, no recording, or holds no picture.
         """
         self._path = path
         self._file = _open(path)
@@ -72,7 +72,7 @@ class Recording:
         """Read a picture, counted from 0, with its time from the first picture's.
 
         Raises:
-            drivers.errors.CameraError: the file is damaged there.
+            CameraError: the file is damaged there.
         """
         places = self._pictures[index].places
         try:
@@ -105,7 +105,7 @@ class Recording:
         """Note where the pictures are; tell whether the file was closed as it should.
 
         Raises:
-            drivers.errors.CameraError: a record says what none can.
+            CameraError: a record says what none can.
         """
         try:
             return self._indexed()

@@ -11,9 +11,9 @@ from typing import IO
 
 from mcap.writer import CompressionType, IndexType, Writer
 
-from drivers.camera.recording_format import PROFILE, SCHEMAS, encoded, nanoseconds
-from drivers.camera.source import Shot
-from drivers.errors import CameraError
+from gazerig.drivers.camera.recording_format import PROFILE, SCHEMAS, encoded, nanoseconds
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.errors import CameraError
 
 # What the system has may be lost with the power; so often it is put on the disk.
 _SYNC_NS = 1_000_000_000
@@ -34,7 +34,7 @@ class RecordingWriter:
             keeps pictures exactly; over: an existing file is written over
 
         Raises:
-            drivers.errors.CameraError: the file is there already or cannot be made.
+            CameraError: the file is there already or cannot be made.
         """
         self._path = path
         self._jpeg_quality = jpeg_quality

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.params import CameraCareParams
 
 FIRST_PICTURE_S = 15.0
 """A camera may take so long for its first picture: exposure settles, networks are loaded."""

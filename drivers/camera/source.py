@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import cv2
 import numpy as np
 
-from drivers.types import Depth, DetectedFace, Picture, PictureLens
+from gazerig.drivers.types import Depth, DetectedFace, Picture, PictureLens
 
 
 class Shot(NamedTuple):
@@ -38,7 +38,7 @@ class PictureSource(Protocol):
         """Open the device or file.
 
         Raises:
-            drivers.errors.CameraError: it cannot; the message names the thing and the cure.
+            CameraError: it cannot; the message names the thing and the cure.
         """
         ...
 
@@ -46,7 +46,7 @@ class PictureSource(Protocol):
         """Wait for a picture newer than the last one; None where ``stop`` was set meanwhile.
 
         Raises:
-            drivers.errors.CameraError: there will be no more pictures.
+            CameraError: there will be no more pictures.
         """
         ...
 

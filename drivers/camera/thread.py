@@ -8,12 +8,12 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-from drivers.camera.capture_loop import CameraWatch, failed
-from drivers.camera.frame_analysis import Motion
-from drivers.camera.params import CameraCareParams
-from drivers.camera.source import PictureSource
-from drivers.errors import CameraError
-from drivers.types import Detections, FaceDetector
+from gazerig.drivers.camera.capture_loop import CameraWatch, failed
+from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.source import PictureSource
+from gazerig.drivers.errors import CameraError
+from gazerig.drivers.types import Detections, FaceDetector
 
 # OpenCV gives up waiting for a camera after 10 s; a film stops at once.
 _LONGEST_WAIT_S = 12.0
@@ -55,7 +55,7 @@ class CameraThread:
         """Open the source and start looking.
 
         Raises:
-            drivers.errors.CameraError: the source cannot be opened, or is open already.
+            CameraError: the source cannot be opened, or is open already.
         """
         if self._thread is not None:
             raise CameraError("the camera thread runs already: close() it before opening it anew")
@@ -71,7 +71,7 @@ class CameraThread:
         """Give what the newest picture showed, or None before the first.
 
         Raises:
-            drivers.errors.CameraError: the source is gone for good, or looking has failed.
+            CameraError: the source is gone for good, or looking has failed.
         """
         if self._failure is not None:
             raise failed(self._failure) from self._failure

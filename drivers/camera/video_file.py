@@ -9,11 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from drivers.camera.source import Shot
-from drivers.camera.video_pacing import FilmPace
-from drivers.camera.video_reader import Reel, open_reel
-from drivers.errors import CameraError
-from drivers.types import Picture
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.video_pacing import FilmPace
+from gazerig.drivers.camera.video_reader import Reel, open_reel
+from gazerig.drivers.errors import CameraError
+from gazerig.drivers.types import Picture
 
 
 class FilmPicture(NamedTuple):
@@ -38,7 +38,7 @@ class VideoFile:
         """Open the file, or open it anew at film time 0.
 
         Raises:
-            drivers.errors.CameraError: it is absent, no film or picture, empty or cut short.
+            CameraError: it is absent, no film or picture, empty or cut short.
         """
         self.close()
         self._reel = open_reel(self._path)
@@ -68,7 +68,7 @@ class VideoFile:
 
         Raises:
             ValueError: the number is below 1 or below the last one read.
-            drivers.errors.CameraError: the file cannot be read any more.
+            CameraError: the file cannot be read any more.
         """
         return self._opened().picture(number)
 
@@ -77,7 +77,7 @@ class VideoFile:
 
         Raises:
             ValueError: the number is below 1 or below the last one read.
-            drivers.errors.CameraError: the file cannot be read any more.
+            CameraError: the file cannot be read any more.
         """
         return Shot(self.due_s(number), number, self.picture(number))
 
@@ -86,7 +86,7 @@ class VideoFile:
 
         Raises:
             ValueError: film time is negative or ran back.
-            drivers.errors.CameraError: the file cannot be read any more.
+            CameraError: the file cannot be read any more.
         """
         number = self.number_at(film_s)
         return FilmPicture(number, self.due_s(number), self.picture(number))
@@ -95,7 +95,7 @@ class VideoFile:
         """Wait until the next picture is due, then read the newest; the film starts here.
 
         Raises:
-            drivers.errors.CameraError: the file cannot be read any more.
+            CameraError: the file cannot be read any more.
         """
         due = self._pace.wait(self._opened().times, now_s, stop)
         return None if due is None else Shot(due.host_s, due.number, self.picture(due.number))

@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drivers.camera.video_timestamps import FilmTimes
+from gazerig.drivers.camera.video_timestamps import FilmTimes
 
 
 class Due(NamedTuple):

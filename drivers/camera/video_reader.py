@@ -6,11 +6,11 @@ from typing import Any, Protocol
 
 import cv2
 
-from drivers.camera.quiet_opencv import quiet_opencv
-from drivers.camera.source import bgr
-from drivers.camera.video_timestamps import SAMPLE, FilmTimes, at_a_rate, by_table, rising
-from drivers.errors import CameraError
-from drivers.types import Picture
+from gazerig.drivers.camera.quiet_opencv import quiet_opencv
+from gazerig.drivers.camera.source import bgr
+from gazerig.drivers.camera.video_timestamps import SAMPLE, FilmTimes, at_a_rate, by_table, rising
+from gazerig.drivers.errors import CameraError
+from gazerig.drivers.types import Picture
 
 _STILL_RATE_HZ, _ASSUMED_RATE_HZ = 10.0, 25.0
 _RATES_HZ = (0.5, 1000.0)
@@ -40,7 +40,7 @@ def open_reel(path: Path) -> Reel:
     """Open a file as what it is.
 
     Raises:
-        drivers.errors.CameraError: it is absent, no film or picture, empty or cut short.
+        CameraError: it is absent, no film or picture, empty or cut short.
     """
     if not path.exists():
         raise CameraError(f"no film or picture at {path}: check the path")

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import cv2
 
-from drivers.camera.frame_rate import RateWatch
-from drivers.camera.params import WebcamParams
-from drivers.camera.quiet_opencv import quiet_opencv
-from drivers.camera.source import Shot, bgr
-from drivers.errors import CameraError
+from gazerig.drivers.camera.frame_rate import RateWatch
+from gazerig.drivers.camera.params import WebcamParams
+from gazerig.drivers.camera.quiet_opencv import quiet_opencv
+from gazerig.drivers.camera.source import Shot, bgr
+from gazerig.drivers.errors import CameraError
 
 # Pictures in a row that may fail before the camera counts as gone; one fails now and
 # then where a cable is long.
@@ -71,7 +71,7 @@ class Webcam:
         """Open the camera and fetch one picture as a proof.
 
         Raises:
-            drivers.errors.CameraError: it is absent, forbidden, busy or gives no picture.
+            CameraError: it is absent, forbidden, busy or gives no picture.
         """
         self.close()
         self._check_file()
@@ -94,7 +94,7 @@ class Webcam:
         """Wait for the next picture; its time is the kernel's stamp, else that of its arrival.
 
         Raises:
-            drivers.errors.CameraError: the camera is not open or gives no more pictures.
+            CameraError: the camera is not open or gives no more pictures.
         """
         if self._capture is None:
             raise CameraError(f"camera {self._file} is not open: call open() before taking")

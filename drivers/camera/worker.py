@@ -1,4 +1,4 @@
-"""The process that looks at pictures, from its start to its end; see drivers.camera.process."""
+"""The process that looks at pictures, from its start to its end (see ``process``)."""
 
 import os
 import signal
@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import cv2
 
-from drivers.camera.capture_loop import CameraWatch, failed
-from drivers.camera.frame_analysis import Motion
-from drivers.camera.params import CameraCareParams
-from drivers.camera.shared_frames import SlotWriter, Where
-from drivers.camera.source import PictureSource
-from drivers.errors import CameraError, SetupError
-from drivers.types import Detections, FaceDetector
+from gazerig.drivers.camera.capture_loop import CameraWatch, failed
+from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.shared_frames import SlotWriter, Where
+from gazerig.drivers.camera.source import PictureSource
+from gazerig.drivers.errors import CameraError, SetupError
+from gazerig.drivers.types import Detections, FaceDetector
 
 NICE = 10  # the loop goes first
 LONGEST_END_S = 12.0

@@ -4,18 +4,18 @@ from collections.abc import Mapping, Sequence
 from math import ceil
 from struct import pack
 
-from drivers.dynamixel.control_table import (
+from gazerig.drivers.dynamixel.control_table import (
     FAST_READ_SINCE,
     MODELS,
     WATCHDOG_UNIT_S,
     IndirectBlock,
     indirect_blocks,
 )
-from drivers.dynamixel.family import DYNAMIXEL
-from drivers.dynamixel.feedback import Readings
-from drivers.dynamixel.params import DynamixelParams as DynamixelParams
-from drivers.dynamixel.protocol import ERROR_NUMBER, HEADER
-from drivers.dynamixel.read_windows import (
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.feedback import Readings
+from gazerig.drivers.dynamixel.params import DynamixelParams as DynamixelParams
+from gazerig.drivers.dynamixel.protocol import ERROR_NUMBER, HEADER
+from gazerig.drivers.dynamixel.read_windows import (
     INDIRECT_MAP,
     Sample,
     View,
@@ -23,20 +23,20 @@ from drivers.dynamixel.read_windows import (
     direct_turns,
     indirect_turns,
 )
-from drivers.dynamixel.supervisor import DynamixelSupervisor
-from drivers.dynamixel.sync_packets import FastGroup, PlainGroup
-from drivers.serial.port import BusPort
-from drivers.servo_bus.bus import CUT, RESTART_S, SmartServoBus
-from drivers.servo_bus.provisioning import AddressMap
-from drivers.servo_bus.sync_read import Heard, Reader, Whole
-from drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.dynamixel.supervisor import DynamixelSupervisor
+from gazerig.drivers.dynamixel.sync_packets import FastGroup, PlainGroup
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.bus import CUT, RESTART_S, SmartServoBus
+from gazerig.drivers.servo_bus.provisioning import AddressMap
+from gazerig.drivers.servo_bus.sync_read import Heard, Reader, Whole
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 
 class DynamixelBus(SmartServoBus):
-    """A chain of Dynamixel servos in position mode; implements drivers.types.ServoBus.
+    """A chain of Dynamixel servos in position mode; implements gazerig.drivers.types.ServoBus.
 
     Args:
-        port: drivers.serial.port.BlockingPort, or an emulated port with its methods.
+        port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
         setups: the servos, in the order of every sequence given and taken.
         params: how to speak with them.
     """

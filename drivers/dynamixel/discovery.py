@@ -9,10 +9,10 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from drivers.dynamixel.control_table import BAUD_RATES, MODELS
-from drivers.dynamixel.protocol import BROADCAST, ERROR_NUMBER, instruction, statuses
-from drivers.serial.port import BusPort
-from drivers.servo_bus.family import Status
+from gazerig.drivers.dynamixel.control_table import BAUD_RATES, MODELS
+from gazerig.drivers.dynamixel.protocol import BROADCAST, ERROR_NUMBER, instruction, statuses
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.family import Status
 
 FACTORY_BAUD = 57_600
 COMMON_FIRST = (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600, 4_500_000)
@@ -100,8 +100,8 @@ def scan(
     """Ask at one baud rate after the other who is there; the port is left open at the last.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     for baud in bauds:
         if not port.setBaudRate(baud):

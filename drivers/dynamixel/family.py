@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from drivers.dynamixel import protocol
-from drivers.dynamixel.control_table import (
+from gazerig.drivers.dynamixel import protocol
+from gazerig.drivers.dynamixel.control_table import (
     MODELS,
     PWM_FULL,
     REGISTERS,
@@ -14,12 +14,12 @@ from drivers.dynamixel.control_table import (
     name_errors,
     speed_units,
 )
-from drivers.dynamixel.registers import Registers
-from drivers.serial.port import BusPort
-from drivers.servo_bus.family import Arming, Family
+from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.family import Arming, Family
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoSetup
 
 POSITION_MODE = 3
 

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from math import copysign
 
-from drivers.dynamixel.control_table import MODELS, VELOCITY_UNIT_STEPS_S
-from drivers.dynamixel.protocol import ALERT
-from drivers.dynamixel.read_windows import Sample
-from drivers.plausibility import Plausibility
-from drivers.servo_bus.sync_read import Heard, Whole
-from drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.dynamixel.control_table import MODELS, VELOCITY_UNIT_STEPS_S
+from gazerig.drivers.dynamixel.protocol import ALERT
+from gazerig.drivers.dynamixel.read_windows import Sample
+from gazerig.drivers.plausibility import Plausibility
+from gazerig.drivers.servo_bus.sync_read import Heard, Whole
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 _new = tuple.__new__
 

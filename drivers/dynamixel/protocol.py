@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 
 from fastcrc.crc16 import umts
 
-from drivers.servo_bus.family import Status
+from gazerig.drivers.servo_bus.family import Status
 
 HEADER = b"\xff\xff\xfd\x00"
 RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"

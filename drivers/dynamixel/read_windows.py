@@ -17,8 +17,8 @@ not the one waited for.
 import struct
 from typing import NamedTuple
 
-from drivers.dynamixel.control_table import IndirectBlock
-from drivers.servo_bus.window_schedule import Turns
+from gazerig.drivers.dynamixel.control_table import IndirectBlock
+from gazerig.drivers.servo_bus.window_schedule import Turns
 
 SENSED = ("current", "velocity", "position")
 ARMED = ("torque", "hardware_error")

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from dynamixel_sdk import COMM_SUCCESS
 
-from drivers.dynamixel.control_table import REGISTERS
-from drivers.dynamixel.protocol import ALERT, ERROR_NUMBER, SyncWrite
-from drivers.dynamixel.sdk_handler import SdkPackets
-from drivers.serial.port import BusPort
-from drivers.servo_bus.family import Identity as Identity
+from gazerig.drivers.dynamixel.control_table import REGISTERS
+from gazerig.drivers.dynamixel.protocol import ALERT, ERROR_NUMBER, SyncWrite
+from gazerig.drivers.dynamixel.sdk_handler import SdkPackets
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.family import Identity as Identity
 
 TRIES = 3
 

@@ -12,8 +12,13 @@ from dynamixel_sdk import COMM_RX_CORRUPT, COMM_RX_TIMEOUT, COMM_SUCCESS, COMM_T
 from dynamixel_sdk.protocol2_packet_handler import Protocol2PacketHandler
 from fastcrc.crc16 import umts
 
-from drivers.dynamixel.protocol import ERROR_NUMBER, STATUS_OVERHEAD, bytes_missing, instruction
-from drivers.dynamixel.protocol import statuses as find_statuses
+from gazerig.drivers.dynamixel.protocol import (
+    ERROR_NUMBER,
+    STATUS_OVERHEAD,
+    bytes_missing,
+    instruction,
+)
+from gazerig.drivers.dynamixel.protocol import statuses as find_statuses
 
 LONGEST = 1024
 """No packet of the SDK is longer."""

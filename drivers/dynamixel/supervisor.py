@@ -3,16 +3,21 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import inf
 
-from drivers.dynamixel.control_table import REGISTERS, WATCHDOG_UNIT_S, name_errors, speed_units
-from drivers.dynamixel.feedback import Readings
-from drivers.dynamixel.protocol import ALERT
-from drivers.dynamixel.read_windows import Sample
-from drivers.servo_bus.faults import Health
-from drivers.servo_bus.recovery import Recovery
-from drivers.servo_bus.supervisor import AGAIN_S, Supervisor
-from drivers.servo_bus.torque import TRIPPED, heal_tripped
-from drivers.servo_bus.transaction import TRIES, Line
-from drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.dynamixel.control_table import (
+    REGISTERS,
+    WATCHDOG_UNIT_S,
+    name_errors,
+    speed_units,
+)
+from gazerig.drivers.dynamixel.feedback import Readings
+from gazerig.drivers.dynamixel.protocol import ALERT
+from gazerig.drivers.dynamixel.read_windows import Sample
+from gazerig.drivers.servo_bus.faults import Health
+from gazerig.drivers.servo_bus.recovery import Recovery
+from gazerig.drivers.servo_bus.supervisor import AGAIN_S, Supervisor
+from gazerig.drivers.servo_bus.torque import TRIPPED, heal_tripped
+from gazerig.drivers.servo_bus.transaction import TRIES, Line
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 CHECK_S = 1.0
 """So often one servo is asked whether it is still armed, each in turn."""
@@ -110,7 +115,7 @@ class DynamixelSupervisor(Supervisor):
         """Do what is due after a read; servos that are well again get their reading here.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         if now_s >= self._due_s:
             self._do_due(readings, group, now_s)

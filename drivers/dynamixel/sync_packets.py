@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from fastcrc.crc16 import umts
 
-from drivers.dynamixel.protocol import (
+from gazerig.drivers.dynamixel.protocol import (
     BROADCAST,
     ERROR_NUMBER,
     HEADER,
@@ -22,8 +22,8 @@ from drivers.dynamixel.protocol import (
     statuses,
     sync_read,
 )
-from drivers.dynamixel.read_windows import Sample, View
-from drivers.servo_bus.sync_read import Pieces
+from gazerig.drivers.dynamixel.read_windows import Sample, View
+from gazerig.drivers.servo_bus.sync_read import Pieces
 
 Values = tuple[Any, ...]
 """All numbers of a whole answer; ``Group.columns`` says which are whose."""

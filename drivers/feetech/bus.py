@@ -9,7 +9,7 @@ the package index are copies of it. The protocol is small, and the port is ours 
 What an STS cannot do. It has no bus watchdog: when the host falls silent, a servo goes on
 to its last goal and holds it, for ever. Nothing in the servo stands in for that: whoever
 runs the bus must let go before leaving (``release``) or have a guardian beside it that
-does (robot.guardian), and what bounds the force until somebody cuts the power is the
+does (gazerig.robot.guardian), and what bounds the force until somebody cuts the power is the
 torque limit (``strength``) and the servo's own overload protection, which leaves a fifth
 of the torque after two seconds. So goals are sent a tick at a time, never far ahead.
 Faults do not latch: their bits come and go, and so do the names in ``faults``.
@@ -17,24 +17,24 @@ Faults do not latch: their bits come and go, and so do the names in ``faults``.
 
 from collections.abc import Mapping, Sequence
 
-from drivers.feetech.family import FEETECH
-from drivers.feetech.group import Group
-from drivers.feetech.params import FeetechParams as FeetechParams
-from drivers.feetech.protocol import HEADER, GoalWrite
-from drivers.feetech.readings import Readings
-from drivers.feetech.supervisor import FeetechSupervisor
-from drivers.feetech.views import Sample, View, again_turns, alone_turns, together_turns
-from drivers.serial.port import BusPort
-from drivers.servo_bus.bus import CUT, RESTART_S, SmartServoBus
-from drivers.servo_bus.sync_read import Heard, Reader, Whole
-from drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.group import Group
+from gazerig.drivers.feetech.params import FeetechParams as FeetechParams
+from gazerig.drivers.feetech.protocol import HEADER, GoalWrite
+from gazerig.drivers.feetech.readings import Readings
+from gazerig.drivers.feetech.supervisor import FeetechSupervisor
+from gazerig.drivers.feetech.views import Sample, View, again_turns, alone_turns, together_turns
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.bus import CUT, RESTART_S, SmartServoBus
+from gazerig.drivers.servo_bus.sync_read import Heard, Reader, Whole
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 
 class FeetechBus(SmartServoBus):
-    """A chain of STS servos in position mode; implements drivers.types.ServoBus.
+    """A chain of STS servos in position mode; implements gazerig.drivers.types.ServoBus.
 
     Args:
-        port: drivers.serial.port.BlockingPort, or an emulated port with its methods.
+        port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
         setups: the servos, in the order of every sequence given and taken.
         params: how to speak with them.
 
@@ -117,7 +117,7 @@ class FeetechBus(SmartServoBus):
         """Ask everybody who answered once more, and keep what both answers say.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         again = self._reader.again(tuple(heard))
         kept: dict[int, Heard[Sample]] = {}
@@ -135,7 +135,7 @@ class FeetechBus(SmartServoBus):
         """Send goals with the speeds that may be used for them.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         entering, speeds = self._supervisor.entering, self._speeds
         if entering:

@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from drivers.feetech import protocol
-from drivers.feetech.memory_table import (
+from gazerig.drivers.feetech import protocol
+from gazerig.drivers.feetech.memory_table import (
     MODELS,
     MULTI_TURN,
     REGISTERS,
@@ -13,14 +13,14 @@ from drivers.feetech.memory_table import (
     name_errors,
     speed_units,
 )
-from drivers.feetech.protocol import MOST_GOALS, GoalWrite
-from drivers.feetech.registers import StsRegisters
-from drivers.feetech.scan import everybody
-from drivers.serial.port import BusPort
-from drivers.servo_bus.family import Arming, Family
+from gazerig.drivers.feetech.protocol import MOST_GOALS, GoalWrite
+from gazerig.drivers.feetech.registers import StsRegisters
+from gazerig.drivers.feetech.scan import everybody
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.family import Arming, Family
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoSetup
 
 POSITION_MODE = 0
 

@@ -8,15 +8,15 @@ import struct
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from drivers.feetech.protocol import (
+from gazerig.drivers.feetech.protocol import (
     HEADER,
     STATUS_OVERHEAD,
     bytes_missing,
     statuses,
     sync_read,
 )
-from drivers.feetech.views import Sample, View
-from drivers.servo_bus.sync_read import Pieces
+from gazerig.drivers.feetech.views import Sample, View
+from gazerig.drivers.servo_bus.sync_read import Pieces
 
 Values = tuple[Any, ...]
 """All numbers of a whole answer; ``Group.columns`` says which are whose."""

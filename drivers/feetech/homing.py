@@ -5,10 +5,10 @@ it in its EEPROM. Everything that was calibrated in steps before is void afterwa
 Source: Feetech memory table STS3215, register 40.
 """
 
-from drivers.errors import ServoFault, ServoMissing
-from drivers.feetech.memory_table import SET_MIDDLE, STEPS_PER_TURN
-from drivers.feetech.registers import StsRegisters
-from drivers.serial.port import BusPort
+from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.feetech.memory_table import SET_MIDDLE, STEPS_PER_TURN
+from gazerig.drivers.feetech.registers import StsRegisters
+from gazerig.drivers.serial.port import BusPort
 
 MIDDLE = STEPS_PER_TURN // 2
 NEAR_STEPS = 8
@@ -19,9 +19,9 @@ def set_middle(port: BusPort, servo_id: int) -> int:
     """Let a limp servo call its present place 2048; gives the offset it has now, in steps.
 
     Raises:
-        drivers.errors.ServoMissing: it does not answer.
-        drivers.errors.ServoFault: its torque is on, or it does not take the order.
-        drivers.errors.BusLost: the port is gone.
+        ServoMissing: it does not answer.
+        ServoFault: its torque is on, or it does not take the order.
+        BusLost: the port is gone.
     """
     registers = StsRegisters(port)
     where = f"{port.port_name}: servo {servo_id}"

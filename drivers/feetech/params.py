@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from drivers.feetech.memory_table import BAUD_RATES
+from gazerig.drivers.feetech.memory_table import BAUD_RATES
 
 
 @dataclass(frozen=True, slots=True)

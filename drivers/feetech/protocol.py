@@ -17,7 +17,7 @@ Source: Feetech, communication protocol of the SCS and STS series.
 import struct
 from collections.abc import Iterable, Sequence
 
-from drivers.servo_bus.family import Status
+from gazerig.drivers.servo_bus.family import Status
 
 HEADER = b"\xff\xff"
 BROADCAST = 0xFE

@@ -2,18 +2,18 @@
 
 The checksum of the bus is a sum of one byte: bytes spoilt in two places pass it now and
 then. So a position that no joint can have come to since the last one is not given
-(``drivers.plausibility``), and on a disturbed line every answer needs a second one that says
-the same.
+(``gazerig.drivers.plausibility``), and on a disturbed line every answer needs a second one that
+says the same.
 """
 
 from collections.abc import Mapping, Sequence
 
-from drivers.feetech.memory_table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
-from drivers.feetech.views import Sample
-from drivers.plausibility import Plausibility
-from drivers.servo_bus.sync_read import Heard, Whole
-from drivers.servo_bus.turn import nearest_turn
-from drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.feetech.memory_table import CURRENT_UNIT_MA, LOAD_UNIT, MODELS, STEPS_PER_TURN
+from gazerig.drivers.feetech.views import Sample
+from gazerig.drivers.plausibility import Plausibility
+from gazerig.drivers.servo_bus.sync_read import Heard, Whole
+from gazerig.drivers.servo_bus.turn import nearest_turn
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 ALIKE_C, ALIKE_TENTH_V = 3, 10
 """So far apart temperatures and voltages of two answers right after one another may be."""

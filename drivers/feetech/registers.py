@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from drivers.feetech.memory_table import REGISTERS, Register
-from drivers.feetech.protocol import (
+from gazerig.drivers.feetech.memory_table import REGISTERS, Register
+from gazerig.drivers.feetech.protocol import (
     PING,
     STATUS_OVERHEAD,
     bytes_missing,
@@ -13,10 +13,10 @@ from drivers.feetech.protocol import (
     sync_write,
     write,
 )
-from drivers.feetech.scan import FACTORY_BAUD, IDENTITY_LENGTH, REPLY_S
-from drivers.serial.port import BITS_PER_BYTE, BusPort
-from drivers.servo_bus.family import Identity as Identity
-from drivers.servo_bus.family import Status
+from gazerig.drivers.feetech.scan import FACTORY_BAUD, IDENTITY_LENGTH, REPLY_S
+from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
+from gazerig.drivers.servo_bus.family import Identity as Identity
+from gazerig.drivers.servo_bus.family import Status
 
 TRIES = 3
 

@@ -10,8 +10,14 @@ Source of the packets: Feetech, communication protocol of the SCS and STS series
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from drivers.feetech.memory_table import BAUD_RATES, HIGHEST_ID, MODELS, REGISTERS, STEPS_PER_TURN
-from drivers.feetech.protocol import (
+from gazerig.drivers.feetech.memory_table import (
+    BAUD_RATES,
+    HIGHEST_ID,
+    MODELS,
+    REGISTERS,
+    STEPS_PER_TURN,
+)
+from gazerig.drivers.feetech.protocol import (
     BROADCAST,
     PING,
     STATUS_OVERHEAD,
@@ -19,8 +25,8 @@ from drivers.feetech.protocol import (
     read,
     statuses,
 )
-from drivers.serial.port import BITS_PER_BYTE, BusPort
-from drivers.servo_bus.family import Status
+from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
+from gazerig.drivers.servo_bus.family import Status
 
 FACTORY_BAUD = 1_000_000
 COMMON_FIRST = BAUD_RATES
@@ -99,8 +105,8 @@ def scan(
     """Ask at one baud rate after the other who is there; the port is left open at the last.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     for baud in bauds:
         if not port.setBaudRate(baud):

@@ -3,14 +3,19 @@
 from collections.abc import Collection, Mapping
 from math import inf
 
-from drivers.feetech.memory_table import REGISTERS, TORQUE_FULL, acceleration_units, name_errors
-from drivers.feetech.readings import Readings
-from drivers.feetech.views import ARMED, Sample
-from drivers.servo_bus.faults import Health
-from drivers.servo_bus.recovery import FAR_SIDE, Recovery
-from drivers.servo_bus.supervisor import Supervisor
-from drivers.servo_bus.transaction import TRIES, Line
-from drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.feetech.memory_table import (
+    REGISTERS,
+    TORQUE_FULL,
+    acceleration_units,
+    name_errors,
+)
+from gazerig.drivers.feetech.readings import Readings
+from gazerig.drivers.feetech.views import ARMED, Sample
+from gazerig.drivers.servo_bus.faults import Health
+from gazerig.drivers.servo_bus.recovery import FAR_SIDE, Recovery
+from gazerig.drivers.servo_bus.supervisor import Supervisor
+from gazerig.drivers.servo_bus.transaction import TRIES, Line
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 CHECK_S = 0.1
 """On a disturbed line one servo's settings are compared so often, each in turn."""
@@ -174,7 +179,7 @@ class FeetechSupervisor(Supervisor):
         """Ask those in doubt once more, and suspect who is not armed indeed.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         ids = tuple(i for i in self._ids if i in self._doubted and i in group)
         found = self._line.ask_bytes(ids, ARMED.address, ARMED.length)
@@ -196,7 +201,7 @@ class FeetechSupervisor(Supervisor):
         limits, gains, mode. A servo that differs is set up anew, softly.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         self._check_at_s = now_s + CHECK_S
         self._checked = (self._checked + 1) % len(self._ids)
@@ -223,7 +228,7 @@ class FeetechSupervisor(Supervisor):
         """Do what is due after a read; servos that are well again get their reading here.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         if self.engaged and now_s >= self._check_at_s and self._readings.places.disturbed(now_s):
             self._check_next(group, now_s)

@@ -11,14 +11,15 @@ not the one waited for.
 import struct
 from typing import NamedTuple
 
-from drivers.feetech.memory_table import REGISTERS
-from drivers.servo_bus.window_schedule import Turns
+from gazerig.drivers.feetech.memory_table import REGISTERS
+from gazerig.drivers.servo_bus.window_schedule import Turns
 
 
 class Sample(NamedTuple):
     """One servo's answer in register units, signs decoded.
 
-    error: bits of drivers.feetech.memory_table.STATUS_ERRORS, of the answer and of Status (65)
+    error: bits of gazerig.drivers.feetech.memory_table.STATUS_ERRORS, of the answer and of Status
+    (65)
     torque, acceleration, limit: registers 40, 41 and 48; None where the reading did not
         cover them
     """

@@ -9,11 +9,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from drivers.event_log import EventLog
-from drivers.hobby_board.channel import Channel
-from drivers.host_lateness import HostLateness
-from drivers.serial.port import BusPort
-from drivers.types import ServoSetup
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.host_lateness import HostLateness
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoSetup
 
 
 class Exchange(Protocol):
@@ -86,7 +86,7 @@ class Timing(NamedTuple):
 
 
 class Board(Protocol):
-    """One board, or several on one line; all may raise drivers.errors.BusLost.
+    """One board, or several on one line; all may raise BusLost.
 
     line: what carries the bytes; texts: what people are told
     damage: the kinds of errors that noise makes
@@ -116,7 +116,7 @@ class Board(Protocol):
         """Find the board; return the pulses of these servos. Nothing moves.
 
         Raises:
-            drivers.errors.ServoMissing: it does not answer, or a channel is no servo's.
+            ServoMissing: it does not answer, or a channel is no servo's.
         """
         ...
 
@@ -124,7 +124,7 @@ class Board(Protocol):
         """Make it ready for goals, before any is sent.
 
         Raises:
-            drivers.errors.ServoMissing: it does not answer.
+            ServoMissing: it does not answer.
         """
         ...
 

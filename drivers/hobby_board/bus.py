@@ -7,30 +7,30 @@ What such a board cannot do, and so this bus cannot promise:
 - Where a servo is before its pulses begin is unknown. It goes to the first pulse at its
   own speed, whatever limit is armed.
 - No watchdog can be armed over the line: when this program dies the servos hold their last
-  goals, unless a guardian beside it stops the pulses (robot.guardian).
+  goals, unless a guardian beside it stops the pulses (gazerig.robot.guardian).
 - The board knows nothing of its servos' supply: servos that restart alone go unnoticed.
 """
 
 from collections.abc import Sequence
 from math import inf
 
-from drivers.errors import BusLost, PortError, ServoMissing
-from drivers.event_log import EventLog
-from drivers.hobby_board.board import Board
-from drivers.hobby_board.channel import Channel
-from drivers.hobby_board.models import channel_label
-from drivers.hobby_board.release import TRIES, switch_off
-from drivers.hobby_board.silence import Silence
-from drivers.hobby_board.start import take_on
-from drivers.hobby_board.supervisor import Supervisor
-from drivers.serial.reconnect import LastingPort
-from drivers.types import BusHealth, ServoReading, ServoSetup
+from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.hobby_board.board import Board
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.hobby_board.models import channel_label
+from gazerig.drivers.hobby_board.release import TRIES, switch_off
+from gazerig.drivers.hobby_board.silence import Silence
+from gazerig.drivers.hobby_board.start import take_on
+from gazerig.drivers.hobby_board.supervisor import Supervisor
+from gazerig.drivers.serial.reconnect import LastingPort
+from gazerig.drivers.types import BusHealth, ServoReading, ServoSetup
 
 UNMEASURED = "hobby servos tell no positions: what is shown is where they were sent"
 
 
 class HobbyBoardBus:
-    """The channels of one board; implements drivers.types.ServoBus.
+    """The channels of one board; implements gazerig.drivers.types.ServoBus.
 
     Args:
         board: what carries its pulses.
@@ -72,8 +72,8 @@ class HobbyBoardBus:
         """Open the port, find the board and every channel; nothing moves.
 
         Raises:
-            drivers.errors.PortError: the port cannot be opened.
-            drivers.errors.ServoMissing: the board or a channel does not answer.
+            PortError: the port cannot be opened.
+            ServoMissing: the board or a channel does not answer.
         """
         self._setups = self._wanted
         self._begin()
@@ -98,7 +98,7 @@ class HobbyBoardBus:
         is gone all is None, and the port is tried again now and then.
 
         Raises:
-            drivers.errors.BusLost: port or board have been gone for longer than ``give_up_s``.
+            BusLost: port or board have been gone for longer than ``give_up_s``.
         """
         self._now_s = now_s
         if self._link.down and not self._link.returned(now_s):
@@ -127,8 +127,8 @@ class HobbyBoardBus:
         inside at 30 deg/s. Returns the goals that are now in force, in steps.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
-            drivers.errors.ServoMissing: the board does not answer, or a channel does not take
+            BusLost: the port is gone.
+            ServoMissing: the board does not answer, or a channel does not take
                 its goal.
         """
         self._take_wanted()
@@ -200,7 +200,7 @@ class HobbyBoardBus:
         """Stop all pulses, confirmed; never raises for a board that does not answer.
 
         Raises:
-            drivers.errors.BusLost: the port is gone, and stays so when tried once more; the
+            BusLost: the port is gone, and stays so when tried once more; the
                 torque is taken off by the first read after it is back.
         """
         self._supervisor.let_go()
@@ -223,7 +223,7 @@ class HobbyBoardBus:
         """Take the torque off, see that it is gone, and say where it is not.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         try:
             released = switch_off(self._board, self._ids)
@@ -305,7 +305,7 @@ class HobbyBoardBus:
         """Give up where the board has not answered for too long.
 
         Raises:
-            drivers.errors.BusLost: so it is.
+            BusLost: so it is.
         """
         # Where anything arrives the board is there: it is noise that keeps it from being read.
         silent_s = min(self._silence.seconds(now_s), now_s - self._byte_s)

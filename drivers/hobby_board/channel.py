@@ -3,10 +3,10 @@
 from collections import deque
 from math import inf
 
-from drivers.hobby_board.models import HOBBY
-from drivers.hobby_board.ramp import Ramp
-from drivers.slow_entry import entry_speed_steps_s
-from drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.hobby_board.models import HOBBY
+from gazerig.drivers.hobby_board.ramp import Ramp
+from gazerig.drivers.slow_entry import entry_speed_steps_s
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 RECENT_S = 0.1
 """The board may be so far behind the last goals: its own period is 20 ms, and lines are slow."""

@@ -6,9 +6,9 @@ where its servo is, and a first pulse is not ramped: the servo goes there at its
 
 from enum import Enum
 
-from drivers.hobby_board.board import Board
-from drivers.hobby_board.channel import FINE_STEPS, Channel
-from drivers.hobby_board.models import US_STEPS, channel_label
+from gazerig.drivers.hobby_board.board import Board
+from gazerig.drivers.hobby_board.channel import FINE_STEPS, Channel
+from gazerig.drivers.hobby_board.models import US_STEPS, channel_label
 
 
 class Outcome(Enum):
@@ -26,7 +26,7 @@ def take(board: Board, channel: Channel, pulse_steps: int) -> Outcome:
     after. A joint outside its limits comes inside at 30 deg/s.
 
     Raises:
-        drivers.errors.BusLost: the port is gone.
+        BusLost: the port is gone.
     """
     goal = channel.start(pulse_steps, board.line.port.now_s())
     if not board.send_limits([channel], confirmed=True):

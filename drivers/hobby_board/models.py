@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from drivers.event_log import servo_label
+from gazerig.drivers.event_log import servo_label
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoSetup
 
 US_STEPS = 4
 """Pulse widths are counted in quarters of a microsecond."""

@@ -26,7 +26,7 @@ def switch_off(board: Stoppable, channels: Sequence[int]) -> Released:
     """Stop the pulses, and see that they are gone.
 
     Raises:
-        drivers.errors.BusLost: the port is gone.
+        BusLost: the port is gone.
     """
     left = tuple(channels)
     heard: set[int] = set()

@@ -3,22 +3,22 @@
 from collections.abc import Sequence
 from math import inf
 
-from drivers.errors import ServoMissing
-from drivers.event_log import EventLog
-from drivers.hobby_board.board import Board
-from drivers.hobby_board.channel import Channel
-from drivers.hobby_board.hold import Outcome, refusal, take
-from drivers.hobby_board.models import channel_label
-from drivers.hobby_board.release import TRIES
-from drivers.types import ServoSetup
+from gazerig.drivers.errors import ServoMissing
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.hobby_board.board import Board
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.hobby_board.hold import Outcome, refusal, take
+from gazerig.drivers.hobby_board.models import channel_label
+from gazerig.drivers.hobby_board.release import TRIES
+from gazerig.drivers.types import ServoSetup
 
 
 def every_pulse(board: Board, setups: Sequence[ServoSetup]) -> tuple[int, ...]:
     """Ask for every pulse.
 
     Raises:
-        drivers.errors.BusLost: the port is gone.
-        drivers.errors.ServoMissing: a channel does not answer.
+        BusLost: the port is gone.
+        ServoMissing: a channel does not answer.
     """
     ids = tuple(setup.id for setup in setups)
     for _ in range(TRIES):
@@ -38,8 +38,8 @@ def take_on(board: Board, channels: Sequence[Channel], log: EventLog) -> None:
     """Take hold of every channel, those without pulses one after another.
 
     Raises:
-        drivers.errors.BusLost: the port is gone.
-        drivers.errors.ServoMissing: the board does not answer, or a channel does not take
+        BusLost: the port is gone.
+        ServoMissing: the board does not answer, or a channel does not take
             its goal.
     """
     board.prepare(log)
@@ -61,7 +61,7 @@ def _insist(board: Board, channel: Channel, pulse: int) -> None:
     """Take hold of one channel.
 
     Raises:
-        drivers.errors.ServoMissing: it does not take its goal.
+        ServoMissing: it does not take its goal.
     """
     for _ in range(TRIES):
         outcome = take(board, channel, pulse)

@@ -8,11 +8,11 @@ and what the board says of itself.
 from collections.abc import Sequence
 from math import inf
 
-from drivers.event_log import EventLog
-from drivers.hobby_board.board import Board
-from drivers.hobby_board.channel import Channel
-from drivers.hobby_board.hold import Outcome, refusal, take
-from drivers.hobby_board.models import channel_label
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.hobby_board.board import Board
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.hobby_board.hold import Outcome, refusal, take
+from gazerig.drivers.hobby_board.models import channel_label
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
 """A board that lets go of its channels more often within such a time stays without pulses."""
@@ -89,7 +89,7 @@ class Supervisor:
         Gives whether the board answered.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         self._asked = (self._asked + 1) % len(self._channels)
         channel = self._channels[self._asked]

@@ -1,9 +1,9 @@
 """I2C transfers as bytes, as NXP's SC18IM700 takes them from a serial line; pure.
 
 All ports of servos carry bytes, so these carry I2C: a bridge on a serial line, an emulated one
-on a pseudo-terminal, and drivers.i2c.port, which does with the kernel's buses what a bridge does
-with its own. S begins, then the address with its direction bit and a count, and of a write
-so many bytes; P ends. R, a register, P reads the bridge's own; register 0A tells how the last
+on a pseudo-terminal, and gazerig.drivers.i2c.port, which does with the kernel's buses what a
+bridge does with its own. S begins, then the address with its direction bit and a count, and of a
+write so many bytes; P ends. R, a register, P reads the bridge's own; register 0A tells how the last
 transfer ended. Source: NXP, SC18IM700 data sheet, section 7.1.
 """
 

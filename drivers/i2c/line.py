@@ -6,15 +6,15 @@ I2C has no check bytes: who acts upon an answer asks twice.
 from collections import Counter
 from collections.abc import Sequence
 
-from drivers.host_lateness import HostLateness
-from drivers.i2c.bridge import ASK_STATUS, OUTCOMES
-from drivers.serial.port import BITS_PER_BYTE, BusPort
+from gazerig.drivers.host_lateness import HostLateness
+from gazerig.drivers.i2c.bridge import ASK_STATUS, OUTCOMES
+from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
 
 WAIT_PIECE_S = 0.1
 
 
 class I2cLine:
-    """A port with an I2C bus behind it; every method may raise drivers.errors.BusLost.
+    """A port with an I2C bus behind it; every method may raise BusLost.
 
     tx_bytes, rx_bytes: counts since it was made
     errors: counts by kind

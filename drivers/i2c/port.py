@@ -1,7 +1,7 @@
 """An I2C bus of the kernel as a port that carries bytes: it does what a bridge chip does.
 
-The commands are those of drivers.i2c.bridge. The kernel itself frees a bus whose data line is
-held down, where its driver can.
+The commands are those of gazerig.drivers.i2c.bridge. The kernel itself frees a bus whose data line
+is held down, where its driver can.
 """
 
 import errno
@@ -16,10 +16,10 @@ from typing import Any
 
 from smbus2 import SMBus, i2c_msg
 
-from drivers.errors import BusLost, PortError
-from drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, Part, commands
-from drivers.serial.port import BlockingPort, BusPort
-from drivers.serial.port_owner import is_i2c
+from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, Part, commands
+from gazerig.drivers.serial.port import BlockingPort, BusPort
+from gazerig.drivers.serial.port_owner import is_i2c
 
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
 """Requests of the kernel's i2c-dev."""
@@ -43,7 +43,7 @@ def port_of(
 
 
 class I2cPort:
-    """A real I2C bus by its path; implements drivers.serial.port.BusPort.
+    """A real I2C bus by its path; implements gazerig.drivers.serial.port.BusPort.
 
     Args:
         port_name: its path, e.g. /dev/i2c-1.
@@ -74,7 +74,7 @@ class I2cPort:
         """Open it; the rate of an I2C bus is set in the system, not here.
 
         Raises:
-            drivers.errors.PortError: absent, busy or not permitted.
+            PortError: absent, busy or not permitted.
         """
         self.closePort()
         try:
@@ -104,7 +104,7 @@ class I2cPort:
         """Carry out transfers; what they read waits to be taken.
 
         Raises:
-            drivers.errors.BusLost: the bus is gone.
+            BusLost: the bus is gone.
         """
         if self._on_traffic is not None:
             self._on_traffic()
@@ -140,7 +140,7 @@ class I2cPort:
         """See that no driver of the kernel has taken an address for itself.
 
         Raises:
-            drivers.errors.BusLost: so it is; the message says how to free it.
+            BusLost: so it is; the message says how to free it.
         """
         if self._bus.fd is None or address in self._checked:
             return
@@ -162,7 +162,7 @@ class I2cPort:
         """Return ``length`` bytes or what there is; where there is nothing, wait.
 
         Raises:
-            drivers.errors.BusLost: the bus is gone.
+            BusLost: the bus is gone.
         """
         if self._on_traffic is not None:
             self._on_traffic()

@@ -6,28 +6,28 @@ Its own serial timeout, set with Pololu's program, helps where the cable or the 
 from collections.abc import Sequence
 from math import inf
 
-from drivers.errors import ServoMissing
-from drivers.event_log import EventLog
-from drivers.hobby_board.board import BoardTexts, Seen, Timing, goals_of
-from drivers.hobby_board.channel import Channel
-from drivers.hobby_board.models import channel_label
-from drivers.hobby_board.start import every_pulse
-from drivers.maestro.commands import (
+from gazerig.drivers.errors import ServoMissing
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.hobby_board.board import BoardTexts, Seen, Timing, goals_of
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.hobby_board.models import channel_label
+from gazerig.drivers.hobby_board.start import every_pulse
+from gazerig.drivers.maestro.commands import (
     ERRORS,
     HIGHEST,
     LOWEST,
     MOST_INPUT,
     name_errors,
 )
-from drivers.maestro.limits import ACCEL_STEPS_S2, SPEED_STEPS_S, accel_units, speed_units
-from drivers.maestro.line import Line
-from drivers.maestro.params import MaestroParams
-from drivers.serial.port import BusPort
-from drivers.types import ServoSetup
+from gazerig.drivers.maestro.limits import ACCEL_STEPS_S2, SPEED_STEPS_S, accel_units, speed_units
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoSetup
 
 
 class MaestroBoard:
-    """One board; implements drivers.hobby_board.board.Board."""
+    """One board; implements gazerig.drivers.hobby_board.board.Board."""
 
     damage = ("damaged", "incomplete", *ERRORS)
 
@@ -66,8 +66,8 @@ class MaestroBoard:
         """Greet the board and return the pulses of these servos; nothing moves.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
-            drivers.errors.ServoMissing: it does not answer, or a channel is no servo's.
+            BusLost: the port is gone.
+            ServoMissing: it does not answer, or a channel is no servo's.
         """
         where = self.line.port.port_name
         register = self.line.greet()

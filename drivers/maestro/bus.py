@@ -2,19 +2,19 @@
 
 from collections.abc import Sequence
 
-from drivers.hobby_board.bus import HobbyBoardBus
-from drivers.maestro.board import MaestroBoard
-from drivers.maestro.commands import MICRO
-from drivers.maestro.params import MaestroParams as MaestroParams
-from drivers.serial.port import BusPort
-from drivers.types import ServoSetup
+from gazerig.drivers.hobby_board.bus import HobbyBoardBus
+from gazerig.drivers.maestro.board import MaestroBoard
+from gazerig.drivers.maestro.commands import MICRO
+from gazerig.drivers.maestro.params import MaestroParams as MaestroParams
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoSetup
 
 
 class MaestroBus(HobbyBoardBus):
-    """The channels of one Maestro; implements drivers.types.ServoBus.
+    """The channels of one Maestro; implements gazerig.drivers.types.ServoBus.
 
     Args:
-        port: drivers.serial.port.BlockingPort, or an emulated port with its methods.
+        port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
         setups: the servos, in the order of every sequence given and taken; a servo's id is
             its channel, and steps are quarter microseconds.
         params: how to speak with the board.
@@ -33,7 +33,7 @@ class MaestroBus(HobbyBoardBus):
         Home may be a place, to which servos go at the armed speed, or no pulses at all.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         self._supervisor.let_go()
         self._maestro.line.send(self._maestro.line.speech.go_home())
@@ -44,7 +44,7 @@ class MaestroBus(HobbyBoardBus):
         The Micro Maestro knows no such question.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         if self._maestro.params.channels <= MICRO:
             return None

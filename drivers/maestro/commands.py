@@ -9,7 +9,7 @@ Source: Pololu Maestro Servo Controller User's Guide (0J40), sections 4.e and 5.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from drivers.maestro.params import Form
+from gazerig.drivers.maestro.params import Form
 
 SET_TARGET = 0x84
 SET_SPEED = 0x87

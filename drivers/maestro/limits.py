@@ -5,7 +5,7 @@ Source: Pololu Maestro User's Guide (0J40), section 5.e.
 
 from math import ceil
 
-from drivers.maestro.commands import MOST
+from gazerig.drivers.maestro.commands import MOST
 
 SPEED_STEPS_S = 100.0
 """Unit of the board's speed limit: a quarter microsecond in 10 ms."""

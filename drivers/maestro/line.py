@@ -7,10 +7,10 @@ other. After one that stayed out the line is emptied before anything is asked ag
 from collections import Counter
 from collections.abc import Sequence
 
-from drivers.host_lateness import HostLateness
-from drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, Speech, words
-from drivers.maestro.params import MaestroParams
-from drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
+from gazerig.drivers.host_lateness import HostLateness
+from gazerig.drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, Speech, words
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
 
 AT_ONCE = 6
 """So many questions in one write: the board's receive buffer is small."""
@@ -24,7 +24,7 @@ ALIKE_STEPS, FASTEST_STEPS_S = 200, 40_000.0
 
 
 class Line:
-    """A port with one board behind it; every method may raise drivers.errors.BusLost.
+    """A port with one board behind it; every method may raise BusLost.
 
     speech: how the board wants its commands
     tx_bytes, rx_bytes: counts since it was made

@@ -12,11 +12,11 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
-from drivers.errors import PortError
-from drivers.maestro.commands import ERRORS, MICRO, PROTOCOL_ERROR, name_errors
-from drivers.maestro.line import Line
-from drivers.maestro.params import Form, MaestroParams
-from drivers.serial.port import BusPort
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.maestro.commands import ERRORS, MICRO, PROTOCOL_ERROR, name_errors
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.params import Form, MaestroParams
+from gazerig.drivers.serial.port import BusPort
 
 USB_CHANNELS = {"1ffb:0089": 6, "1ffb:008a": 12, "1ffb:008b": 18, "1ffb:008c": 24}
 """Channels by USB vendor and product id."""
@@ -52,8 +52,8 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> MaestroF
         id tells it: ``USB_CHANNELS``.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: the port went away.
+        PortError: the port cannot be opened.
+        BusLost: the port went away.
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: choose 115200")

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from drivers.errors import PortError
-from drivers.hobby_board.release import switch_off
-from drivers.maestro.line import Line
-from drivers.maestro.params import MaestroParams
-from drivers.serial.port import BusPort
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.hobby_board.release import switch_off
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.serial.port import BusPort
 
 
 def stop_pulses(port: BusPort, params: MaestroParams, channels: Sequence[int]) -> tuple[int, ...]:
@@ -18,8 +18,8 @@ def stop_pulses(port: BusPort, params: MaestroParams, channels: Sequence[int]) -
         channels: those of the rig; others of the board are left as they are.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: the port went away.
+        PortError: the port cannot be opened.
+        BusLost: the port went away.
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s")

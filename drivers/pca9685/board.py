@@ -7,16 +7,16 @@ goal that is not followed up stands. What a servo's id is: sixteen times its boa
 from collections import defaultdict
 from collections.abc import Sequence
 
-from drivers.errors import ServoMissing
-from drivers.event_log import EventLog
-from drivers.hobby_board.board import BoardTexts, Seen, Timing
-from drivers.hobby_board.channel import Channel
-from drivers.hobby_board.release import TRIES
-from drivers.hobby_board.start import every_pulse
-from drivers.i2c import bridge
-from drivers.i2c.line import I2cLine
-from drivers.pca9685.params import Pca9685Params
-from drivers.pca9685.registers import (
+from gazerig.drivers.errors import ServoMissing
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.hobby_board.board import BoardTexts, Seen, Timing
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.hobby_board.release import TRIES
+from gazerig.drivers.hobby_board.start import every_pulse
+from gazerig.drivers.i2c import bridge
+from gazerig.drivers.i2c.line import I2cLine
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.pca9685.registers import (
     ALL_LED,
     AUTO_INCREMENT,
     AWAKE,
@@ -42,8 +42,8 @@ from drivers.pca9685.registers import (
     runs,
     steps_per_count,
 )
-from drivers.serial.port import BusPort
-from drivers.types import ServoSetup
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoSetup
 
 LONGEST_LEAD_S = 0.05
 """A pulse on its way goes on for no longer than this after a pause."""
@@ -56,10 +56,11 @@ PRESCALE_EVERY = 8
 
 
 class Pca9685Board:
-    """The boards of one bus; implements drivers.hobby_board.board.Board.
+    """The boards of one bus; implements gazerig.drivers.hobby_board.board.Board.
 
     Args:
-        port: drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge behind it.
+        port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge behind
+        it.
         params: how to reach them.
     """
 
@@ -132,8 +133,8 @@ class Pca9685Board:
         """See that the boards are there and return the pulses of these servos; nothing changes.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
-            drivers.errors.ServoMissing: a board does not answer, or another chip does.
+            BusLost: the port is gone.
+            ServoMissing: a board does not answer, or another chip does.
         """
         self._sent.clear()
         for address in self._boards([setup.id for setup in setups]):
@@ -144,7 +145,7 @@ class Pca9685Board:
         """See that what answers at an address is a PCA9685.
 
         Raises:
-            drivers.errors.ServoMissing: it is not, or nothing answers.
+            ServoMissing: it is not, or nothing answers.
         """
         where = f"{self.line.port.port_name}: "
         tries = (self._registers(address) for _ in range(TRIES))

@@ -2,18 +2,19 @@
 
 from collections.abc import Sequence
 
-from drivers.hobby_board.bus import HobbyBoardBus
-from drivers.pca9685.board import Pca9685Board
-from drivers.pca9685.params import Pca9685Params as Pca9685Params
-from drivers.serial.port import BusPort
-from drivers.types import ServoSetup
+from gazerig.drivers.hobby_board.bus import HobbyBoardBus
+from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.pca9685.params import Pca9685Params as Pca9685Params
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoSetup
 
 
 class Pca9685Bus(HobbyBoardBus):
-    """The channels of the boards on one I2C bus; implements drivers.types.ServoBus.
+    """The channels of the boards on one I2C bus; implements gazerig.drivers.types.ServoBus.
 
     Args:
-        port: drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge behind it.
+        port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge behind
+        it.
         setups: the servos, in the order of every sequence given and taken; a servo's id is
             its channel, and steps are quarter microseconds.
         params: how to reach them.

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from drivers.pca9685.registers import CHANNELS, MOST_PRESCALE, prescale_of
+from gazerig.drivers.pca9685.registers import CHANNELS, MOST_PRESCALE, prescale_of
 
 BRIDGE_BAUD = 115_200
 """Rate of the serial line of a bridge; that of an I2C bus is set in the system."""

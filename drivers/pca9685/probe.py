@@ -1,9 +1,9 @@
 """Which addresses of an I2C bus answer as a PCA9685 does: registers are read, none is written."""
 
-from drivers.errors import PortError
-from drivers.pca9685.board import Pca9685Board
-from drivers.pca9685.params import RESERVED, Pca9685Params
-from drivers.serial.port import BusPort
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.pca9685.params import RESERVED, Pca9685Params
+from gazerig.drivers.serial.port import BusPort
 
 FIRST, LAST = 0x40, 0x77
 
@@ -12,8 +12,8 @@ def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
     """Return the addresses of the boards on a bus; the port is left open.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it went away.
+        PortError: the port cannot be opened.
+        BusLost: it went away.
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: name its port")

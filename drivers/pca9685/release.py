@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from drivers.errors import PortError
-from drivers.hobby_board.release import switch_off
-from drivers.pca9685.board import Pca9685Board
-from drivers.pca9685.params import Pca9685Params
-from drivers.serial.port import BusPort
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.hobby_board.release import switch_off
+from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.serial.port import BusPort
 
 
 def stop_pulses(port: BusPort, params: Pca9685Params, channels: Sequence[int]) -> tuple[int, ...]:
@@ -18,8 +18,8 @@ def stop_pulses(port: BusPort, params: Pca9685Params, channels: Sequence[int]) -
         channels: those of the rig; others are left as they are, unless theirs do not stop.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: the port went away.
+        PortError: the port cannot be opened.
+        BusLost: the port went away.
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s")

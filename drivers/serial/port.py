@@ -15,8 +15,8 @@ from dynamixel_sdk import PortHandler
 from serial import Serial, SerialException
 from serial.tools import list_ports
 
-from drivers.errors import BusLost, PortError
-from drivers.serial.list_ports import holders, lasting_name
+from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.serial.list_ports import holders, lasting_name
 
 BITS_PER_BYTE = 10
 SDK_MARGIN_S = 0.034
@@ -56,7 +56,7 @@ class BusPort(Protocol):
         """Send bytes.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         ...
 
@@ -64,7 +64,7 @@ class BusPort(Protocol):
         """Give ``length`` bytes, or those that came before the deadline.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         ...
 
@@ -72,7 +72,7 @@ class BusPort(Protocol):
         """Count the bytes that have arrived.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         ...
 
@@ -80,7 +80,7 @@ class BusPort(Protocol):
         """Throw away what has arrived, without waiting.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         ...
 
@@ -88,7 +88,7 @@ class BusPort(Protocol):
         """Throw away what arrives until the line is quiet; gives the number of bytes.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         ...
 
@@ -133,7 +133,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Send bytes; waits at most 50 ms for room in the adapter's buffer.
 
         Raises:
-            drivers.errors.BusLost: the port is gone or takes nothing.
+            BusLost: the port is gone or takes nothing.
         """
         if self._on_traffic is not None:
             self._on_traffic()
@@ -155,7 +155,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Give ``length`` bytes, or those that came before the deadline.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         if self._on_traffic is not None:
             self._on_traffic()
@@ -178,7 +178,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Throw away what arrives until nothing came for 3 ms; gives the number of bytes.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         end_s = time.monotonic() + BABBLE_S
         dropped = 0
@@ -225,7 +225,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Open at a baud rate; False where the rate is not possible.
 
         Raises:
-            drivers.errors.PortError: absent, busy or not permitted.
+            PortError: absent, busy or not permitted.
         """
         if baudrate not in MORE_RATES and self.getCFlagBaud(baudrate) <= 0:
             return False
@@ -236,7 +236,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Open at a baud rate.
 
         Raises:
-            drivers.errors.PortError: absent, busy or not permitted.
+            PortError: absent, busy or not permitted.
         """
         self.closePort()
         where = self._where()
@@ -262,7 +262,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Return the path to open: a port that was open is found again by its adaptor's number.
 
         Raises:
-            drivers.errors.PortError: another adaptor has its name now.
+            PortError: another adaptor has its name now.
         """
         lasting, name = self._lasting, str(self.port_name)
         if lasting is None:

@@ -8,8 +8,8 @@ import os
 import re
 from collections.abc import Sequence
 
-from drivers.errors import PortError
-from drivers.serial.list_ports import SerialPort
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.serial.list_ports import SerialPort
 
 POLOLU = "1ffb:"
 """USB vendor of Pololu."""
@@ -30,7 +30,7 @@ def refuse_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
     """See that a port is one that packets of this kind of bus may be sent to.
 
     Raises:
-        drivers.errors.PortError: it is a board that they would move.
+        PortError: it is a board that they would move.
     """
     if is_i2c(device) and kind != "pca9685":
         raise PortError(

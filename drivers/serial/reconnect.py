@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 
-from drivers.errors import BusLost, PortError
-from drivers.event_log import EventLog
-from drivers.serial.port import BusPort
-from drivers.serial.reopening import FIRST_S, LAST_S, Reconnect
+from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.reopening import FIRST_S, LAST_S, Reconnect
 
 
 class LastingPort:
@@ -50,7 +50,7 @@ class LastingPort:
         """Try to open the port again where that is due; tell whether it is open.
 
         Raises:
-            drivers.errors.BusLost: it has been gone for longer than ``give_up_s``.
+            BusLost: it has been gone for longer than ``give_up_s``.
         """
         gone_s = self._link.gone_for_s(now_s)
         if self._link.due(now_s):

@@ -4,20 +4,20 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from typing import Protocol
 
-from drivers.errors import BusLost, PortError, ServoFault, ServoMissing
-from drivers.event_log import EventLog, servo_label
-from drivers.serial.port import BusPort
-from drivers.serial.reconnect import LastingPort
-from drivers.servo_bus.discovery import find
-from drivers.servo_bus.family import Family
-from drivers.servo_bus.faults import Health
-from drivers.servo_bus.goals import clipped
-from drivers.servo_bus.poll_list import Roll
-from drivers.servo_bus.provisioning import AddressMap, Provisioning
-from drivers.servo_bus.recovery import Recovery
-from drivers.servo_bus.torque import switch_off
-from drivers.servo_bus.transaction import TRIES, Line
-from drivers.types import BusHealth, ServoReading, ServoSetup
+from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
+from gazerig.drivers.event_log import EventLog, servo_label
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.reconnect import LastingPort
+from gazerig.drivers.servo_bus.discovery import find
+from gazerig.drivers.servo_bus.family import Family
+from gazerig.drivers.servo_bus.faults import Health
+from gazerig.drivers.servo_bus.goals import clipped
+from gazerig.drivers.servo_bus.poll_list import Roll
+from gazerig.drivers.servo_bus.provisioning import AddressMap, Provisioning
+from gazerig.drivers.servo_bus.recovery import Recovery
+from gazerig.drivers.servo_bus.torque import switch_off
+from gazerig.drivers.servo_bus.transaction import TRIES, Line
+from gazerig.drivers.types import BusHealth, ServoReading, ServoSetup
 
 RESTART_S = 0.1
 """Servos that were silent for so long may have restarted: their power was cut."""
@@ -77,12 +77,12 @@ class Polled(Protocol):
 
 
 class SmartServoBus(ABC):
-    """A chain of smart servos in position mode; implements drivers.types.ServoBus.
+    """A chain of smart servos in position mode; implements gazerig.drivers.types.ServoBus.
 
     A family's own bus says how an answer becomes readings, and who looks after the servos.
 
     Args:
-        port: drivers.serial.port.BlockingPort, or an emulated port with its methods.
+        port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
         setups: the servos, in the order of every sequence given and taken.
         family: the make of the servos.
         params: how to speak with them.
@@ -182,8 +182,8 @@ class SmartServoBus(ABC):
         """Open the port, find every servo, check and prepare it; torque stays off.
 
         Raises:
-            drivers.errors.PortError: the port cannot be opened.
-            drivers.errors.ServoMissing: servos are absent, of another model or refuse.
+            PortError: the port cannot be opened.
+            ServoMissing: servos are absent, of another model or refuse.
         """
         self._take_wanted()
         where, baud = self._port.port_name, self._bus_params.baud
@@ -213,7 +213,7 @@ class SmartServoBus(ABC):
         is None, and the port is tried again now and then.
 
         Raises:
-            drivers.errors.BusLost: port or servos have been gone for longer than ``give_up_s``.
+            BusLost: port or servos have been gone for longer than ``give_up_s``.
         """
         self._now_s = now_s
         if self._link.down and not self._link.returned(now_s):
@@ -236,9 +236,9 @@ class SmartServoBus(ABC):
         are now in force, in steps.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
-            drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
-            drivers.errors.ServoFault: a servo has latched an error, refuses its torque, or
+            BusLost: the port is gone.
+            ServoMissing: a servo does not answer or does not take its goal.
+            ServoFault: a servo has latched an error, refuses its torque, or
                 stands beyond its encoder's zero, from where it would go the wrong way.
         """
         try:
@@ -313,7 +313,7 @@ class SmartServoBus(ABC):
         """Torque off on every servo, confirmed; never raises for a servo that does not answer.
 
         Raises:
-            drivers.errors.BusLost: the port is gone, and stays so when tried once more; the
+            BusLost: the port is gone, and stays so when tried once more; the
                 torque is taken off by the first read after it is back.
         """
         self._supervisor.let_go()
@@ -336,7 +336,7 @@ class SmartServoBus(ABC):
         """Take the torque off, see that it is gone, and say where it is not.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         try:
             released = switch_off(self._line, self._ids)
@@ -366,7 +366,7 @@ class SmartServoBus(ABC):
         """Give up where nobody has answered for too long.
 
         Raises:
-            drivers.errors.BusLost: so it is.
+            BusLost: so it is.
         """
         silent_s = self._health.silent_for_s(now_s)
         if silent_s >= self._bus_params.give_up_s:

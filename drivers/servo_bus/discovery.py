@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 
-from drivers.errors import ServoMissing
-from drivers.event_log import EventLog, servo_label
-from drivers.servo_bus.family import Family, Identity, SingleRegisters
-from drivers.servo_bus.transaction import Line
-from drivers.types import ServoSetup
+from gazerig.drivers.errors import ServoMissing
+from gazerig.drivers.event_log import EventLog, servo_label
+from gazerig.drivers.servo_bus.family import Family, Identity, SingleRegisters
+from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.types import ServoSetup
 
 
 def find(
@@ -18,7 +18,7 @@ def find(
     tells of them.
 
     Raises:
-        drivers.errors.ServoMissing: some are absent, of another model or too old; all are
+        ServoMissing: some are absent, of another model or too old; all are
             named at once, with those that are there and not expected.
     """
     family = line.family

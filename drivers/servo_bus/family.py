@@ -1,17 +1,18 @@
 """What the engine must know of a make of servo: everything that makes differ in, as one value.
 
-The engine (drivers.servo_bus) knows no make by name. A make is a protocol file (the codec), a
-table file and one ``Family`` made of both; docs/servo-families.md explains it field by field.
+The engine (gazerig.drivers.servo_bus) knows no make by name. A make is a protocol file (the
+codec), a table file and one ``Family`` made of both; docs/servo-families.md explains it field by
+field.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from drivers.serial.port import BusPort
+from gazerig.drivers.serial.port import BusPort
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoSetup
 
 
 class Status(NamedTuple):

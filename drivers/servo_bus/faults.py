@@ -2,9 +2,9 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-from drivers.event_log import EventLog, Seldom, servo_label
-from drivers.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
-from drivers.types import ServoSetup
+from gazerig.drivers.event_log import EventLog, Seldom, servo_label
+from gazerig.drivers.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
+from gazerig.drivers.types import ServoSetup
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
 """A servo that restarts more often within such a time stays without torque."""

@@ -7,11 +7,11 @@ torque off, or a lock opened and closed again. Every write is noted in the log.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from drivers.errors import ServoMissing
-from drivers.event_log import EventLog, register_label, servo_label
-from drivers.servo_bus.family import Register, SingleRegisters
-from drivers.servo_bus.transaction import Line
-from drivers.types import ServoSetup
+from gazerig.drivers.errors import ServoMissing
+from gazerig.drivers.event_log import EventLog, register_label, servo_label
+from gazerig.drivers.servo_bus.family import Register, SingleRegisters
+from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.types import ServoSetup
 
 
 class Difference(NamedTuple):
@@ -65,8 +65,8 @@ class Provisioning:
         Takes the torque away from those whose EEPROM differs.
 
         Raises:
-            drivers.errors.ServoMissing: a servo does not answer, or does not take a setting.
-            drivers.errors.BusLost: the port is gone.
+            ServoMissing: a servo does not answer, or does not take a setting.
+            BusLost: the port is gone.
         """
         differences = self.differences(ids)
         if differences:
@@ -81,7 +81,7 @@ class Provisioning:
         """Make servos answer every order; torque and bus watchdog off, where they are not.
 
         Raises:
-            drivers.errors.ServoMissing: a servo does not answer.
+            ServoMissing: a servo does not answer.
         """
         # A servo may be set to answer questions alone; this takes no answer and ends that.
         self._registers.write_all(ids, "status_return_level", self._family.answer_level)
@@ -96,7 +96,7 @@ class Provisioning:
         """Read servos and return what is not as it should be.
 
         Raises:
-            drivers.errors.ServoMissing: a servo does not answer.
+            ServoMissing: a servo does not answer.
         """
         different: list[Difference] = []
         for first, last in self._family.spans:
@@ -152,7 +152,7 @@ class Provisioning:
         """Write a register; True if the servo has taken it.
 
         Raises:
-            drivers.errors.ServoMissing: it does not answer.
+            ServoMissing: it does not answer.
         """
         written = self._registers.write(servo_id, name, value)
         if not written and not self._registers.refusal:

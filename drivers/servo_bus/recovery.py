@@ -6,15 +6,15 @@ becomes the present position, and only then comes the torque.
 
 from collections.abc import Collection, Mapping, Sequence
 
-from drivers.errors import ServoFault, ServoMissing
-from drivers.event_log import EventLog
-from drivers.servo_bus.faults import Health
-from drivers.servo_bus.provisioning import Provisioning
-from drivers.servo_bus.torque import find_ailing, insist, positions, switch_off, switch_on
-from drivers.servo_bus.transaction import Line
-from drivers.servo_bus.turn import nearest_turn
-from drivers.slow_entry import entry_speed_steps_s
-from drivers.types import ServoSetup
+from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.servo_bus.faults import Health
+from gazerig.drivers.servo_bus.provisioning import Provisioning
+from gazerig.drivers.servo_bus.torque import find_ailing, insist, positions, switch_off, switch_on
+from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.servo_bus.turn import nearest_turn
+from gazerig.drivers.slow_entry import entry_speed_steps_s
+from gazerig.drivers.types import ServoSetup
 
 FAR_SIDE = "stands beyond its encoder's zero: turn it into its range by hand"
 
@@ -53,7 +53,7 @@ class Recovery:
         should be tried again.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         # Others are waiting: what fails is tried again later, not at once.
         before, self._line.tries = self._line.tries, 1
@@ -66,7 +66,7 @@ class Recovery:
         """Return whether a servo's settings are not as they should be; a silent one's may be.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         try:
             return bool(self._provisioning.differences((servo_id,)))
@@ -131,7 +131,7 @@ class Recovery:
         """Leave those limp that would go the wrong way round into their range.
 
         Raises:
-            drivers.errors.ServoMissing: a servo does not answer.
+            ServoMissing: a servo does not answer.
         """
         if not self._family.single_turn:
             return ids
@@ -159,8 +159,8 @@ class Recovery:
         Those outside their limits come inside slowly. Returns the goals, and who is outside.
 
         Raises:
-            drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
-            drivers.errors.ServoFault: a servo refuses its torque, or has lost its zero.
+            ServoMissing: a servo does not answer or does not take its goal.
+            ServoFault: a servo refuses its torque, or has lost its zero.
         """
         line, family = self._line, self._family
         if not ids:
@@ -184,7 +184,7 @@ class Recovery:
         """See that no servo would go the wrong way round into its range.
 
         Raises:
-            drivers.errors.ServoFault: one would.
+            ServoFault: one would.
         """
         for servo_id, steps in zip(ids, present, strict=True):
             if self.is_lost(servo_id, steps):

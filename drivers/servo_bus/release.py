@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from drivers.errors import PortError
-from drivers.serial.port import BusPort
-from drivers.servo_bus.family import Family
-from drivers.servo_bus.torque import switch_off
-from drivers.servo_bus.transaction import Line
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.family import Family
+from gazerig.drivers.servo_bus.torque import switch_off
+from gazerig.drivers.servo_bus.transaction import Line
 
 LEAST_S, MOST_S = 0.005, 0.02
 """Patience for an answer beyond its time on the wire."""
@@ -22,8 +22,8 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
         ids: of the servos.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: the port went away.
+        PortError: the port cannot be opened.
+        BusLost: the port went away.
     """
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s")

@@ -5,12 +5,12 @@ from collections.abc import Collection, Mapping
 from math import inf
 from typing import Protocol
 
-from drivers.plausibility import Plausibility
-from drivers.servo_bus.faults import Health
-from drivers.servo_bus.recovery import Recovery
-from drivers.servo_bus.transaction import Line
-from drivers.slow_entry import SlowEntry
-from drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.plausibility import Plausibility
+from gazerig.drivers.servo_bus.faults import Health
+from gazerig.drivers.servo_bus.recovery import Recovery
+from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.slow_entry import SlowEntry
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 AGAIN_S = 0.25
 """Time between attempts to set a servo up again, or to learn what an alert is about."""

@@ -8,9 +8,9 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from math import inf
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from drivers.servo_bus.poll_list import Roll, silent_ones
-from drivers.servo_bus.transaction import Line
-from drivers.servo_bus.window_schedule import Turns
+from gazerig.drivers.servo_bus.poll_list import Roll, silent_ones
+from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.servo_bus.window_schedule import Turns
 
 MOST_GROUPS = 64
 """So many prepared exchanges are kept."""
@@ -124,7 +124,7 @@ class Reader(Generic[View, Sample]):
         """Read everybody who is asked now; who is not in the answer gave no good one.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         roll = self.roll
         if self._together.troubled:
@@ -158,7 +158,7 @@ class Reader(Generic[View, Sample]):
         """Ask some servos once more, in one exchange; who is not in the answer gave no good one.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         group = self._group(tuple(ids), self._second)
         raw, at_s = self._line.exchange(group.request, group.reply_length)

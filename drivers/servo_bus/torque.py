@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
 
-from drivers.errors import ServoFault, ServoMissing
-from drivers.servo_bus.transaction import Line
+from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.servo_bus.transaction import Line
 
 TRIES = 3
 TRIPPED = 255
@@ -30,7 +30,7 @@ def positions(line: Line, ids: Sequence[int]) -> tuple[int, ...]:
     """Read every position, as the servos count.
 
     Raises:
-        drivers.errors.ServoMissing: a servo does not answer.
+        ServoMissing: a servo does not answer.
     """
     found = line.ask(ids, "present_position")
     _raise_missing(line, [servo_id for servo_id in ids if servo_id not in found])
@@ -41,7 +41,7 @@ def insist(line: Line, ids: Sequence[int], name: str, values: Sequence[int]) -> 
     """Write a register and read it back until every servo has its value.
 
     Raises:
-        drivers.errors.ServoMissing: a servo does not answer or does not take it.
+        ServoMissing: a servo does not answer or does not take it.
     """
     _until(
         line,
@@ -104,8 +104,8 @@ def switch_on(line: Line, ids: Sequence[int], goals: Sequence[int], speeds: Sequ
     """Set the goals, then the torque, and see that every position is still the same.
 
     Raises:
-        drivers.errors.ServoMissing: a servo does not answer or does not take its goal.
-        drivers.errors.ServoFault: a servo refuses its torque, or its position jumped.
+        ServoMissing: a servo does not answer or does not take its goal.
+        ServoFault: a servo refuses its torque, or its position jumped.
     """
     family = line.family
     wanted = dict(zip(ids, zip(goals, speeds, strict=True), strict=True))

@@ -4,11 +4,11 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
-from drivers.host_lateness import HostLateness
-from drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
-from drivers.servo_bus.adaptive_timeout import Patience
-from drivers.servo_bus.family import Family, Identity
-from drivers.servo_bus.poll_list import silent_ones
+from gazerig.drivers.host_lateness import HostLateness
+from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
+from gazerig.drivers.servo_bus.adaptive_timeout import Patience
+from gazerig.drivers.servo_bus.family import Family, Identity
+from gazerig.drivers.servo_bus.poll_list import silent_ones
 
 TRIES, HURRIED = 3, 4.0
 
@@ -17,7 +17,7 @@ _BACKLOG_S = 0.05
 
 
 class Line:
-    """A port with the patience of one bus; every method may raise drivers.errors.BusLost.
+    """A port with the patience of one bus; every method may raise BusLost.
 
     What is asked and written here goes through sync read and sync write even for a single
     servo: an echo of such a question cannot be taken for its answer.

@@ -5,18 +5,18 @@ Pixels have their centres at whole numbers: (0, 0) is the middle of the top left
 so a picture of width w reaches from -0.5 to w - 0.5.
 """
 
-from drivers.errors import ModelFileError
-from drivers.types import FaceDetector
-from drivers.vision.face_mtcnn import MtcnnDetector
-from drivers.vision.face_params import FaceDetectorParams
-from drivers.vision.face_yunet import YunetDetector
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.types import FaceDetector
+from gazerig.drivers.vision.face_mtcnn import MtcnnDetector
+from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face_yunet import YunetDetector
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:
     """Make the detector that the parameters name.
 
     Raises:
-        drivers.errors.ModelFileError: its model file is missing or not what it should be.
+        ModelFileError: its model file is missing or not what it should be.
     """
     if params.kind == "mtcnn":
         return MtcnnDetector(params)

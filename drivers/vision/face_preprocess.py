@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.types import DetectedFace, Picture
+from gazerig.drivers.types import DetectedFace, Picture
 
 
 class Prepared(NamedTuple):

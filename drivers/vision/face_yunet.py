@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.quiet_opencv import quiet_opencv
-from drivers.errors import ModelFileError
-from drivers.types import DetectedFace, Picture
-from drivers.vision.face_params import FaceDetectorParams
-from drivers.vision.face_preprocess import largest_first, prepare
+from gazerig.drivers.camera.quiet_opencv import quiet_opencv
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face_preprocess import largest_first, prepare
 
 _CURE = (
     "get face_detection_yunet_2023mar.onnx or a later one from the OpenCV zoo"
@@ -28,7 +28,7 @@ class YunetDetector:
         """Load the network and try it on an empty picture.
 
         Raises:
-            drivers.errors.ModelFileError: the file is missing or is not YuNet.
+            ModelFileError: the file is missing or is not YuNet.
         """
         self._params = params
         self._net = _load(model_file, params.min_confidence)

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from math import degrees, radians
 from typing import NamedTuple
 
-from robot.types import JointAngles, JointState, Level, Verdict
+from gazerig.robot.types import JointAngles, JointState, Level, Verdict
 
 PASSING = ("starting slowly", "too hard", "too fast")
 """Reasons that say how a goal is approached, not that it cannot be reached."""

@@ -6,19 +6,19 @@ The board knows no watchdog: a guardian stops its pulses when this program is ki
 
 from collections.abc import Callable
 
-from drivers.errors import BusLost
-from drivers.hobby_board.models import US_STEPS
-from drivers.maestro.bus import MaestroBus
-from drivers.maestro.params import MaestroParams
-from drivers.pca9685.bus import Pca9685Bus
-from drivers.pca9685.params import Pca9685Params
-from drivers.serial.port import BusPort
-from drivers.types import ServoBus, ServoReading, ServoSetup
-from robot.bringup.single_joint import Stopped
-from robot.clock import Clock
-from robot.guardian.guarded_bus import GuardedBus
-from robot.guardian.guardian import Guardian
-from robot.joint import JointParams
+from gazerig.drivers.errors import BusLost
+from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.maestro.bus import MaestroBus
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.bus import Pca9685Bus
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
+from gazerig.robot.bringup.single_joint import Stopped
+from gazerig.robot.clock import Clock
+from gazerig.robot.guardian.guarded_bus import GuardedBus
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.joint import JointParams
 
 PERIOD_S = 0.03
 SPEED_US_S = 200.0
@@ -81,7 +81,7 @@ class OneHobby:
         """Find board and channel; gives the pulse width in us, None where there are no pulses.
 
         Raises:
-            drivers.errors.SetupError: the board or the channel does not answer.
+            SetupError: the board or the channel does not answer.
         """
         self._bus.open()
         reading = self._read()
@@ -93,7 +93,7 @@ class OneHobby:
         Where it had no pulses it goes there at once, at its own speed.
 
         Raises:
-            drivers.errors.ServoMissing: the channel does not take it.
+            ServoMissing: the channel does not take it.
         """
         self._bus.retune([self._setup._replace(rest_steps=self._within(place_us))])
         (self._goal,) = self._bus.engage()
@@ -108,8 +108,8 @@ class OneHobby:
         """Wait a moment and lead it on; tells whether it is where it was sent.
 
         Raises:
-            drivers.errors.BusLost: the board does not answer any more.
-            robot.bringup.single_joint.Stopped: a person or the system asked for it.
+            BusLost: the board does not answer any more.
+            gazerig.robot.bringup.single_joint.Stopped: a person or the system asked for it.
         """
         why = self._stopped()
         if why is not None:
@@ -123,7 +123,7 @@ class OneHobby:
         """Lead it to where it was sent; gives the pulse in us that it gets in the end.
 
         Raises:
-            drivers.errors.BusLost, robot.bringup.single_joint.Stopped: see ``look``.
+            BusLost, gazerig.robot.bringup.single_joint.Stopped: see ``look``.
         """
         way = abs(self._goal - self._read().position_steps) / US_STEPS
         end_s = self._clock.now_s() + way / SPEED_US_S + PATIENCE_S
@@ -152,7 +152,7 @@ class OneHobby:
         """Stop its pulses and close the port; safe to call at any time.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         try:
             self._bus.release()
@@ -167,7 +167,7 @@ class OneHobby:
         """Ask the board until it answers.
 
         Raises:
-            drivers.errors.BusLost: it does not answer any more.
+            BusLost: it does not answer any more.
         """
         end_s = self._clock.now_s() + SILENT_S
         while True:

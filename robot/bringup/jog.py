@@ -12,26 +12,26 @@ what was really applied:
         control.stop()
 
 Between two calls nothing is sent: Dynamixel servos are held by their own bus watchdog, others
-stay at their last goal, or limp where a guardian watches them (robot.guardian, after .4 s), and
-the next call goes on from there.
+stay at their last goal, or limp where a guardian watches them (gazerig.robot.guardian, after .4
+s), and the next call goes on from there.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import degrees, isfinite, radians, sqrt
 
-from drivers.errors import SetupError
-from gaze.quintic import Quintic
-from robot.body import Body
-from robot.bringup.applied import Moved, Notes, Step, outcome, standing
-from robot.clock import Clock
-from robot.menus import refuse_out_of_range
-from robot.observers import left_out
-from robot.orders import Jog
-from robot.power_down import Again
-from robot.safety.guard import Guard
-from robot.safety.motion import JointLimit
-from robot.types import JointAngles, JointState
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.quintic import Quintic
+from gazerig.robot.body import Body
+from gazerig.robot.bringup.applied import Moved, Notes, Step, outcome, standing
+from gazerig.robot.clock import Clock
+from gazerig.robot.menus import refuse_out_of_range
+from gazerig.robot.observers import left_out
+from gazerig.robot.orders import Jog
+from gazerig.robot.power_down import Again
+from gazerig.robot.safety.guard import Guard
+from gazerig.robot.safety.motion import JointLimit
+from gazerig.robot.types import JointAngles, JointState
 
 _PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
 """Of a fifth-order polynomial from rest to rest, over distance/time and distance/time^2."""
@@ -123,7 +123,7 @@ class ManualControl:
         """Open the bus and switch torque on where the joints are; give the goals in force.
 
         Raises:
-            drivers.errors.SetupError: port or servos are not as configured.
+            SetupError: port or servos are not as configured.
         """
         self._goal = self.body.start()
         self._guard.reset(self._clock.now_s(), self._goal)
@@ -137,9 +137,9 @@ class ManualControl:
         """Move one joint slowly; the others hold where they are.
 
         Raises:
-            drivers.errors.SetupError: there is no such joint, or the angle is no number or
+            SetupError: there is no such joint, or the angle is no number or
                 outside the joint's range.
-            drivers.errors.DriverError: the bus is gone.
+            DriverError: the bus is gone.
         """
         refuse_beyond(joint, angle_deg, self.body.names, self._guard.limits)
         return self.pose({joint: angle_deg})
@@ -148,8 +148,8 @@ class ManualControl:
         """Move several joints slowly, so that they arrive together; the others hold.
 
         Raises:
-            drivers.errors.SetupError: there is no such joint, or an angle is no number.
-            drivers.errors.DriverError: the bus is gone.
+            SetupError: there is no such joint, or an angle is no number.
+            DriverError: the bus is gone.
         """
         names = self.body.names
         refuse_unknown(angles_deg, names)
@@ -179,7 +179,7 @@ class ManualControl:
         """Hold the goals in force for so long.
 
         Raises:
-            drivers.errors.DriverError: the bus is gone.
+            DriverError: the bus is gone.
         """
         goal, end_s = self._goal, self._clock.now_s() + seconds
 
@@ -198,7 +198,7 @@ class ManualControl:
         stopped: asked at every step; gives why to stop, None while there is no reason
 
         Raises:
-            drivers.errors.DriverError: the bus is gone.
+            DriverError: the bus is gone.
         """
         before, self._stopped = self._stopped, stopped
         try:
@@ -221,7 +221,7 @@ class ManualControl:
         gently: the guard goes slowly all the way, not only at the start
 
         Raises:
-            drivers.errors.DriverError: the bus is gone.
+            DriverError: the bus is gone.
         """
         clock, period = self._clock, 1.0 / self._params.rate_hz
         start_s = last_s = clock.now_s()
@@ -283,7 +283,7 @@ def refuse_unknown(angles_deg: Mapping[str, float], joints: tuple[str, ...]) -> 
     """Refuse what is no joint of the rig or no angle.
 
     Raises:
-        drivers.errors.SetupError: with what there is.
+        SetupError: with what there is.
     """
     for name, angle in angles_deg.items():
         if name not in joints:
@@ -298,7 +298,7 @@ def refuse_beyond(
     """Refuse an angle outside a joint's range, before anything moves.
 
     Raises:
-        drivers.errors.SetupError: with the range.
+        SetupError: with the range.
     """
     refuse_unknown({joint: angle_deg}, joints)
     try:

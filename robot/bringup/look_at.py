@@ -4,17 +4,17 @@ from collections.abc import Mapping
 from math import degrees, isfinite
 from typing import NamedTuple
 
-from drivers.errors import SetupError
-from gaze.angles import angle_between, norm, sub
-from gaze.field_of_view import line_of_sight
-from gaze.oculomotor import Oculomotor
-from gaze.types import GazeState, Target, Vec3
-from robot.bringup.applied import Moved, Step
-from robot.bringup.jog import ManualControl
-from robot.gaze_error import gaze_error
-from robot.joint import JointParams
-from robot.kinematics import Kinematics
-from robot.types import JointAngles, JointState
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.angles import angle_between, norm, sub
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.types import GazeState, Target, Vec3
+from gazerig.robot.bringup.applied import Moved, Step
+from gazerig.robot.bringup.jog import ManualControl
+from gazerig.robot.gaze_error import gaze_error
+from gazerig.robot.joint import JointParams
+from gazerig.robot.kinematics import Kinematics
+from gazerig.robot.types import JointAngles, JointState
 
 AT_END_DEG = 1.0
 
@@ -57,8 +57,8 @@ def look_at(
     p_world_m: x forward, y left, z up from the neck base
 
     Raises:
-        drivers.errors.SetupError: it is no point, or one in the head itself.
-        drivers.errors.DriverError: the bus is gone.
+        SetupError: it is no point, or one in the head itself.
+        DriverError: the bus is gone.
     """
     refuse_not_finite(p_world_m)
     fresh = True
@@ -149,7 +149,7 @@ def refuse_not_finite(p_world_m: Vec3) -> None:
     """Refuse what is no point.
 
     Raises:
-        drivers.errors.SetupError: a coordinate is no number.
+        SetupError: a coordinate is no number.
     """
     if not all(map(isfinite, p_world_m)):
         raise SetupError(f"{p_world_m} is no point: three numbers in metres, e.g. 1.0 0.2 0.3")
@@ -159,7 +159,7 @@ def refuse_inside(p_world_m: Vec3, pose: GazeState) -> None:
     """Refuse a point that no eye can look at.
 
     Raises:
-        drivers.errors.SetupError: it lies within 3 cm of the head's middle.
+        SetupError: it lies within 3 cm of the head's middle.
     """
     if norm(sub(p_world_m, pose.p_world_head_m)) < 0.03:
         x, y, z = p_world_m

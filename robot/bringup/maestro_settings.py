@@ -12,12 +12,12 @@ from collections.abc import Iterator, Sequence
 from math import ceil, floor
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from drivers.hobby_board.models import US_STEPS
-from drivers.maestro.commands import MICRO
-from drivers.maestro.limits import accel_units, speed_units
-from drivers.maestro.params import MaestroParams
-from drivers.servo_models import servo_label
-from drivers.types import ServoSetup
+from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.maestro.commands import MICRO
+from gazerig.drivers.maestro.limits import accel_units, speed_units
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.types import ServoSetup
 
 FACTORY_US = (992, 2000)
 """Range of every channel of a new board."""

@@ -8,13 +8,13 @@ happens.
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from drivers.errors import BusLost, ServoFault, ServoMissing
-from drivers.hobby_board.release import switch_off
-from drivers.maestro.commands import MOST_INPUT, name_errors
-from drivers.maestro.limits import SPEED_STEPS_S, speed_units
-from drivers.maestro.line import Line
-from drivers.servo_models import servo_label
-from drivers.types import ServoSetup
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
+from gazerig.drivers.hobby_board.release import switch_off
+from gazerig.drivers.maestro.commands import MOST_INPUT, name_errors
+from gazerig.drivers.maestro.limits import SPEED_STEPS_S, speed_units
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.types import ServoSetup
 
 SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0
 """20 deg/s of the servo's shaft."""
@@ -46,9 +46,9 @@ def walk(
     places: quarter microseconds
 
     Raises:
-        drivers.errors.ServoMissing: the board does not answer, or the channel is no servo's.
-        drivers.errors.ServoFault: the pulses do not end.
-        drivers.errors.BusLost: the port is gone.
+        ServoMissing: the board does not answer, or the channel is no servo's.
+        ServoFault: the pulses do not end.
+        BusLost: the port is gone.
     """
     speech = line.speech
     if 0 < _pulse(line, setup) <= MOST_INPUT:
@@ -107,7 +107,7 @@ def _end(line: Line, setup: ServoSetup) -> None:
     """Stop the pulses and see that they have.
 
     Raises:
-        drivers.errors.ServoFault: nobody confirms it.
+        ServoFault: nobody confirms it.
     """
     try:
         left = switch_off(line, (setup.id,))
@@ -122,8 +122,8 @@ def sent_home(line: Line) -> tuple[str, ...]:
     """Send all channels home and clear the errors; gives those that the board held, by name.
 
     Raises:
-        drivers.errors.ServoMissing: the board does not answer.
-        drivers.errors.BusLost: the port is gone.
+        ServoMissing: the board does not answer.
+        BusLost: the port is gone.
     """
     register = line.greet()
     if register is None:

@@ -6,8 +6,8 @@ A bus that is opened for moving prepares its servos, which is a write; this one 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from robot.bringup.telemetry import Look, Looks
-from robot.joint import JointParams
+from gazerig.robot.bringup.telemetry import Look, Looks
+from gazerig.robot.joint import JointParams
 
 _DIGITS = {"goal_deg": 2, "position_deg": 2, "velocity_deg_s": 1, "load": 3}
 
@@ -51,7 +51,7 @@ class Monitor:
         """Look at every servo once.
 
         Raises:
-            drivers.errors.BusLost: a port is gone.
+            BusLost: a port is gone.
         """
         start_s = self._now_s()
         looks = {name: self._looks[one.bus].look(one) for name, one in self._joints.items()}

@@ -2,10 +2,10 @@
 
 from collections.abc import Container, Iterator, Sequence
 
-from drivers.hobby_board.models import US_STEPS
-from drivers.servo_models import BusKind
-from robot.bringup.searching import Looked, found_of
-from robot.bringup.servo_kind import Found
+from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.servo_models import BusKind
+from gazerig.robot.bringup.searching import Looked, found_of
+from gazerig.robot.bringup.servo_kind import Found
 
 
 def servo_plain(kind: BusKind, servo: Found) -> dict[str, object]:

@@ -19,13 +19,13 @@ is not found out: with such a one on the line name the kind that is wished.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from drivers.maestro.params import MaestroParams
-from drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
-from drivers.serial.port import BusPort
-from drivers.serial.port_owner import POLOLU
-from drivers.servo_models import BUS_KINDS, BusKind
-from robot.bringup.servo_families import KINDS
-from robot.bringup.servo_kind import Found
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_owner import POLOLU
+from gazerig.drivers.servo_models import BUS_KINDS, BusKind
+from gazerig.robot.bringup.servo_families import KINDS
+from gazerig.robot.bringup.servo_kind import Found
 
 BOARD_RATES = (115_200, 9_600, 57_600, 38_400, 19_200)
 """Of a Maestro's serial pins, the usual ones first; on USB any will do."""
@@ -99,8 +99,8 @@ def search(
     to_the_end: servos of a kind do not end it, as a line can carry two kinds; a board does
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     met: BusKind | None = None
     for kind, baud in asked:

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple, Protocol
 
-from drivers.errors import BusLost
-from robot.bringup.servo_kind import Registers
+from gazerig.drivers.errors import BusLost
+from gazerig.robot.bringup.servo_kind import Registers
 
 
 class Found(NamedTuple):
@@ -18,7 +18,7 @@ class OneServo(Protocol):
     """One servo by itself; the others of its line are left as they are.
 
     What it changes in the servo it puts back. Every method may raise
-    drivers.errors.BusLost where the servo does not answer any more.
+    BusLost where the servo does not answer any more.
 
     who: what messages call it, "neck_yaw (servo 7)"
     alone: what it does when this program dies while it is driven, with the cure; "" where it
@@ -32,9 +32,9 @@ class OneServo(Protocol):
         """See that it is the right servo, sound, and in position mode.
 
         Raises:
-            drivers.errors.ServoMissing: it does not answer, is another model, or is set up
+            ServoMissing: it does not answer, is another model, or is set up
                 in another way.
-            drivers.errors.ServoFault: it suffers from something.
+            ServoFault: it suffers from something.
         """
         ...
 
@@ -46,7 +46,7 @@ class OneServo(Protocol):
         """Let the limp servo call its present place the middle, 2048; gives its new offset.
 
         Raises:
-            drivers.errors.SetupError: this kind cannot.
+            SetupError: this kind cannot.
         """
         ...
 
@@ -68,8 +68,8 @@ class OneServo(Protocol):
         strength: share of full drive
 
         Raises:
-            drivers.errors.ServoMissing: the position does not lie within one turn.
-            drivers.errors.ServoFault: the torque does not come on, or the position jumped.
+            ServoMissing: the position does not lie within one turn.
+            ServoFault: the torque does not come on, or the position jumped.
         """
         ...
 
@@ -101,7 +101,7 @@ class Asked:
         """Give a register's value.
 
         Raises:
-            drivers.errors.BusLost: it does not answer any more.
+            BusLost: it does not answer any more.
         """
         value = self._registers.read(self._id, register)
         if value is None:
@@ -112,7 +112,7 @@ class Asked:
         """Write a register.
 
         Raises:
-            drivers.errors.BusLost: it does not answer any more, or refuses the value.
+            BusLost: it does not answer any more, or refuses the value.
         """
         if not self._registers.write(self._id, register, value):
             raise BusLost(f"{self.who} does not take {register} {value}: check its cable and power")

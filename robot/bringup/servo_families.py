@@ -2,20 +2,20 @@
 
 from collections.abc import Callable
 
-from drivers.dynamixel import control_table as dynamixel
-from drivers.dynamixel import discovery as dynamixel_scan
-from drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
-from drivers.dynamixel.registers import Registers
-from drivers.errors import SetupError
-from drivers.feetech import homing
-from drivers.feetech import memory_table as feetech
-from drivers.feetech import scan as feetech_scan
-from drivers.feetech.family import FEETECH as FEETECH_FAMILY
-from drivers.feetech.protocol import REBOOT, instruction
-from drivers.feetech.registers import StsRegisters
-from drivers.serial.port import BusPort
-from drivers.servo_models import SERVOS
-from robot.bringup.servo_kind import Driving, Scanned, ServoKind, Setting
+from gazerig.drivers.dynamixel import control_table as dynamixel
+from gazerig.drivers.dynamixel import discovery as dynamixel_scan
+from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
+from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.feetech import homing
+from gazerig.drivers.feetech import memory_table as feetech
+from gazerig.drivers.feetech import scan as feetech_scan
+from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
+from gazerig.drivers.feetech.protocol import REBOOT, instruction
+from gazerig.drivers.feetech.registers import StsRegisters
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_models import SERVOS
+from gazerig.robot.bringup.servo_kind import Driving, Scanned, ServoKind, Setting
 
 XL430_LOAD_FULL = 1000.0
 """Models without current measurement give their load in 0.1 % of the stall torque there."""
@@ -156,7 +156,7 @@ def kind_of(model: str) -> ServoKind:
     """Return the kind of a servo by its model.
 
     Raises:
-        drivers.errors.SetupError: it is no smart servo.
+        SetupError: it is no smart servo.
     """
     kind = KINDS.get(SERVOS[model].bus)
     if kind is None:

@@ -1,15 +1,15 @@
 """What bring-up must know of a kind of smart servo: one value a kind.
 
-The values stand in robot.bringup.servo_families; everything else in bring-up is written once.
-A board of hobby servos, whose channels do not answer, is no such kind.
+The values stand in gazerig.robot.bringup.servo_families; everything else in bring-up is written
+once. A board of hobby servos, whose channels do not answer, is no such kind.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from drivers.serial.port import BusPort
-from drivers.servo_bus.family import Family, Identity
-from drivers.servo_models import BusKind
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.family import Family, Identity
+from gazerig.drivers.servo_models import BusKind
 
 Tell = Callable[[str], None]
 """Is told in a few words what is being done now."""

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drivers.errors import ServoFault, ServoMissing
-from drivers.serial.port import BusPort
-from robot.bringup.servo_kind import TRIES, Found, ServoKind
+from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.serial.port import BusPort
+from gazerig.robot.bringup.servo_kind import TRIES, Found, ServoKind
 
 BACK_S = 3.0
 """A servo that is not back after so long will not come; they take about 0.4 to 0.8 s."""
@@ -47,7 +47,7 @@ def present(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> Found:
     """Find one servo.
 
     Raises:
-        drivers.errors.ServoMissing: it does not answer.
+        ServoMissing: it does not answer.
     """
     found = kind.ping(port, servo_id, baud, 3)
     if found is None:
@@ -62,7 +62,7 @@ def standing(port: BusPort, kind: ServoKind, servo_id: int) -> Standing:
     """Return how a servo stands.
 
     Raises:
-        drivers.errors.BusLost: the port is gone.
+        BusLost: the port is gone.
     """
     registers = kind.registers(port, TRIES)
     status = registers.read(servo_id, kind.family.error_register)
@@ -87,9 +87,9 @@ def restart(
     """Restart a servo and wait until it answers; its torque is off then.
 
     Raises:
-        drivers.errors.ServoMissing: it does not answer, before or after.
-        drivers.errors.ServoFault: it answers, but has not restarted.
-        drivers.errors.BusLost: the port is gone.
+        ServoMissing: it does not answer, before or after.
+        ServoFault: it answers, but has not restarted.
+        BusLost: the port is gone.
     """
     present(port, kind, servo_id, baud)
     before, began_s = standing(port, kind, servo_id), port.now_s()

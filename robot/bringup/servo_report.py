@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from robot.bringup.doctor.findings import LEVELS, Finding, Level
+from gazerig.robot.bringup.doctor.findings import LEVELS, Finding, Level
 
 _JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 

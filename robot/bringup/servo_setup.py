@@ -11,11 +11,11 @@ under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech memory 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from drivers.errors import PortError, ServoFault, ServoMissing
-from drivers.serial.port import BusPort
-from drivers.servo_models import servo_label
-from drivers.types import ServoSetup
-from robot.bringup.servo_kind import TRIES, Found, ServoKind, Tell
+from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.servo_kind import TRIES, Found, ServoKind, Tell
 
 SHARED, ANSWERS = 2, 6
 """So many of so many answers in pieces are no accident."""
@@ -38,9 +38,9 @@ def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell)
     """Find the one servo that is connected, whatever its id and baud rate; all rates are asked.
 
     Raises:
-        drivers.errors.ServoMissing: none answers, or more than one.
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        ServoMissing: none answers, or more than one.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     found: list[Found] = []
     junk = 0
@@ -78,7 +78,7 @@ def refuse_model(found: Found, kind: ServoKind, setup: ServoSetup, where: str) -
     """See that the servo found is of the model the joint wants.
 
     Raises:
-        drivers.errors.ServoMissing: it is another.
+        ServoMissing: it is another.
     """
     if found.number != kind.models[setup.model].number:
         raise ServoMissing(
@@ -96,10 +96,10 @@ def assign(
 
     Raises:
         ValueError: there is no such id or baud rate.
-        drivers.errors.ServoMissing: of another model, or is not found again.
-        drivers.errors.ServoFault: it refuses.
-        drivers.errors.PortError: the adaptor cannot run at a rate.
-        drivers.errors.BusLost: the port is gone.
+        ServoMissing: of another model, or is not found again.
+        ServoFault: it refuses.
+        PortError: the adaptor cannot run at a rate.
+        BusLost: the port is gone.
     """
     refuse_model(found, kind, setup, port.port_name)
     if not 0 <= setup.id <= kind.highest_id:

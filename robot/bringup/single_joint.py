@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 
-from drivers.dynamixel.control_table import STEPS_PER_TURN
-from drivers.errors import DriverError, ServoFault
-from robot.bringup.servo_access import Found, OneServo
-from robot.calibrate.stop_search import STEPS_PER_DEG, Stop, StopSearchParams, go, search
-from robot.clock import Clock
-from robot.joint import JointParams
+from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
+from gazerig.drivers.errors import DriverError, ServoFault
+from gazerig.robot.bringup.servo_access import Found, OneServo
+from gazerig.robot.calibrate.stop_search import STEPS_PER_DEG, Stop, StopSearchParams, go, search
+from gazerig.robot.clock import Clock
+from gazerig.robot.joint import JointParams
 
 PERIOD_S = 0.02
 """A search looks 50 times a second where the line is quick enough."""
@@ -76,8 +76,8 @@ class SingleJoint:
         """Lead it to its stop towards more (1) or fewer (-1) steps, and a little back.
 
         Raises:
-            drivers.errors.BusLost: it does not answer any more.
-            drivers.errors.ServoFault: it let go on the way, so where it stood was no stop.
+            BusLost: it does not answer any more.
+            ServoFault: it let go on the way, so where it stood was no stop.
             Stopped: a person or the system asked for it.
         """
         stop = search(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)

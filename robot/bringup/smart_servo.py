@@ -1,15 +1,16 @@
-"""One smart servo by itself, for calibrating; implements robot.bringup.servo_access.OneServo.
+"""One smart servo by itself, for calibrating; implements
+gazerig.robot.bringup.servo_access.OneServo.
 
 Where it has a bus watchdog that is armed while the torque is on, so a servo that is left alone
 stops. Where its memory has a lock its limits are opened with the lock shut: the servo obeys and
 its EEPROM keeps the old ones, so switching it off and on puts back what a killed program left.
 """
 
-from drivers.errors import ServoFault, ServoMissing, SetupError
-from drivers.serial.port import BusPort
-from robot.bringup.servo_access import Asked, Found
-from robot.bringup.servo_families import kind_of
-from robot.bringup.servo_kind import TRIES
+from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
+from gazerig.drivers.serial.port import BusPort
+from gazerig.robot.bringup.servo_access import Asked, Found
+from gazerig.robot.bringup.servo_families import kind_of
+from gazerig.robot.bringup.servo_kind import TRIES
 
 WATCHDOG_S = 0.3
 """Three readings that were lost in a row must not let it trip."""
@@ -111,7 +112,7 @@ class SmartServo:
         """Switch the torque off, and see that it is.
 
         Raises:
-            drivers.errors.ServoFault: it is not.
+            ServoFault: it is not.
         """
         if self._family.watchdog_unit_s is not None:
             self._asked.put("bus_watchdog", 0)

@@ -10,23 +10,23 @@ from dataclasses import replace
 from math import degrees
 from typing import NamedTuple, Protocol
 
-from drivers.dynamixel.control_table import REGISTERS, VELOCITY_UNIT_STEPS_S
-from drivers.dynamixel.control_table import name_errors as name_dynamixel
-from drivers.dynamixel.registers import Registers
-from drivers.feetech.memory_table import LOAD_UNIT
-from drivers.feetech.memory_table import REGISTERS as STS
-from drivers.feetech.memory_table import name_errors as name_feetech
-from drivers.feetech.registers import StsRegisters
-from drivers.feetech.views import ARMED
-from drivers.hobby_board.models import US_STEPS
-from drivers.maestro.commands import MOST_INPUT
-from drivers.maestro.line import Line
-from drivers.maestro.params import MaestroParams
-from drivers.pca9685.board import Pca9685Board
-from drivers.pca9685.params import Pca9685Params
-from drivers.serial.port import BusPort
-from robot.bringup.servo_families import DYNAMIXEL
-from robot.joint import JointParams
+from gazerig.drivers.dynamixel.control_table import REGISTERS, VELOCITY_UNIT_STEPS_S
+from gazerig.drivers.dynamixel.control_table import name_errors as name_dynamixel
+from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.feetech.memory_table import LOAD_UNIT
+from gazerig.drivers.feetech.memory_table import REGISTERS as STS
+from gazerig.drivers.feetech.memory_table import name_errors as name_feetech
+from gazerig.drivers.feetech.registers import StsRegisters
+from gazerig.drivers.feetech.views import ARMED
+from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.maestro.commands import MOST_INPUT
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.serial.port import BusPort
+from gazerig.robot.bringup.servo_families import DYNAMIXEL
+from gazerig.robot.joint import JointParams
 
 # 116 goal position | 120 tick, 122 moving, 123 status, 124 pwm | 126 current, 128 velocity,
 # 132 position | 136, 140 trajectory | 144 voltage, 146 temperature: no gap between them
@@ -65,7 +65,7 @@ class Looks(Protocol):
         """Ask a joint's servo; None where it does not answer.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         ...
 

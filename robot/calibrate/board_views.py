@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot.calibrate.charuco_board import SeenBoard
-from robot.calibrate.charuco_pose import board_poses
-from robot.seeing.intrinsics import Intrinsics
+from gazerig.robot.calibrate.charuco_board import SeenBoard
+from gazerig.robot.calibrate.charuco_pose import board_poses
+from gazerig.robot.seeing.intrinsics import Intrinsics
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ Nothing is printed or written here: questions go to ``Person``, the result is a 
 from collections.abc import Callable
 from typing import Literal, Protocol
 
-from drivers.dynamixel.control_table import STEPS_PER_TURN
-from robot.bringup.single_joint import SingleJoint
-from robot.calibrate.calibration import (
+from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
+from gazerig.robot.bringup.single_joint import SingleJoint
+from gazerig.robot.calibrate.calibration import (
     Calibration,
     CalibrationRefused,
     Marks,
@@ -18,7 +18,7 @@ from robot.calibrate.calibration import (
     is_lid,
     middle,
 )
-from robot.calibrate.stop_search import Stop, StopSearchParams
+from gazerig.robot.calibrate.stop_search import Stop, StopSearchParams
 
 ZeroBy = Literal["middle", "person"]
 
@@ -34,7 +34,7 @@ class Person(Protocol):
         """Return when they have done what is asked; ``live`` gives the line to show meanwhile.
 
         Raises:
-            robot.bringup.single_joint.Stopped: they want it to end.
+            gazerig.robot.bringup.single_joint.Stopped: they want it to end.
         """
         ...
 
@@ -71,9 +71,10 @@ def by_hand(single: SingleJoint, person: Person, margin_deg: float) -> Calibrati
     """Let a person turn the limp joint to its ends and straight ahead.
 
     Raises:
-        robot.calibrate.calibration.CalibrationRefused: what was marked makes no calibration.
-        drivers.errors.DriverError: the servo does not answer any more.
-        robot.bringup.single_joint.Stopped: the person wants it to end.
+        gazerig.robot.calibrate.calibration.CalibrationRefused: what was marked makes no
+        calibration.
+        DriverError: the servo does not answer any more.
+        gazerig.robot.bringup.single_joint.Stopped: the person wants it to end.
     """
     single.let_go()
     watched = Watched(single)
@@ -100,9 +101,9 @@ def by_motion(
     """Drive the joint slowly and weakly to both stops; the zero is half-way, or a person's.
 
     Raises:
-        robot.calibrate.calibration.CalibrationRefused: what was found makes no calibration.
-        drivers.errors.DriverError: the servo is not fit for it, or does not answer any more.
-        robot.bringup.single_joint.Stopped: the person wants it to end.
+        gazerig.robot.calibrate.calibration.CalibrationRefused: what was found makes no calibration.
+        DriverError: the servo is not fit for it, or does not answer any more.
+        gazerig.robot.bringup.single_joint.Stopped: the person wants it to end.
     """
     try:
         marks = _find_stops(single, person, params)

@@ -3,7 +3,7 @@
 A servo counts 4096 steps a turn; where 4095 meets 0 is its seam. After a restart it knows
 only the place within the turn, so a joint whose travel holds the seam would wake up a whole
 turn from where it is: such a joint cannot be used and must be built in anew.
-Steps as in drivers.dynamixel.control_table, angles in degrees at the joint.
+Steps as in gazerig.drivers.dynamixel.control_table, angles in degrees at the joint.
 """
 
 from collections.abc import Mapping
@@ -11,9 +11,9 @@ from dataclasses import replace
 from math import floor
 from typing import NamedTuple
 
-from drivers.dynamixel.control_table import STEPS_PER_TURN
-from drivers.errors import SetupError
-from robot.joint import JointParams
+from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.joint import JointParams
 
 SMALLEST_RANGE_DEG = 5.0
 """A joint that moves less than this was not really moved."""
@@ -53,7 +53,7 @@ class Marks(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """What the rig file must say of one joint; fields as in robot.joint.JointParams."""
+    """What the rig file must say of one joint; fields as in gazerig.robot.joint.JointParams."""
 
     zero_step: int
     sign: int
@@ -137,7 +137,7 @@ def is_lid(joint_name: str) -> bool:
 
 
 def lid_keys(joint_name: str) -> tuple[str, str]:
-    """Give the keys of a lid's shut and open angle under lid_joints, as in config.rig.LidJoints."""
+    """Return the keys of a lid's shut and open angle under lid_joints, as in LidJoints."""
     lid = joint_name.removesuffix("_lid").removesuffix("_upper")
     return f"{lid}_shut_deg", f"{lid}_open_deg"
 

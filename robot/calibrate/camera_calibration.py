@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.errors import SetupError
-from robot.calibrate.board_views import ViewCollector, ViewParams
-from robot.calibrate.charuco_board import SeenBoard
-from robot.frames import LensParams
-from robot.seeing.intrinsics import Intrinsics, project, rays
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.calibrate.board_views import ViewCollector, ViewParams
+from gazerig.robot.calibrate.charuco_board import SeenBoard
+from gazerig.robot.frames import LensParams
+from gazerig.robot.seeing.intrinsics import Intrinsics, project, rays
 
 Floats = NDArray[np.float64]
 

@@ -11,19 +11,19 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from drivers.camera.source import Shot
-from drivers.errors import CameraError
-from gaze.types import Angles2, Angles3, HeadGeometry
-from robot.calibrate.board_views import Coverage, ViewCollector
-from robot.calibrate.camera_calibration import (
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.errors import CameraError
+from gazerig.gaze.types import Angles2, Angles3, HeadGeometry
+from gazerig.robot.calibrate.board_views import Coverage, ViewCollector
+from gazerig.robot.calibrate.camera_calibration import (
     CameraCalibrationRefused,
     LensCalibration,
     LensCalibrationParams,
     calibrate_lens,
 )
-from robot.calibrate.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
-from robot.calibrate.hand_eye import NeckView
-from robot.seeing.intrinsics import Intrinsics, intrinsics_of_view
+from gazerig.robot.calibrate.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
+from gazerig.robot.calibrate.hand_eye import NeckView
+from gazerig.robot.seeing.intrinsics import Intrinsics, intrinsics_of_view
 
 Look = Callable[[], Shot | None]
 """Gives the newest picture at once, None before the first."""
@@ -107,7 +107,7 @@ class LensSteps:
         """Look for the board in a picture and keep the view if it is new.
 
         Raises:
-            drivers.errors.CameraError: the pictures have changed their size.
+            CameraError: the pictures have changed their size.
         """
         height, width = shot.picture.shape[:2]
         if self._collector is None:
@@ -128,7 +128,8 @@ class LensSteps:
         """Give the lens, or None and why more views are needed.
 
         Raises:
-            robot.calibrate.camera_calibration.CameraCalibrationRefused: more views will not help.
+            gazerig.robot.calibrate.camera_calibration.CameraCalibrationRefused: more views will
+            not help.
         """
         try:
             return self.result(), ""
@@ -142,7 +143,8 @@ class LensSteps:
         """Give the lens.
 
         Raises:
-            robot.calibrate.camera_calibration.CameraCalibrationRefused: the views do not show it.
+            gazerig.robot.calibrate.camera_calibration.CameraCalibrationRefused: the views do not
+            show it.
         """
         views: Sequence[SeenBoard] = self._collector.views if self._collector is not None else ()
         width, height = self._size if self._collector is not None else (1, 1)
@@ -157,7 +159,7 @@ class Neck(Protocol):
         """Move gently to a yaw, pitch and roll; return when the head is there.
 
         Raises:
-            drivers.errors.DriverError: it cannot.
+            DriverError: it cannot.
         """
         ...
 
@@ -223,7 +225,7 @@ def neck_steps(
     geometry: gives the head's pose for measured angles
 
     Raises:
-        drivers.errors.DriverError: head or camera have failed.
+        DriverError: head or camera have failed.
     """
     par = params if params is not None else NeckStepParams()
     for number, asked in enumerate(angles_rad, 1):

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.types import Picture
+from gazerig.drivers.types import Picture
 
 Floats = NDArray[np.float64]
 

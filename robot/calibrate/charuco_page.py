@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from drivers.errors import SetupError
-from drivers.file_output import output_file
-from drivers.types import Picture
-from robot.calibrate.charuco_board import CharucoBoard
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import output_file
+from gazerig.drivers.types import Picture
+from gazerig.robot.calibrate.charuco_board import CharucoBoard
 
 PAPERS_MM: dict[str, tuple[float, float]] = {"a4": (297.0, 210.0), "letter": (279.4, 215.9)}
 """Width and height of the paper laid crosswise."""
@@ -29,7 +29,7 @@ def page(board: CharucoBoard, paper: str) -> Picture:
     """Draw the page: (h, w) grey, 12 px a millimetre.
 
     Raises:
-        drivers.errors.SetupError: no such paper, or the board is too large for it.
+        SetupError: no such paper, or the board is too large for it.
     """
     if paper not in PAPERS_MM:
         raise SetupError(f"paper {paper!r}: unknown; there is {', '.join(PAPERS_MM)}")
@@ -57,7 +57,7 @@ def write_page(board: CharucoBoard, paper: str, out: Path, force: bool = False) 
     """Write the page as PDF or PNG, by the name's ending; either prints in true size.
 
     Raises:
-        drivers.errors.SetupError: see ``page``, or the ending is another one.
+        SetupError: see ``page``, or the ending is another one.
             Or it is there already and not forced, or cannot be written.
     """
     if out.suffix.lower() not in (".pdf", ".png"):

@@ -1,7 +1,8 @@
 """Where the board is in the camera frame, from one picture of it. Pure.
 
-Frames as in robot.calibrate.charuco_board and robot.seeing.intrinsics. A flat board seen from far
-has two poses that explain it nearly as well, mirrored about the line of sight; both are given.
+Frames as in gazerig.robot.calibrate.charuco_board and gazerig.robot.seeing.intrinsics. A flat
+board seen from far has two poses that explain it nearly as well, mirrored about the line of sight;
+both are given.
 """
 
 from typing import NamedTuple
@@ -10,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from robot.calibrate.charuco_board import LEAST_CORNERS, SeenBoard
-from robot.seeing.intrinsics import Intrinsics
+from gazerig.robot.calibrate.charuco_board import LEAST_CORNERS, SeenBoard
+from gazerig.robot.seeing.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from gaze.angles import add, rotate, rotate_back, sub
-from gaze.types import Mat3, Vec3
-from robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.gaze.angles import add, rotate, rotate_back, sub
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.seeing.face_pose import PARTS_FACE_M
 
 Key = Literal["left", "right", "up", "down", "larger", "smaller", "enter", "skip", "back", "end"]
 

@@ -7,12 +7,12 @@ model, guard, servos.
 
 from math import degrees, inf
 
-from gaze.angles import norm, sub
-from gaze.top_down import TopDown
-from gaze.types import Face, GazeState, Percept, Target, Vec3
-from robot.calibrate.face_calibration import FaceCalibration, Key, point_world_m, pressed
-from robot.gaze_error import gaze_error
-from robot.loop import Tick
+from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.top_down import TopDown
+from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
+from gazerig.robot.calibrate.face_calibration import FaceCalibration, Key, point_world_m, pressed
+from gazerig.robot.gaze_error import gaze_error
+from gazerig.robot.loop import Tick
 
 AIMED_DEG = 1.0
 """Eyes nearer than this to the part look at it."""
@@ -30,7 +30,7 @@ _PULL = 1.0
 
 
 class FaceSteering:
-    """A robot.loop.Chooser whose choices come from keys.
+    """A gazerig.robot.loop.Chooser whose choices come from keys.
 
     state: how far the person has come
     face: the face that is looked at, None while none is seen

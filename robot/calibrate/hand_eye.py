@@ -5,7 +5,7 @@ move by what the camera sees, and only one place of the camera on the head makes
 agree. OpenCV's closed forms (manual, cv2.calibrateHandEye) start the search; they trust
 every single pose of the board, whose tilt is poorly seen, so the answer is the place of
 camera and board that brings all corners of all pictures nearest to where they are seen.
-Frames as in robot.frames; the board's as in robot.calibrate.charuco_board.
+Frames as in gazerig.robot.frames; the board's as in gazerig.robot.calibrate.charuco_board.
 """
 
 from collections.abc import Sequence
@@ -17,13 +17,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.types import Mat3, Vec3
-from robot.calibrate.camera_calibration import CameraCalibrationRefused
-from robot.calibrate.charuco_board import SeenBoard
-from robot.calibrate.charuco_pose import board_poses
-from robot.calibrate.hand_eye_fit import Fit, Pose, Sights, refined, start
-from robot.frames import CameraParams, mounted_at
-from robot.seeing.intrinsics import Intrinsics
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.calibrate.camera_calibration import CameraCalibrationRefused
+from gazerig.robot.calibrate.charuco_board import SeenBoard
+from gazerig.robot.calibrate.charuco_pose import board_poses
+from gazerig.robot.calibrate.hand_eye_fit import Fit, Pose, Sights, refined, start
+from gazerig.robot.frames import CameraParams, mounted_at
+from gazerig.robot.seeing.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 

@@ -19,9 +19,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.types import Mat3, Vec3
-from robot.calibrate.charuco_board import SeenBoard
-from robot.seeing.intrinsics import Intrinsics, project
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.calibrate.charuco_board import SeenBoard
+from gazerig.robot.seeing.intrinsics import Intrinsics, project
 
 Floats = NDArray[np.float64]
 

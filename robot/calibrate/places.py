@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import degrees
 
-from robot.calibrate.calibration import (
+from gazerig.robot.calibrate.calibration import (
     SMALLEST_RANGE_DEG,
     CalibrationRefused,
     Places,
     inwards,
     is_lid,
 )
-from robot.joint import JointParams
+from gazerig.robot.joint import JointParams
 
 Place = tuple[float, float]
 """(angle, position)"""
@@ -48,7 +48,7 @@ def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: f
     marked: in any order; margin_deg: kept from the ends of any other joint
 
     Raises:
-        robot.calibrate.calibration.CalibrationRefused: they make no linkage, or no range
+        gazerig.robot.calibrate.calibration.CalibrationRefused: they make no linkage, or no range
             with 0 inside.
     """
     linkage = tuple(sorted((round(angle, 1) + 0.0, position) for angle, position in marked))

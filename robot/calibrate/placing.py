@@ -7,12 +7,12 @@ that tells its place is turned by hand. Nothing is printed or written here.
 from collections.abc import Callable
 from typing import Protocol
 
-from robot.bringup.hobby_servo import OneHobby
-from robot.bringup.single_joint import SingleJoint
-from robot.calibrate.calibrating import Person, Watched
-from robot.calibrate.calibration import Places, ends_of, is_lid
-from robot.calibrate.places import Place, angle_now, between, likely_angle, places
-from robot.joint import JointParams
+from gazerig.robot.bringup.hobby_servo import OneHobby
+from gazerig.robot.bringup.single_joint import SingleJoint
+from gazerig.robot.calibrate.calibrating import Person, Watched
+from gazerig.robot.calibrate.calibration import Places, ends_of, is_lid
+from gazerig.robot.calibrate.places import Place, angle_now, between, likely_angle, places
+from gazerig.robot.joint import JointParams
 
 SHUT_WHERE = {
     "upper_lid": "to where it is SHUT: where it shall meet the lower lid",
@@ -51,7 +51,7 @@ class Steerer(Person, Protocol):
         """Return when the servo is where it is wanted.
 
         Raises:
-            robot.bringup.single_joint.Stopped: they want it to end.
+            gazerig.robot.bringup.single_joint.Stopped: they want it to end.
         """
         ...
 
@@ -194,9 +194,9 @@ def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> 
     more: places between each two that are marked; margin_deg: kept from the ends, but for lids
 
     Raises:
-        robot.calibrate.calibration.CalibrationRefused: they make no linkage.
-        drivers.errors.DriverError: the servo does not answer any more.
-        robot.bringup.single_joint.Stopped: the person wants it to end.
+        gazerig.robot.calibrate.calibration.CalibrationRefused: they make no linkage.
+        DriverError: the servo does not answer any more.
+        gazerig.robot.bringup.single_joint.Stopped: the person wants it to end.
     """
     placer.begin()
     marked = _lid(placer, person) if is_lid(placer.name) else _turning(placer, person)

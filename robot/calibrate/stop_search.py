@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from drivers.dynamixel.control_table import STEPS_PER_TURN
+from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
 
 STEPS_PER_DEG = STEPS_PER_TURN / 360.0
 

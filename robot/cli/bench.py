@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from drivers.i2c.port import port_of
-from drivers.serial.list_ports import Host, SerialPort, serial_ports
-from drivers.serial.port import BusPort
-from drivers.serial.port_owner import usb_of
-from robot.cli.terminal import status
+from gazerig.drivers.i2c.port import port_of
+from gazerig.drivers.serial.list_ports import Host, SerialPort, serial_ports
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_owner import usb_of
+from gazerig.robot.cli.terminal import status
 
 host = Host()
 """Where this computer tells about its ports."""

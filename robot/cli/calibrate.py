@@ -9,17 +9,25 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from config.save import copy_shipped, propose, rig_file, save_rig
-from config.schema import Rig, load_rig
-from drivers.errors import SetupError
-from robot.bringup.single_joint import Stopped
-from robot.calibrate.calibration import Value, changes
-from robot.calibrate.stop_search import StopSearchParams
-from robot.cli.calibrate_joint import Bench, By, How, Made, ZeroBy, measure, refuse_impossible
-from robot.cli.person import Lines
-from robot.cli.steering import SteeringPerson
-from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
-from robot.cli.wires import MockOption, PortOption, wires
+from gazerig.config.save import copy_shipped, propose, rig_file, save_rig
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.bringup.single_joint import Stopped
+from gazerig.robot.calibrate.calibration import Value, changes
+from gazerig.robot.calibrate.stop_search import StopSearchParams
+from gazerig.robot.cli.calibrate_joint import (
+    Bench,
+    By,
+    How,
+    Made,
+    ZeroBy,
+    measure,
+    refuse_impossible,
+)
+from gazerig.robot.cli.person import Lines
+from gazerig.robot.cli.steering import SteeringPerson
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
+from gazerig.robot.cli.wires import MockOption, PortOption, wires
 
 
 def calibrate_joints(
@@ -112,7 +120,7 @@ def _refuse_long_lists(rig: str, loaded: Rig, names: tuple[str, ...]) -> None:
     """Find out before anything moves that places could not be written where they stand.
 
     Raises:
-        config.load.ConfigError: a linkage is spread over several lines, which are kept.
+        gazerig.config.load.ConfigError: a linkage is spread over several lines, which are kept.
     """
     joints = [n for n in names if loaded.joints[n].linkage or not loaded.joints[n].facts.measured]
     propose(rig_file(rig), {f"joints.{name}.linkage": ((0, 0),) for name in joints})
@@ -122,7 +130,7 @@ def _span(pulses: str) -> tuple[float, float]:
     """Read --pulses.
 
     Raises:
-        drivers.errors.SetupError: these are no two numbers.
+        SetupError: these are no two numbers.
     """
     low, _, high = pulses.partition(":")
     try:
@@ -135,7 +143,7 @@ def refuse_unwritable(rig: str, out: Path | None) -> None:
     """Find out before anything is calibrated that nothing could be written.
 
     Raises:
-        config.load.ConfigError, drivers.errors.SetupError: why, and what to do.
+        gazerig.config.load.ConfigError, SetupError: why, and what to do.
     """
     if out is None:
         save_rig(rig, {}, datetime.now())

@@ -5,27 +5,27 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
-from config.schema import Rig
-from drivers.errors import ServoFault, ServoMissing, SetupError
-from drivers.i2c.port import port_of
-from robot.bringup.hobby_servo import OneHobby
-from robot.bringup.servo_access import OneServo
-from robot.bringup.single_joint import SingleJoint
-from robot.bringup.smart_servo import SmartServo
-from robot.calibrate.calibrating import by_hand, by_motion
-from robot.calibrate.calibration import Calibration, CalibrationRefused, Places
-from robot.calibrate.placing import HandPlacer, HobbyPlacer, by_places
-from robot.calibrate.stop_search import StopSearchParams
-from robot.cli.opened import opened
-from robot.cli.steering import SteeringPerson
-from robot.cli.terminal import say
-from robot.cli.wires import Wires
-from robot.clock import RealClock
-from robot.guardian.guarded_servo import GuardedServo
-from robot.guardian.guardian import Guardian
-from robot.interrupts import Interrupts
-from robot.power_down import PowerDown
-from robot.rig_bus import bus_names, joints_on, release_plan
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
+from gazerig.drivers.i2c.port import port_of
+from gazerig.robot.bringup.hobby_servo import OneHobby
+from gazerig.robot.bringup.servo_access import OneServo
+from gazerig.robot.bringup.single_joint import SingleJoint
+from gazerig.robot.bringup.smart_servo import SmartServo
+from gazerig.robot.calibrate.calibrating import by_hand, by_motion
+from gazerig.robot.calibrate.calibration import Calibration, CalibrationRefused, Places
+from gazerig.robot.calibrate.placing import HandPlacer, HobbyPlacer, by_places
+from gazerig.robot.calibrate.stop_search import StopSearchParams
+from gazerig.robot.cli.opened import opened
+from gazerig.robot.cli.steering import SteeringPerson
+from gazerig.robot.cli.terminal import say
+from gazerig.robot.cli.wires import Wires
+from gazerig.robot.clock import RealClock
+from gazerig.robot.guardian.guarded_servo import GuardedServo
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.interrupts import Interrupts
+from gazerig.robot.power_down import PowerDown
+from gazerig.robot.rig_bus import bus_names, joints_on, release_plan
 
 Made = Calibration | Places
 
@@ -82,8 +82,8 @@ def measure(bench: Bench, names: Sequence[str]) -> Measured:
     """Calibrate one joint after the other, bus by bus.
 
     Raises:
-        drivers.errors.SetupError: a port cannot be opened, or there are no answers left.
-        robot.bringup.single_joint.Stopped: somebody wants it to end.
+        SetupError: a port cannot be opened, or there are no answers left.
+        gazerig.robot.bringup.single_joint.Stopped: somebody wants it to end.
     """
     found: dict[str, Made] = {}
     refused: list[str] = []
@@ -102,7 +102,7 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: How) -> None:
     """Refuse what the servos of these joints cannot do.
 
     Raises:
-        drivers.errors.SetupError: says which, and what can be done.
+        SetupError: says which, and what can be done.
     """
     kinds = {name: rig.bus_of(name).kind for name in names}
     blind = [name for name in names if not rig.joints[name].facts.measured]
@@ -229,7 +229,7 @@ def _warn_of_neck(name: str, person: SteeringPerson) -> None:
     """Ask before something as heavy as a head moves by itself.
 
     Raises:
-        robot.calibrate.calibration.CalibrationRefused: the answer was no.
+        gazerig.robot.calibrate.calibration.CalibrationRefused: the answer was no.
     """
     if not name.startswith("neck"):
         return

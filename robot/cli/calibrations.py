@@ -5,9 +5,9 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from robot.cli.calibrate import calibrate_joints
-from robot.cli.camera import calibrate_board, calibrate_camera
-from robot.cli.face import calibrate_face
+from gazerig.robot.cli.calibrate import calibrate_joints
+from gazerig.robot.cli.camera import calibrate_board, calibrate_camera
+from gazerig.robot.cli.face import calibrate_face
 
 DEFAULT = "joints"
 _HELP = ("--help", "-h")

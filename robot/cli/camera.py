@@ -14,31 +14,31 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from config.schema import Rig, load_rig
-from drivers.camera.source import Shot
-from drivers.camera.thread import CameraThread
-from drivers.camera.webcam import Webcam
-from drivers.errors import SetupError
-from drivers.types import DetectedFace, Picture
-from robot.calibrate.camera_calibration import LensCalibration
-from robot.calibrate.camera_steps import LensSteps, Neck, NeckStep, neck_angles, neck_steps
-from robot.calibrate.charuco_board import BoardParams, CharucoBoard
-from robot.calibrate.charuco_page import RULER_MM, write_page
-from robot.calibrate.hand_eye import HandEye, HandEyeParams, camera_on_head
-from robot.cli.camera_neck import agrees, go_on, moving_neck
-from robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
-from robot.clock import RealClock
-from robot.frames import CameraParams
-from robot.kinematics import NECK, Kinematics
-from robot.rig_angles import lid_ends, neck_span
-from robot.seeing.intrinsics import intrinsics_of_lens
-from sim_mock.cameras.charuco_scene import BoardScene
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.thread import CameraThread
+from gazerig.drivers.camera.webcam import Webcam
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.robot.calibrate.camera_calibration import LensCalibration
+from gazerig.robot.calibrate.camera_steps import LensSteps, Neck, NeckStep, neck_angles, neck_steps
+from gazerig.robot.calibrate.charuco_board import BoardParams, CharucoBoard
+from gazerig.robot.calibrate.charuco_page import RULER_MM, write_page
+from gazerig.robot.calibrate.hand_eye import HandEye, HandEyeParams, camera_on_head
+from gazerig.robot.cli.camera_neck import agrees, go_on, moving_neck
+from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.clock import RealClock
+from gazerig.robot.frames import CameraParams
+from gazerig.robot.kinematics import NECK, Kinematics
+from gazerig.robot.rig_angles import lid_ends, neck_span
+from gazerig.robot.seeing.intrinsics import intrinsics_of_lens
+from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 app = typer.Typer()
 
 
 class Paper(StrEnum):
-    """Paper to print on; the keys of robot.calibrate.charuco_page.PAPERS_MM."""
+    """Paper to print on; the keys of gazerig.robot.calibrate.charuco_page.PAPERS_MM."""
 
     a4 = "a4"
     letter = "letter"
@@ -336,7 +336,7 @@ def _number(value: Any) -> str:
 
 def _writable(rig: str, out: Path | None) -> None:
     """Find out before anybody holds a board that nothing could be written."""
-    from config.save import save_rig  # type: ignore[import-not-found, unused-ignore]
+    from gazerig.config.save import save_rig  # type: ignore[import-not-found, unused-ignore]
 
     if out is None:
         save_rig(rig, {}, datetime.now())
@@ -346,7 +346,7 @@ def _writable(rig: str, out: Path | None) -> None:
 
 def _write(job: _Job, rig: str, changes: dict[str, Any], out: Path | None, yes: bool) -> None:
     """Write what was found after a yes, and say where the old file is."""
-    from config.save import copy_shipped, save_rig
+    from gazerig.config.save import copy_shipped, save_rig
 
     if not agrees(job.stopped, yes, f"write these {len(changes)} values into {out or rig}?"):
         say("nothing written")

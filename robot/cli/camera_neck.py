@@ -5,21 +5,21 @@ from collections.abc import Callable, Iterator
 from math import degrees
 from typing import Any
 
-from config.schema import Rig
-from drivers.errors import SetupError
-from gaze.types import Angles3
-from robot.body import Body
-from robot.calibrate.camera_calibration import CameraCalibrationRefused
-from robot.cli.servo_words import left_alone
-from robot.cli.terminal import say
-from robot.clock import RealClock
-from robot.interrupts import Interrupts
-from robot.kinematics import NECK
-from robot.power_down import PowerDown
-from robot.rig_angles import limits, park_rad
-from robot.rig_bus import guarded_rig_bus
-from robot.safety.guard import Guard
-from sim_mock.cameras.charuco_scene import BoardScene
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.types import Angles3
+from gazerig.robot.body import Body
+from gazerig.robot.calibrate.camera_calibration import CameraCalibrationRefused
+from gazerig.robot.cli.servo_words import left_alone
+from gazerig.robot.cli.terminal import say
+from gazerig.robot.clock import RealClock
+from gazerig.robot.interrupts import Interrupts
+from gazerig.robot.kinematics import NECK
+from gazerig.robot.power_down import PowerDown
+from gazerig.robot.rig_angles import limits, park_rad
+from gazerig.robot.rig_bus import guarded_rig_bus
+from gazerig.robot.safety.guard import Guard
+from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 Stopped = Callable[[], str | None]
 """Gives why to stop, None while there is no reason."""
@@ -29,7 +29,7 @@ _SETTLE_S = 0.4
 
 
 class JoggedNeck:
-    """A robot.calibrate.camera_steps.Neck that goes through the guard, as jogging does."""
+    """A gazerig.robot.calibrate.camera_steps.Neck that goes through the guard, as jogging does."""
 
     def __init__(self, control: Any, mock: BoardScene | None, stopped: Stopped) -> None:
         """Take a started ManualControl, and the scene that must know of the head."""
@@ -70,10 +70,10 @@ def moving_neck(
     mock: the simulated board, for which the servos are emulated too
 
     Raises:
-        drivers.errors.SetupError: port or servos are not as configured, or the answer was no.
+        SetupError: port or servos are not as configured, or the answer was no.
     """
-    from robot.bringup.jog import JogParams, ManualControl, parked  # type: ignore[import-not-found, unused-ignore]
-    from robot.cli.wires import wires  # type: ignore[import-not-found, unused-ignore]
+    from gazerig.robot.bringup.jog import JogParams, ManualControl, parked  # type: ignore[import-not-found, unused-ignore]
+    from gazerig.robot.cli.wires import wires  # type: ignore[import-not-found, unused-ignore]
 
     if any(name not in rig.joints for name in NECK[:2]):
         raise CameraCalibrationRefused(
@@ -110,7 +110,7 @@ def go_on(stopped: Stopped) -> None:
     """Refuse to go on where there is a reason to stop.
 
     Raises:
-        robot.calibrate.camera_calibration.CameraCalibrationRefused: with the reason.
+        gazerig.robot.calibrate.camera_calibration.CameraCalibrationRefused: with the reason.
     """
     why = stopped()
     if why is not None:
@@ -119,7 +119,7 @@ def go_on(stopped: Stopped) -> None:
 
 def agrees(stopped: Stopped, yes: bool, question: str) -> bool:
     """Ask on the terminal; yes: the answer is known."""
-    from robot.cli.person import (  # type: ignore[import-not-found, unused-ignore]
+    from gazerig.robot.cli.person import (  # type: ignore[import-not-found, unused-ignore]
         Lines,
         TerminalPerson,
     )

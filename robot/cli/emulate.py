@@ -9,16 +9,16 @@ from typing import Annotated
 
 import typer
 
-from config.schema import load_rig
-from drivers.errors import SetupError
-from drivers.servo_models import BusKind
-from robot.cli.terminal import clear_errors
-from robot.emulated_rig import emulated_lines
-from sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
-from sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine, Pca9685Line
-from sim_mock.pty.line import BusSettings
-from sim_mock.pty.server import Settings, run
-from sim_mock.pty.server import say as say_line
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.servo_models import BusKind
+from gazerig.robot.cli.terminal import clear_errors
+from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
+from gazerig.sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine, Pca9685Line
+from gazerig.sim_mock.pty.line import BusSettings
+from gazerig.sim_mock.pty.server import Settings, run
+from gazerig.sim_mock.pty.server import say as say_line
 
 app = typer.Typer()
 

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable
 
 import typer
 
-from config.load import shipped_names
-from sim_mock.scenes.registry import scenes
+from gazerig.config.load import shipped_names
+from gazerig.sim_mock.scenes.registry import scenes
 
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "run": (

@@ -12,21 +12,21 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from config.save import copy_shipped, rig_file, save_rig
-from config.schema import Rig, load_rig
-from drivers.errors import SetupError
-from gaze.types import Vec3
-from robot.assemble import Assembly, assemble
-from robot.audience import Audience, Steer, Wished
-from robot.bringup.single_joint import Stopped
-from robot.bus_events import drawn_together
-from robot.calibrate.face_calibration import PART_WORDS, FaceCalibration, begun, changes
-from robot.calibrate.face_steering import FaceSteering
-from robot.cli.calibrate import refuse_unwritable
-from robot.cli.keys import BUTTONS, HELP, Keys, LineKeys, PageKeys, TerminalKeys
-from robot.cli.person import Lines, TerminalPerson
-from robot.cli.run import host_port
-from robot.cli.terminal import (
+from gazerig.config.save import copy_shipped, rig_file, save_rig
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.types import Vec3
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.audience import Audience, Steer, Wished
+from gazerig.robot.bringup.single_joint import Stopped
+from gazerig.robot.bus_events import drawn_together
+from gazerig.robot.calibrate.face_calibration import PART_WORDS, FaceCalibration, begun, changes
+from gazerig.robot.calibrate.face_steering import FaceSteering
+from gazerig.robot.cli.calibrate import refuse_unwritable
+from gazerig.robot.cli.keys import BUTTONS, HELP, Keys, LineKeys, PageKeys, TerminalKeys
+from gazerig.robot.cli.person import Lines, TerminalPerson
+from gazerig.robot.cli.run import host_port
+from gazerig.robot.cli.terminal import (
     FAULT,
     RigArgument,
     clear_errors,
@@ -34,12 +34,12 @@ from robot.cli.terminal import (
     signals,
     status,
 )
-from robot.cli.wires import MockOption, PortOption
-from robot.interrupts import Interrupts
-from robot.loop import LoopCount, Tick
-from robot.loop import run as run_loop
-from robot.remote.stop_door import StopDoor
-from robot.session import Wanted, way_out
+from gazerig.robot.cli.wires import MockOption, PortOption
+from gazerig.robot.interrupts import Interrupts
+from gazerig.robot.loop import LoopCount, Tick
+from gazerig.robot.loop import run as run_loop
+from gazerig.robot.remote.stop_door import StopDoor
+from gazerig.robot.session import Wanted, way_out
 
 STILL_SCENE = "sits-still"
 
@@ -119,8 +119,8 @@ def _steered(
 
     page: where one is served, None where there is none
     Raises:
-        robot.bringup.single_joint.Stopped: a signal or a fault ended it.
-        drivers.errors.DriverError: port, servos or camera are not as configured.
+        gazerig.robot.bringup.single_joint.Stopped: a signal or a fault ended it.
+        DriverError: port, servos or camera are not as configured.
     """
     idle = rig.gaze.idle
     steering = FaceSteering(

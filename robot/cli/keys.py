@@ -11,9 +11,9 @@ from queue import Empty, Full, Queue
 from types import TracebackType
 from typing import Protocol, Self, get_args
 
-from drivers.errors import SetupError
-from robot.calibrate.face_calibration import Key
-from robot.cli.person import Lines
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.calibrate.face_calibration import Key
+from gazerig.robot.cli.person import Lines
 
 HELP = (
     "arrow keys or w a s d move the gaze as you see it; + and - the step; Enter: it looks at it; "
@@ -62,7 +62,7 @@ def key_and_count(line: str) -> tuple[Key, int]:
     """Read "left 3", "enter" or an empty line, which is Enter.
 
     Raises:
-        drivers.errors.SetupError: it is no key; with what there is.
+        SetupError: it is no key; with what there is.
     """
     word, _, number = line.strip().lower().partition(" ")
     number = number.strip() or "1"
@@ -155,7 +155,7 @@ class LineKeys:
         """Give the next key where the eyes are ready for it.
 
         Raises:
-            drivers.errors.SetupError: a line is no key, or there are no more.
+            SetupError: a line is no key, or there are no more.
         """
         if self._ready:
             return self._ready.pop(0)

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from drivers.errors import DriverError, SetupError
-from robot.cli.terminal import FAULT, clear_errors, say
-from robot.clock import RealClock
-from robot.remote.running_rig import RunningRig, running
+from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.robot.cli.terminal import FAULT, clear_errors, say
+from gazerig.robot.clock import RealClock
+from gazerig.robot.remote.running_rig import RunningRig, running
 
 app = typer.Typer()
 _LEADS_EVERY_S = 0.2
@@ -122,7 +122,7 @@ def read_point(words: Sequence[str]) -> tuple[float, float, float] | None:
     """Read X Y Z in metres, or "free" as None.
 
     Raises:
-        drivers.errors.SetupError: it is neither.
+        SetupError: it is neither.
     """
     if list(words) == ["free"]:
         return None

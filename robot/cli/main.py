@@ -8,22 +8,22 @@ from typing import Annotated
 
 import typer
 
-from config.load import load
-from config.schema import Rig, load_rig
-from drivers.file_input import read_limited
-from drivers.file_output import write_file
-from drivers.serial.list_ports import serial_ports
-from robot.cli import emulate as cli_emulate
-from robot.cli import motion as cli_motion
-from robot.cli import record as cli_record
-from robot.cli import replay as cli_replay
-from robot.cli import report as cli_report
-from robot.cli import run as cli_run
-from robot.cli import servos as cli_servos
-from robot.cli import tune as cli_tune
-from robot.cli.examples import add_examples
-from robot.cli.start import next_steps
-from robot.cli.terminal import (
+from gazerig.config.load import load
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.file_output import write_file
+from gazerig.drivers.serial.list_ports import serial_ports
+from gazerig.robot.cli import emulate as cli_emulate
+from gazerig.robot.cli import motion as cli_motion
+from gazerig.robot.cli import record as cli_record
+from gazerig.robot.cli import replay as cli_replay
+from gazerig.robot.cli import report as cli_report
+from gazerig.robot.cli import run as cli_run
+from gazerig.robot.cli import servos as cli_servos
+from gazerig.robot.cli import tune as cli_tune
+from gazerig.robot.cli.examples import add_examples
+from gazerig.robot.cli.start import next_steps
+from gazerig.robot.cli.terminal import (
     DEBUG_LOGGER,
     ForceOption,
     RigArgument,
@@ -31,7 +31,7 @@ from robot.cli.terminal import (
     run_app,
     say,
 )
-from robot.remote.running_rig import running
+from gazerig.robot.remote.running_rig import running
 
 app = typer.Typer(
     invoke_without_command=True,
@@ -75,8 +75,8 @@ def fit_scanpath(
 ) -> None:
     """Fit a walk over the face to an eye-tracker recording, as YAML that run takes."""
     with clear_errors():
-        from robot import fit_scanpath as fitting
-        from robot.fixations import PartBoxes
+        from gazerig.robot import fit_scanpath as fitting
+        from gazerig.robot.fixations import PartBoxes
 
         boxes = load(parts, PartBoxes) if parts is not None else None
         say(fitting.fit(recording, boxes, out, smoothing, seed, force))
@@ -96,7 +96,7 @@ def schema(
     force: ForceOption = False,
 ) -> None:
     """Export the JSON Schema of rig files, for editors."""
-    from config.export import json_schema
+    from gazerig.config.export import json_schema
 
     text = json.dumps(json_schema(Rig), indent=2) + "\n"
     if out is None:

@@ -11,12 +11,12 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from config.schema import Rig, load_rig
-from drivers.dynamixel.registers import Registers
-from drivers.feetech.registers import StsRegisters
-from drivers.serial.port import BusPort
-from robot.bringup.monitor import Monitor, Sample, as_json
-from robot.bringup.telemetry import (
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.feetech.registers import StsRegisters
+from gazerig.drivers.serial.port import BusPort
+from gazerig.robot.bringup.monitor import Monitor, Sample, as_json
+from gazerig.robot.bringup.telemetry import (
     DynamixelLooks,
     FeetechLooks,
     Look,
@@ -24,12 +24,12 @@ from robot.bringup.telemetry import (
     MaestroLooks,
     Pca9685Looks,
 )
-from robot.cli.opened import opened
-from robot.cli.terminal import RigArgument, clear_errors, signals
-from robot.cli.wires import MockOption, PortOption, Wires, wires
-from robot.clock import RealClock
-from robot.joint import JointParams
-from robot.rig_bus import bus_names
+from gazerig.robot.cli.opened import opened
+from gazerig.robot.cli.terminal import RigArgument, clear_errors, signals
+from gazerig.robot.cli.wires import MockOption, PortOption, Wires, wires
+from gazerig.robot.clock import RealClock
+from gazerig.robot.joint import JointParams
+from gazerig.robot.rig_bus import bus_names
 
 app = typer.Typer()
 

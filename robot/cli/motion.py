@@ -9,23 +9,23 @@ from typing import Annotated, NamedTuple
 
 import typer
 
-from config.schema import Rig, load_rig
-from drivers.errors import SetupError
-from robot.body import Body
-from robot.bringup.applied import PASSING, Moved, Step
-from robot.bringup.jog import JogParams, ManualControl, parked, refuse_beyond
-from robot.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
-from robot.bus_events import drawn_together
-from robot.cli import calibrations as cli_calibrations
-from robot.cli import monitor as cli_monitor
-from robot.cli.servo_words import holding, left_alone
-from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
-from robot.cli.wires import MockOption, PortOption, RigOption, Wires, wires
-from robot.clock import RealClock
-from robot.power_down import PowerDown
-from robot.rig_angles import lid_ends, limits, park_rad
-from robot.rig_bus import guarded_rig_bus
-from robot.safety.guard import Guard
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.body import Body
+from gazerig.robot.bringup.applied import PASSING, Moved, Step
+from gazerig.robot.bringup.jog import JogParams, ManualControl, parked, refuse_beyond
+from gazerig.robot.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
+from gazerig.robot.bus_events import drawn_together
+from gazerig.robot.cli import calibrations as cli_calibrations
+from gazerig.robot.cli import monitor as cli_monitor
+from gazerig.robot.cli.servo_words import holding, left_alone
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.cli.wires import MockOption, PortOption, RigOption, Wires, wires
+from gazerig.robot.clock import RealClock
+from gazerig.robot.power_down import PowerDown
+from gazerig.robot.rig_angles import lid_ends, limits, park_rad
+from gazerig.robot.rig_bus import guarded_rig_bus
+from gazerig.robot.safety.guard import Guard
 
 app = typer.Typer()
 app.add_typer(cli_calibrations.app)
@@ -113,7 +113,7 @@ def look_at_command(
         loaded = load_rig(rig)
         # Imports vision as well, so only this command does, and before the torque is on: in
         # that time the servos' watchdog would trip.
-        from robot.assemble import gaze_parts
+        from gazerig.robot.assemble import gaze_parts
 
         kinematics, oculomotor = gaze_parts(loaded, seed)
     with _commanded(loaded, _Way(mock, port, yes, rig), 20.0, hold, not no_park) as control:
@@ -171,7 +171,7 @@ def _ask_for_fingers(rig: Rig, yes: bool) -> None:
     """Ask before servos jump that nobody knows the places of.
 
     Raises:
-        drivers.errors.SetupError: there is nobody to ask.
+        SetupError: there is nobody to ask.
         typer.Abort: the answer was no.
     """
     blind = [name for name in rig.names if not rig.joints[name].facts.measured]

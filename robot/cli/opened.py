@@ -3,12 +3,12 @@
 import contextlib
 from collections.abc import Iterator
 
-from config.schema import Rig
-from drivers.errors import PortError
-from drivers.serial.port import BusPort
-from robot.cli.bench import to_open
-from robot.cli.wires import Wires
-from robot.guardian.guardian import Guardian
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.serial.port import BusPort
+from gazerig.robot.cli.bench import to_open
+from gazerig.robot.cli.wires import Wires
+from gazerig.robot.guardian.guardian import Guardian
 
 
 @contextlib.contextmanager
@@ -18,7 +18,7 @@ def opened(rig: Rig, wire: Wires, bus: str, guardian: Guardian | None = None) ->
     guardian: is shown a sign of life with all that is sent
 
     Raises:
-        drivers.errors.PortError: it is absent, busy, not permitted, or has no such speed.
+        PortError: it is absent, busy, not permitted, or has no such speed.
     """
     config = rig.bus_named(bus)
     with to_open(wire.paths[bus], guardian.beat if guardian is not None else None) as port:

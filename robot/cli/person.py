@@ -6,10 +6,10 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from drivers.errors import SetupError
-from drivers.file_input import read_limited
-from robot.bringup.single_joint import Stopped
-from robot.cli.terminal import say, status
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_input import read_limited
+from gazerig.robot.bringup.single_joint import Stopped
+from gazerig.robot.cli.terminal import say, status
 
 LOOK_S = 0.03
 """A joint is looked at so often while somebody thinks: more than 20 times a second."""
@@ -27,7 +27,7 @@ def _answers_of(file: Path) -> list[str]:
     """Read the answers of a file.
 
     Raises:
-        drivers.errors.SetupError: it is no text.
+        SetupError: it is no text.
         OSError: it cannot be read.
     """
     try:
@@ -78,7 +78,7 @@ class Lines:
 
 
 class TerminalPerson:
-    """Asks on the terminal; implements robot.calibrate.calibrating.Person.
+    """Asks on the terminal; implements gazerig.robot.calibrate.calibrating.Person.
 
     Args:
         lines: where answers come from.
@@ -99,11 +99,11 @@ class TerminalPerson:
         say(line)
 
     def wait(self, question: str, live: Callable[[], str]) -> None:
-        """Return at Enter; see robot.calibrate.calibrating.Person."""
+        """Return at Enter; see gazerig.robot.calibrate.calibrating.Person."""
         self._ask(question, live, ("",))
 
     def agrees(self, question: str, live: Callable[[], str] | None = None) -> bool:
-        """Give yes or no; see robot.calibrate.calibrating.Person."""
+        """Give yes or no; see gazerig.robot.calibrate.calibrating.Person."""
         if self._yes:
             say(f"{question} yes (--yes)")
             return True

@@ -15,7 +15,7 @@ QUICK = frozenset(
         *("ask", "look", "status", "stop", "resume"),
     }
 )
-"""The commands of robot.cli.tune."""
+"""The commands of gazerig.robot.cli.tune."""
 _ELSEWHERE = {"--help", "--debug"}
 """Options that the whole program knows more about."""
 
@@ -31,7 +31,7 @@ def main() -> None:
         if is_quick(sys.argv[1:], os.environ):
             _quick()
         else:
-            from robot.cli.main import main as whole
+            from gazerig.robot.cli.main import main as whole
 
             whole()
     finally:  # all is said: nothing is left to interrupt
@@ -64,7 +64,7 @@ def hold_standard_files() -> None:
 
 
 def is_quick(words: Sequence[str], environ: Mapping[str, str]) -> bool:
-    """Tell whether robot.cli.tune alone can do what was typed, or complete it for a shell.
+    """Tell whether gazerig.robot.cli.tune alone can do what was typed, or complete it for a shell.
 
     words: what stands after ``gazerig``
     """
@@ -78,7 +78,7 @@ def is_quick(words: Sequence[str], environ: Mapping[str, str]) -> bool:
 
 
 def _quick() -> None:
-    from robot.cli.terminal import run_app
-    from robot.cli.tune import app
+    from gazerig.robot.cli.terminal import run_app
+    from gazerig.robot.cli.tune import app
 
     run_app(app, sys.argv[1:], "try with --debug")

@@ -4,20 +4,20 @@ from typing import Annotated
 
 import typer
 
-from config.schema import Rig, load_rig
-from drivers.errors import ServoFault, SetupError
-from drivers.maestro.line import Line
-from drivers.pca9685.release import stop_pulses
-from drivers.serial.port import BusPort
-from robot.bringup import servo_reboot as servo_reboot
-from robot.bringup.maestro_sweep import sent_home
-from robot.bringup.servo_families import KINDS
-from robot.bringup.servo_kind import ServoKind
-from robot.cli.bench import YesOption, to_open
-from robot.cli.terminal import FAULT, clear_errors, say
-from robot.cli.wires import MockOption, PortOption, bus_label, wires
-from robot.clock import RealClock
-from robot.rig_bus import bus_names, joints_on
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import ServoFault, SetupError
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.pca9685.release import stop_pulses
+from gazerig.drivers.serial.port import BusPort
+from gazerig.robot.bringup import servo_reboot as servo_reboot
+from gazerig.robot.bringup.maestro_sweep import sent_home
+from gazerig.robot.bringup.servo_families import KINDS
+from gazerig.robot.bringup.servo_kind import ServoKind
+from gazerig.robot.cli.bench import YesOption, to_open
+from gazerig.robot.cli.terminal import FAULT, clear_errors, say
+from gazerig.robot.cli.wires import MockOption, PortOption, bus_label, wires
+from gazerig.robot.clock import RealClock
+from gazerig.robot.rig_bus import bus_names, joints_on
 
 app = typer.Typer()
 
@@ -65,7 +65,7 @@ def _servo(rig: Rig, text: str) -> tuple[str, int]:
     """Read the name of a joint, or a servo id; gives its bus and id.
 
     Raises:
-        drivers.errors.SetupError: it is neither, or there are several buses with such ids.
+        SetupError: it is neither, or there are several buses with such ids.
     """
     if text in rig.joints:
         return rig.joints[text].bus, rig.joints[text].id
@@ -120,7 +120,7 @@ def _pulses_off(rig: Rig, bus: str, line: BusPort) -> None:
     """Do what comes nearest to a restart of a PCA9685: stop the pulses of the rig's channels.
 
     Raises:
-        drivers.errors.ServoFault: some do not stop.
+        ServoFault: some do not stop.
     """
     ids = tuple(rig.joints[joint].id for joint in joints_on(rig, bus))
     left = stop_pulses(line, rig.bus_named(bus).pca9685, ids)

@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
-from drivers.camera.params import WebcamParams
-from drivers.camera.source import PictureSource
-from drivers.errors import SetupError
-from robot.cli.terminal import clear_errors, say, signals, status
-from robot.clock import RealClock
+from gazerig.drivers.camera.params import WebcamParams
+from gazerig.drivers.camera.source import PictureSource
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.cli.terminal import clear_errors, say, signals, status
+from gazerig.robot.clock import RealClock
 
 app = typer.Typer(add_completion=False)
 
@@ -60,16 +60,16 @@ def _source(
     width, height, rate_hz = wishes
     # OpenCV and depthai are heavy: loaded when it is clear that there is something to do.
     if oak:
-        from drivers.camera.oak import OakSource
-        from drivers.camera.oak_params import OakParams
+        from gazerig.drivers.camera.oak import OakSource
+        from gazerig.drivers.camera.oak_params import OakParams
 
         params = OakParams(width_px=width, height_px=height or 400, rate_hz=rate_hz)
         return OakSource(params), "OAK-D"
     if video is not None:
-        from drivers.camera.video_file import VideoFile
+        from gazerig.drivers.camera.video_file import VideoFile
 
         return VideoFile(video), f"film {video.name}"
-    from drivers.camera.webcam import Webcam
+    from gazerig.drivers.camera.webcam import Webcam
 
     wanted = WebcamParams(width_px=width, height_px=height or 480, rate_hz=rate_hz)
     return Webcam.of(camera or 0, wanted), f"webcam {camera}"
@@ -85,7 +85,7 @@ def _record(
     stopped: Callable[[], str | None],
 ) -> None:
     """Record until told to stop, and say what is in the file."""
-    from drivers.camera.recorder import CameraRecorder
+    from gazerig.drivers.camera.recorder import CameraRecorder
 
     clock = RealClock()
     recorder = CameraRecorder(source, file, {"source": name}, jpeg, force)

@@ -13,15 +13,15 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from drivers.errors import SetupError
-from drivers.file_output import refuse_existing
-from robot.cli.run import host_port
-from robot.cli.terminal import FAULT, ForceOption, clear_errors, say, signals
-from robot.loop import Tick
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import refuse_existing
+from gazerig.robot.cli.run import host_port
+from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, say, signals
+from gazerig.robot.loop import Tick
 
 if TYPE_CHECKING:
-    from robot.page.snapshot import ShownRig
-    from robot.recording.rerun import Rerun
+    from gazerig.robot.page.snapshot import ShownRig
+    from gazerig.robot.recording.rerun import Rerun
 
 app = typer.Typer(add_completion=False)
 
@@ -96,12 +96,12 @@ def _export(
     file: Path, bids: bool, out: Path | None, subject: str | None, task: str | None, force: bool
 ) -> None:
     """Write one kind of export and say what was written."""
-    from robot.reckoned import RECKONED
-    from robot.recording.export_bids import About, write_bids
-    from robot.recording.export_csv import csv_files, write_csv
-    from robot.recording.gaze_angles import trace_of
-    from robot.recording.gaze_labels import labels_of, stretches_of
-    from robot.recording.read import RunRecording, used
+    from gazerig.robot.reckoned import RECKONED
+    from gazerig.robot.recording.export_bids import About, write_bids
+    from gazerig.robot.recording.export_csv import csv_files, write_csv
+    from gazerig.robot.recording.gaze_angles import trace_of
+    from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
+    from gazerig.robot.recording.read import RunRecording, used
 
     recording = RunRecording(file)
     stem = out or file.with_suffix("")
@@ -149,12 +149,12 @@ def _show(
     stopped: Callable[[], str | None],
 ) -> bool:
     """Serve the page until told to stop; False where it cannot be had."""
-    from robot.clock import RealClock
-    from robot.page.link import Page
-    from robot.recording.frames import Frames
-    from robot.recording.player import State
-    from robot.recording.read import RunRecording, used
-    from robot.recording.replay import Replay
+    from gazerig.robot.clock import RealClock
+    from gazerig.robot.page.link import Page
+    from gazerig.robot.recording.frames import Frames
+    from gazerig.robot.recording.player import State
+    from gazerig.robot.recording.read import RunRecording, used
+    from gazerig.robot.recording.replay import Replay
 
     recording, clock = RunRecording(file), RealClock()
     _warn(recording.note)
@@ -197,11 +197,11 @@ def _show(
 
 def _built(config_yaml: str) -> "ShownRig | None":
     """Give how the recorded rig was built; None, with a word why, where nobody can tell."""
-    from config.load import ConfigError, load
-    from config.schema import Rig
-    from robot.assemble import gaze_parts
-    from robot.frames import CameraMount
-    from robot.page.snapshot import ShownRig
+    from gazerig.config.load import ConfigError, load
+    from gazerig.config.schema import Rig
+    from gazerig.robot.assemble import gaze_parts
+    from gazerig.robot.frames import CameraMount
+    from gazerig.robot.page.snapshot import ShownRig
 
     with TemporaryDirectory() as folder:
         file = Path(folder) / "recorded.yaml"
@@ -227,8 +227,8 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
 
     Only joints as recorded can come out the same; nothing else was then to change.
     """
-    from robot.recording.read import RunRecording, used
-    from robot.recording.rerun import rerun
+    from gazerig.robot.recording.read import RunRecording, used
+    from gazerig.robot.recording.rerun import rerun
 
     recording = RunRecording(file)
     with used(file), _progress("running again", recording.duration_s) as read:

@@ -13,20 +13,20 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from config.load import ConfigError
-from drivers.errors import SetupError
-from drivers.file_output import refuse_existing
-from robot.cli.terminal import ForceOption, clear_errors, say, signals
+from gazerig.config.load import ConfigError
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import refuse_existing
+from gazerig.robot.cli.terminal import ForceOption, clear_errors, say, signals
 
 if TYPE_CHECKING:
-    from config.schema import Rig
-    from gaze.scanpath import Walk
-    from robot.assemble import Assembly
-    from robot.choice import Choice
-    from robot.recording.read import RunRecording
-    from robot.report.about import About
-    from robot.report.gathered import Gathered, Gathering
-    from robot.report.measured import Finding
+    from gazerig.config.schema import Rig
+    from gazerig.gaze.scanpath import Walk
+    from gazerig.robot.assemble import Assembly
+    from gazerig.robot.choice import Choice
+    from gazerig.robot.recording.read import RunRecording
+    from gazerig.robot.report.about import About
+    from gazerig.robot.report.gathered import Gathered, Gathering
+    from gazerig.robot.report.measured import Finding
 
 app = typer.Typer(add_completion=False)
 
@@ -69,9 +69,9 @@ def report(
         if (file is None) == (scene is None):
             raise SetupError("report takes a recording, or --scene NAME: one of them")
         # Drawing and models are heavy; `--help` does without them.
-        from robot.report.build import report_of
-        from robot.report.page import banner
-        from robot.report.written import numbers_file
+        from gazerig.robot.report.build import report_of
+        from gazerig.robot.report.page import banner
+        from gazerig.robot.report.written import numbers_file
 
         target = page_file(out or _beside(file, scene))
         refuse_existing(target, numbers_file(target), force=force)
@@ -79,7 +79,7 @@ def report(
             if file is not None:
                 about, run = _recorded(file, file.stem, tell)
             else:
-                from robot.choice import Choice
+                from gazerig.robot.choice import Choice
 
                 choice = Choice(True, True, seed, scene, scanpath=scanpath, saccade=saccade)
                 layers = _Layers(rig, character, profile)
@@ -102,10 +102,10 @@ def compare(
 ) -> None:
     """Put two runs side by side and say what differs by more than chance."""
     with clear_errors():
-        from robot.recording.read import RunRecording, used
-        from robot.report.compare import LEVEL
-        from robot.report.compare import compare as comparing
-        from robot.report.written import numbers_file
+        from gazerig.robot.recording.read import RunRecording, used
+        from gazerig.robot.report.compare import LEVEL
+        from gazerig.robot.report.compare import compare as comparing
+        from gazerig.robot.report.written import numbers_file
 
         target = page_file(out)
         refuse_existing(target, numbers_file(target), force=force)
@@ -130,8 +130,8 @@ def compare(
 
 def _recorded(file: Path, name: str, tell: _Tell) -> "tuple[About, Gathered]":
     """Read a recorded run."""
-    from robot.recording.read import RunRecording, used
-    from robot.report.build import read
+    from gazerig.robot.recording.read import RunRecording, used
+    from gazerig.robot.report.build import read
 
     recording = RunRecording(file)
     about = _about(recording, name)
@@ -147,9 +147,9 @@ def _simulated(
     tell: _Tell,
 ) -> "tuple[About, Gathered]":
     """Run a scene in simulated time."""
-    from config.schema import load_rig, load_walk
-    from robot.assemble import assemble, chosen
-    from robot.report.gathered import Gathering
+    from gazerig.config.schema import load_rig, load_walk
+    from gazerig.robot.assemble import assemble, chosen
+    from gazerig.robot.report.gathered import Gathering
 
     rig = load_rig(*layers)
     made, gathering = assemble(rig, choice), Gathering()
@@ -174,8 +174,8 @@ def _run(
     made: "Assembly", gathering: "Gathering", seconds: float, conversation: str | None, tell: _Tell
 ) -> None:
     """Let the head look for so long; Ctrl-C ends the run early."""
-    from robot.loop import Tick, run
-    from robot.planner import Planner
+    from gazerig.robot.loop import Tick, run
+    from gazerig.robot.planner import Planner
 
     words, scene = f"simulating {seconds:.0f} s", made.scene
     planner = Planner(scene.behaviour, made.robot.ask) if scene is not None else None
@@ -207,7 +207,7 @@ def _run(
 
 def _about(recording: "RunRecording", name: str) -> "About":
     """Describe a recorded run."""
-    from robot.report.about import About
+    from gazerig.robot.report.about import About
 
     info = recording.info
     known = (
@@ -237,11 +237,11 @@ def _configured(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
     """Read the configuration that a recording holds.
 
     Raises:
-        config.load.ConfigError: it is not valid today.
+        gazerig.config.load.ConfigError: it is not valid today.
     """
-    from config.load import load
-    from config.schema import RULES, Rig, load_walk
-    from gaze.scanpath import Walk
+    from gazerig.config.load import load
+    from gazerig.config.schema import RULES, Rig, load_walk
+    from gazerig.gaze.scanpath import Walk
 
     with TemporaryDirectory() as folder:
         rig_file, walk_file = Path(folder) / "recorded.yaml", Path(folder) / "walk.yaml"
@@ -260,8 +260,8 @@ def _described(
     walk: "Walk",
 ) -> "About":
     """Add to a run's description the style of its gaze."""
-    from robot.report.about import About
-    from robot.report.model import own
+    from gazerig.robot.report.about import About
+    from gazerig.robot.report.model import own
 
     gaze = rig.gaze
     styles = (

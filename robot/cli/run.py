@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from config.load import ConfigError
-from config.schema import load_rig
-from config.text import rig_text, walk_text
-from drivers.errors import SetupError
-from drivers.file_output import refuse_existing, write_file
-from robot.cli.examples import complete_scene, complete_shipped
-from robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
-from robot.joint_faults import JointFault
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig
+from gazerig.config.text import rig_text, walk_text
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import refuse_existing, write_file
+from gazerig.robot.cli.examples import complete_scene, complete_shipped
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.joint_faults import JointFault
 
 if TYPE_CHECKING:
-    from robot.assemble import Assembly
-    from robot.audience import Told
-    from robot.choice import Choice
+    from gazerig.robot.assemble import Assembly
+    from gazerig.robot.audience import Told
+    from gazerig.robot.choice import Choice
 
 app = typer.Typer()
 
@@ -118,9 +118,9 @@ def run(
     """Run the head: gazerig run --mock, then open the page it names."""
     with clear_errors(rig, port, mock):
         # Vision and emulator are heavy; `check` and `--help` do without them.
-        from robot import session
-        from robot.assemble import assemble
-        from robot.audience import Wished
+        from gazerig.robot import session
+        from gazerig.robot.assemble import assemble
+        from gazerig.robot.audience import Wished
 
         address = host_port(page)
         refuse_existing(*_written_at_the_end(heatmap, summary), force=force)
@@ -172,9 +172,9 @@ def _told(
     pictures_hz: float,
 ) -> "Told":
     """Gather what tuning and recording must know of the command line."""
-    from robot.audience import Told
-    from robot.recording.run_info import RunInfo, versions
-    from robot.tuning import Tuning
+    from gazerig.robot.audience import Told
+    from gazerig.robot.recording.run_info import RunInfo, versions
+    from gazerig.robot.tuning import Tuning
 
     def info() -> RunInfo:
         whole = made.retuner.rig
@@ -215,7 +215,7 @@ def host_port(text: str) -> tuple[str, int]:
     """Read what is given as --page.
 
     Raises:
-        drivers.errors.SetupError: it is no address.
+        SetupError: it is no address.
     """
     host, _, port = text.rpartition(":")
     if not host or not port.isdecimal() or not 0 < int(port) < 65536:

@@ -11,24 +11,24 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from config.schema import load_rig
-from drivers.errors import SetupError
-from drivers.i2c.port import port_of
-from drivers.pca9685.params import Pca9685Params
-from drivers.pca9685.probe import probe
-from drivers.serial.list_ports import SerialPort
-from drivers.serial.port import BusPort
-from drivers.serial.port_owner import POLOLU, is_i2c
-from drivers.servo_models import BusKind
-from robot.bringup.doctor.port import name_ports
-from robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
-from robot.bringup.searching import RATES, Looked, found_of, known_kinds, plan, search
-from robot.bringup.servo_families import KINDS
-from robot.cli import bench as bench
-from robot.cli.bench import JsonOption, console
-from robot.cli.suggestions import completed
-from robot.cli.terminal import FAULT, clear_errors, say
-from robot.cli.wires import MockOption, wires
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.i2c.port import port_of
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.pca9685.probe import probe
+from gazerig.drivers.serial.list_ports import SerialPort
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_owner import POLOLU, is_i2c
+from gazerig.drivers.servo_models import BusKind
+from gazerig.robot.bringup.doctor.port import name_ports
+from gazerig.robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
+from gazerig.robot.bringup.searching import RATES, Looked, found_of, known_kinds, plan, search
+from gazerig.robot.bringup.servo_families import KINDS
+from gazerig.robot.cli import bench as bench
+from gazerig.robot.cli.bench import JsonOption, console
+from gazerig.robot.cli.suggestions import completed
+from gazerig.robot.cli.terminal import FAULT, clear_errors, say
+from gazerig.robot.cli.wires import MockOption, wires
 
 app = typer.Typer()
 
@@ -121,7 +121,7 @@ def parse_bauds(text: str) -> tuple[int, ...] | None:
     """Read --bauds; None for all.
 
     Raises:
-        drivers.errors.SetupError: it holds what nobody can be set to.
+        SetupError: it holds what nobody can be set to.
     """
     if text == "all":
         return None

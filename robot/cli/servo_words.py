@@ -1,8 +1,8 @@
 """What the servos of a rig do when they are switched on or left alone, in words for a person."""
 
-from config.schema import Rig
-from drivers.servo_models import BusKind
-from robot.rig_bus import bus_names
+from gazerig.config.schema import Rig
+from gazerig.drivers.servo_models import BusKind
+from gazerig.robot.rig_bus import bus_names
 
 _LEFT_ALONE: dict[BusKind, str] = {
     "dynamixel": "the Dynamixel servos' own watchdog stops them",

@@ -2,7 +2,7 @@
 
 import typer
 
-from robot.cli import doctor, reboot, scan, setup
+from gazerig.robot.cli import doctor, reboot, scan, setup
 
 app = typer.Typer()
 for part in (scan, doctor, setup, reboot):

@@ -12,21 +12,21 @@ from pathlib import Path
 
 import typer
 
-from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
-from drivers.hobby_board.models import US_STEPS
-from drivers.maestro.line import Line
-from drivers.maestro.params import MaestroParams
-from drivers.maestro.probe import USB_CHANNELS
-from drivers.serial.port import BusPort
-from drivers.serial.port_owner import POLOLU
-from drivers.servo_models import servo_label
-from drivers.types import ServoSetup
-from robot.bringup.maestro_settings import clipped, instructions, settings_file
-from robot.bringup.maestro_sweep import FINE_STEPS, Place, walk
-from robot.cli import bench as bench
-from robot.cli.terminal import say, signals
-from robot.clock import RealClock
-from robot.joint import JointParams
+from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
+from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.probe import USB_CHANNELS
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_owner import POLOLU
+from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.maestro_settings import clipped, instructions, settings_file
+from gazerig.robot.bringup.maestro_sweep import FINE_STEPS, Place, walk
+from gazerig.robot.cli import bench as bench
+from gazerig.robot.cli.terminal import say, signals
+from gazerig.robot.clock import RealClock
+from gazerig.robot.joint import JointParams
 
 WIGGLE_DEG = 5.0
 QUICK_STEPS_S = 90.0 / 360.0 * 16_000.0
@@ -43,9 +43,9 @@ def set_up_board(
     """Go through a board's settings and channels; gives the joints that were skipped.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened, or no board answers.
-        drivers.errors.ServoFault: pulses could not be stopped.
-        drivers.errors.BusLost: the port is gone.
+        PortError: the port cannot be opened, or no board answers.
+        ServoFault: pulses could not be stopped.
+        BusLost: the port is gone.
     """
     for text in instructions(params, setups, on_usb(line.port_name)):
         say(f"   {text}")
@@ -75,7 +75,7 @@ def write_settings(
     """Write what to set on a board as a file of Pololu's programs, and say how it is loaded.
 
     Raises:
-        drivers.errors.SetupError: the file cannot be written.
+        SetupError: the file cannot be written.
     """
     try:
         file.write_text(settings_file(params, setups, on_usb(port)), encoding="utf-8")

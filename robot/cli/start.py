@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from drivers.serial.list_ports import SerialPort
+from gazerig.drivers.serial.list_ports import SerialPort
 
 _BEGIN = (
     ("gazerig run --mock", "see a head look at a visitor in your browser; no hardware needed"),

@@ -5,12 +5,12 @@ import sys
 from collections.abc import Callable
 from math import isfinite
 
-from drivers.errors import SetupError
-from robot.bringup.single_joint import Stopped
-from robot.calibrate.placing import Steered
-from robot.cli.keys import TerminalKeys
-from robot.cli.person import LOOK_S, TerminalPerson
-from robot.cli.terminal import say, status
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.bringup.single_joint import Stopped
+from gazerig.robot.calibrate.placing import Steered
+from gazerig.robot.cli.keys import TerminalKeys
+from gazerig.robot.cli.person import LOOK_S, TerminalPerson
+from gazerig.robot.cli.terminal import say, status
 
 STEPS_US = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 FIRST_STEP = 3
@@ -23,7 +23,7 @@ LINES_HELP = "+20 or -20 moves it by so many us, 1480 to that width, Enter: it i
 
 
 class SteeringPerson(TerminalPerson):
-    """Asks on the terminal; implements robot.calibrate.placing.Steerer.
+    """Asks on the terminal; implements gazerig.robot.calibrate.placing.Steerer.
 
     Keys are taken as they are pressed where a terminal answers, lines from a file or a pipe.
     """
@@ -54,8 +54,8 @@ class SteeringPerson(TerminalPerson):
         """Wait for a line while something is looked after.
 
         Raises:
-            robot.bringup.single_joint.Stopped: they want it to end.
-            drivers.errors.SetupError: there are no more lines.
+            gazerig.robot.bringup.single_joint.Stopped: they want it to end.
+            SetupError: there are no more lines.
         """
         while True:
             self._look(live)

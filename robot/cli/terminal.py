@@ -15,11 +15,11 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from config.load import ConfigError, shipped_names
-from drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
-from robot.cli.line_writer import LineWriter
-from robot.cli.suggestions import completed, speaking_of, with_doctor
-from robot.interrupts import Interrupts
+from gazerig.config.load import ConfigError, shipped_names
+from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
+from gazerig.robot.cli.line_writer import LineWriter
+from gazerig.robot.cli.suggestions import completed, speaking_of, with_doctor
+from gazerig.robot.interrupts import Interrupts
 
 BAD_INPUT = 2
 """Exit code: something asked for or configured is wrong."""

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from config.load import ConfigError, read_yaml, shipped_names
-from drivers.errors import DriverError, SetupError
-from robot.cli import lead as cli_lead
-from robot.cli.lead import PidOption
-from robot.cli.terminal import clear_errors, say
-from robot.remote.running_rig import JsonValue, KnobInfo, RunningRig
+from gazerig.config.load import ConfigError, read_yaml, shipped_names
+from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.robot.cli import lead as cli_lead
+from gazerig.robot.cli.lead import PidOption
+from gazerig.robot.cli.terminal import clear_errors, say
+from gazerig.robot.remote.running_rig import JsonValue, KnobInfo, RunningRig
 
 app = typer.Typer()
 app.add_typer(cli_lead.app)
@@ -31,8 +31,8 @@ def complete_key(incomplete: str) -> list[str]:
             return list(rig.get(incomplete))
     except DriverError:
         # Only here: the other commands leave all keys and rules to the rig that runs.
-        from config.knobs import knobs
-        from config.schema import load_rig
+        from gazerig.config.knobs import knobs
+        from gazerig.config.schema import load_rig
 
         desk = load_rig("desk")
         return [knob.key for knob in knobs(desk, desk) if knob.key.startswith(incomplete)]
@@ -221,7 +221,7 @@ def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
     """Read KEY VALUE KEY VALUE ... with values as YAML.
 
     Raises:
-        drivers.errors.SetupError: a value is missing or no YAML, or a key stands twice.
+        SetupError: a value is missing or no YAML, or a key stands twice.
     """
     if len(pairs) % 2:
         raise SetupError(f"{pairs[-1]}: a value is missing; gazerig set KEY VALUE [KEY VALUE ...]")
@@ -236,7 +236,7 @@ def read_value(key: str, text: str) -> Any:
     """Read a value as it would stand after its key in the YAML file.
 
     Raises:
-        drivers.errors.SetupError: it cannot stand there.
+        SetupError: it cannot stand there.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "value.yaml"

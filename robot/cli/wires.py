@@ -6,17 +6,17 @@ from typing import Annotated, NamedTuple
 
 import typer
 
-from config.schema import Rig
-from drivers.errors import SetupError
-from drivers.i2c.port import port_of
-from drivers.serial.list_ports import serial_ports
-from drivers.serial.port import BusPort
-from drivers.serial.port_owner import refuse_owner
-from drivers.types import ServoSetup
-from robot.emulated_rig import emulated_lines
-from robot.rig_bus import bus_names, joints_on, ports_of, rig_setups
-from sim_mock.devices import Emulated
-from sim_mock.pty.client import PtyBuses
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.i2c.port import port_of
+from gazerig.drivers.serial.list_ports import serial_ports
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_owner import refuse_owner
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.robot.rig_bus import bus_names, joints_on, ports_of, rig_setups
+from gazerig.sim_mock.devices import Emulated
+from gazerig.sim_mock.pty.client import PtyBuses
 
 MockOption = Annotated[
     bool, typer.Option("--mock", help="Emulated servo bus instead of the rig's.")
@@ -61,8 +61,8 @@ def wires(
     devices: what is emulated on some buses instead of the rig's servos
 
     Raises:
-        drivers.errors.SetupError: the options exclude each other, or name no bus of the rig.
-        drivers.errors.PortError: a port's owner would take servo packets for commands.
+        SetupError: the options exclude each other, or name no bus of the rig.
+        PortError: a port's owner would take servo packets for commands.
     """
     if mock and port is not None:
         raise SetupError("--port and --mock exclude each other: --mock has a port of its own")

@@ -2,16 +2,17 @@
 
 from collections.abc import Sequence
 
-from drivers.errors import DriverError
-from drivers.types import BusHealth, ServoBus, ServoReading, ServoSetup
-from robot.guardian.guardian import Guardian
+from gazerig.drivers.errors import DriverError
+from gazerig.drivers.types import BusHealth, ServoBus, ServoReading, ServoSetup
+from gazerig.robot.guardian.guardian import Guardian
 
 RETRY_S = 1.0
 """Time between attempts to take hold of servos that refused."""
 
 
 class GuardedBus:
-    """Puts signs of life and the guardian's doings into a bus; implements drivers.types.ServoBus.
+    """Puts signs of life and the guardian's doings into a bus; implements
+    gazerig.drivers.types.ServoBus.
 
     Every read and write is a sign of life. A loop that hung and wakes again finds the torque
     off: it switches it off once more, confirmed, then takes hold where the joints are, as
@@ -36,7 +37,7 @@ class GuardedBus:
         """Open the bus, with a guardian started beside it; torque stays off.
 
         Raises:
-            drivers.errors.SetupError: no guardian can be started, or as the bus raises it.
+            SetupError: no guardian can be started, or as the bus raises it.
         """
         self._guardian.join(self._plan)
         try:
@@ -49,7 +50,7 @@ class GuardedBus:
         """Read all servos; None of all while the guardian is letting go of them.
 
         Raises:
-            drivers.errors.BusLost: no servo has answered for longer than the bus waits.
+            BusLost: no servo has answered for longer than the bus waits.
         """
         self._beat()
         self._guardian.check(now_s)
@@ -64,8 +65,8 @@ class GuardedBus:
         """Switch torque on where the joints are, under the guardian's eyes.
 
         Raises:
-            drivers.errors.SetupError: the guardian did not start, or as the bus raises it.
-            drivers.errors.DriverError: as the bus raises it.
+            SetupError: the guardian did not start, or as the bus raises it.
+            DriverError: as the bus raises it.
         """
         # Before the torque, which comes on servo by servo.
         self._guardian.arm(self._plan)
@@ -88,7 +89,7 @@ class GuardedBus:
         """Torque off on every servo; after that the guardian has nothing to let go of.
 
         Raises:
-            drivers.errors.BusLost: the port is gone; the guardian keeps trying.
+            BusLost: the port is gone; the guardian keeps trying.
         """
         self._holding = self._lost_hold = False
         self._rearmed.clear()

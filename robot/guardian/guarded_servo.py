@@ -1,12 +1,12 @@
 """One servo without a watchdog, driven for calibrating under a guardian's eyes."""
 
-from drivers.errors import ServoFault
-from robot.bringup.servo_access import Found, OneServo
-from robot.guardian.guardian import Guardian
+from gazerig.drivers.errors import ServoFault
+from gazerig.robot.bringup.servo_access import Found, OneServo
+from gazerig.robot.guardian.guardian import Guardian
 
 
 class GuardedServo:
-    """Adds a guardian to a servo by itself; implements robot.bringup.servo_access.OneServo.
+    """Adds a guardian to a servo by itself; implements gazerig.robot.bringup.servo_access.OneServo.
 
     Signs of life are the bytes that its port sends and waits for.
 
@@ -28,7 +28,7 @@ class GuardedServo:
         """Switch the torque on with a guardian beside it; see OneServo.
 
         Raises:
-            drivers.errors.SetupError: the guardian does not start.
+            SetupError: the guardian does not start.
         """
         self._guardian.join(0)
         self._guardian.arm(0)
@@ -38,7 +38,7 @@ class GuardedServo:
         """Send a goal.
 
         Raises:
-            drivers.errors.ServoFault: the program stood still, and the guardian has let go.
+            ServoFault: the program stood still, and the guardian has let go.
         """
         if self._guardian.released(0):
             raise ServoFault(

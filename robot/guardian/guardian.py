@@ -4,12 +4,18 @@ import os
 import select
 import subprocess
 import sys
-from pathlib import Path
 
-from drivers.errors import SetupError
-from robot.guardian import process
-from robot.guardian.heartbeat import IDLE, MAX_PLANS, RELEASED, RELEASING, Heartbeat, shared_file
-from robot.guardian.release_plan import ReleasePlan, encode
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.guardian import process
+from gazerig.robot.guardian.heartbeat import (
+    IDLE,
+    MAX_PLANS,
+    RELEASED,
+    RELEASING,
+    Heartbeat,
+    shared_file,
+)
+from gazerig.robot.guardian.release_plan import ReleasePlan, encode
 
 READY_S = 20.0
 """A guardian starts within 0.1 s; a machine under load may take long."""
@@ -58,7 +64,7 @@ class Guardian:
         """Start it where it does not run yet; returns at once.
 
         Raises:
-            drivers.errors.SetupError: no process can be started.
+            SetupError: no process can be started.
         """
         self._users.add(plan)
         if self._process is None:
@@ -71,7 +77,7 @@ class Guardian:
         """Wait until it watches, where it has just been started.
 
         Raises:
-            drivers.errors.SetupError: it does not start.
+            SetupError: it does not start.
         """
         if self._process is not None and self._process.stdout is not None and not self._ready:
             stdout = self._process.stdout
@@ -87,7 +93,7 @@ class Guardian:
         """Let it watch from now on, before torque comes on.
 
         Raises:
-            drivers.errors.SetupError: it does not run, and torque must not come on without it.
+            SetupError: it does not run, and torque must not come on without it.
         """
         self.wait_until_ready()
         self._heartbeat.set_state(plan, IDLE)
@@ -168,7 +174,6 @@ class Guardian:
             stdout=subprocess.PIPE,
             bufsize=0,
             pass_fds=(self._fd,),
-            env=_environment(),
             # Ctrl-C and a closed terminal are the program's.
             start_new_session=True,
         )
@@ -182,10 +187,3 @@ class Guardian:
 
 def _ending(code: int) -> str:
     return f"signal {-code}" if code < 0 else f"exit code {code}"
-
-
-def _environment() -> dict[str, str]:
-    """Return an environment in which the guardian finds this very package."""
-    here = str(Path(__file__).resolve().parents[2])
-    known = os.environ.get("PYTHONPATH")
-    return {**os.environ, "PYTHONPATH": os.pathsep.join((here, known)) if known else here}

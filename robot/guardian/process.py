@@ -1,8 +1,8 @@
 """The guardian itself: lets go of servos that have no watchdog when their program dies or hangs.
 
-Run by robot.guardian.guardian as
+Run by gazerig.robot.guardian.guardian as
 
-    python -m robot.guardian.process HEARTBEAT_FD PLANS
+    python -m gazerig.robot.guardian.process HEARTBEAT_FD PLANS
 
 with one end of a pipe as standard input, whose other end the program holds, and a pipe as
 standard output, on which one byte says that it is ready. It knows nothing of the program
@@ -19,12 +19,12 @@ import select
 import signal
 import sys
 
-from drivers.errors import DriverError
-from drivers.i2c.port import port_of
-from robot.clock import RealClock
-from robot.guardian.hang_detector import HangDetector
-from robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, Heartbeat
-from robot.guardian.release_plan import ReleasePlan, decode, describe, releaser
+from gazerig.drivers.errors import DriverError
+from gazerig.drivers.i2c.port import port_of
+from gazerig.robot.clock import RealClock
+from gazerig.robot.guardian.hang_detector import HangDetector
+from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, Heartbeat
+from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, releaser
 
 LOOK_S = 0.02
 """Time between two looks at the heartbeat."""

@@ -4,9 +4,9 @@ import json
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drivers.maestro.params import Form, MaestroParams
-from drivers.serial.port import BusPort
-from drivers.servo_models import HOBBY_KINDS, BusKind
+from gazerig.drivers.maestro.params import Form, MaestroParams
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
 
 
 class ReleasePlan(NamedTuple):
@@ -15,7 +15,7 @@ class ReleasePlan(NamedTuple):
     port: path of the serial port
     baud: bit/s
     ids: of the servos; channels of a Maestro
-    protocol, device, crc, channels: of a Maestro, as in drivers.maestro.params
+    protocol, device, crc, channels: of a Maestro, as in gazerig.drivers.maestro.params
     addresses: of PCA9685 boards
     """
 
@@ -47,28 +47,28 @@ def releaser(plan: ReleasePlan) -> Callable[[BusPort], tuple[int, ...]]:
     """Return what lets go of the servos of a plan through a port of its path.
 
     It opens the port and returns the ids that did not confirm; it raises
-    drivers.errors.PortError where the port cannot be opened, drivers.errors.BusLost where it
+    PortError where the port cannot be opened, BusLost where it
     went away. All that it needs is imported here, and of the drivers no more than one.
     """
     if plan.kind == "feetech":
-        from drivers.feetech.family import FEETECH
-        from drivers.servo_bus.release import disable_torque
+        from gazerig.drivers.feetech.family import FEETECH
+        from gazerig.drivers.servo_bus.release import disable_torque
 
         return lambda port: disable_torque(port, FEETECH, plan.baud, plan.ids)
     if plan.kind == "maestro":
-        from drivers.maestro import release as maestro
+        from gazerig.drivers.maestro import release as maestro
 
         params = MaestroParams(plan.baud, plan.protocol, plan.device, plan.crc, plan.channels)
         return lambda port: maestro.stop_pulses(port, params, plan.ids)
     if plan.kind == "pca9685":
-        from drivers.pca9685 import release as pca9685
-        from drivers.pca9685.params import Pca9685Params
+        from gazerig.drivers.pca9685 import release as pca9685
+        from gazerig.drivers.pca9685.params import Pca9685Params
 
         first, *more = plan.addresses
         boards = Pca9685Params(first, tuple(more))
         return lambda port: pca9685.stop_pulses(port, boards, plan.ids)
-    from drivers.dynamixel.family import DYNAMIXEL
-    from drivers.servo_bus.release import disable_torque
+    from gazerig.drivers.dynamixel.family import DYNAMIXEL
+    from gazerig.drivers.servo_bus.release import disable_torque
 
     return lambda port: disable_torque(port, DYNAMIXEL, plan.baud, plan.ids)
 

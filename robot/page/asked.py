@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import NoReturn
 
-from robot.orders import KINDS
+from gazerig.robot.orders import KINDS
 
 ASKED_BYTES = 2048
 """Longest request; a stop with its reason has a hundred bytes."""

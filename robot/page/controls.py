@@ -5,12 +5,12 @@ from html import escape
 
 import viser
 
-from robot.orders import Ask, LookAt
-from robot.page.jog import JogView
-from robot.page.tell import Teller
-from robot.page.tuning import TuningView
-from robot.page.value import put
-from robot.types import Snapshot
+from gazerig.robot.orders import Ask, LookAt
+from gazerig.robot.page.jog import JogView
+from gazerig.robot.page.tell import Teller
+from gazerig.robot.page.tuning import TuningView
+from gazerig.robot.page.value import put
+from gazerig.robot.types import Snapshot
 
 STEER = "steer"
 """A menu of this name is the steps of a calibration, not something to ask the robot for."""

@@ -1,7 +1,7 @@
 """The page's door: the only way in, at the asked address, for those who may come in.
 
 A reverse proxy before viser, which itself listens where nobody else can reach it
-(``robot.page.server``). Whoever comes in shows a token, once, in the query of the first
+(``gazerig.robot.page.server``). Whoever comes in shows a token, once, in the query of the first
 address; a cookie takes its place. That holds on this machine as well, which may have other
 users. The Origin of every websocket and of everything that is sent must be the address of
 this page, and on the loopback that address must be a name of the loopback, or a foreign name
@@ -26,13 +26,13 @@ from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 from yarl import URL
 
-from robot.page.asked import ASKED_BYTES, compact, from_browser, leads
-from robot.page.browsers import Browsers, Places
-from robot.page.connections import Connections
-from robot.page.rate import Rate
-from robot.page.relay import TAKES_S, carry_in, carry_out, until_one_ends
-from robot.page.server import BROWSER_HEADER, FROM_BROWSER_BYTES, TO_BROWSER_BYTES
-from robot.page.stop_line import StopSender
+from gazerig.robot.page.asked import ASKED_BYTES, compact, from_browser, leads
+from gazerig.robot.page.browsers import Browsers, Places
+from gazerig.robot.page.connections import Connections
+from gazerig.robot.page.rate import Rate
+from gazerig.robot.page.relay import TAKES_S, carry_in, carry_out, until_one_ends
+from gazerig.robot.page.server import BROWSER_HEADER, FROM_BROWSER_BYTES, TO_BROWSER_BYTES
+from gazerig.robot.page.stop_line import StopSender
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 MOST_TABS = 16

@@ -5,11 +5,23 @@ Mean dwell times per part are those of Nakamoto & Tsuruno, table 1.
 
 from collections import Counter, defaultdict
 
-from gaze.types import PART_NAMES, PARTS
-from robot.page import style as page_style
-from robot.page.style import INK, LINE_PX, PALE, box, counted, frame, heading, line, note, svg, text
-from robot.report.human import DWELL_MEAN_S
-from robot.types import SeenFixation
+from gazerig.gaze.types import PART_NAMES, PARTS
+from gazerig.robot.page import style as page_style
+from gazerig.robot.page.style import (
+    INK,
+    LINE_PX,
+    PALE,
+    box,
+    counted,
+    frame,
+    heading,
+    line,
+    note,
+    svg,
+    text,
+)
+from gazerig.robot.report.human import DWELL_MEAN_S
+from gazerig.robot.types import SeenFixation
 
 MEASURED_MEAN_S = dict(zip(PARTS, DWELL_MEAN_S, strict=True))
 """Nakamoto & Tsuruno, table 1."""

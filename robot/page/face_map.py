@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.angles import add, rotate, scale, unit
-from gaze.types import Floats
-from robot.face_gaze import on_face
-from robot.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
-from robot.types import Snapshot
+from gazerig.gaze.angles import add, rotate, scale, unit
+from gazerig.gaze.types import Floats
+from gazerig.robot.face_gaze import on_face
+from gazerig.robot.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.types import Snapshot
 
 SHRINK = 3
 """The map is so many times smaller than the drawn face."""

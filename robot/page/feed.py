@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from robot.orders import Value
-from robot.page.link import KNOBS, VALUES
-from robot.remote.requests import Change, Knob, plain
+from gazerig.robot.orders import Value
+from gazerig.robot.page.link import KNOBS, VALUES
+from gazerig.robot.remote.requests import Change, Knob, plain
 
 _PIECE = 40  # parameters a message: some 20 kB, a tenth of what a message may be
 
 
 class Fed(Protocol):
-    """What the feed asks of the parameters of a running rig (robot.tuning.Tuning)."""
+    """What the feed asks of the parameters of a running rig (gazerig.robot.tuning.Tuning)."""
 
     @property
     def version(self) -> int:

@@ -5,10 +5,10 @@ from math import atan, cos, hypot, pi, sin, tan
 import numpy as np
 import viser
 
-from gaze.types import Floats, Vec3
-from robot.page.head import Colour
-from robot.page.place import along, put, quaternion
-from robot.types import Snapshot
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.robot.page.head import Colour
+from gazerig.robot.page.place import along, put, quaternion
+from gazerig.robot.types import Snapshot
 
 _CAMERA: Colour = (120, 128, 140)
 _FIELD: dict[str, Colour] = {"left": (20, 150, 120), "right": (190, 90, 30)}

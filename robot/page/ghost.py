@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from gaze.angles import rotate_back, sub
-from robot.page.head import (
+from gazerig.gaze.angles import rotate_back, sub
+from gazerig.robot.page.head import (
     EYE_RADIUS_M,
     SHELL_HALF_AXES_M,
     SHELL_MIDDLE_M,
@@ -16,9 +16,9 @@ from robot.page.head import (
     lid_turn,
     lower_lid_turn,
 )
-from robot.page.mesh import Mesh, ellipsoid, lid, ring
-from robot.page.place import along, put, quaternion
-from robot.types import Ghost, Snapshot
+from gazerig.robot.page.mesh import Mesh, ellipsoid, lid, ring
+from gazerig.robot.page.place import along, put, quaternion
+from gazerig.robot.types import Ghost, Snapshot
 
 _GHOST: Colour = (70, 110, 255)
 _SIGHT_M = 0.35

@@ -10,11 +10,11 @@ import numpy as np
 import viser
 from viser import transforms
 
-from gaze.angles import add, norm, rotate, rotate_back, sub
-from gaze.types import Mat3, Vec3
-from robot.page.mesh import Mesh, cap, ellipsoid, lid, ring, turned
-from robot.page.place import Turn, along, put, quaternion, turn_to, turned_up, upright_along
-from robot.types import Snapshot
+from gazerig.gaze.angles import add, norm, rotate, rotate_back, sub
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.page.mesh import Mesh, cap, ellipsoid, lid, ring, turned
+from gazerig.robot.page.place import Turn, along, put, quaternion, turn_to, turned_up, upright_along
+from gazerig.robot.types import Snapshot
 
 FLOOR_M = -0.14
 """Height of the table the rig stands on, below the neck base."""

@@ -3,9 +3,9 @@
 from html import escape
 from typing import Literal
 
-from robot.page.status import OLD_PICTURE_S
-from robot.page.style import AMBER, GREEN, GREY, LEVELS, RED, frame, heading, note, pill
-from robot.types import Servos, Snapshot, Timing
+from gazerig.robot.page.status import OLD_PICTURE_S
+from gazerig.robot.page.style import AMBER, GREEN, GREY, LEVELS, RED, frame, heading, note, pill
+from gazerig.robot.types import Servos, Snapshot, Timing
 
 Strain = Literal["", "near", "over"]
 """How a figure stands to its limit."""

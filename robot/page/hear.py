@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Protocol, cast
 
-from drivers.errors import DriverError
-from gaze.types import Vec3
-from robot.clock import RealClock
-from robot.orders import Jog, LookAt, Order, Resume, Tune, Value, from_json, signed
-from robot.remote.requests import Saved, Tuning
-from robot.reply import OrderTaker
+from gazerig.drivers.errors import DriverError
+from gazerig.gaze.types import Vec3
+from gazerig.robot.clock import RealClock
+from gazerig.robot.orders import Jog, LookAt, Order, Resume, Tune, Value, from_json, signed
+from gazerig.robot.remote.requests import Saved, Tuning
+from gazerig.robot.reply import OrderTaker
 
 _REPLY_S = 1.0
 _SAID_EVERY_S = 3.0
@@ -18,7 +18,7 @@ _LATER = "next start"
 
 
 class Confined(Protocol):
-    """Says which files a person at a browser may name (config.confined.Confined)."""
+    """Says which files a person at a browser may name (gazerig.config.confined.Confined)."""
 
     def file(self, given: str, kind: str = "") -> str:
         """Return a shipped name or a whole path; raise where it may not be named."""

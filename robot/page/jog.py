@@ -6,10 +6,10 @@ from math import degrees, radians
 
 import viser
 
-from robot.orders import Jog, LookAt
-from robot.page.tell import Teller
-from robot.page.value import put
-from robot.types import JOINTS, Snapshot
+from gazerig.robot.orders import Jog, LookAt
+from gazerig.robot.page.tell import Teller
+from gazerig.robot.page.value import put
+from gazerig.robot.types import JOINTS, Snapshot
 
 _STEP_DEG = 0.1
 _FOLLOWS_DEG = 0.15

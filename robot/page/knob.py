@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 
 import viser
 
-from robot.page.value import put
+from gazerig.robot.page.value import put
 
 Put = Callable[[str, object], None]
 """Asks for another value: key, value."""
@@ -18,7 +18,7 @@ _FAR = 20.0
 
 
 class PageKnob(NamedTuple):
-    """A parameter as config.knobs describes it, read from JSON."""
+    """A parameter as gazerig.config.knobs describes it, read from JSON."""
 
     key: str
     group: str

@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import viser
 
-from robot.page.fields import CameraField, EyeFields
-from robot.page.ghost import GhostView
-from robot.types import Snapshot
+from gazerig.robot.page.fields import CameraField, EyeFields
+from gazerig.robot.page.ghost import GhostView
+from gazerig.robot.types import Snapshot
 
 
 @dataclass

@@ -1,6 +1,6 @@
 """Show the running rig on a web page without ever making the control loop wait.
 
-The page is a process of its own (``robot.page.view``), fed through a socket pair with
+The page is a process of its own (``gazerig.robot.page.view``), fed through a socket pair with
 frozen values. Every call here returns at once: what the page cannot take is dropped and
 counted, and a page that is slow, stopped or dead changes nothing for the caller. The
 page ends when this side of the socket closes, so it never outlives the program, however
@@ -22,13 +22,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from math import nan
 from operator import attrgetter
-from pathlib import Path
 from urllib.parse import urlsplit
 
-from robot.clock import RealClock
-from robot.page.ear import MESSAGE_BYTES, TELL, Ear, told
-from robot.page.stop_line import StopListener
-from robot.types import SeenBody, SeenFace, Snapshot
+from gazerig.robot.clock import RealClock
+from gazerig.robot.page.ear import MESSAGE_BYTES, TELL, Ear, told
+from gazerig.robot.page.stop_line import StopListener
+from gazerig.robot.types import SeenBody, SeenFace, Snapshot
 
 # The first byte of a message says what follows it. To the page: a snapshot, a picture, menus,
 # what can be tuned, its values, an answer or words for everybody, where a replay stands.
@@ -162,7 +161,7 @@ class Page:
 
     def _command(self, fd: int, stop_fd: int) -> list[str]:
         arguments = [str(fd), str(stop_fd), str(os.getpid()), self._host, str(self._port)]
-        return [sys.executable, "-P", "-m", "robot.page.view", *arguments]
+        return [sys.executable, "-P", "-m", "gazerig.robot.page.view", *arguments]
 
     def join(self, link: socket.socket, stops: socket.socket | None = None) -> None:
         """Talk over these from now on; ``open`` makes them with a process at the other ends.
@@ -347,8 +346,5 @@ def _code(process: subprocess.Popen[bytes]) -> int | None:
 
 
 def _environment() -> dict[str, str]:
-    """Let the page find this very package, and keep its numerics to one thread."""
-    here = str(Path(__file__).resolve().parents[2])
-    known = os.environ.get("PYTHONPATH")
-    path = os.pathsep.join((here, known)) if known else here
-    return {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+    """Return this process's environment with numerics in one thread."""
+    return {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from robot.types import Timing
+from gazerig.robot.types import Timing
 
 OVER_S = 5.0
 """How far back the figures reach."""

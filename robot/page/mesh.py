@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.types import Floats, Vec3
+from gazerig.gaze.types import Floats, Vec3
 
 _AROUND = 48
 

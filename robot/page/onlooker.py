@@ -13,14 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drivers.types import BusHealth, Detections
-from gaze.angles import rotate_back, sub
-from robot.frames import CameraMount, PoseHistory
-from robot.loop import Tick
-from robot.page.feed import TuningFeed
-from robot.page.link import Page
-from robot.page.picture import draw_detections, encode, ground
-from robot.page.snapshot import (
+from gazerig.drivers.types import BusHealth, Detections
+from gazerig.gaze.angles import rotate_back, sub
+from gazerig.robot.frames import CameraMount, PoseHistory
+from gazerig.robot.loop import Tick
+from gazerig.robot.page.feed import TuningFeed
+from gazerig.robot.page.link import Page
+from gazerig.robot.page.picture import draw_detections, encode, ground
+from gazerig.robot.page.snapshot import (
     Said,
     Snapshots,
     health_words,
@@ -29,8 +29,8 @@ from robot.page.snapshot import (
     target_name,
     verdict_words,
 )
-from robot.seeing.face_pose import Intrinsics, intrinsics_of_view, project
-from robot.seeing.head_turn_residual import ResidualFigures
+from gazerig.robot.seeing.face_pose import Intrinsics, intrinsics_of_view, project
+from gazerig.robot.seeing.head_turn_residual import ResidualFigures
 
 _SNAPSHOT_S = 0.04
 _PICTURE_S = 0.1

@@ -11,17 +11,17 @@ import cv2
 import numpy as np
 import viser
 
-from robot.page.dwell import Dwell
-from robot.page.face_map import FaceMap
-from robot.page.health import health
-from robot.page.layers import Layers
-from robot.page.saccades import MainSequence
-from robot.page.status import silence, status
-from robot.page.style import frame, heading, note
-from robot.page.timeline import Timeline
-from robot.page.traces import Traces, TracesView
-from robot.page.why import pulls, winner
-from robot.types import SeenFixation, SeenSaccade, Snapshot
+from gazerig.robot.page.dwell import Dwell
+from gazerig.robot.page.face_map import FaceMap
+from gazerig.robot.page.health import health
+from gazerig.robot.page.layers import Layers
+from gazerig.robot.page.saccades import MainSequence
+from gazerig.robot.page.status import silence, status
+from gazerig.robot.page.style import frame, heading, note
+from gazerig.robot.page.timeline import Timeline
+from gazerig.robot.page.traces import Traces, TracesView
+from gazerig.robot.page.why import pulls, winner
+from gazerig.robot.types import SeenFixation, SeenSaccade, Snapshot
 
 # What is shown by and by, in pictures of the page of which there are at most 25 a second.
 _WORDS_EVERY, _TRACES_EVERY, _STRIP_EVERY, _FIGURES_EVERY = 3, 4, 8, 25

@@ -3,11 +3,11 @@
 import numpy as np
 import viser
 
-from gaze.types import PARTS, Floats, Vec3
-from robot.page.head import FLOOR_M, Colour
-from robot.page.mesh import Mesh, cap, disc, ellipsoid, ring
-from robot.page.place import put, quaternion
-from robot.types import SeenBody, SeenFace, Snapshot
+from gazerig.gaze.types import PARTS, Floats, Vec3
+from gazerig.robot.page.head import FLOOR_M, Colour
+from gazerig.robot.page.mesh import Mesh, cap, disc, ellipsoid, ring
+from gazerig.robot.page.place import put, quaternion
+from gazerig.robot.types import SeenBody, SeenFace, Snapshot
 
 FIXATED_WITHIN_M = 0.02
 """A face part this close to the target is the one looked at (parts are 3 cm apart or more)."""

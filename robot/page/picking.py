@@ -5,13 +5,13 @@ from math import hypot, radians
 
 import numpy as np
 
-from drivers.camera.depth_roi import depth_at
-from drivers.types import Detections
-from gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
-from gaze.types import Percept, Vec3
-from robot.frames import CameraMount, CameraParams, PoseHistory
-from robot.loop import Tick
-from robot.seeing.intrinsics import Intrinsics, intrinsics_of_lens, rays
+from gazerig.drivers.camera.depth_roi import depth_at
+from gazerig.drivers.types import Detections
+from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
+from gazerig.gaze.types import Percept, Vec3
+from gazerig.robot.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.loop import Tick
+from gazerig.robot.seeing.intrinsics import Intrinsics, intrinsics_of_lens, rays
 
 NEAR_RAD = 0.12
 """A click within 7 deg of somebody means something as far away as they are."""

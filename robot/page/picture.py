@@ -5,7 +5,7 @@ from typing import cast
 import cv2
 import numpy as np
 
-from drivers.types import Depth, DetectedFace, Detections, MovingBlob, Picture
+from gazerig.drivers.types import Depth, DetectedFace, Detections, MovingBlob, Picture
 
 PICTURE_WIDTH_PX = 320
 NEAREST_M, FARTHEST_M = 0.3, 6.0

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from math import atan2, copysign, cos, hypot, sin, sqrt
 from typing import Protocol
 
-from gaze.types import Floats, Mat3, Vec3
+from gazerig.gaze.types import Floats, Mat3, Vec3
 
 _STILL_M, _STILL = 1e-4, 3e-4
 """What has moved less, in metres and in parts of a quaternion (0.04 deg), stays where it is:

@@ -6,7 +6,7 @@ from collections.abc import Awaitable
 import aiohttp
 from aiohttp import web
 
-from robot.page.rate import Rate
+from gazerig.robot.page.rate import Rate
 
 MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
 """From one browser; a person who drags with two hands sends some 60 a second."""

@@ -10,8 +10,8 @@ from typing import Any
 
 import viser
 
-from robot.page.value import put
-from robot.recording.player import KINDS, SPEEDS
+from gazerig.robot.page.value import put
+from gazerig.robot.recording.player import KINDS, SPEEDS
 
 Tell = Callable[[int, Mapping[str, object]], None]
 """Hands what a person asks for to the rig's side: the browser's number, and the request."""
@@ -77,7 +77,7 @@ class ReplayView:
             self._tell(client.client_id, {"replay": asked})
 
     def show(self, state: Mapping[str, Any]) -> None:
-        """Show where it stands, as robot.recording.replay writes it: a player's State.
+        """Show where it stands, as gazerig.robot.recording.replay writes it: a player's State.
 
         Once there are also marks, counts along the recording by kind, and events, (at_s, words).
         """

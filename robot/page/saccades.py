@@ -1,6 +1,6 @@
 """The main sequence as the rig makes it, in the range of people's: speed and length of saccades.
 
-The ranges are those that the report judges by (robot.report.human).
+The ranges are those that the report judges by (gazerig.robot.report.human).
 """
 
 from collections import deque
@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from gaze.types import Floats
-from robot.page.style import (
+from gazerig.gaze.types import Floats
+from gazerig.robot.page.style import (
     BLUE,
     GREY,
     LINE_PX,
@@ -23,8 +23,8 @@ from robot.page.style import (
     svg,
     text,
 )
-from robot.report.human import fastest_peak, longest_ms, shortest_ms, slowest_peak
-from robot.types import SeenSaccade
+from gazerig.robot.report.human import fastest_peak, longest_ms, shortest_ms, slowest_peak
+from gazerig.robot.types import SeenSaccade
 
 KEPT = 400
 """Saccades shown at most, the newest."""

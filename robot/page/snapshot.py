@@ -7,20 +7,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drivers.types import BusHealth
-from gaze.angles import norm, sub
-from gaze.field_of_view import FieldOfViewParams, line_of_sight
-from gaze.types import PART_NAMES, GazeState, Target, Vec3
-from robot.frames import CameraMount
-from robot.gaze_error import gaze_error
-from robot.kinematics import Kinematics
-from robot.loop import Tick
-from robot.page.loop_timing import LoopTiming
-from robot.report.gaze_events import Blink, Event, Fixation, GazeEvents, Saccade
-from robot.safety.health import HealthParams
-from robot.safety.motion import JointLimit
-from robot.seeing.head_turn_residual import ResidualFigures
-from robot.types import (
+from gazerig.drivers.types import BusHealth
+from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
+from gazerig.gaze.types import PART_NAMES, GazeState, Target, Vec3
+from gazerig.robot.frames import CameraMount
+from gazerig.robot.gaze_error import gaze_error
+from gazerig.robot.kinematics import Kinematics
+from gazerig.robot.loop import Tick
+from gazerig.robot.page.loop_timing import LoopTiming
+from gazerig.robot.report.gaze_events import Blink, Event, Fixation, GazeEvents, Saccade
+from gazerig.robot.safety.health import HealthParams
+from gazerig.robot.safety.motion import JointLimit
+from gazerig.robot.seeing.head_turn_residual import ResidualFigures
+from gazerig.robot.types import (
     Ghost,
     JointState,
     Level,

@@ -2,8 +2,8 @@
 
 from html import escape
 
-from robot.page.style import AMBER, GREY, LEVELS, ORANGE, PHASES, RED, counted, frame, pill
-from robot.types import Snapshot
+from gazerig.robot.page.style import AMBER, GREY, LEVELS, ORANGE, PHASES, RED, counted, frame, pill
+from gazerig.robot.types import Snapshot
 
 _REASONS_SHOWN = 4
 OLD_PICTURE_S = 0.5

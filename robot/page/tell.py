@@ -5,10 +5,10 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 
-from robot.clock import Clock, RealClock
-from robot.orders import Jog, LookAt, Order, as_json
-from robot.page.ear import MESSAGE_BYTES, telling
-from robot.page.rate import Rate
+from gazerig.robot.clock import Clock, RealClock
+from gazerig.robot.orders import Jog, LookAt, Order, as_json
+from gazerig.robot.page.ear import MESSAGE_BYTES, telling
+from gazerig.robot.page.rate import Rate
 
 DOOR = "door"
 """Who asks where it is the stop button or a click in the picture."""

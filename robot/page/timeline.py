@@ -4,8 +4,8 @@ from collections import deque
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from gaze.types import PART_NAMES
-from robot.page.style import (
+from gazerig.gaze.types import PART_NAMES
+from gazerig.robot.page.style import (
     GREY,
     LEVELS,
     LINE_PX,
@@ -20,7 +20,7 @@ from robot.page.style import (
     svg,
     text,
 )
-from robot.types import SeenBlink, SeenEvent, SeenSaccade, Snapshot
+from gazerig.robot.types import SeenBlink, SeenEvent, SeenSaccade, Snapshot
 
 STRIP_S = 30.0
 """How far back the strip reaches."""

@@ -8,9 +8,9 @@ import numpy as np
 import viser
 from viser import uplot
 
-from gaze.types import Floats
-from robot.page.style import AMBER, BLUE, GREY, PALE_BLUE, frame
-from robot.types import Snapshot, Trail
+from gazerig.gaze.types import Floats
+from gazerig.robot.page.style import AMBER, BLUE, GREY, PALE_BLUE, frame
+from gazerig.robot.types import Snapshot, Trail
 
 TRACE_S = 30.0
 """How far back the traces are kept."""

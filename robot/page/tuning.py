@@ -11,9 +11,9 @@ from typing import cast
 
 import viser
 
-from robot.page.knob import KnobControl, PageKnob, knob_from
-from robot.page.tell import Teller
-from robot.page.value import put
+from gazerig.robot.page.knob import KnobControl, PageKnob, knob_from
+from gazerig.robot.page.tell import Teller
+from gazerig.robot.page.value import put
 
 MOST_SHOWN = 30
 SAVE, REVERT = "save", "revert to the file"

@@ -1,11 +1,11 @@
 """The page's own process: take the newest snapshot off the socket and draw it.
 
-Started by ``robot.page.link.Page`` as ``python -m robot.page.view FD STOP_FD PARENT HOST PORT``,
-with the token and a folder of its own in its environment, which other users cannot read as
-they can its arguments. It
+Started by ``gazerig.robot.page.link.Page`` as ``python -m gazerig.robot.page.view FD STOP_FD
+PARENT HOST PORT``, with the token and a folder of its own in its environment, which other users
+cannot read as they can its arguments. It
 ends when the other side of the socket closes. Nothing is fetched from anywhere: the
 page's script comes from the viser package and all shapes are made here. Browsers come in
-by ``robot.page.door``; what people do there goes to the rig over the same socket.
+by ``gazerig.robot.page.door``; what people do there goes to the rig over the same socket.
 """
 
 import errno
@@ -24,12 +24,12 @@ from typing import NamedTuple
 
 import viser
 
-from robot.page.controls import ControlsView
-from robot.page.door import Door
-from robot.page.ear import MESSAGE_BYTES
-from robot.page.head import FLOOR_M, HeadView
-from robot.page.layers import LayersView
-from robot.page.link import (
+from gazerig.robot.page.controls import ControlsView
+from gazerig.robot.page.door import Door
+from gazerig.robot.page.ear import MESSAGE_BYTES
+from gazerig.robot.page.head import FLOOR_M, HeadView
+from gazerig.robot.page.layers import LayersView
+from gazerig.robot.page.link import (
     CANNOT_OPEN,
     CHOICES,
     EVERYBODY,
@@ -45,14 +45,14 @@ from robot.page.link import (
     WORDS,
     unpack,
 )
-from robot.page.panel import PanelView
-from robot.page.people import PeopleView
-from robot.page.process_limits import limit_process
-from robot.page.replay import ReplayView
-from robot.page.server import browser_of, open_server
-from robot.page.stop_line import StopSender
-from robot.page.tell import Teller
-from robot.types import Snapshot
+from gazerig.robot.page.panel import PanelView
+from gazerig.robot.page.people import PeopleView
+from gazerig.robot.page.process_limits import limit_process
+from gazerig.robot.page.replay import ReplayView
+from gazerig.robot.page.server import browser_of, open_server
+from gazerig.robot.page.stop_line import StopSender
+from gazerig.robot.page.tell import Teller
+from gazerig.robot.types import Snapshot
 
 _FRAME_S = 0.04
 _SILENT_AFTER_S = 1.0

@@ -2,9 +2,9 @@
 
 from html import escape
 
-from gaze.types import Pull
-from robot.page.style import BLUE, GREY, PALE, TARGETS, frame, heading, note, pill
-from robot.types import Snapshot
+from gazerig.gaze.types import Pull
+from gazerig.robot.page.style import BLUE, GREY, PALE, TARGETS, frame, heading, note, pill
+from gazerig.robot.types import Snapshot
 
 _TERMS = ("slide", "loom", "spin", "onset", "rule")
 _COLOURS = dict(zip(_TERMS, ("#4dabf7", "#845ef7", "#22b8cf", "#ff922b", "#37b24d"), strict=True))

@@ -6,12 +6,12 @@ well; with them a recorded run can be done again to the bit.
 
 from collections.abc import Callable, Mapping, Sequence
 
-from drivers.errors import ServoFault, SetupError
-from robot.body import Body
-from robot.joint import JointParams
-from robot.recording.moment import Engaged, Heard, Measured, Refused
-from robot.safety.guard import JointLimit
-from robot.types import JointAngles, JointState
+from gazerig.drivers.errors import ServoFault, SetupError
+from gazerig.robot.body import Body
+from gazerig.robot.joint import JointParams
+from gazerig.robot.recording.moment import Engaged, Heard, Measured, Refused
+from gazerig.robot.safety.guard import JointLimit
+from gazerig.robot.types import JointAngles, JointState
 
 
 class BodyTap(Body):
@@ -58,7 +58,7 @@ class BodyTap(Body):
         """Torque off at once.
 
         Raises:
-            drivers.errors.BusLost: the port is gone.
+            BusLost: the port is gone.
         """
         self._body.let_go()
 
@@ -66,8 +66,8 @@ class BodyTap(Body):
         """Torque on again; note the goals, or why there are none.
 
         Raises:
-            drivers.errors.SetupError: a servo does not answer, refuses or has latched a fault.
-            drivers.errors.BusLost: the port is gone.
+            SetupError: a servo does not answer, refuses or has latched a fault.
+            BusLost: the port is gone.
         """
         try:
             goals = self._body.take_hold()

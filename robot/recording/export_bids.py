@@ -3,7 +3,7 @@
 Each of left eye (eye1), right eye (eye2) and cyclopean gaze (eye3) has a table without a
 header and its JSON with the columns' names, beside a table of events; both tables are
 compressed. The data set is one that the official validator accepts. The robot is the
-participant; angles and signs are those of robot.recording.gaze_angles.
+participant; angles and signs are those of gazerig.robot.recording.gaze_angles.
 """
 
 import gzip
@@ -17,13 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drivers.errors import SetupError
-from drivers.file_input import read_limited
-from drivers.file_output import make_folder, output_file, write_file
-from gaze.types import PART_NAMES, Floats
-from robot.reckoned import PARTLY, RECKONED, Basis
-from robot.recording.gaze_angles import Trace
-from robot.recording.gaze_labels import Labels, Stretch
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.file_output import make_folder, output_file, write_file
+from gazerig.gaze.types import PART_NAMES, Floats
+from gazerig.robot.reckoned import PARTLY, RECKONED, Basis
+from gazerig.robot.recording.gaze_angles import Trace
+from gazerig.robot.recording.gaze_labels import Labels, Stretch
 
 BIDS_VERSION = "1.11.1"
 
@@ -77,7 +77,7 @@ def write_bids(
     force: replace the run of this subject and task that is there
 
     Raises:
-        drivers.errors.SetupError: the folder holds another data set, or has a run of this
+        SetupError: the folder holds another data set, or has a run of this
             subject and task, or cannot be written.
     """
     subject, task = f"sub-{label_of(about.subject)}", label_of(about.task)

@@ -1,6 +1,7 @@
 """A run as CSV that eye-tracking tools and spreadsheets open: samples, events, fixations.
 
-Angles and signs are those of robot.recording.gaze_angles; an empty cell is a lost eye. Beside
+Angles and signs are those of gazerig.robot.recording.gaze_angles; an empty cell is a lost eye.
+Beside
 the samples stands what they rest on, as JSON: servos that measured, or such as tell nothing.
 """
 
@@ -12,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.file_output import output_text, refuse_existing, write_file
-from robot.reckoned import RECKONED
-from robot.recording.gaze_angles import MOVEMENTS, Trace
-from robot.recording.gaze_labels import Labels, Stretch
+from gazerig.drivers.file_output import output_text, refuse_existing, write_file
+from gazerig.robot.reckoned import RECKONED
+from gazerig.robot.recording.gaze_angles import MOVEMENTS, Trace
+from gazerig.robot.recording.gaze_labels import Labels, Stretch
 
 _GAZE = (
     "time_s", "x_deg", "y_deg", "left_x_deg", "left_y_deg", "right_x_deg", "right_y_deg",
@@ -42,7 +43,7 @@ def write_csv(
     force: replace files that are there
 
     Raises:
-        drivers.errors.SetupError: one is there already or cannot be written.
+        SetupError: one is there already or cannot be written.
     """
     refuse_existing(*csv_files(stem), force=force)
     made = (

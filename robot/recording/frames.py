@@ -11,16 +11,16 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from drivers.errors import SetupError
-from robot.bus_events import drawn_together
-from robot.orders import Ask, Renew
-from robot.page.link import pack, unpack
-from robot.page.snapshot import Said, ShownRig, Snapshots, seeing_words, verdict_words
-from robot.recording.gaze_angles import order_words
-from robot.recording.player import Mark
-from robot.seeing.head_turn_residual import ResidualFigures
-from robot.tick import Tick
-from robot.types import SeenEvent, Trail
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.bus_events import drawn_together
+from gazerig.robot.orders import Ask, Renew
+from gazerig.robot.page.link import pack, unpack
+from gazerig.robot.page.snapshot import Said, ShownRig, Snapshots, seeing_words, verdict_words
+from gazerig.robot.recording.gaze_angles import order_words
+from gazerig.robot.recording.player import Mark
+from gazerig.robot.seeing.head_turn_residual import ResidualFigures
+from gazerig.robot.tick import Tick
+from gazerig.robot.types import SeenEvent, Trail
 
 SNAPSHOT_EVERY_S = 0.02
 _NO_RESIDUAL = ResidualFigures(None, None, 0)
@@ -54,7 +54,7 @@ class Frames:
         progress: is told how many seconds are read
 
         Raises:
-            drivers.errors.SetupError: there is no tick.
+            SetupError: there is no tick.
         """
         self._times, self._packed = array("d"), list[bytes]()
         self.marks: list[Mark] = []

@@ -20,12 +20,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.angles import add, angle_between, sub, yaw_pitch
-from gaze.field_of_view import line_of_sight
-from gaze.types import Angles2, Floats, GazeState, Target, Vec3
-from robot.orders import Jog, Order, Renew, Stop
-from robot.reckoned import Basis, basis_of, reckoned_joints
-from robot.tick import Tick
+from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3
+from gazerig.robot.orders import Jog, Order, Renew, Stop
+from gazerig.robot.reckoned import Basis, basis_of, reckoned_joints
+from gazerig.robot.tick import Tick
 
 Ints = NDArray[np.int64]
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.types import Floats
-from robot.recording.gaze_angles import MOVEMENTS, Ints, LookedAt, Trace
+from gazerig.gaze.types import Floats
+from gazerig.robot.recording.gaze_angles import MOVEMENTS, Ints, LookedAt, Trace
 
 LONGEST_LAG_S = 0.1
 SHORTEST_PURSUIT_S = 0.1

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gaze.types import Bodies, Face, GazeCommand, GazeState, Limited, Percept, Pull, Target
-from robot.orders import as_json as order_as_json
-from robot.orders import from_recording as order_from_json
-from robot.tick import Tick
-from robot.types import JOINTS, JointAngles, JointState, Verdict
+from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Limited, Percept, Pull, Target
+from gazerig.robot.orders import as_json as order_as_json
+from gazerig.robot.orders import from_recording as order_from_json
+from gazerig.robot.tick import Tick
+from gazerig.robot.types import JOINTS, JointAngles, JointState, Verdict
 
 Json = dict[str, Any]
 Flat = tuple[Any, ...]

@@ -8,9 +8,9 @@ from collections import deque
 from collections.abc import Iterator
 from math import inf
 
-from drivers.types import Picture
-from robot.page.picture import encode
-from robot.tick import Tick
+from gazerig.drivers.types import Picture
+from gazerig.robot.page.picture import encode
+from gazerig.robot.tick import Tick
 
 
 class PictureEncoder:

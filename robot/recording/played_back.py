@@ -4,17 +4,17 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
-from drivers.errors import SetupError
-from drivers.types import Detections
-from gaze.types import Percept
-from robot.body import Body
-from robot.frames import CameraMount, PoseHistory
-from robot.joint import JointParams
-from robot.recording.moment import Engaged, Heard, Measured, Moment, Refused
-from robot.safety.guard import JointLimit
-from robot.seeing.perception import Perception
-from robot.seeing.tracks import Tracker, TrackParams
-from robot.types import JointAngles, JointState
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import Detections
+from gazerig.gaze.types import Percept
+from gazerig.robot.body import Body
+from gazerig.robot.frames import CameraMount, PoseHistory
+from gazerig.robot.joint import JointParams
+from gazerig.robot.recording.moment import Engaged, Heard, Measured, Moment, Refused
+from gazerig.robot.safety.guard import JointLimit
+from gazerig.robot.seeing.perception import Perception
+from gazerig.robot.seeing.tracks import Tracker, TrackParams
+from gazerig.robot.types import JointAngles, JointState
 
 H = TypeVar("H", bound=Heard)
 
@@ -85,7 +85,7 @@ class PlayedBody(Body):
         """Torque on again; give the recorded goals.
 
         Raises:
-            drivers.errors.SetupError: it was refused then.
+            SetupError: it was refused then.
         """
         refused = next((one for one in self._said if isinstance(one, Refused)), None)
         if refused is not None:

@@ -17,13 +17,13 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, DataEnd, Header, Metadata
 from zstandard import ZstdError
 
-from drivers.errors import DriverError, SetupError
-from gaze.types import Percept
-from robot.recording import run_format as fmt
-from robot.recording.chunk_reader import LARGEST_BYTES, unpacked
-from robot.recording.moment import Moment, from_json, percept_from_json
-from robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
-from robot.tick import Tick
+from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.gaze.types import Percept
+from gazerig.robot.recording import run_format as fmt
+from gazerig.robot.recording.chunk_reader import LARGEST_BYTES, unpacked
+from gazerig.robot.recording.moment import Moment, from_json, percept_from_json
+from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
+from gazerig.robot.tick import Tick
 
 _MAGIC = b"\x89MCAP0\r\n"
 _CAMERA = "gazerig-camera-"

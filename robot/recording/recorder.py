@@ -1,6 +1,6 @@
 """Records a run without ever making the control loop wait.
 
-A process of its own writes the file (robot.recording.writer_process); a tick is handed
+A process of its own writes the file (gazerig.robot.recording.writer_process); a tick is handed
 over as plain tuples and the loop goes on at once. The process outlives this program by
 as long as it takes to close the file.
 """
@@ -12,17 +12,17 @@ from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
-from drivers.errors import SetupError
-from drivers.types import BusHealth
-from gaze.types import Percept
-from robot.body import Body
-from robot.recording import writer_process as writer
-from robot.recording.body_tap import BodyTap
-from robot.recording.moment import Heard, Measured, flat, flat_percept
-from robot.recording.picture_encoder import PictureEncoder
-from robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
-from robot.recording.writer_link import WriterLink
-from robot.tick import Tick
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import BusHealth
+from gazerig.gaze.types import Percept
+from gazerig.robot.body import Body
+from gazerig.robot.recording import writer_process as writer
+from gazerig.robot.recording.body_tap import BodyTap
+from gazerig.robot.recording.moment import Heard, Measured, flat, flat_percept
+from gazerig.robot.recording.picture_encoder import PictureEncoder
+from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
+from gazerig.robot.recording.writer_link import WriterLink
+from gazerig.robot.tick import Tick
 
 _HEALTH_S = 1.0
 _SEND_S = 0.05
@@ -67,7 +67,7 @@ class Recorder:
         """Create the file and start the process that writes it; returns at once.
 
         Raises:
-            drivers.errors.SetupError: the file exists or cannot be made.
+            SetupError: the file exists or cannot be made.
         """
         if self._over and self._path.is_file():
             target = Path(os.path.realpath(self._path))
@@ -192,7 +192,7 @@ def _created(path: Path, over: bool) -> int:
     """Create the file to be written.
 
     Raises:
-        drivers.errors.SetupError: it exists or cannot be made.
+        SetupError: it exists or cannot be made.
     """
     flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if over else os.O_EXCL)
     try:

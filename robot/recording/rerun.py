@@ -12,18 +12,18 @@ from itertools import chain
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from config.load import ConfigError, load, shipped
-from config.schema import Rig, load_rig
-from config.text import rig_text
-from drivers.errors import DriverError, SetupError
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.loop import LoopCount, Tick
-from robot.recording.moment import Measured, Moment
-from robot.recording.played_back import NoCamera, PlayedBody, PlayedPerception
-from robot.recording.read import BadRecording, RunRecording
-from robot.session import leave
-from robot.summary import Summary
+from gazerig.config.load import ConfigError, load, shipped
+from gazerig.config.schema import Rig, load_rig
+from gazerig.config.text import rig_text
+from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import LoopCount, Tick
+from gazerig.robot.recording.moment import Measured, Moment
+from gazerig.robot.recording.played_back import NoCamera, PlayedBody, PlayedPerception
+from gazerig.robot.recording.read import BadRecording, RunRecording
+from gazerig.robot.session import leave
+from gazerig.robot.summary import Summary
 
 Joints = Literal["recorded", "emulated"]
 
@@ -37,7 +37,7 @@ class Rerun(NamedTuple):
     ticks: compared; agreeing: whose target, gaze and commands are the same to the bit
     first_difference_s: from the first tick, None where all agree; differs: what does there
     tx_same: the bytes on the emulated bus are the same too, None where nobody can know
-    recorded, again: the figures of both (robot.summary)
+    recorded, again: the figures of both (gazerig.robot.summary)
     notes: what else a person should know
     """
 
@@ -72,8 +72,8 @@ def rerun(
     note: gets every tick of the new run, to be recorded or reported on
 
     Raises:
-        config.load.ConfigError: the rig or character is at fault.
-        drivers.errors.SetupError: the recording cannot be read or holds no tick.
+        gazerig.config.load.ConfigError: the rig or character is at fault.
+        SetupError: the recording cannot be read or holds no tick.
     """
     changed = rig is not None or character is not None
     fed = _joints(joints, changed)
@@ -132,7 +132,7 @@ class _Again:
         """See that recorded joints are the rig's own; say where the rig has others.
 
         Raises:
-            drivers.errors.SetupError: they are to be fed to a rig that has others.
+            SetupError: they are to be fed to a rig that has others.
         """
         names = self._made.robot.body.names
         if names == recorded:
@@ -327,7 +327,7 @@ def _kept(text: str, file: Path) -> Path:
 
 
 def _character(name_or_path: str) -> Path:
-    """Find a character as config.schema.load_rig does."""
+    """Find a character as gazerig.config.schema.load_rig does."""
     if "/" in name_or_path or name_or_path.endswith((".yaml", ".yml")):
         return Path(name_or_path)
     return shipped("characters", name_or_path)

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import orjson
 from mcap.writer import CompressionType, Writer
 
-from robot.recording import run_format as fmt
-from robot.recording.run_info import PROFILE, RunEnd, as_text
+from gazerig.robot.recording import run_format as fmt
+from gazerig.robot.recording.run_info import PROFILE, RunEnd, as_text
 
 _CHUNK_BYTES = 1 << 20
 _WHOLE_NS = 1_000_000_000

@@ -2,13 +2,13 @@
 
 from typing import Any
 
-from drivers.types import BusHealth
-from gaze.types import GazeState, Vec3
-from robot.recording import run_format as fmt
-from robot.recording import viewer_messages as viewers
-from robot.recording.moment import Flat, as_json, percept_as_json
-from robot.recording.run_writer import RunWriter
-from robot.types import JointState, Verdict
+from gazerig.drivers.types import BusHealth
+from gazerig.gaze.types import GazeState, Vec3
+from gazerig.robot.recording import run_format as fmt
+from gazerig.robot.recording import viewer_messages as viewers
+from gazerig.robot.recording.moment import Flat, as_json, percept_as_json
+from gazerig.robot.recording.run_writer import RunWriter
+from gazerig.robot.types import JointState, Verdict
 
 _VIEWED_EVERY_S = 0.0399  # a little under 40 ms, so that rounding does not turn it into 45
 

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from math import copysign, sqrt
 from typing import Any
 
-from gaze.angles import add, compose, norm, rotate, rotation, sub
-from gaze.types import Angles2, GazeState, Mat3, Vec3
-from robot.recording.run_format import UNUSED
-from robot.types import JointState
+from gazerig.gaze.angles import add, compose, norm, rotate, rotation, sub
+from gazerig.gaze.types import Angles2, GazeState, Mat3, Vec3
+from gazerig.robot.recording.run_format import UNUSED
+from gazerig.robot.types import JointState
 
 Json = dict[str, Any]
 

@@ -11,11 +11,10 @@ import socket
 import subprocess
 import sys
 from collections import deque
-from pathlib import Path
 from typing import Any
 
-from robot.recording import writer_process as writer
-from robot.recording.run_writer import Written
+from gazerig.robot.recording import writer_process as writer
+from gazerig.robot.recording.run_writer import Written
 
 QUEUE_BYTES = 64_000_000
 """What waits at most: some minutes of a run."""
@@ -161,8 +160,5 @@ class WriterLink:
 
 
 def _environment() -> dict[str, str]:
-    """Let the writer find this very package, and keep its numerics to one thread."""
-    here = str(Path(__file__).resolve().parents[2])
-    known = os.environ.get("PYTHONPATH")
-    path = os.pathsep.join((here, known)) if known else here
-    return {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+    """Return this process's environment with numerics in one thread."""
+    return {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

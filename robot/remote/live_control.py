@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Protocol
 
-from drivers.errors import SetupError
-from robot.clock import Clock
-from robot.loop import Tick
-from robot.remote.file_watch import FileWatch
-from robot.remote.requests import Orderable, Pulse, Requests, Tuning
-from robot.remote.server import RemoteServer
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.clock import Clock
+from gazerig.robot.loop import Tick
+from gazerig.robot.remote.file_watch import FileWatch
+from gazerig.robot.remote.requests import Orderable, Pulse, Requests, Tuning
+from gazerig.robot.remote.server import RemoteServer
 
 
 class FileTuning(Tuning, Protocol):

@@ -11,13 +11,13 @@ from math import degrees
 from pathlib import Path
 from typing import Protocol
 
-from drivers.errors import DriverError
-from robot.clock import Clock
-from robot.loop import Tick
-from robot.orders import Order, Renew, Tune, Value, from_json, signed
-from robot.page.snapshot import lead_words, target_name
-from robot.reckoned import reckoned_joints
-from robot.reply import Ticket
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.clock import Clock
+from gazerig.robot.loop import Tick
+from gazerig.robot.orders import Order, Renew, Tune, Value, from_json, signed
+from gazerig.robot.page.snapshot import lead_words, target_name
+from gazerig.robot.reckoned import reckoned_joints
+from gazerig.robot.reply import Ticket
 
 _TAKEN_UP_S = 1.0
 """Within this the loop must have obeyed; a servo that answers late costs it some 50 ms."""
@@ -132,7 +132,7 @@ class Tuning(Protocol):
 
 
 class Orderable(Protocol):
-    """A robot that takes orders, as robot.loop.Robot does."""
+    """A robot that takes orders, as gazerig.robot.loop.Robot does."""
 
     def order(self, order: Order) -> Ticket | None:
         """Ask for something from the next tick on; raises ValueError with the rule."""

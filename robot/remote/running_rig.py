@@ -1,6 +1,6 @@
 """Steer and tune a rig that runs in another program of the same user.
 
-from robot.remote.running_rig import RunningRig
+from gazerig.robot.remote.running_rig import RunningRig
 
 with RunningRig.connect() as rig:
     rig.set("gaze.lids.blinks_per_min", 12.0)
@@ -18,11 +18,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, cast
 
-from drivers.errors import DriverError, SetupError
-from robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Value, as_json, check
-from robot.remote.heartbeat import Heartbeat
-from robot.remote.sockets import ANSWER_BYTES, Garbled, Wire, dial, folder, is_private, sockets
-from robot.reply import Reply
+from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Value, as_json, check
+from gazerig.robot.remote.heartbeat import Heartbeat
+from gazerig.robot.remote.sockets import (
+    ANSWER_BYTES,
+    Garbled,
+    Wire,
+    dial,
+    folder,
+    is_private,
+    sockets,
+)
+from gazerig.robot.reply import Reply
 
 _CONNECT_S = 1.0
 _ANSWER_S = 10.0

@@ -12,11 +12,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from robot.clock import RealClock
-from robot.remote import sockets as remote_socket
-from robot.remote.budget import ALL, EACH, Budget
-from robot.remote.requests import Requests, is_stop
-from robot.remote.sockets import REQUEST_BYTES, Garbled, Wire
+from gazerig.robot.clock import RealClock
+from gazerig.robot.remote import sockets as remote_socket
+from gazerig.robot.remote.budget import ALL, EACH, Budget
+from gazerig.robot.remote.requests import Requests, is_stop
+from gazerig.robot.remote.sockets import REQUEST_BYTES, Garbled, Wire
 
 _REST_S = 2.0
 """A request that has begun must end within this."""
@@ -47,7 +47,7 @@ class RemoteServer:
         """Begin to listen; sockets of rigs that were killed are removed. Gives the socket's path.
 
         Raises:
-            drivers.errors.SetupError: no socket can be had; the message says why.
+            SetupError: no socket can be had; the message says why.
         """
         uid = os.getuid()
         folder = remote_socket.folder(os.environ, uid)

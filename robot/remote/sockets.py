@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
-from drivers.errors import SetupError
-from robot.clock import RealClock
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.clock import RealClock
 
 REQUEST_BYTES = 1 << 16
 """Longest request. Reading one holds the interpreter: 64 KiB take less than a millisecond."""
@@ -51,7 +51,7 @@ def make_private(path: Path, uid: int) -> None:
     """Make a folder that only its owner can enter, or see that it is one.
 
     Raises:
-        drivers.errors.SetupError: somebody else could put a socket there, or it cannot be made.
+        SetupError: somebody else could put a socket there, or it cannot be made.
     """
     try:
         with contextlib.suppress(FileExistsError):
@@ -100,7 +100,7 @@ def listen(path: Path) -> socket.socket:
     """Put a listening socket at a path, for its owner alone; what was there is replaced.
 
     Raises:
-        drivers.errors.SetupError: the path is too long, or the disk refuses.
+        SetupError: the path is too long, or the disk refuses.
     """
     if len(os.fsencode(path)) > _PATH_BYTES - len(".new"):
         raise SetupError(f"{path}: too long for a socket; set XDG_RUNTIME_DIR to a shorter path")

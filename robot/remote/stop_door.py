@@ -7,13 +7,13 @@ While a person calibrates, parameters stay as they are and nobody else leads the
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from drivers.errors import SetupError
-from robot.clock import Clock
-from robot.loop import Tick
-from robot.orders import Order, Resume, Stop, Value
-from robot.remote.requests import Change, Knob, Pulse, Requests, Saved
-from robot.remote.server import RemoteServer
-from robot.reply import OrderTaker, Ticket
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.clock import Clock
+from gazerig.robot.loop import Tick
+from gazerig.robot.orders import Order, Resume, Stop, Value
+from gazerig.robot.remote.requests import Change, Knob, Pulse, Requests, Saved
+from gazerig.robot.remote.server import RemoteServer
+from gazerig.robot.reply import OrderTaker, Ticket
 
 
 class StopDoor:
@@ -75,7 +75,7 @@ class _OnlyStops:
 
 
 class _Fixed:
-    """Parameters that nobody can see or change; implements robot.remote.requests.Tuning."""
+    """Parameters that nobody can see or change; implements gazerig.robot.remote.requests.Tuning."""
 
     version = 0
 

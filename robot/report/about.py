@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from robot.report.model import ModelWalk
+from gazerig.robot.report.model import ModelWalk
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from math import nan
 
 import numpy as np
 
-from gaze.types import Floats
-from robot.report.blink_finder import Blink
-from robot.report.gathered import Gathered
-from robot.report.measured import Measured, figure, mean, median, spread_over_mean
+from gazerig.gaze.types import Floats
+from gazerig.robot.report.blink_finder import Blink
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.measured import Measured, figure, mean, median, spread_over_mean
 
 _DOUBLE_S = 0.6
 _EVOKING_DEG = 33.0

@@ -5,8 +5,8 @@ from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
-from drivers.errors import SetupError
-from robot.report import (
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.report import (
     blinks,
     eye_head,
     face,
@@ -18,14 +18,14 @@ from robot.report import (
     saccades,
     social,
 )
-from robot.report.about import About
-from robot.report.bands import BY_KEY, applies
-from robot.report.canvas import COLOURS, Drawing, Shown, caption_of, png
-from robot.report.gathered import Gathered, Gathering
-from robot.report.measured import Finding, Measured, judged
-from robot.report.page import Picture, report_page
-from robot.report.written import write_all
-from robot.tick import Tick
+from gazerig.robot.report.about import About
+from gazerig.robot.report.bands import BY_KEY, applies
+from gazerig.robot.report.canvas import COLOURS, Drawing, Shown, caption_of, png
+from gazerig.robot.report.gathered import Gathered, Gathering
+from gazerig.robot.report.measured import Finding, Measured, judged
+from gazerig.robot.report.page import Picture, report_page
+from gazerig.robot.report.written import write_all
+from gazerig.robot.tick import Tick
 
 Progress = Callable[[str, float], None]
 """Told what is being done and the share of it that is done, 0..1."""
@@ -59,7 +59,7 @@ def report(
     force: replace files that are there
 
     Raises:
-        drivers.errors.SetupError: a file cannot be written.
+        SetupError: a file cannot be written.
     """
     return report_of(read(ticks, about, progress), about, out, progress, force)
 
@@ -70,7 +70,7 @@ def report_of(
     """Do the same with a run that is gathered already.
 
     Raises:
-        drivers.errors.SetupError: a file cannot be written.
+        SetupError: a file cannot be written.
     """
     findings = found(run)
     pictures = drawn([Shown(about.name, run, COLOURS[0], about.model)], progress)
@@ -83,7 +83,7 @@ def read(ticks: Iterable[Tick], about: About, progress: Progress) -> Gathered:
     """Gather a run in one pass.
 
     Raises:
-        drivers.errors.SetupError: there is nothing in it.
+        SetupError: there is nothing in it.
     """
     gathering, first_s = Gathering(), None
     progress(READING, 0.0)

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from robot.report.gathered import Gathered
-from robot.report.model import ModelWalk
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.model import ModelWalk
 
 COLOURS = ("#1c6ea4", "#d9660a")
 HUMAN = "#7f8c8d"

@@ -16,17 +16,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from gaze.types import Floats
-from robot.report.about import About
-from robot.report.bands import BY_KEY
-from robot.report.build import Progress, drawn, measured, read
-from robot.report.canvas import COLOURS, Shown
-from robot.report.compare_page import Difference, Word, compare_page, mixed
-from robot.report.gathered import Gathered
-from robot.report.measured import Measured, figure, judged
-from robot.report.measured import drawn as resampled
-from robot.report.written import write_all
-from robot.tick import Tick
+from gazerig.gaze.types import Floats
+from gazerig.robot.report.about import About
+from gazerig.robot.report.bands import BY_KEY
+from gazerig.robot.report.build import Progress, drawn, measured, read
+from gazerig.robot.report.canvas import COLOURS, Shown
+from gazerig.robot.report.compare_page import Difference, Word, compare_page, mixed
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.measured import Measured, figure, judged
+from gazerig.robot.report.measured import drawn as resampled
+from gazerig.robot.report.written import write_all
+from gazerig.robot.tick import Tick
 
 LEVEL = 0.05
 _DRAWS = 2000
@@ -59,7 +59,7 @@ def compare(
     force: replace files that are there
 
     Raises:
-        drivers.errors.SetupError: a file cannot be written, or there is nothing in a run.
+        SetupError: a file cannot be written, or there is nothing in a run.
     """
     runs = [read(each, about, progress) for each, about in zip(ticks, abouts, strict=True)]
     progress(COMPARING, 0.0)

@@ -4,12 +4,20 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Literal, NamedTuple
 
-from robot.reckoned import Basis
-from robot.report.about import About
-from robot.report.bands import GROUPS
-from robot.report.gathered import Gathered
-from robot.report.measured import Finding
-from robot.report.page import Picture, banner, left_out, line_of, number, rendered, with_unit
+from gazerig.robot.reckoned import Basis
+from gazerig.robot.report.about import About
+from gazerig.robot.report.bands import GROUPS
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.measured import Finding
+from gazerig.robot.report.page import (
+    Picture,
+    banner,
+    left_out,
+    line_of,
+    number,
+    rendered,
+    with_unit,
+)
 
 Word = Literal["more than chance", "may be chance", "too few events"]
 

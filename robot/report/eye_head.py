@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.types import Floats
-from robot.report import human
-from robot.report.gathered import Gathered
-from robot.report.measured import Measured, median
-from robot.report.saccade_finder import THRESHOLD_DEG_S
+from gazerig.gaze.types import Floats
+from gazerig.robot.report import human
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.measured import Measured, median
+from gazerig.robot.report.saccade_finder import THRESHOLD_DEG_S
 
 LEAST_DEG = 5.0
 _AFTER_S, _BEFORE_S, _LEAST_AFTER_S = 0.9, 0.15, 0.45

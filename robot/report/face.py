@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gaze.types import PARTS, Floats
-from robot.report import human
-from robot.report.gathered import Gathered
-from robot.report.measured import Measured, mean, median
-from robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.gaze.types import PARTS, Floats
+from gazerig.robot.report import human
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.measured import Measured, mean, median
+from gazerig.robot.seeing.face_pose import PARTS_FACE_M
 
 N = len(PARTS)
 _EYES = (PARTS.index("LE"), PARTS.index("RE"))

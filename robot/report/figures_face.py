@@ -7,12 +7,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Ellipse
 
-from gaze.types import PART_NAMES, PARTS, Floats
-from robot.heatmap_face import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
-from robot.report import face, human
-from robot.report.bands import FACE
-from robot.report.canvas import HUMAN, HUMAN_FILL, INK, Drawing, Shown, label, legend, nothing
-from robot.report.model import published
+from gazerig.gaze.types import PART_NAMES, PARTS, Floats
+from gazerig.robot.heatmap_face import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.report import face, human
+from gazerig.robot.report.bands import FACE
+from gazerig.robot.report.canvas import (
+    HUMAN,
+    HUMAN_FILL,
+    INK,
+    Drawing,
+    Shown,
+    label,
+    legend,
+    nothing,
+)
+from gazerig.robot.report.model import published
 
 _NAMES = [PART_NAMES[part] for part in PARTS]
 _NONE = "no fixation on a face part"

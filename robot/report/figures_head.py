@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from robot.report import eye_head, following, human
-from robot.report.bands import FOLLOWING, HEAD
-from robot.report.canvas import HUMAN, HUMAN_FILL, Drawing, Shown, label, legend, nothing
+from gazerig.robot.report import eye_head, following, human
+from gazerig.robot.report.bands import FOLLOWING, HEAD
+from gazerig.robot.report.canvas import HUMAN, HUMAN_FILL, Drawing, Shown, label, legend, nothing
 
 
 def _contribution(figure: Figure, runs: Sequence[Shown]) -> None:

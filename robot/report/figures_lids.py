@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from robot.report import blinks, human, social
-from robot.report.bands import LIDS, SOCIAL
-from robot.report.canvas import (
+from gazerig.robot.report import blinks, human, social
+from gazerig.robot.report.bands import LIDS, SOCIAL
+from gazerig.robot.report.canvas import (
     HUMAN,
     HUMAN_FILL,
     Drawing,

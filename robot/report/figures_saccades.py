@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from robot.report import human, saccades
-from robot.report.bands import SACCADES
-from robot.report.canvas import HUMAN, HUMAN_FILL, Drawing, Shown, label, legend, nothing
+from gazerig.robot.report import human, saccades
+from gazerig.robot.report.bands import SACCADES
+from gazerig.robot.report.canvas import HUMAN, HUMAN_FILL, Drawing, Shown, label, legend, nothing
 
 _OVERVIEW_S = 12.0
 _NO_SACCADES = "no saccade of 1 deg or more"

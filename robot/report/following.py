@@ -3,10 +3,10 @@
 import numpy as np
 from scipy import signal
 
-from gaze.types import Floats
-from robot.report.eye_head import rate, stretches
-from robot.report.gathered import Gathered
-from robot.report.measured import Measured, median
+from gazerig.gaze.types import Floats
+from gazerig.robot.report.eye_head import rate, stretches
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.measured import Measured, median
 
 SLOWEST_DEG_S, FASTEST_DEG_S = 5.0, 40.0
 _STRETCH_S = 0.15

@@ -9,17 +9,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
-from gaze.field_of_view import line_of_sight
-from gaze.types import Face, Floats, Vec3
-from robot.face_gaze import on_face
-from robot.orders import Ask
-from robot.reckoned import reckoned_joints
-from robot.report.blink_finder import BlinkFinder
-from robot.report.gaze_events import NEAR_FACE_M, Blink, Fixation, GazeEvents, Saccade, beside_m
-from robot.report.run_joints import LOWER, UPPER, RunJoints, joints_of, openings
-from robot.summary import cyclopean
-from robot.tick import Tick
+from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import Face, Floats, Vec3
+from gazerig.robot.face_gaze import on_face
+from gazerig.robot.orders import Ask
+from gazerig.robot.reckoned import reckoned_joints
+from gazerig.robot.report.blink_finder import BlinkFinder
+from gazerig.robot.report.gaze_events import (
+    NEAR_FACE_M,
+    Blink,
+    Fixation,
+    GazeEvents,
+    Saccade,
+    beside_m,
+)
+from gazerig.robot.report.run_joints import LOWER, UPPER, RunJoints, joints_of, openings
+from gazerig.robot.summary import cyclopean
+from gazerig.robot.tick import Tick
 
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""

@@ -9,15 +9,15 @@ from collections import Counter, deque
 from math import degrees
 from typing import NamedTuple, TypeVar
 
-from gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
-from gaze.types import PARTS, Face, Vec3
-from robot.report.blink_finder import Blink as Blink
-from robot.report.blink_finder import BlinkFinder
-from robot.report.run_joints import UPPER, openings
-from robot.report.saccade_finder import Jump, SaccadeFinder
-from robot.summary import cyclopean
-from robot.tick import Tick
-from robot.types import JOINTS
+from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
+from gazerig.gaze.types import PARTS, Face, Vec3
+from gazerig.robot.report.blink_finder import Blink as Blink
+from gazerig.robot.report.blink_finder import BlinkFinder
+from gazerig.robot.report.run_joints import UPPER, openings
+from gazerig.robot.report.saccade_finder import Jump, SaccadeFinder
+from gazerig.robot.summary import cyclopean
+from gazerig.robot.tick import Tick
+from gazerig.robot.types import JOINTS
 
 NEAR_PART_M = 0.03
 """A line of sight that passes a part within this distance is on it."""

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gaze.types import Floats
+from gazerig.gaze.types import Floats
 
 BAHILL_DEG_S, BALOH_DEG_S, ROUND_DEG = 551.0, 420.0, 14.0
 """Peak speed V (1 - exp(-A / 14 deg)): Bahill et al. 1975 and Baloh et al. 1975."""

@@ -7,8 +7,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gaze.types import Floats
-from robot.report.bands import Band
+from gazerig.gaze.types import Floats
+from gazerig.robot.report.bands import Band
 
 VerdictWord = Literal["pass", "outside", "too few events"]
 Statistic = Callable[[Floats], float]

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gaze.scanpath import ScanpathParams, Walk, normalised, without_refixations
-from gaze.scanpath_dwell import dwell_law
-from gaze.types import PARTS, Floats
-from robot.report import human
+from gazerig.gaze.scanpath import ScanpathParams, Walk, normalised, without_refixations
+from gazerig.gaze.scanpath_dwell import dwell_law
+from gazerig.gaze.types import PARTS, Floats
+from gazerig.robot.report import human
 
 _DRAWS = 3000
 

@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import jinja2
 
-from robot.reckoned import RECKONED, Basis
-from robot.report.about import About
-from robot.report.bands import BANDS, GROUPS, Band
-from robot.report.canvas import Drawing
-from robot.report.gathered import Gathered
-from robot.report.measured import Finding
-from robot.report.run_joints import RunJoints
+from gazerig.robot.reckoned import RECKONED, Basis
+from gazerig.robot.report.about import About
+from gazerig.robot.report.bands import BANDS, GROUPS, Band
+from gazerig.robot.report.canvas import Drawing
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.measured import Finding
+from gazerig.robot.report.run_joints import RunJoints
 
 _CLASSES = {"pass": "pass", "outside": "outside", "too few events": "few"}
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from robot.reckoned import Basis, basis_of
-from robot.report.bands import GROUPS, LIDS, PARALLEL
-from robot.types import in_order
+from gazerig.robot.reckoned import Basis, basis_of
+from gazerig.robot.report.bands import GROUPS, LIDS, PARALLEL
+from gazerig.robot.types import in_order
 
 UPPER = ("left_upper_lid", "right_upper_lid")
 LOWER = ("left_lower_lid", "right_lower_lid")

@@ -9,8 +9,8 @@ from collections import deque
 from math import degrees, exp, inf, sqrt
 from typing import NamedTuple
 
-from gaze.angles import angle_between
-from gaze.types import Vec3
+from gazerig.gaze.angles import angle_between
+from gazerig.gaze.types import Vec3
 
 THRESHOLD_DEG_S = 30.0
 """Relative speed that makes a saccade; one servo step of both eyes in a tick is half of it."""

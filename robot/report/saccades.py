@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from gaze.types import Floats
-from robot.report import human
-from robot.report.gathered import Gathered
-from robot.report.measured import Measured, figure, mean, median, one_over_mean
+from gazerig.gaze.types import Floats
+from gazerig.robot.report import human
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.measured import Measured, figure, mean, median, one_over_mean
 
 LEAST_DEG = 1.0
 """Below, threshold and encoder steps shape what is measured."""

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from gaze.types import Floats
-from robot.report.gathered import Gathered
-from robot.report.measured import Measured, longest, mean
+from gazerig.gaze.types import Floats
+from gazerig.robot.report.gathered import Gathered
+from gazerig.robot.report.measured import Measured, longest, mean
 
 _HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
 """The oval of a face, a little larger than an adult's."""

@@ -4,8 +4,8 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from drivers.file_output import make_folder, refuse_existing, write_file
-from robot.report.page import Picture
+from gazerig.drivers.file_output import make_folder, refuse_existing, write_file
+from gazerig.robot.report.page import Picture
 
 
 def numbers_file(out: Path) -> Path:
@@ -25,7 +25,7 @@ def write_all(
     force: replace files that are there
 
     Raises:
-        drivers.errors.SetupError: something is there already or cannot be written.
+        SetupError: something is there already or cannot be written.
     """
     folder, data = out.with_name(f"{out.stem}_figures"), numbers_file(out)
     paths = tuple(folder / f"{picture.drawing.key}.png" for picture in pictures)

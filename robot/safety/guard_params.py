@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from robot.safety.collisions import CollisionParams
-from robot.safety.health import HealthParams
-from robot.safety.stuck import StuckParams
+from gazerig.robot.safety.collisions import CollisionParams
+from gazerig.robot.safety.health import HealthParams
+from gazerig.robot.safety.stuck import StuckParams
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Literal
 
-from robot.safety.motion import JointLimit
-from robot.types import JointState
+from gazerig.robot.safety.motion import JointLimit
+from gazerig.robot.types import JointState
 
 Strain = Literal["", "hot", "overloaded", "voltage"]
 _Column = tuple[float | None, ...]

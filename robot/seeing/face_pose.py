@@ -20,11 +20,11 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gaze.types import PARTS, Mat3, Vec3
-from robot.seeing.intrinsics import Intrinsics as Intrinsics
-from robot.seeing.intrinsics import intrinsics_of_view as intrinsics_of_view
-from robot.seeing.intrinsics import project as project
-from robot.seeing.intrinsics import rays as rays_through
+from gazerig.gaze.types import PARTS, Mat3, Vec3
+from gazerig.robot.seeing.intrinsics import Intrinsics as Intrinsics
+from gazerig.robot.seeing.intrinsics import intrinsics_of_view as intrinsics_of_view
+from gazerig.robot.seeing.intrinsics import project as project
+from gazerig.robot.seeing.intrinsics import rays as rays_through
 
 Floats = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from math import degrees
 from statistics import median
 from typing import NamedTuple
 
-from gaze.angles import compose, cross, dot, norm, sub, unit
-from gaze.types import Mat3, Vec3
+from gazerig.gaze.angles import compose, cross, dot, norm, sub, unit
+from gazerig.gaze.types import Mat3, Vec3
 
 # The head turns or stands: rad/s.
 _TURNS_RAD_S, _STANDS_RAD_S = 0.35, 0.09

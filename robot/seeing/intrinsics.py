@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robot.frames import LensParams
+from gazerig.robot.frames import LensParams
 
 Floats = NDArray[np.float64]
 Distortion = tuple[float, float, float, float, float]

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from drivers.camera.frame_analysis import Motion
-from drivers.camera.pose_buffer import PoseRing
-from drivers.camera.source import Shot
-from drivers.types import MovingBlob
-from drivers.vision.motion.detector import MotionDetector
-from drivers.vision.motion.params import MotionParams
-from gaze.types import Floats
-from robot.frames import LensParams
-from robot.seeing.intrinsics import intrinsics_of_lens
+from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.vision.motion.detector import MotionDetector
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.gaze.types import Floats
+from gazerig.robot.frames import LensParams
+from gazerig.robot.seeing.intrinsics import intrinsics_of_lens
 
 
 class MotionFinder:

@@ -12,15 +12,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.types import Detections
-from gaze.angles import add, norm, rotate, scale, sub, unit
-from gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
-from robot.frames import CameraMount, LensParams, PoseHistory
-from robot.seeing.face_pose import PARTS_FACE_M
-from robot.seeing.head_turn_residual import HeadTurnResidual, ResidualFigures, Seen, turning_rad_s
-from robot.seeing.intrinsics import Intrinsics, intrinsics_of_lens
-from robot.seeing.same_person import Known, without_own_motion
-from robot.seeing.sightings import (
+from gazerig.drivers.types import Detections
+from gazerig.gaze.angles import add, norm, rotate, scale, sub, unit
+from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
+from gazerig.robot.frames import CameraMount, LensParams, PoseHistory
+from gazerig.robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.robot.seeing.head_turn_residual import (
+    HeadTurnResidual,
+    ResidualFigures,
+    Seen,
+    turning_rad_s,
+)
+from gazerig.robot.seeing.intrinsics import Intrinsics, intrinsics_of_lens
+from gazerig.robot.seeing.same_person import Known, without_own_motion
+from gazerig.robot.seeing.sightings import (
     SIZE_SPREAD,
     Box,
     Reading,
@@ -28,7 +33,7 @@ from robot.seeing.sightings import (
     face_sighting,
     reader_of,
 )
-from robot.seeing.tracks import Sighting, Track, Tracker
+from gazerig.robot.seeing.tracks import Sighting, Track, Tracker
 
 DepthAt = Callable[[NDArray[Any], Box], Reading]
 """Reads the distance of what a box of pixels shows from a depth picture."""

@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 from math import hypot
 
-from gaze.angles import add, dot, norm, scale, sub, unit
-from gaze.types import Vec3
-from robot.seeing.tracks import Sighting
+from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
+from gazerig.gaze.types import Vec3
+from gazerig.robot.seeing.tracks import Sighting
 
 # What a moving patch is called whose kind is not known; a named one is always itself.
 _UNNAMED = "thing"

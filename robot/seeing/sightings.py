@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.types import DetectedFace, MovingBlob
-from gaze.angles import add, compose, norm, rotate, scale
-from gaze.types import Mat3, Vec3
-from robot.seeing.face_pose import LANDMARKS_FACE_M, PUPIL_DISTANCE_M, FacePose, face_pose
-from robot.seeing.intrinsics import Intrinsics
-from robot.seeing.tracks import Sighting
+from gazerig.drivers.types import DetectedFace, MovingBlob
+from gazerig.gaze.angles import add, compose, norm, rotate, scale
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M, PUPIL_DISTANCE_M, FacePose, face_pose
+from gazerig.robot.seeing.intrinsics import Intrinsics
+from gazerig.robot.seeing.tracks import Sighting
 
 Box = tuple[float, float, float, float]
 """x, y, width, height in pixels."""

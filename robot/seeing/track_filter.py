@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gaze.angles import sub, unit
-from gaze.types import Vec3
+from gazerig.gaze.angles import sub, unit
+from gazerig.gaze.types import Vec3
 
 Floats = NDArray[np.float64]
 

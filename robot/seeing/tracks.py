@@ -11,10 +11,10 @@ from math import hypot, log
 
 import numpy as np
 
-from gaze.angles import add, cross, norm, scale, sub, unit
-from gaze.types import Mat3, Vec3
-from robot.seeing.assignment import FORBIDDEN, get_ready, likeliest_pairs
-from robot.seeing.track_filter import Floats, Restlessness, TrackFilter, far_off, sight_cov
+from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.seeing.assignment import FORBIDDEN, get_ready, likeliest_pairs
+from gazerig.robot.seeing.track_filter import Floats, Restlessness, TrackFilter, far_off, sight_cov
 
 # Two numbers of the detector for one thing, as a cost: 4 standard deviations.
 _OTHER_MARK = 16.0

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gaze.types import Mat3, Vec3
-from robot.seeing.intrinsics import Intrinsics
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.seeing.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]

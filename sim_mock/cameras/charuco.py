@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.types import Picture
-from gaze.types import Mat3, Vec3
-from robot.calibrate.charuco_board import CharucoBoard
-from robot.seeing.intrinsics import Intrinsics, rays
+from gazerig.drivers.types import Picture
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.calibrate.charuco_board import CharucoBoard
+from gazerig.robot.seeing.intrinsics import Intrinsics, rays
 
 Floats = NDArray[np.float64]
 

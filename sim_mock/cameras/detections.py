@@ -12,12 +12,12 @@ from math import radians
 
 import numpy as np
 
-from drivers.types import DetectedFace, Detections, MovingBlob
-from gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
-from gaze.types import Mat3, Vec3
-from robot.frames import CameraMount
-from robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
-from sim_mock.scenes.scene import Person, Scene, Thing
+from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
+from gazerig.gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.frames import CameraMount
+from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
+from gazerig.sim_mock.scenes.scene import Person, Scene, Thing
 
 _FARTHEST_FACE_M = 4.0
 _HAND_RADIUS_M = 0.07
@@ -42,7 +42,7 @@ class SceneCameraParams:
 
 
 class SceneCamera:
-    """A drivers.types.Camera on a scene; everything happens when it is looked at."""
+    """A gazerig.drivers.types.Camera on a scene; everything happens when it is looked at."""
 
     def __init__(
         self,

@@ -8,8 +8,8 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from gaze.types import Vec3
-from sim_mock.cameras.canvas import Bytes, Colour, Picture3d, Sheet
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.cameras.canvas import Bytes, Colour, Picture3d, Sheet
 
 _LOW: Vec3 = (-2.5, -3.0, -0.9)
 _HIGH: Vec3 = (4.0, 3.0, 1.6)

@@ -17,15 +17,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.types import Detections, FaceDetector, MovingBlob, Picture
-from gaze.angles import norm, sub
-from gaze.types import Mat3, Vec3
-from robot.frames import CameraMount
-from robot.seeing.intrinsics import Intrinsics, intrinsics_of_view
-from sim_mock.cameras.canvas import Picture3d
-from sim_mock.cameras.draw_person import draw_person, draw_thing
-from sim_mock.cameras.draw_room import draw_room
-from sim_mock.scenes.scene import Scene, Thing
+from gazerig.drivers.types import Detections, FaceDetector, MovingBlob, Picture
+from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.frames import CameraMount
+from gazerig.robot.seeing.intrinsics import Intrinsics, intrinsics_of_view
+from gazerig.sim_mock.cameras.canvas import Picture3d
+from gazerig.sim_mock.cameras.draw_person import draw_person, draw_thing
+from gazerig.sim_mock.cameras.draw_room import draw_room
+from gazerig.sim_mock.scenes.scene import Scene, Thing
 
 _HAND_RADIUS_M = 0.07
 _FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
@@ -73,7 +73,7 @@ class PixelCameraParams:
 
 
 class PixelCamera:
-    """A drivers.types.Camera on a drawn scene; everything happens when it is looked at."""
+    """A gazerig.drivers.types.Camera on a drawn scene; everything happens when it is looked at."""
 
     def __init__(
         self,
@@ -136,7 +136,7 @@ class PixelCamera:
         detector: makes another one; motion: gives what finds motion from what did; None: as is
 
         Raises:
-            drivers.errors.SetupError: the detector cannot be made; the old one goes on.
+            SetupError: the detector cannot be made; the old one goes on.
         """
         if motion is not None:
             self._find_motion = motion(self._find_motion)

@@ -6,9 +6,9 @@ It does not blur, distort, drop or reorder pictures, and its delay is constant.
 from collections.abc import Callable
 from typing import Protocol
 
-from drivers.camera.frame_analysis import Motion, look
-from drivers.camera.source import Shot
-from drivers.types import Detections, FaceDetector
+from gazerig.drivers.camera.frame_analysis import Motion, look
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import Detections, FaceDetector
 
 
 class Film(Protocol):
@@ -74,7 +74,7 @@ class FilmCamera:
         """Open the film at its first picture.
 
         Raises:
-            drivers.errors.CameraError: the film cannot be opened.
+            CameraError: the film cannot be opened.
         """
         self._video.open()
         self._newest = None
@@ -84,7 +84,7 @@ class FilmCamera:
         """Give the newest detections that have come through by ``now_s``.
 
         Raises:
-            drivers.errors.CameraError: the film cannot be read any more.
+            CameraError: the film cannot be read any more.
         """
         while self._captured_s(self.pictures + 1) + self._delay_s <= now_s:
             self._look(self.pictures + 1)
@@ -100,7 +100,7 @@ class FilmCamera:
         detector: makes another one; motion: gives what finds motion from what did; None: as is
 
         Raises:
-            drivers.errors.SetupError: the detector cannot be made; the old one goes on.
+            SetupError: the detector cannot be made; the old one goes on.
         """
         if motion is not None:
             self._motion = motion(self._motion)

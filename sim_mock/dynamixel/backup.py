@@ -4,7 +4,7 @@ What exactly is stored no document tells; here everything that may be written, e
 what moves the servo.
 """
 
-from sim_mock.dynamixel.memory import DynamixelMemory, in_eeprom
+from gazerig.sim_mock.dynamixel.memory import DynamixelMemory, in_eeprom
 
 NOT_STORED = (
     "torque_enable", "bus_watchdog", "goal_pwm", "goal_current", "goal_velocity", "goal_position",

@@ -5,10 +5,10 @@ Sources: ROBOTIS e-Manual, Protocol 2.0 and X series.
 
 from collections.abc import Callable, Iterable, Sequence
 
-from drivers.dynamixel.control_table import BAUD_RATES, EEPROM_END
-from sim_mock.dynamixel.fast_read import fast_reply
-from sim_mock.dynamixel.framing import DynamixelFraming
-from sim_mock.dynamixel.instructions import (
+from gazerig.drivers.dynamixel.control_table import BAUD_RATES, EEPROM_END
+from gazerig.sim_mock.dynamixel.fast_read import fast_reply
+from gazerig.sim_mock.dynamixel.framing import DynamixelFraming
+from gazerig.sim_mock.dynamixel.instructions import (
     BULK_READ,
     BULK_WRITE,
     CRC_ERROR,
@@ -26,16 +26,16 @@ from sim_mock.dynamixel.instructions import (
     sync_writes,
     touches_eeprom,
 )
-from sim_mock.dynamixel.memory import ACCESS
-from sim_mock.dynamixel.packets import HEADER, fast_pieces, plain_pieces
-from sim_mock.dynamixel.quirks import DynamixelQuirks
-from sim_mock.dynamixel.servo import DynamixelServo
-from sim_mock.replies import Answer, Piece
-from sim_mock.smart_servo.chain import ServoChain, Wanted, whole_ms
-from sim_mock.smart_servo.faults import ServoFaults, commands_of
-from sim_mock.smart_servo.framing import Instruction
-from sim_mock.smart_servo.physics import ServoSpec
-from sim_mock.smart_servo.quirks import AfterMissing
+from gazerig.sim_mock.dynamixel.memory import ACCESS
+from gazerig.sim_mock.dynamixel.packets import HEADER, fast_pieces, plain_pieces
+from gazerig.sim_mock.dynamixel.quirks import DynamixelQuirks
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.replies import Answer, Piece
+from gazerig.sim_mock.smart_servo.chain import ServoChain, Wanted, whole_ms
+from gazerig.sim_mock.smart_servo.faults import ServoFaults, commands_of
+from gazerig.sim_mock.smart_servo.framing import Instruction
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.smart_servo.quirks import AfterMissing
 
 COMMANDS = commands_of(252, DynamixelQuirks, reset="id 1, 57600 baud; needs torque off")
 MIN_WATCHDOG_MS = 20

@@ -1,12 +1,12 @@
 """The drive of an emulated servo: modes, goals and origin between registers and shaft.
 
 Reads the control table and never refuses anything: what may be written is decided in
-sim_mock.dynamixel.servo. The registers' position is ``side * shaft.x + shift``.
+gazerig.sim_mock.dynamixel.servo. The registers' position is ``side * shaft.x + shift``.
 """
 
 from typing import NamedTuple
 
-from drivers.dynamixel.control_table import (
+from gazerig.drivers.dynamixel.control_table import (
     ACCELERATION_UNIT_STEPS_S2,
     GAINS,
     PWM_FULL,
@@ -14,7 +14,7 @@ from drivers.dynamixel.control_table import (
     VELOCITY_UNIT_STEPS_S,
     Model,
 )
-from sim_mock.dynamixel.live_registers import (
+from gazerig.sim_mock.dynamixel.live_registers import (
     ARRIVED,
     ASTRAY,
     FOLLOWING_STEPS,
@@ -22,8 +22,8 @@ from sim_mock.dynamixel.live_registers import (
     RUNNING,
     Live,
 )
-from sim_mock.dynamixel.memory import DynamixelMemory
-from sim_mock.dynamixel.modes import (
+from gazerig.sim_mock.dynamixel.memory import DynamixelMemory
+from gazerig.sim_mock.dynamixel.modes import (
     BY_TIME,
     BY_TIME_SINCE,
     DRIVEN_BY,
@@ -33,9 +33,9 @@ from sim_mock.dynamixel.modes import (
     VELOCITY,
     loop_of,
 )
-from sim_mock.smart_servo.motor import LIMP, Shaft, flicker
-from sim_mock.smart_servo.physics import Physics, Quirks
-from sim_mock.smart_servo.profile import Profile, SpeedProfile
+from gazerig.sim_mock.smart_servo.motor import LIMP, Shaft, flicker
+from gazerig.sim_mock.smart_servo.physics import Physics, Quirks
+from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
 
 TRIPPED = 255
 """Bus Watchdog (98) reads so after it has stopped the servo."""

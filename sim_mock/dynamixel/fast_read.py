@@ -1,6 +1,6 @@
 """The fast read of every tick in one tight loop: unique ids, nothing spoilt.
 
-Gives the same bytes as sim_mock.dynamixel.packets.fast_pieces, in half the time; a test
+Gives the same bytes as gazerig.sim_mock.dynamixel.packets.fast_pieces, in half the time; a test
 compares the two.
 """
 
@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping
 
 from fastcrc.crc16 import umts
 
-from sim_mock.dynamixel.memory import ACCESS
-from sim_mock.dynamixel.packets import CRC, HEAD, HEADER, STATUS
-from sim_mock.dynamixel.servo import DynamixelServo
-from sim_mock.replies import BROADCAST
+from gazerig.sim_mock.dynamixel.memory import ACCESS
+from gazerig.sim_mock.dynamixel.packets import CRC, HEAD, HEADER, STATUS
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.replies import BROADCAST
 
 
 def fast_reply(

@@ -6,8 +6,8 @@ and were not is still understood; ``strict`` servos drop it instead.
 
 from fastcrc.crc16 import umts
 
-from sim_mock.dynamixel.packets import HEADER, LONGEST, RAW, SHORTEST, STUFFED
-from sim_mock.smart_servo.framing import Framing, Instruction
+from gazerig.sim_mock.dynamixel.packets import HEADER, LONGEST, RAW, SHORTEST, STUFFED
+from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
 
 
 class DynamixelFraming(Framing):

@@ -6,10 +6,10 @@ Source: ROBOTIS e-Manual, Protocol 2.0.
 import struct
 from collections.abc import Callable
 
-from drivers.dynamixel.control_table import EEPROM_END
-from sim_mock.dynamixel.memory import ACCESS, DATA_RANGE, INSTRUCTION_ERROR
-from sim_mock.dynamixel.servo import DynamixelServo
-from sim_mock.smart_servo.chain import Wanted
+from gazerig.drivers.dynamixel.control_table import EEPROM_END
+from gazerig.sim_mock.dynamixel.memory import ACCESS, DATA_RANGE, INSTRUCTION_ERROR
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.smart_servo.chain import Wanted
 
 PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, REBOOT = 1, 2, 3, 4, 5, 6, 8
 CLEAR, BACKUP = 0x10, 0x20

@@ -1,13 +1,13 @@
 """The control table of an emulated servo as bytes: access, ranges, indirect windows.
 
 Knows the rules that follow from the table alone; what needs the servo's state (EEPROM
-lock, limit registers, watchdog) is asked by sim_mock.dynamixel.servo.
+lock, limit registers, watchdog) is asked by gazerig.sim_mock.dynamixel.servo.
 """
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from drivers.dynamixel.control_table import (
+from gazerig.drivers.dynamixel.control_table import (
     EEPROM_END,
     IndirectBlock,
     Model,
@@ -15,7 +15,7 @@ from drivers.dynamixel.control_table import (
     indirect_blocks,
     registers_of,
 )
-from sim_mock.dynamixel.live_registers import PROFILED
+from gazerig.sim_mock.dynamixel.live_registers import PROFILED
 
 # Numbers of the status error byte (Protocol 2.0).
 RESULT_FAIL = 1

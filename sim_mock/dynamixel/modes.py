@@ -9,8 +9,8 @@ comes out is in units of PWM (885 are 100 %).
 from collections.abc import Callable
 from math import inf
 
-from drivers.dynamixel.control_table import PWM_FULL, VELOCITY_UNIT_STEPS_S, Model
-from sim_mock.smart_servo.motor import Loop
+from gazerig.drivers.dynamixel.control_table import PWM_FULL, VELOCITY_UNIT_STEPS_S, Model
+from gazerig.sim_mock.smart_servo.motor import Loop
 
 CURRENT, VELOCITY, POSITION, EXTENDED, CURRENT_POSITION, PWM = 0, 1, 3, 4, 5, 16
 POSITION_MODES = (POSITION, EXTENDED, CURRENT_POSITION)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from fastcrc.crc16 import umts
 
-from sim_mock.replies import BROADCAST, Answer, Piece, merge
+from gazerig.sim_mock.replies import BROADCAST, Answer, Piece, merge
 
 HEADER = b"\xff\xff\xfd\x00"
 RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"

@@ -7,7 +7,7 @@ Sources: ROBOTIS e-Manual, Protocol 2.0; the device side of ROBOTIS' Dynamixel2A
 from dataclasses import dataclass
 from typing import Literal
 
-from sim_mock.smart_servo.quirks import ChainQuirks
+from gazerig.sim_mock.smart_servo.quirks import ChainQuirks
 
 BadCrc = Literal["silent", "reply"]
 Stuffing = Literal["accept", "strict"]

@@ -1,11 +1,12 @@
 """One emulated Dynamixel X servo: what may be written when, errors, watchdog, restarts.
 
-The control table is in sim_mock.dynamixel.memory, modes, profiles and gains in its neighbours.
+The control table is in gazerig.sim_mock.dynamixel.memory, modes, profiles and gains in its
+neighbours.
 What it does not do: play inside the gear, a blinking LED, the RC, S.Bus and iBus protocols of
 register 13.
 """
 
-from drivers.dynamixel.control_table import (
+from gazerig.drivers.dynamixel.control_table import (
     BACKUP_SINCE,
     BAUD_RATES,
     FAST_READ_SINCE,
@@ -15,10 +16,10 @@ from drivers.dynamixel.control_table import (
     SHADOW_OFF,
     Model,
 )
-from sim_mock.dynamixel.backup import Backup
-from sim_mock.dynamixel.drive import TRIPPED, Drive
-from sim_mock.dynamixel.live_registers import LIVE_AT, SENSED, SENSED_AT, put, put_sensed
-from sim_mock.dynamixel.memory import (
+from gazerig.sim_mock.dynamixel.backup import Backup
+from gazerig.sim_mock.dynamixel.drive import TRIPPED, Drive
+from gazerig.sim_mock.dynamixel.live_registers import LIVE_AT, SENSED, SENSED_AT, put, put_sensed
+from gazerig.sim_mock.dynamixel.memory import (
     ACCESS,
     DATA_RANGE,
     INSTRUCTION_ERROR,
@@ -26,11 +27,11 @@ from sim_mock.dynamixel.memory import (
     DynamixelMemory,
     in_eeprom,
 )
-from sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
-from sim_mock.dynamixel.write_rules import GOALS, Rules
-from sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec, checked
-from sim_mock.smart_servo.protection import Limits
-from sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
+from gazerig.sim_mock.dynamixel.write_rules import GOALS, Rules
+from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec, checked
+from gazerig.sim_mock.smart_servo.protection import Limits
+from gazerig.sim_mock.smart_servo.servo import SmartServo
 
 ALERT = 0x80
 WATCHDOG_UNIT_MS = 20

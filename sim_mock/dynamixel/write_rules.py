@@ -1,9 +1,15 @@
 """What an emulated servo lets be written now: EEPROM lock, modes, limits, tripped watchdog."""
 
-from drivers.dynamixel.control_table import EEPROM_END, Model, Register
-from sim_mock.dynamixel.drive import TRIPPED, Drive
-from sim_mock.dynamixel.memory import ACCESS, DATA_LIMIT, DATA_RANGE, DynamixelMemory, Fields
-from sim_mock.dynamixel.modes import POSITION, modes_of
+from gazerig.drivers.dynamixel.control_table import EEPROM_END, Model, Register
+from gazerig.sim_mock.dynamixel.drive import TRIPPED, Drive
+from gazerig.sim_mock.dynamixel.memory import (
+    ACCESS,
+    DATA_LIMIT,
+    DATA_RANGE,
+    DynamixelMemory,
+    Fields,
+)
+from gazerig.sim_mock.dynamixel.modes import POSITION, modes_of
 
 GOALS = ("goal_pwm", "goal_current", "goal_velocity", "goal_position")
 MULTI_TURN_STEPS = 1_048_575

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import log
 from random import Random
 
-from sim_mock.replies import Answer, Piece
+from gazerig.sim_mock.replies import Answer, Piece
 
 NOBODY = -1
 """Id of pieces that no servo sent: noise, echo, babble."""

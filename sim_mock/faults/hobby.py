@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from sim_mock.faults.grammar import Commands
-from sim_mock.faults.line import LineFaults, Struck
-from sim_mock.hobby_servo import HobbyServo
+from gazerig.sim_mock.faults.grammar import Commands
+from gazerig.sim_mock.faults.line import LineFaults, Struck
+from gazerig.sim_mock.hobby_servo import HobbyServo
 
 
 class HobbyBody(Protocol):

@@ -10,10 +10,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
-from sim_mock.device import Reply
-from sim_mock.faults.active import NOBODY, ActiveFaults, Fault
-from sim_mock.faults.grammar import Commands
-from sim_mock.replies import Piece
+from gazerig.sim_mock.device import Reply
+from gazerig.sim_mock.faults.active import NOBODY, ActiveFaults, Fault
+from gazerig.sim_mock.faults.grammar import Commands
+from gazerig.sim_mock.replies import Piece
 
 
 class Struck(Protocol):

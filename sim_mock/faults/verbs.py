@@ -1,6 +1,6 @@
 """What can be asked of an emulated line as text, in the parts that devices choose from."""
 
-from sim_mock.faults.grammar import (
+from gazerig.sim_mock.faults.grammar import (
     BOTH,
     MS,
     SWITCH,
@@ -15,7 +15,7 @@ from sim_mock.faults.grammar import (
     or_all,
     whole,
 )
-from sim_mock.faults.line import LineFaults
+from gazerig.sim_mock.faults.line import LineFaults
 
 _BYTE_COUNT = whole(0, 1024, "a number of bytes")
 _BYTES = Word("BYTES", _BYTE_COUNT)

@@ -5,8 +5,8 @@ Source: Feetech, communication protocol of the STS/SMS series.
 
 from collections.abc import Callable, Iterable, Sequence
 
-from drivers.feetech.memory_table import HIGHEST_ID
-from sim_mock.feetech.instructions import (
+from gazerig.drivers.feetech.memory_table import HIGHEST_ID
+from gazerig.sim_mock.feetech.instructions import (
     PING,
     SYNC_READ,
     SYNC_WRITE,
@@ -15,13 +15,13 @@ from sim_mock.feetech.instructions import (
     sync_rows,
     sync_writes,
 )
-from sim_mock.feetech.packets import HEADER, FeetechFraming, pieces
-from sim_mock.feetech.quirks import FeetechQuirks
-from sim_mock.feetech.servo import FeetechServo
-from sim_mock.replies import Answer, Piece
-from sim_mock.smart_servo.chain import ServoChain, whole_ms
-from sim_mock.smart_servo.faults import ServoFaults, commands_of
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.feetech.packets import HEADER, FeetechFraming, pieces
+from gazerig.sim_mock.feetech.quirks import FeetechQuirks
+from gazerig.sim_mock.feetech.servo import FeetechServo
+from gazerig.sim_mock.replies import Answer, Piece
+from gazerig.sim_mock.smart_servo.chain import ServoChain, whole_ms
+from gazerig.sim_mock.smart_servo.faults import ServoFaults, commands_of
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 COMMANDS = commands_of(HIGHEST_ID, FeetechQuirks, without=("shock",), reset="id 1, 1000000 bit/s")
 

@@ -6,8 +6,8 @@ Source: Feetech, communication protocol of the STS/SMS series.
 
 from collections.abc import Callable
 
-from drivers.feetech.memory_table import STEPS_PER_TURN
-from sim_mock.feetech.servo import MIDDLE, FeetechServo
+from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN
+from gazerig.sim_mock.feetech.servo import MIDDLE, FeetechServo
 
 PING, READ, WRITE, REG_WRITE, ACTION = 1, 2, 3, 4, 5
 RESTORE, REBOOT, RESET_TURNS, CALIBRATE = 6, 8, 10, 11

@@ -10,8 +10,8 @@ those that owners read out of an STS3215.
 from collections.abc import Callable, Mapping
 from typing import Literal, NamedTuple
 
-from drivers.feetech.memory_table import BAUD_RATES, HIGHEST_ID, FeetechModel
-from sim_mock.feetech.packets import signed
+from gazerig.drivers.feetech.memory_table import BAUD_RATES, HIGHEST_ID, FeetechModel
+from gazerig.sim_mock.feetech.packets import signed
 
 SIZE = 256
 """What is not a register reads 0."""

@@ -2,7 +2,7 @@
 
 Reads the memory and never refuses anything. The registers' position is ``shaft.x + shift``;
 where turns are not counted it is told within one turn. Shaft and motor are those of
-sim_mock.smart_servo.motor. What no document tells of the controller is assumed, so that a
+gazerig.sim_mock.smart_servo.motor. What no document tells of the controller is assumed, so that a
 servo with factory gains needs all its duty at 50 steps of error and does not overshoot:
 owners measure 20-30 steps at half the stall torque. Left out: the starting force (24) and the
 dead zones (26, 27), so that friction keeps it up to 2 steps from its goal, as it does in fact.
@@ -11,14 +11,18 @@ dead zones (26, 27), so that friction keeps it up to 2 steps from its goal, as i
 import struct
 from typing import NamedTuple
 
-from drivers.feetech.memory_table import ACCELERATION_UNIT_STEPS_S2, CURRENT_UNIT_MA, FeetechModel
-from drivers.feetech.memory_table import STEPS_PER_TURN as TURN
-from drivers.feetech.memory_table import TORQUE_FULL as FULL
-from sim_mock.feetech.memory import PWM, SERVO, STEP, WHEEL, FeetechMemory
-from sim_mock.feetech.packets import signed, unsigned
-from sim_mock.smart_servo.motor import LIMP, Loop, Shaft, flicker
-from sim_mock.smart_servo.physics import Physics
-from sim_mock.smart_servo.profile import Profile, SpeedProfile
+from gazerig.drivers.feetech.memory_table import (
+    ACCELERATION_UNIT_STEPS_S2,
+    CURRENT_UNIT_MA,
+    FeetechModel,
+)
+from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
+from gazerig.drivers.feetech.memory_table import TORQUE_FULL as FULL
+from gazerig.sim_mock.feetech.memory import PWM, SERVO, STEP, WHEEL, FeetechMemory
+from gazerig.sim_mock.feetech.packets import signed, unsigned
+from gazerig.sim_mock.smart_servo.motor import LIMP, Loop, Shaft, flicker
+from gazerig.sim_mock.smart_servo.physics import Physics
+from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
 
 CURRENT_UNIT_A = CURRENT_UNIT_MA / 1000.0
 RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6

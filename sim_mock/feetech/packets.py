@@ -9,8 +9,8 @@ protocol of the STS/SMS series.
 
 from collections.abc import Sequence
 
-from sim_mock.replies import Answer, Piece, merge
-from sim_mock.smart_servo.framing import Framing, Instruction
+from gazerig.sim_mock.replies import Answer, Piece, merge
+from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
 
 HEADER = b"\xff\xff"
 SHORTEST = 6

@@ -8,7 +8,7 @@ report decides; they are assumed.
 from dataclasses import dataclass
 from typing import Literal
 
-from sim_mock.smart_servo.quirks import ChainQuirks
+from gazerig.sim_mock.smart_servo.quirks import ChainQuirks
 
 BroadcastPing = Literal["answer", "mix", "silence"]
 Goal = Literal["wait", "torque-on"]

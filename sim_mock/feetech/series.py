@@ -7,8 +7,8 @@ Sources: Feetech, SCSCL of its SDK (addresses); rustypot's table of the SCS0009.
 is assumed: no public document tells.
 """
 
-from drivers.feetech.memory_table import MODELS, FeetechModel
-from sim_mock.feetech.memory import STS, Register, Table
+from gazerig.drivers.feetech.memory_table import MODELS, FeetechModel
+from gazerig.sim_mock.feetech.memory import STS, Register, Table
 
 _EEPROM = (
     Register("id", 5, initial=1),

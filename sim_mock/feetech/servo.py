@@ -1,26 +1,26 @@
 """One emulated Feetech servo: what a write does, errors, restarts.
 
-Memory is in sim_mock.feetech.memory, what turns the shaft in its motor, what documents leave
-open in its quirks. What it does not do: reversed phases, angle resolution (30), a blinking LED,
-backup (09).
+Memory is in gazerig.sim_mock.feetech.memory, what turns the shaft in its motor, what documents
+leave open in its quirks. What it does not do: reversed phases, angle resolution (30), a blinking
+LED, backup (09).
 """
 
 import struct
 
-from drivers.feetech.memory_table import (
+from gazerig.drivers.feetech.memory_table import (
     EEPROM_END,
     RETURN_DELAY_UNIT_S,
     SET_MIDDLE,
     FeetechModel,
 )
-from sim_mock.feetech.memory import FeetechMemory
-from sim_mock.feetech.motor import CURRENT_UNIT_A, GOALS_AT, FeetechDrive
-from sim_mock.feetech.packets import unsigned
-from sim_mock.feetech.quirks import FeetechQuirks
-from sim_mock.feetech.series import series_of
-from sim_mock.smart_servo.physics import Physics, ServoSpec, checked
-from sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE, Limits
-from sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.feetech.memory import FeetechMemory
+from gazerig.sim_mock.feetech.motor import CURRENT_UNIT_A, GOALS_AT, FeetechDrive
+from gazerig.sim_mock.feetech.packets import unsigned
+from gazerig.sim_mock.feetech.quirks import FeetechQuirks
+from gazerig.sim_mock.feetech.series import series_of
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec, checked
+from gazerig.sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE, Limits
+from gazerig.sim_mock.smart_servo.servo import SmartServo
 
 MIDDLE = 2048
 TIME_UNIT_S = 0.01

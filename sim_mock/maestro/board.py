@@ -8,12 +8,12 @@ and scripts but for the one that a fault starts. Source: Pololu Maestro User's G
 
 from collections.abc import Callable, Sequence
 
-from sim_mock.device import Reply
-from sim_mock.faults.active import NOBODY
-from sim_mock.hobby_servo import HobbyServo, HobbySpec
-from sim_mock.maestro.body import Body
-from sim_mock.maestro.channel import Channel
-from sim_mock.maestro.commands import (
+from gazerig.sim_mock.device import Reply
+from gazerig.sim_mock.faults.active import NOBODY
+from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
+from gazerig.sim_mock.maestro.body import Body
+from gazerig.sim_mock.maestro.channel import Channel
+from gazerig.sim_mock.maestro.commands import (
     GET_ERRORS,
     GET_MOVING,
     GET_POSITION,
@@ -33,9 +33,9 @@ from sim_mock.maestro.commands import (
     Heard,
     word,
 )
-from sim_mock.maestro.faults import COMMANDS, MaestroFaults
-from sim_mock.maestro.settings import LIMITS, Settings, chosen, width_steps
-from sim_mock.replies import Piece
+from gazerig.sim_mock.maestro.faults import COMMANDS, MaestroFaults
+from gazerig.sim_mock.maestro.settings import LIMITS, Settings, chosen, width_steps
+from gazerig.sim_mock.replies import Piece
 
 SIZES = (6, 12, 18, 24)
 ASKING = (GET_POSITION, GET_MOVING, GET_ERRORS, GET_SCRIPT)

@@ -6,10 +6,10 @@ at. Source: Pololu Maestro User's Guide (0J40); [A] is assumed.
 
 from collections.abc import Callable, Sequence
 
-from sim_mock.hobby_servo import HobbyServo
-from sim_mock.maestro.channel import Channel
-from sim_mock.maestro.commands import ERRORS
-from sim_mock.maestro.settings import OnError, Settings
+from gazerig.sim_mock.hobby_servo import HobbyServo
+from gazerig.sim_mock.maestro.channel import Channel
+from gazerig.sim_mock.maestro.commands import ERRORS
+from gazerig.sim_mock.maestro.settings import OnError, Settings
 
 PERIODS_S = 100
 """Periods in a second; a pulse goes out in every second one."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from sim_mock.faults.grammar import (
+from gazerig.sim_mock.faults.grammar import (
     SWITCH,
     TIME,
     Commands,
@@ -15,12 +15,12 @@ from sim_mock.faults.grammar import (
     or_all,
     whole,
 )
-from sim_mock.faults.hobby import HobbyFaults
-from sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs
-from sim_mock.hobby_servo import HobbyServo
-from sim_mock.maestro.body import Body
-from sim_mock.maestro.commands import ERRORS
-from sim_mock.maestro.settings import cases
+from gazerig.sim_mock.faults.hobby import HobbyFaults
+from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs
+from gazerig.sim_mock.hobby_servo import HobbyServo
+from gazerig.sim_mock.maestro.body import Body
+from gazerig.sim_mock.maestro.commands import ERRORS
+from gazerig.sim_mock.maestro.settings import cases
 
 
 class Board(Protocol):

@@ -5,8 +5,8 @@ Time passes in whole steps of 10 ms; a servo hears a new pulse once a period of 
 
 from collections.abc import Callable, Mapping, Sequence
 
-from sim_mock.hobby_servo import HobbyServo
-from sim_mock.pca9685.chip import CHANNELS, Chip
+from gazerig.sim_mock.hobby_servo import HobbyServo
+from gazerig.sim_mock.pca9685.chip import CHANNELS, Chip
 
 STEPS_S = 100
 US_STEPS = 4

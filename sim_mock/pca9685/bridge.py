@@ -9,13 +9,13 @@ NXP, SC18IM700 data sheet, section 7.1.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from sim_mock.device import Reply
-from sim_mock.faults.active import NOBODY
-from sim_mock.hobby_servo import HobbyServo, HobbySpec
-from sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
-from sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
-from sim_mock.pca9685.faults import CASES, COMMANDS, Pca9685Faults
-from sim_mock.replies import Piece
+from gazerig.sim_mock.device import Reply
+from gazerig.sim_mock.faults.active import NOBODY
+from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
+from gazerig.sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
+from gazerig.sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
+from gazerig.sim_mock.pca9685.faults import CASES, COMMANDS, Pca9685Faults
+from gazerig.sim_mock.replies import Piece
 
 START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")
 STATUS_REGISTER = 0x0A

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from sim_mock.faults.grammar import (
+from gazerig.sim_mock.faults.grammar import (
     SWITCH,
     TIME,
     Commands,
@@ -14,10 +14,10 @@ from sim_mock.faults.grammar import (
     or_all,
     whole,
 )
-from sim_mock.faults.hobby import HobbyFaults
-from sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs
-from sim_mock.hobby_servo import HobbyServo
-from sim_mock.pca9685.body import Body
+from gazerig.sim_mock.faults.hobby import HobbyFaults
+from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs
+from gazerig.sim_mock.hobby_servo import HobbyServo
+from gazerig.sim_mock.pca9685.body import Body
 
 CASES = {"oscillator-mhz": "MHZ"}
 

@@ -5,7 +5,7 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
+from gazerig.sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
 
 READ_FLAG = 0x0001
 LONGEST_BLOCK = 32

@@ -9,15 +9,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from sim_mock.devices import DynamixelLine, Emulated, packed
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.devices import DynamixelLine, Emulated, packed
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 STOP_S = 2.0
-ROOT = Path(__file__).parents[2]
 
 
 class _Served:
-    """A server process of ``sim_mock.pty.server``."""
+    """A server process of ``gazerig.sim_mock.pty.server``."""
 
     def __init__(self) -> None:
         self._server: subprocess.Popen[bytes] | None = None
@@ -30,8 +29,7 @@ class _Served:
         linked = [{**bus, "link": link} for bus, link in zip(buses, links, strict=True)]
         settings = json.dumps({"buses": linked, "until_eof": True})
         self._server = subprocess.Popen(
-            [sys.executable, "-m", "sim_mock.pty.server", settings],
-            cwd=ROOT,
+            [sys.executable, "-P", "-m", "gazerig.sim_mock.pty.server", settings],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             # Ctrl-C and timeouts go to a whole group: the servos must outlive their client's
@@ -132,7 +130,7 @@ class PtyBus(_Served):
         """Start a server for servos or a board; return the path to open as a serial port.
 
         The path stays the same over ``unplug`` and ``plug``. The rest as in
-        sim_mock.pty.line.BusSettings.
+        gazerig.sim_mock.pty.line.BusSettings.
 
         Raises:
             RuntimeError: the server did not start; its message is on standard error.

@@ -6,9 +6,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sim_mock.devices import CASES, Emulated, build
-from sim_mock.pty.terminal import Terminal
-from sim_mock.wire import ServoLine
+from gazerig.sim_mock.devices import CASES, Emulated, build
+from gazerig.sim_mock.pty.terminal import Terminal
+from gazerig.sim_mock.wire import ServoLine
 
 PACKET_GAP, GAP_MS = "packet-gap-ms", 50.0
 """On a real line 1.5 ms; here the host's scheduler may tear a packet apart for longer."""
@@ -28,7 +28,7 @@ class BusSettings:
 
     device: what it is; clients at another baud rate than its own are not heard
     name: tells several buses of one process apart; None: it is the only one
-    wire_time, turnaround_us: as in sim_mock.wire
+    wire_time, turnaround_us: as in gazerig.sim_mock.wire
     link: name under which the terminal can be opened, also after it was unplugged
     choices: cases of the device by name
     seed: of the random numbers that faults draw

@@ -1,6 +1,6 @@
 """Emulated servos and boards on pseudo-terminals, in a process of their own.
 
-``python -m sim_mock.pty.server '{"buses": [{"device": {"kind": "dynamixel", "servos":
+``python -m gazerig.sim_mock.pty.server '{"buses": [{"device": {"kind": "dynamixel", "servos":
 [[1, "xl330-m077", 2048]]}}]}'`` prints one JSON line a bus with its terminal's path and
 serves clients that come and go. It takes commands as lines on standard input and answers
 each with one JSON line: {"ok": ...} or {"error": ...}. Where there are several buses, a
@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from sim_mock.devices import unpacked
-from sim_mock.pty.line import BusSettings, TerminalLine
+from gazerig.sim_mock.devices import unpacked
+from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
 
 
 @dataclass(frozen=True)

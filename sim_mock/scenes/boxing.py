@@ -20,8 +20,8 @@ world's x; both hold for the desk rig within what the neck turns to follow the o
 from math import atan2, pi, sin, tan
 from typing import NamedTuple
 
-from gaze.types import Vec3
-from sim_mock.scenes.scene import Event, Key, Person, Thing, between, there_and_back
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import Event, Key, Person, Thing, between, there_and_back
 
 HEAD_M: Vec3 = (0.04, 0.0, 0.13)
 HALF_FIELD_RAD = 34.5 / 180.0 * pi

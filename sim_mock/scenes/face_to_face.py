@@ -10,8 +10,8 @@ and Cook), away by some 14 deg and mostly sideways. Not modelled: a child's smal
 
 from math import atan2, hypot, pi, sin
 
-from gaze.types import Vec3
-from sim_mock.scenes.scene import Event, Key, Person, Thing, between
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import Event, Key, Person, Thing, between
 
 HEAD_M: Vec3 = (0.04, 0.0, 0.13)
 

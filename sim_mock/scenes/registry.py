@@ -1,12 +1,12 @@
 """The scenes that a simulated robot can be put into."""
 
-from sim_mock.scenes.boxing import Boxing
-from sim_mock.scenes.face_to_face import FaceToFace
-from sim_mock.scenes.scene import Scene
-from sim_mock.scenes.sits_still import SitsStill
-from sim_mock.scenes.steps_aside import StepsAside
-from sim_mock.scenes.visitor import Visitor
-from sim_mock.scenes.walks_past import WalksPast
+from gazerig.sim_mock.scenes.boxing import Boxing
+from gazerig.sim_mock.scenes.face_to_face import FaceToFace
+from gazerig.sim_mock.scenes.scene import Scene
+from gazerig.sim_mock.scenes.sits_still import SitsStill
+from gazerig.sim_mock.scenes.steps_aside import StepsAside
+from gazerig.sim_mock.scenes.visitor import Visitor
+from gazerig.sim_mock.scenes.walks_past import WalksPast
 
 
 def scenes() -> dict[str, Scene]:

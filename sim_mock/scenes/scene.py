@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from math import atan2, radians
 from typing import Literal, NamedTuple, Protocol
 
-from gaze.types import Angles2, Vec3
+from gazerig.gaze.types import Angles2, Vec3
 
 
 class Person(NamedTuple):

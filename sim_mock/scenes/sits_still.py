@@ -6,8 +6,8 @@ still: no sway, no glance aside, no blink.
 
 from math import atan2, hypot
 
-from gaze.types import Vec3
-from sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
 HEAD_M: Vec3 = (0.04, 0.0, 0.13)
 FACE_M: Vec3 = (0.95, 0.06, 0.24)

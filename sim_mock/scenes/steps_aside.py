@@ -7,8 +7,8 @@ much as shoes on a floor give. Peak speed 2.0 m/s, 105 deg/s as seen by the robo
 
 from math import cos, radians, sin
 
-from gaze.types import Vec3
-from sim_mock.scenes.scene import Event, Key, Person, Thing, between
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import Event, Key, Person, Thing, between
 
 HEAD_M: Vec3 = (0.04, 0.0, 0.13)
 STEP_AT_S, STEP_BACK_AT_S, STEP_S = 2.0, 6.0, 0.7

@@ -2,8 +2,8 @@
 
 from math import pi, sin
 
-from gaze.types import Vec3
-from sim_mock.scenes.scene import Event, Key, Person, Thing, between
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import Event, Key, Person, Thing, between
 
 # One round: arrive, talk, move left, turn the head, wave, step aside, leave, come back.
 _ROUND_S = 44.0

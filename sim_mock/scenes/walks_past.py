@@ -5,8 +5,8 @@ The face is turned to the robot all the way, as of somebody who looks while pass
 
 from math import atan2
 
-from gaze.types import Vec3
-from sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
 WALK_M_S, FAR_M = 1.0, 1.5
 HALF_WAY_M = 1.1

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Generic, TypeVar
 
-from sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.smart_servo.servo import SmartServo
 
 S = TypeVar("S", bound=SmartServo)
 

@@ -8,15 +8,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, TypeVar
 
-from sim_mock.device import Reply
-from sim_mock.faults.active import NOBODY
-from sim_mock.replies import BROADCAST, Answer, Piece
-from sim_mock.smart_servo.addresses import Addresses, hears
-from sim_mock.smart_servo.faults import ServoFaults
-from sim_mock.smart_servo.framing import Framing, Instruction
-from sim_mock.smart_servo.physics import ServoSpec
-from sim_mock.smart_servo.quirks import ChainQuirks, decided
-from sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.device import Reply
+from gazerig.sim_mock.faults.active import NOBODY
+from gazerig.sim_mock.replies import BROADCAST, Answer, Piece
+from gazerig.sim_mock.smart_servo.addresses import Addresses, hears
+from gazerig.sim_mock.smart_servo.faults import ServoFaults
+from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, decided
+from gazerig.sim_mock.smart_servo.servo import SmartServo
 
 TWIN_AWAY_STEPS = 257
 """A second servo with a taken id stands so far from the first, so that they differ."""

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from sim_mock.faults.grammar import Commands, Verb, Word, number, or_all, whole
-from sim_mock.faults.line import LineFaults
-from sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, packet_verbs
-from sim_mock.smart_servo.quirks import ChainQuirks, cases_of
-from sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.faults.grammar import Commands, Verb, Word, number, or_all, whole
+from gazerig.sim_mock.faults.line import LineFaults
+from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, packet_verbs
+from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, cases_of
+from gazerig.sim_mock.smart_servo.servo import SmartServo
 
 
 class Chain(Protocol):

@@ -1,8 +1,8 @@
 """What an emulated servo is made of and how it is built: every physical number has its place here.
 
 Stall torque, stall current and no-load speed are the model's own and stand in
-drivers.dynamixel.control_table. What no data sheet tells is an assumption, marked [A]; what follows
-from a report of users, [R].
+gazerig.drivers.dynamixel.control_table. What no data sheet tells is an assumption, marked [A];
+what follows from a report of users, [R].
 """
 
 from collections.abc import Sequence

@@ -7,8 +7,8 @@ asked. A heavy load is torque, not duty: a motor at full speed has all the duty 
 from math import inf
 from typing import NamedTuple
 
-from sim_mock.smart_servo.motor import Motor
-from sim_mock.smart_servo.physics import Physics
+from gazerig.sim_mock.smart_servo.motor import Motor
+from gazerig.sim_mock.smart_servo.physics import Physics
 
 LOOK_MS = 20
 LOOK_S = LOOK_MS / 1000.0

@@ -8,9 +8,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
-from sim_mock.smart_servo.motor import Motor, Shaft, long_pause
-from sim_mock.smart_servo.physics import Physics, ServoSpec
-from sim_mock.smart_servo.protection import LOOK_MS, Limits, Protection
+from gazerig.sim_mock.smart_servo.motor import Motor, Shaft, long_pause
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.smart_servo.protection import LOOK_MS, Limits, Protection
 
 
 class Model(Motor, Protocol):

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from recording_damage import USES, judge, recorded, with_bomb  # noqa: E402
 
-from drivers.errors import DriverError  # noqa: E402
+from gazerig.drivers.errors import DriverError  # noqa: E402
 
 
 def main(count: int, seed: int) -> int:

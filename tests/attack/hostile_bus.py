@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from line_noise import KINDS, Noisy, Outcome  # noqa: E402
 
-from drivers.errors import DriverError  # noqa: E402
+from gazerig.drivers.errors import DriverError  # noqa: E402
 
 FAULTS = (
     "babble on", "noise before", "noise after", "echo on", "unplug for 0.5", "block on for 0.3",

@@ -1,6 +1,6 @@
 """The control loop killed, or stopped in its tracks: when do its servos let go? Prints a table.
 
-    PYTHONPATH=.:tests python tests/attack/loop_death.py [repeats]
+    PYTHONPATH=tests python tests/attack/loop_death.py [repeats]
 
 Every servo moves slowly to its end as its loop's process gets SIGKILL or SIGSTOP. "limp": from
 then until no servo is under torque any more; "still": until the last one has stopped moving,

@@ -1,6 +1,6 @@
 """Floods, silent and malformed connections against the page of a running rig. Prints a table.
 
-    PYTHONPATH=.:tests python tests/attack/page_attack.py [seconds of each [names of attacks]]
+    PYTHONPATH=tests python tests/attack/page_attack.py [seconds of each [names of attacks]]
 
 A simulated rig runs in a process of its own, its page on the loopback. Each attack runs in
 another process; meanwhile the loop's rate is counted, then STOP is pressed 20 times as the
@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 from page_visitor import LOOKING, Visitor
 from websockets.sync.client import ClientConnection
 
-from robot.remote.running_rig import RunningRig
+from gazerig.robot.remote.running_rig import RunningRig
 
 CLIENTS = 8
 PRESSES = 20
@@ -208,7 +208,7 @@ class Rig:
     """A simulated rig with its page, in a process of its own."""
 
     def __init__(self) -> None:
-        code = "from robot.cli.main import main; main()"
+        code = "from gazerig.robot.cli.main import main; main()"
         words = ["run", "--mock", "--page", "127.0.0.1:18790"]
         self._process = subprocess.Popen(
             [sys.executable, "-u", "-c", code, *words],
@@ -235,7 +235,7 @@ class Rig:
         for entry in Path("/proc").iterdir():
             with contextlib.suppress(OSError):
                 words = (entry / "cmdline").read_bytes().split(b"\0")
-                if b"robot.page.view" in words and str(self._process.pid).encode() in words:
+                if b"gazerig.robot.page.view" in words and str(self._process.pid).encode() in words:
                     return int(entry.name), self._process.pid
         return None, self._process.pid
 

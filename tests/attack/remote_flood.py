@@ -9,16 +9,16 @@ import subprocess
 import sys
 import tempfile
 
-from config.load import ConfigError
-from config.schema import load_rig
-from robot.assemble import assemble
-from robot.choice import Choice
-from robot.clock import RealClock
-from robot.loop import run
-from robot.remote import server
-from robot.remote.budget import ALL, EACH, Rate
-from robot.remote.live_control import LiveControl
-from robot.tuning import Tuning
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig
+from gazerig.robot.assemble import assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.clock import RealClock
+from gazerig.robot.loop import run
+from gazerig.robot.remote import server
+from gazerig.robot.remote.budget import ALL, EACH, Rate
+from gazerig.robot.remote.live_control import LiveControl
+from gazerig.robot.tuning import Tuning
 
 FLOODS = {
     "nothing": "",
@@ -31,8 +31,8 @@ FLOODS = {
 }
 FLOOD = """
 import sys, time
-from drivers.errors import DriverError
-from robot.remote.running_rig import RunningRig
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.remote.running_rig import RunningRig
 rig, n = RunningRig.connect(), 0
 while True:
     n += 1
@@ -78,7 +78,7 @@ def flooded(what: str, seconds: float, programs: int) -> tuple[float, int, float
 
 _STOP = """
 import time
-from robot.remote.running_rig import RunningRig
+from gazerig.robot.remote.running_rig import RunningRig
 rig = RunningRig.connect()
 began = time.monotonic()
 rig.stop("a test")

@@ -29,12 +29,12 @@ from mixed_rig import mixed_text
 from struck_rigs import CASES, Machine, pair_of, quick
 from true_shafts import Judge, Late, looked_at, on_time, run, sometimes_late
 
-from config.schema import Rig, load_rig
-from drivers.errors import DriverError
-from robot.assemble import Assembly
-from robot.choice import Choice
-from robot.orders import LookAt
-from sim_mock.scenes.registry import scenes
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.assemble import Assembly
+from gazerig.robot.choice import Choice
+from gazerig.robot.orders import LookAt
+from gazerig.sim_mock.scenes.registry import scenes
 
 RIGS = ("desk", "feetech", "maker", "mixed")
 LATES: dict[str, Callable[[], Late]] = {

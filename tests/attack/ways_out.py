@@ -1,6 +1,6 @@
 """Every way out of every command that switches torque on: how many servos stay on?
 
-    PYTHONPATH=. python tests/attack/ways_out.py [--rig desk] [--command run] [--way SIGHUP]
+    python tests/attack/ways_out.py [--rig desk] [--command run] [--way SIGHUP]
 
 Servos are emulated on a pseudo-terminal, and asked there what they really do. A row is one
 command on one rig that was ended one way: servos left on, how far the joints are from their
@@ -29,23 +29,23 @@ from math import degrees
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from config.schema import Rig, load_rig
-from robot.emulated_rig import emulated_lines
-from robot.rig_angles import park_rad
-from sim_mock.pty.client import PtyBuses
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.robot.rig_angles import park_rad
+from gazerig.sim_mock.pty.client import PtyBuses
 
 ROOT = Path(__file__).parents[2]
 RIGS = {"desk": "dynamixel", "feetech": "feetech", "maker": "maestro"}
 LONGEST_S = 20.0
 # Broken on purpose, from outside: what a plug-in, a small machine or a bug of ours would do.
 BROKEN = {
-    "observer raises": "import robot.summary as m\n"
+    "observer raises": "import gazerig.robot.summary as m\n"
     "def note(self, tick):\n    raise RuntimeError('plug-in')\nm.Summary.note = note\n",
-    "MemoryError in the loop": "import robot.loop as m\ntick, n = m.Robot.tick, []\n"
+    "MemoryError in the loop": "import gazerig.robot.loop as m\ntick, n = m.Robot.tick, []\n"
     "def note(self, *words):\n    n.append(0)\n    if len(n) > 200:\n        raise MemoryError\n"
     "    return tick(self, *words)\nm.Robot.tick = note\n",
 }
-START = "import sys; sys.argv[0] = 'gazerig'; from robot.cli.quick import main; main()"
+START = "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.quick import main; main()"
 
 
 def commands(rig: str) -> dict[str, list[str]]:
@@ -121,7 +121,7 @@ def typed(words: list[str], breaks: str = "") -> list[str]:
 
 def started(words: list[str], way: str) -> Started:
     """Start a command the way that its end needs."""
-    env = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "100"}
+    env = {**os.environ, "COLUMNS": "100"}
     command = typed(words, BROKEN.get(way, ""))
     pipe = subprocess.PIPE
     if way == "| head -1":
@@ -202,7 +202,7 @@ def stop_tty(run: Started) -> None:
 
 def kill_page(run: Started) -> None:
     for child in children(run.pid):
-        if b"robot.page.view" in Path(f"/proc/{child}/cmdline").read_bytes():
+        if b"gazerig.robot.page.view" in Path(f"/proc/{child}/cmdline").read_bytes():
             os.kill(child, signal.SIGKILL)
     time.sleep(1.0)
     run.process.send_signal(signal.SIGTERM)

@@ -21,13 +21,13 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Xl330PyController
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.serial.port import BlockingPort
-from drivers.types import ServoSetup
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 IDS = tuple(range(1, 10))
 MODEL = "xl330-m077"

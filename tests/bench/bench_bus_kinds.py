@@ -24,17 +24,17 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Sts3215PyController, Xl330PyController
 
-from drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from drivers.feetech.bus import FeetechBus, FeetechParams
-from drivers.maestro.bus import MaestroBus, MaestroParams
-from drivers.multi_bus import MixedBus, Share
-from drivers.serial.port import BlockingPort, BusPort
-from drivers.types import ServoBus, ServoSetup
-from sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
-from sim_mock.hobby_servo import HobbySpec
-from sim_mock.in_process_port import InProcessPort
-from sim_mock.pty.client import PtyBus
-from sim_mock.smart_servo.physics import ServoSpec
+from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.multi_bus import MixedBus, Share
+from gazerig.drivers.serial.port import BlockingPort, BusPort
+from gazerig.drivers.types import ServoBus, ServoSetup
+from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3, 4, 5, 6)
 BAUD = {"dynamixel": 1_000_000, "feetech": 1_000_000, "maestro": 115_200}

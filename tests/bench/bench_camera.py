@@ -19,19 +19,19 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 
-from drivers.camera.process import CameraProcess
-from drivers.camera.recorder import CameraRecorder
-from drivers.camera.recording_format import encoded
-from drivers.camera.recording_reader import Recording
-from drivers.camera.source import Shot
-from drivers.camera.thread import CameraThread
-from drivers.camera.video_file import VideoFile
-from drivers.camera.worker import CameraParts
-from drivers.types import FaceDetector
-from drivers.vision.face_detector import face_detector
-from drivers.vision.face_params import FaceDetectorParams
-from drivers.vision.motion.params import MotionParams
-from robot.seeing.motion_finder import motion_finder
+from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.recorder import CameraRecorder
+from gazerig.drivers.camera.recording_format import encoded
+from gazerig.drivers.camera.recording_reader import Recording
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.thread import CameraThread
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.camera.worker import CameraParts
+from gazerig.drivers.types import FaceDetector
+from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.robot.seeing.motion_finder import motion_finder
 
 RATE_HZ, ROUNDS, SECONDS = 200.0, 12, 1.0
 STOP = threading.Event()

@@ -17,10 +17,10 @@ from fastcrc.crc16 import umts
 from rich.console import Console
 from rich.table import Table
 
-from drivers.serial.port import BlockingPort
-from sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
-from sim_mock.pty.client import PtyBus
-from sim_mock.wire import ServoLine
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.wire import ServoLine
 
 IDS = tuple(range(1, 10))
 SPECS = [(i, "xl330-m077" if i < 7 else "xc330-m288", 2048) for i in IDS]

@@ -16,8 +16,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from config.schema import load_rig
-from drivers.errors import DriverError
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import DriverError
 
 TESTS = Path(__file__).parents[1]
 HEADS = (

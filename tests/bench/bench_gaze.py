@@ -12,10 +12,10 @@ from collections.abc import Callable
 import numpy as np
 from ruckig import InputParameter, OutputParameter, Ruckig
 
-from config.schema import load_rig
-from gaze.types import Bodies, Face, Percept
-from robot.assemble import Choice, assemble
-from robot.types import JointState
+from gazerig.config.schema import load_rig
+from gazerig.gaze.types import Bodies, Face, Percept
+from gazerig.robot.assemble import Choice, assemble
+from gazerig.robot.types import JointState
 
 TICK_S = 0.005
 

@@ -16,12 +16,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from config.schema import load_rig
-from drivers.types import Detections
-from drivers.vision.face_detector import face_detector
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.loop import Tick, run
+from gazerig.config.schema import load_rig
+from gazerig.drivers.types import Detections
+from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
 
 MEDIA = Path(__file__).resolve().parents[3] / "shared" / "media"
 SECONDS, SKIP_S, BARE = 20.0, 2.0, 60

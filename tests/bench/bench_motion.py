@@ -16,13 +16,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.vision.motion.clustering import gathered
-from drivers.vision.motion.detector import MotionDetector
-from drivers.vision.motion.ego_motion import own_motion
-from drivers.vision.motion.image import made_small
-from drivers.vision.motion.optical_flow import FlowSearch, turn_homography
-from drivers.vision.motion.params import MotionParams
-from drivers.vision.motion.segmentation import what_moves
+from gazerig.drivers.vision.motion.clustering import gathered
+from gazerig.drivers.vision.motion.detector import MotionDetector
+from gazerig.drivers.vision.motion.ego_motion import own_motion
+from gazerig.drivers.vision.motion.image import made_small
+from gazerig.drivers.vision.motion.optical_flow import FlowSearch, turn_homography
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.drivers.vision.motion.segmentation import what_moves
 
 PICTURES, DT_S, TURN_RAD = 150, 1 / 30, np.radians(20.0) / 30
 Picture = NDArray[np.uint8]

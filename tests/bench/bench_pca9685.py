@@ -4,7 +4,7 @@ Both over smbus2's methods on the emulated bus. Adafruit's library is not instal
 project: pip install --no-deps --target DIR adafruit-circuitpython-pca9685
 adafruit-circuitpython-busdevice adafruit-circuitpython-register, and DIR in PYTHONPATH.
 
-Run from the repository: PYTHONPATH=.:tests python tests/bench/bench_pca9685.py
+Run from the repository: PYTHONPATH=tests python tests/bench/bench_pca9685.py
 """
 
 import sys
@@ -13,9 +13,9 @@ from types import SimpleNamespace
 
 from test_pca9685_chip import Bench, CircuitPythonI2C
 
-from drivers.i2c.port import I2cPort
-from drivers.pca9685.bus import Pca9685Bus, Pca9685Params
-from drivers.types import ServoSetup
+from gazerig.drivers.i2c.port import I2cPort
+from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from gazerig.drivers.types import ServoSetup
 
 TICKS, CHANNELS, I2C_HZ = 2000, 6, 100_000.0
 

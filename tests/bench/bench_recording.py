@@ -14,16 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from config.schema import load_rig
-from config.text import rig_text, walk_text
-from robot.assemble import Assembly, assemble
-from robot.choice import Choice
-from robot.loop import Tick, run
-from robot.recording.read import RunRecording
-from robot.recording.recorder import Recorder
-from robot.recording.rerun import rerun
-from robot.recording.run_info import RunInfo, versions
-from robot.session import leave
+from gazerig.config.schema import load_rig
+from gazerig.config.text import rig_text, walk_text
+from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.choice import Choice
+from gazerig.robot.loop import Tick, run
+from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.rerun import rerun
+from gazerig.robot.recording.run_info import RunInfo, versions
+from gazerig.robot.session import leave
 
 
 def made(fast: bool) -> Assembly:

@@ -18,14 +18,14 @@ import numpy as np
 from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler
 from fastcrc import crc16
 
-from config.schema import load_rig
-from drivers.dynamixel.bus import DynamixelBus
-from robot.assemble import Assembly, Choice, assemble
-from robot.loop import run
-from robot.summary import Summary
-from robot.types import in_order
-from sim_mock.dynamixel.chain import build_dynamixel
-from sim_mock.in_process_port import InProcessPort
+from gazerig.config.schema import load_rig
+from gazerig.drivers.dynamixel.bus import DynamixelBus
+from gazerig.robot.assemble import Assembly, Choice, assemble
+from gazerig.robot.loop import run
+from gazerig.robot.summary import Summary
+from gazerig.robot.types import in_order
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
 
 
 def main() -> None:

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drivers.vision.motion.image import Floats, middle
-from drivers.vision.motion.lucas_kanade import Back
+from gazerig.drivers.vision.motion.image import Floats, middle
+from gazerig.drivers.vision.motion.lucas_kanade import Back
 
 # Flow at neighbouring pixels is found from the same patches: so many square pixels count
 # as one measurement (8 px at half size).

@@ -7,9 +7,9 @@ the flow. It is told by its looks: it is as bright as the ground around the patc
 import cv2
 import numpy as np
 
-from drivers.vision.motion.clustering import Group
-from drivers.vision.motion.image import Floats, Grey
-from drivers.vision.motion.optical_flow import Mask
+from gazerig.drivers.vision.motion.clustering import Group
+from gazerig.drivers.vision.motion.image import Floats, Grey
+from gazerig.drivers.vision.motion.optical_flow import Mask
 
 _MARGIN_PX = 8
 # How far from the ground's brightness (standard deviations, grey levels) a thing's pixels are.

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.vision.motion.clustering import Group
-from drivers.vision.motion.image import Floats, Plane
-from drivers.vision.motion.params import MotionParams
+from gazerig.drivers.vision.motion.clustering import Group
+from gazerig.drivers.vision.motion.image import Floats, Plane
+from gazerig.drivers.vision.motion.params import MotionParams
 
 Vec3 = tuple[float, float, float]
 

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.vision.motion.affine import affine_rest
-from drivers.vision.motion.image import Floats
-from drivers.vision.motion.optical_flow import Flow, Mask
-from drivers.vision.motion.params import MotionParams
-from drivers.vision.motion.segmentation import Things
+from gazerig.drivers.vision.motion.affine import affine_rest
+from gazerig.drivers.vision.motion.image import Floats
+from gazerig.drivers.vision.motion.optical_flow import Flow, Mask
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.drivers.vision.motion.segmentation import Things
 
 Indices = NDArray[np.intp]
 

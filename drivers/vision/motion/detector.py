@@ -14,19 +14,37 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.types import MovingBlob
-from drivers.vision.motion.affine import PatchMotion, flow_map, patch_motion
-from drivers.vision.motion.anchor import anchor
-from drivers.vision.motion.backprojection import distance, place, radius_m, small_depth, velocity
-from drivers.vision.motion.clustering import Group, gathered
-from drivers.vision.motion.ego_motion import Ego, own_motion, turn_rad
-from drivers.vision.motion.image import Floats, Lens, Plane, SmallPicture, made_small, to_given
-from drivers.vision.motion.lucas_kanade import Blurred, Room, blurred, refined
-from drivers.vision.motion.optical_flow import Compared, FlowSearch, searchable, turn_homography
-from drivers.vision.motion.parallax import parallax
-from drivers.vision.motion.params import MotionParams
-from drivers.vision.motion.segmentation import what_moves
-from drivers.vision.motion.tracking import Follow, MotionTracks
+from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.vision.motion.affine import PatchMotion, flow_map, patch_motion
+from gazerig.drivers.vision.motion.anchor import anchor
+from gazerig.drivers.vision.motion.backprojection import (
+    distance,
+    place,
+    radius_m,
+    small_depth,
+    velocity,
+)
+from gazerig.drivers.vision.motion.clustering import Group, gathered
+from gazerig.drivers.vision.motion.ego_motion import Ego, own_motion, turn_rad
+from gazerig.drivers.vision.motion.image import (
+    Floats,
+    Lens,
+    Plane,
+    SmallPicture,
+    made_small,
+    to_given,
+)
+from gazerig.drivers.vision.motion.lucas_kanade import Blurred, Room, blurred, refined
+from gazerig.drivers.vision.motion.optical_flow import (
+    Compared,
+    FlowSearch,
+    searchable,
+    turn_homography,
+)
+from gazerig.drivers.vision.motion.parallax import parallax
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.drivers.vision.motion.segmentation import what_moves
+from gazerig.drivers.vision.motion.tracking import Follow, MotionTracks
 
 _KIND = "thing"
 # With less of the older picture in view, too little is left to tell motions apart.

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from drivers.vision.motion.image import Floats, Grey, middle
-from drivers.vision.motion.optical_flow import Compared, moved
+from gazerig.drivers.vision.motion.image import Floats, Grey, middle
+from gazerig.drivers.vision.motion.optical_flow import Compared, moved
 
 _GRID_PX = 8
 # At the edge the flow is worst, and leads out of the picture.

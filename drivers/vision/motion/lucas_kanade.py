@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.vision.motion.image import Floats, Grey, Plane, middle
-from drivers.vision.motion.optical_flow import moved
+from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, middle
+from gazerig.drivers.vision.motion.optical_flow import moved
 
 # (blur in pixels, most steps): what is off by more than the blur is not found.
 _LEVELS = ((2.5, 8), (1.0, 6))

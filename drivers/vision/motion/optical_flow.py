@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.vision.motion.image import Floats, Grey, Plane, SmallPicture
+from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, SmallPicture
 
 Mask = NDArray[np.bool_]
 Flow = NDArray[np.float32]

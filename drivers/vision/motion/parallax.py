@@ -7,8 +7,8 @@ of now, was seen at X - t, whatever it is part of; its depth says by how much th
 
 import numpy as np
 
-from drivers.vision.motion.image import Floats, Plane
-from drivers.vision.motion.optical_flow import Flow
+from gazerig.drivers.vision.motion.image import Floats, Plane
+from gazerig.drivers.vision.motion.optical_flow import Flow
 
 # Nearer than this no lens is sharp, and depth cameras invent.
 _NEAREST_M = 0.1

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from drivers.vision.motion.ego_motion import Ego
-from drivers.vision.motion.image import Plane
-from drivers.vision.motion.optical_flow import Compared, Flow, Mask
-from drivers.vision.motion.params import MotionParams
+from gazerig.drivers.vision.motion.ego_motion import Ego
+from gazerig.drivers.vision.motion.image import Plane
+from gazerig.drivers.vision.motion.optical_flow import Compared, Flow, Mask
+from gazerig.drivers.vision.motion.params import MotionParams
 
 # Where brightness is compared: wide enough to average noise, narrow enough for a hand.
 _WINDOW_PX = 7

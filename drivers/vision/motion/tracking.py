@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.vision.motion.image import Floats
-from drivers.vision.motion.optical_flow import moved
-from drivers.vision.motion.params import MotionParams
+from gazerig.drivers.vision.motion.image import Floats
+from gazerig.drivers.vision.motion.optical_flow import moved
+from gazerig.drivers.vision.motion.params import MotionParams
 
 # Farthest from its expected place, in sizes (the root of box width by height).
 _GATE_SIZES = 0.75

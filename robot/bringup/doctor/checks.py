@@ -5,15 +5,15 @@ Every rule is a function of one ``ServoState`` and yields verdicts.
 
 from collections.abc import Iterator
 
-from drivers.serial.port import BusPort
-from drivers.types import ServoSetup
-from robot.bringup.doctor.dynamixel import DYNAMIXEL
-from robot.bringup.doctor.feetech import FEETECH
-from robot.bringup.doctor.findings import Finding, Fix
-from robot.bringup.doctor.settings import SETTINGS
-from robot.bringup.doctor.state import STATE
-from robot.bringup.doctor.subject import FIX, ServoChecks, ServoState, Verdict
-from robot.bringup.servo_kind import TRIES, Found, Registers, ServoKind
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.dynamixel import DYNAMIXEL
+from gazerig.robot.bringup.doctor.feetech import FEETECH
+from gazerig.robot.bringup.doctor.findings import Finding, Fix
+from gazerig.robot.bringup.doctor.settings import SETTINGS
+from gazerig.robot.bringup.doctor.state import STATE
+from gazerig.robot.bringup.doctor.subject import FIX, ServoChecks, ServoState, Verdict
+from gazerig.robot.bringup.servo_kind import TRIES, Found, Registers, ServoKind
 
 CHECKS: dict[str, ServoChecks] = {checks.kind.name: checks for checks in (DYNAMIXEL, FEETECH)}
 """By the name of the kind."""
@@ -30,7 +30,7 @@ def visit(
     """Read one servo and judge it; torque is left as it is.
 
     Raises:
-        drivers.errors.BusLost: the port is gone.
+        BusLost: the port is gone.
     """
     return examine(take(kind.registers(port, TRIES), CHECKS[kind.name], setup, found, corrupt))
 
@@ -41,7 +41,7 @@ def take(
     """Read all that the rules want to know of one servo.
 
     Raises:
-        drivers.errors.BusLost: the port is gone.
+        BusLost: the port is gone.
     """
     return ServoState(checks, setup, found, checks.read(registers, setup.id), corrupt)
 
@@ -128,7 +128,7 @@ def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
     """Write a fix where the torque is off, so that it stays; returns "" or why it was not done.
 
     Raises:
-        drivers.errors.BusLost: the port is gone.
+        BusLost: the port is gone.
     """
     registers, servo_id = kind.registers(port, TRIES), fix.servo_id
     torque = registers.read(servo_id, "torque_enable")

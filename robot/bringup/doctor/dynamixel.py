@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from drivers.dynamixel.control_table import (
+from gazerig.drivers.dynamixel.control_table import (
     FAST_READ_SINCE,
     HARDWARE_ERRORS,
     MODELS,
@@ -10,7 +10,7 @@ from drivers.dynamixel.control_table import (
     VELOCITY_UNIT_STEPS_S,
     X330_WIDE_INDIRECT_SINCE,
 )
-from robot.bringup.doctor.subject import (
+from gazerig.robot.bringup.doctor.subject import (
     FIX,
     FirmwareNote,
     Protection,
@@ -19,8 +19,8 @@ from robot.bringup.doctor.subject import (
     Verdict,
     WantedSetting,
 )
-from robot.bringup.servo_families import DYNAMIXEL as KIND
-from robot.bringup.servo_kind import Registers
+from gazerig.robot.bringup.servo_families import DYNAMIXEL as KIND
+from gazerig.robot.bringup.servo_kind import Registers
 
 GUARDING = (2, 4, 5)
 """Bits of Shutdown that protect motor and gears: overheating, electrical shock, overload."""

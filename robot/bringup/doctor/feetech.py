@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from drivers.feetech.memory_table import (
+from gazerig.drivers.feetech.memory_table import (
     EEPROM_END,
     MODELS,
     MULTI_TURN,
@@ -12,7 +12,7 @@ from drivers.feetech.memory_table import (
     STEPS_PER_TURN,
     TORQUE_FULL,
 )
-from robot.bringup.doctor.subject import (
+from gazerig.robot.bringup.doctor.subject import (
     FIX,
     Protection,
     ServoChecks,
@@ -20,8 +20,8 @@ from robot.bringup.doctor.subject import (
     Verdict,
     WantedSetting,
 )
-from robot.bringup.servo_families import FEETECH as KIND
-from robot.bringup.servo_kind import Registers
+from gazerig.robot.bringup.servo_families import FEETECH as KIND
+from gazerig.robot.bringup.servo_kind import Registers
 
 SPANS = ((0, EEPROM_END), (EEPROM_END, 71 - EEPROM_END))
 """First address and length of what is read at once: all that is kept, and all that lives."""

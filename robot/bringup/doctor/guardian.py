@@ -1,9 +1,9 @@
 """Whether the guardian, which stands in for a watchdog that servos lack, can do its work."""
 
-from drivers.errors import SetupError
-from robot.bringup.doctor.findings import Finding
-from robot.guardian.guardian import Guardian
-from robot.guardian.release_plan import ReleasePlan, describe
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.bringup.doctor.findings import Finding
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.guardian.release_plan import ReleasePlan, describe
 
 WHERE = "guardian"
 

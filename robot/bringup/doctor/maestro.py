@@ -8,17 +8,17 @@ program. Source: Pololu Maestro User's Guide (0J40), sections 4.b, 4.e, 5.a and 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from drivers.errors import PortError
-from drivers.hobby_board.models import US_STEPS
-from drivers.maestro.commands import MICRO, MOST_INPUT
-from drivers.maestro.line import Line
-from drivers.maestro.params import MaestroParams
-from drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
-from drivers.serial.port import BusPort
-from drivers.servo_models import servo_label
-from drivers.types import ServoSetup
-from robot.bringup.doctor.findings import BOARD, Finding, Fix, Level
-from robot.bringup.maestro_settings import FACTORY_US, wide_range
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.maestro.commands import MICRO, MOST_INPUT
+from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.findings import BOARD, Finding, Fix, Level
+from gazerig.robot.bringup.maestro_settings import FACTORY_US, wide_range
 
 WHERE = "the board"
 SCRIPT = "script"
@@ -70,8 +70,8 @@ def visit(
     """Ask a board for all it tells and judge it; nothing moves.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     return examine(take(port, params, setups, usb))
 
@@ -84,8 +84,8 @@ def take(port: BusPort, params: MaestroParams, setups: Sequence[ServoSetup], usb
     the six that every board has, unless its size is known.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     found = probe(port, params)
     if found is None:
@@ -263,8 +263,8 @@ def apply_fix(port: BusPort, params: MaestroParams, fix: Fix) -> str:
     """Stop the board's script; gives "" or why it was not done. Nothing moves.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     found = probe(port, params)
     if found is None:

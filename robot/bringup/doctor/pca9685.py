@@ -6,15 +6,15 @@ PCA9685 data sheet, rev. 4.
 
 from collections.abc import Iterator, Sequence
 
-from drivers.errors import PortError, ServoMissing
-from drivers.event_log import EventLog
-from drivers.hobby_board.models import US_STEPS
-from drivers.pca9685.board import Pca9685Board
-from drivers.pca9685.params import Pca9685Params
-from drivers.serial.port import BusPort
-from drivers.servo_models import servo_label
-from drivers.types import ServoSetup
-from robot.bringup.doctor.findings import Finding
+from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.findings import Finding
 
 WHERE = "the board"
 
@@ -23,8 +23,8 @@ def visit(port: BusPort, params: Pca9685Params, setups: Sequence[ServoSetup]) ->
     """Ask the boards of one bus for all they tell and judge it; nothing moves.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: name its port")

@@ -6,7 +6,7 @@ Source of the latency timer: ROBOTIS e-Manual, U2D2 (FTDI adaptors wait 16 ms by
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from drivers.serial.list_ports import (
+from gazerig.drivers.serial.list_ports import (
     WISHED_LATENCY_MS,
     Access,
     Host,
@@ -17,7 +17,7 @@ from drivers.serial.list_ports import (
     latency_ms,
     serial_ports,
 )
-from robot.bringup.doctor.findings import Finding
+from gazerig.robot.bringup.doctor.findings import Finding
 
 UDEV_FILE = "/etc/udev/rules.d/99-servo-bus.rules"
 UDEV_RULE = (

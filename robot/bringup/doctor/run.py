@@ -9,15 +9,21 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drivers.errors import DriverError, PortError
-from drivers.serial.list_ports import WISHED_LATENCY_MS, Host, latency_file, latency_ms, set_latency
-from drivers.serial.port import BusPort
-from drivers.servo_models import servo_label
-from drivers.types import ServoSetup
-from robot.bringup.doctor.checks import visit
-from robot.bringup.doctor.findings import Finding, Fix, worst
-from robot.bringup.doctor.port import examine_latency, examine_port, port_facts
-from robot.bringup.servo_kind import Found, ServoKind, Tell
+from gazerig.drivers.errors import DriverError, PortError
+from gazerig.drivers.serial.list_ports import (
+    WISHED_LATENCY_MS,
+    Host,
+    latency_file,
+    latency_ms,
+    set_latency,
+)
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.checks import visit
+from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
+from gazerig.robot.bringup.doctor.port import examine_latency, examine_port, port_facts
+from gazerig.robot.bringup.servo_kind import Found, ServoKind, Tell
 
 
 class Presence(NamedTuple):
@@ -75,8 +81,8 @@ def check(
     """Examine every servo of a bus, and whoever else is on it; torque is left as it is.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     presence = look(port, kind, setups, baud, tell)
     findings = list(judge_presence(presence, kind, baud))
@@ -96,8 +102,8 @@ def look(
     """Find out who is on the bus; the port is left open at the rig's baud rate.
 
     Raises:
-        drivers.errors.PortError: the port cannot be opened.
-        drivers.errors.BusLost: it has gone away.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
     """
     tell(f"asking everybody at {baud} bit/s")
     _open(port, baud)
@@ -211,7 +217,7 @@ def apply_fixes(write: Callable[[Fix], str], findings: Iterable[Finding]) -> Ite
     write: writes one, where that is safe; gives "" or why it was not done
 
     Raises:
-        drivers.errors.BusLost: the port is gone.
+        BusLost: the port is gone.
     """
     for finding in findings:
         for fix in finding.fixes:

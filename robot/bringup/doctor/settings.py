@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
+from gazerig.robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
 
 
 def _firmware(state: ServoState) -> Iterator[Verdict]:

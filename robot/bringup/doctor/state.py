@@ -8,9 +8,9 @@ a restart.
 
 from collections.abc import Iterator
 
-from robot.bringup.doctor.findings import Level
-from robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
-from robot.bringup.servo_kind import ServoModel
+from gazerig.robot.bringup.doctor.findings import Level
+from gazerig.robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
+from gazerig.robot.bringup.servo_kind import ServoModel
 
 TRIPPED = 255
 WARM_C = 10

@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drivers.servo_models import servo_label
-from drivers.types import ServoSetup
-from robot.bringup.doctor.findings import Level
-from robot.bringup.servo_kind import Found, Registers, ServoKind, ServoModel
+from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.findings import Level
+from gazerig.robot.bringup.servo_kind import Found, Registers, ServoKind, ServoModel
 
 FIX = "gazerig doctor --fix"
 
