@@ -118,7 +118,7 @@ def model_of(params: type) -> type[BaseModel]:
 
 @cache
 def shapes_of(params: type) -> dict[str, Shape]:
-    """Give the shape of every field of a Params dataclass, in the order declared.
+    """Return the shape of every field of a Params dataclass, in the order declared.
 
     Raises:
         TypeError: a field has a type or metadata this module does not know.
@@ -292,7 +292,7 @@ def _fill(
 
 
 def _stand_in(shape: Shape, high: bool) -> Any:
-    """Give a value from one end of what may stand at a place."""
+    """Return a value from one end of what may stand at a place."""
     match shape:
         case Shape(form="number" | "whole"):
             least = shape.low if shape.low is not None else (shape.high or 1.0) - 1.0
@@ -311,7 +311,7 @@ def _stand_in(shape: Shape, high: bool) -> Any:
 
 
 def _default(declared: dataclasses.Field[Any]) -> Any:
-    """Give a field's default, if it has one."""
+    """Return a field's default, if it has one."""
     if declared.default_factory is not dataclasses.MISSING:
         return declared.default_factory()
     return _LEFT_OUT if declared.default is dataclasses.MISSING else declared.default

@@ -74,7 +74,7 @@ class Confined:
 
 
 def _leaves(above: str, value: object) -> Iterator[tuple[str, object]]:
-    """Give each value with its whole dotted key, whether it came dotted or as mappings."""
+    """Return each value with its whole dotted key, whether it came dotted or as mappings."""
     if not isinstance(value, Mapping):
         yield above, value
         return

@@ -67,7 +67,7 @@ class Entry:
     line: int
 
     def plain(self) -> Any:
-        """Give the value as dicts, tuples and scalars."""
+        """Return the value as dicts, tuples and scalars."""
         if isinstance(self.value, dict):
             return {key: entry.plain() for key, entry in self.value.items()}
         if isinstance(self.value, tuple):
@@ -75,7 +75,7 @@ class Entry:
         return self.value
 
     def nearest(self, path: Sequence[Step]) -> "Entry":
-        """Give the entry at a path, or the last one there is on the way to it."""
+        """Return the entry at a path, or the last one there is on the way to it."""
         entry = self
         for step in path:
             held: Entry | None = None

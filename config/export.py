@@ -30,7 +30,7 @@ class Complaint(NamedTuple):
 
 
 def json_schema(into: type) -> dict[str, Any]:
-    """Give the JSON Schema (draft 2020-12) of a file that is loaded into ``into``.
+    """Return the JSON Schema (draft 2020-12) of a file that is loaded into ``into``.
 
     Bounds, choices, descriptions and units are those of the fields; unknown keys are
     refused. Rules between fields and the difference of 1 and 1.0 are beyond the schema.

@@ -86,7 +86,7 @@ def knobs(rig: Rig, defaults: Rig) -> tuple[Knob, ...]:
 
 
 def value_of(rig: Rig, key: str) -> Value:
-    """Give the value at a dotted key; of a group, a mapping.
+    """Return the value at a dotted key; of a group, a mapping.
 
     Raises:
         gazerig.config.load.ConfigError: there is no such key; the message says which there are.
@@ -109,12 +109,12 @@ def value_of(rig: Rig, key: str) -> Value:
 
 
 def values(rig: Rig) -> dict[str, Value]:
-    """Give key -> value of every knob."""
+    """Return key -> value of every knob."""
     return {key: value for key, _, value in _leaves(_ROOT, rig, (), _unlisted(rig))}
 
 
 def values_after(known: Mapping[str, Value], before: Rig, after: Rig) -> dict[str, Value]:
-    """Give ``values(after)``; known: ``values(before)``, of which few will differ."""
+    """Return ``values(after)``; known: ``values(before)``, of which few will differ."""
     found = differences(before, after)
     same_entries = all(
         list(getattr(before, over)) == list(getattr(after, over)) for over in _UNLISTED
@@ -126,7 +126,7 @@ def values_after(known: Mapping[str, Value], before: Rig, after: Rig) -> dict[st
 
 
 def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
-    """Give the rig with other values at dotted keys, every rule checked.
+    """Return the rig with other values at dotted keys, every rule checked.
 
     A mapping is laid over what is there, as a file's layer is. None takes an entry out of a
     mapping whose entries cannot be null.
@@ -139,7 +139,7 @@ def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
 
 
 def _judged(rig: Rig, changes: Mapping[str, Value]) -> Rig | None:
-    """Give the changed rig, None where anything is wrong with it.
+    """Return the changed rig, None where anything is wrong with it.
 
     Sections in which nothing changes go through the judge as they are, already checked.
     """
@@ -153,7 +153,7 @@ def _judged(rig: Rig, changes: Mapping[str, Value]) -> Rig | None:
 
 
 def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
-    """Give the changed rig, or raise every fault; all is checked anew."""
+    """Return the changed rig, or raise every fault; all is checked anew."""
     data, faults = plain(rig), []
     for key, value in changes.items():
         faults += _put(data, key, _frozen(value))
@@ -166,7 +166,7 @@ def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
 
 
 def differences(before: Rig, after: Rig) -> dict[str, Value]:
-    """Give the changes that turn one rig into another: ``changed(before, ...) == after``.
+    """Return the changes that turn one rig into another: ``changed(before, ...) == after``.
 
     Where a mapping lost an entry, that entry's value is None.
     """
@@ -174,7 +174,7 @@ def differences(before: Rig, after: Rig) -> dict[str, Value]:
 
 
 def flattened(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
-    """Give changes with mappings written out as their single keys, as a file holds them."""
+    """Return changes with mappings written out as their single keys, as a file holds them."""
     out: dict[str, Value] = {}
     for key, value in changes.items():
         if isinstance(value, Mapping) and _is_group(rig, key):
@@ -185,7 +185,7 @@ def flattened(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
 
 
 def plain(value: Any) -> Any:
-    """Give frozen values as dicts, tuples and scalars."""
+    """Return frozen values as dicts, tuples and scalars."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = shapes_of(type(value))
         return {name: plain(getattr(value, name)) for name in fields}
@@ -197,7 +197,7 @@ def plain(value: Any) -> Any:
 
 
 def _parts(value: Any) -> dict[str, Any] | None:
-    """Give what stands one step below a value, None where there is nothing."""
+    """Return what stands one step below a value, None where there is nothing."""
     if isinstance(value, Mapping):
         return {str(key): item for key, item in value.items()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
@@ -206,7 +206,7 @@ def _parts(value: Any) -> dict[str, Any] | None:
 
 
 def _opened(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
-    """Give a value with plain dicts along the paths and at their ends, the rest as it is."""
+    """Return a value with plain dicts along the paths and at their ends, the rest as it is."""
     if () in paths:
         return plain(value)
     parts = _parts(value) if paths else None
@@ -275,7 +275,7 @@ def live(key: str) -> str:
 
 
 def _at(rig: Rig, key: str) -> Value:
-    """Give the value at a key, None where this rig has no such entry."""
+    """Return the value at a key, None where this rig has no such entry."""
     try:
         return value_of(rig, key)
     except ConfigError:
@@ -283,7 +283,7 @@ def _at(rig: Rig, key: str) -> Value:
 
 
 def _is_group(rig: Rig, key: str) -> bool:
-    """Tell whether a key holds keys of its own in a file."""
+    """Return whether a key holds keys of its own in a file."""
     shape: Shape | None = _ROOT
     for step in key.split("."):
         if shape is None:

@@ -34,11 +34,11 @@ class Document:
 
     @property
     def data(self) -> dict[str, Any]:
-        """Give the values as dicts, tuples and scalars."""
+        """Return the values as dicts, tuples and scalars."""
         return dict(self.root.plain())
 
     def line(self, key: str) -> int:
-        """Give the line of a dotted key path, or of the nearest mapping above it."""
+        """Return the line of a dotted key path, or of the nearest mapping above it."""
         return self.root.nearest(_steps(key)).line
 
 
@@ -148,7 +148,7 @@ def _merged(low: Entry, high: Entry) -> Entry:
 
 
 def _placed(root: Entry, complaint: Complaint) -> Fault:
-    """Give a complaint its file and line."""
+    """Return a complaint its file and line."""
     entry = root.nearest(complaint.path)
     key = ".".join(map(str, complaint.path))
     return Fault(entry.file, entry.line, key, complaint.value, complaint.rule)
@@ -163,7 +163,7 @@ def _contradiction(root: Entry, key: str, rule: str) -> Complaint:
 def _certain(
     root: Entry, into: type[T], wrong: set[tuple[Step, ...]], checks: Sequence[Check[T]]
 ) -> list[tuple[str, str]]:
-    """Give what the checks find whichever right values take the place of the wrong ones."""
+    """Return what the checks find whichever right values take the place of the wrong ones."""
     low, high = (filled(into, root.plain(), wrong, end) for end in (False, True))
     found: list[tuple[str, str]] = []
     for check in checks:

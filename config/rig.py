@@ -81,7 +81,7 @@ class BusConfig:
 
     @property
     def baud(self) -> int:
-        """Give the speed of its line in bit/s."""
+        """Return the speed of its line in bit/s."""
         if self.kind == "dynamixel":
             return self.dynamixel.baud
         if self.kind == "pca9685":
@@ -153,13 +153,13 @@ class LidJoints:
                 raise ValueError("a lid's shut and open angles must differ")
 
     def ends_deg(self, name: str) -> tuple[float | None, float | None]:
-        """Give the angles of the lid of a joint shut and open, None where they are not given."""
+        """Return the angles of the lid of a joint shut and open, None where they are not given."""
         shut, wide = (getattr(self, key) for key in self.keys(name))
         return shut, wide
 
     @staticmethod
     def keys(name: str) -> tuple[str, str]:
-        """Give the keys of a lid joint's shut and open angle."""
+        """Return the keys of a lid joint's shut and open angle."""
         # "left_upper_lid" stands as left_shut_deg, "left_lower_lid" as left_lower_shut_deg.
         lid = name.removesuffix("_lid").removesuffix("_upper")
         return f"{lid}_shut_deg", f"{lid}_open_deg"
@@ -267,11 +267,11 @@ class Rig:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Give the names of the joints, in the order of every sequence of them."""
+        """Return the names of the joints, in the order of every sequence of them."""
         return in_order(self.joints)
 
     def bus_named(self, name: str) -> BusConfig:
-        """Give a bus by its name, "" for the one without.
+        """Return a bus by its name, "" for the one without.
 
         Raises:
             KeyError: there is no such bus.
@@ -279,7 +279,7 @@ class Rig:
         return self.buses[name] if name else self.bus
 
     def bus_of(self, joint: str) -> BusConfig:
-        """Give the bus that a joint's servo is on.
+        """Return the bus that a joint's servo is on.
 
         Raises:
             KeyError: there is no such joint, or no such bus.

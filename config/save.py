@@ -63,7 +63,7 @@ def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> S
 
 
 def rig_file(name_or_path: Path | str) -> Path:
-    """Give the file behind a rig's name or path, as ``gazerig.config.schema.load_rig`` takes it.
+    """Return the file behind a rig's name or path, as ``gazerig.config.schema.load_rig`` takes it.
 
     Raises:
         gazerig.config.load.ConfigError: no rig of that name is shipped.
@@ -138,7 +138,7 @@ def copy_shipped(name: str, to: Path | str, kind: str = "rigs") -> Path:
 def _proposal(
     target: Path, changes: Mapping[str, Value], into: type, base: bytes | None = None
 ) -> tuple[bytes | None, bytes, tuple[Change, ...]]:
-    """Give the file as it is, None where there is none, as it would be, and the difference."""
+    """Return the file as it is, None where there is none, as it would be, and the difference."""
     known = tuple(shapes_of(into))
     if base is None:
         before = read_yaml(target, known)  # refuses what is no YAML, with the line

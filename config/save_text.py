@@ -39,7 +39,7 @@ class _Edit(NamedTuple):
 
 
 def edited(text: str, changes: Mapping[str, Value], into: type) -> str:
-    """Give the text with the values at dotted key paths replaced, missing keys added.
+    """Return the text with the values at dotted key paths replaced, missing keys added.
 
     into: the Params dataclass of the file; its fields' ``says`` explain keys that are added
 
@@ -122,7 +122,7 @@ def _find(root: MappingNode, steps: list[str]) -> _Place | None:
 
 
 def _span(text: str, place: _Place) -> tuple[int, int]:
-    """Give where a value stands: after its anchor and tag; an alias stands for the whole."""
+    """Return where a value stands: after its anchor and tag; an alias stands for the whole."""
     before, node = place
     at = before.start_mark.index if isinstance(before, SequenceNode) else before.end_mark.index
     if node.start_mark.index < at:  # the value itself stands at its anchor, further up
@@ -139,7 +139,7 @@ def _span(text: str, place: _Place) -> tuple[int, int]:
 
 
 def _end(text: str, place: _Place) -> int:
-    """Give where the last character of a value stands, comments after it left out."""
+    """Return where the last character of a value stands, comments after it left out."""
     node = place.node
     inside = isinstance(node, MappingNode | SequenceNode) and not node.flow_style
     if not inside or node.start_mark.index < place.before.start_mark.index:
@@ -200,7 +200,7 @@ def _added(text: str, root: MappingNode, key: str, value: Value, into: type) -> 
 
 
 def _end_of_line(text: str, at: int) -> int:
-    """Give where a line ends, before its line end."""
+    """Return where a line ends, before its line end."""
     end = text.find("\n", at)
     end = len(text) if end < 0 else end
     return end - 1 if end > at and text[end - 1] == "\r" else end

@@ -43,7 +43,7 @@ def refuse_existing(*paths: Path, force: bool = False) -> None:
 
 @contextlib.contextmanager
 def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
-    """Give a file to write to, which takes its place only when all of it is on the disk.
+    """Return a file to write to, which takes its place only when all of it is on the disk.
 
     Args:
         path: the file wanted; a pipe or a device is written to directly.
@@ -73,7 +73,7 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
 
 @contextlib.contextmanager
 def output_text(path: Path, force: bool = False) -> Iterator[TextIO]:
-    """Give a text file to write to, UTF-8 and with the line ends as written.
+    """Return a text file to write to, UTF-8 and with the line ends as written.
 
     Raises:
         SetupError: see ``output_file``.

@@ -40,7 +40,7 @@ class HostLateness:
         self._last_s = at_s
 
     def any_since(self, begin_s: float) -> bool:
-        """Tell whether an answer came late since then, noise beside it or not."""
+        """Return whether an answer came late since then, noise beside it or not."""
         return self._last_s >= begin_s
 
     def forget(self) -> None:

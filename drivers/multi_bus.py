@@ -34,7 +34,7 @@ class _Patience:
         self._in_vain, self._due_s = 0, -inf
 
     def due(self, now_s: float) -> bool:
-        """Tell whether to read it now."""
+        """Return whether to read it now."""
         return now_s >= self._due_s
 
     def note(self, readings: Sequence[ServoReading | None], now_s: float) -> None:
@@ -189,7 +189,7 @@ class MixedBus:
             return
 
     def health(self) -> BusHealth:
-        """Give byte and error counts of all buses together."""
+        """Return byte and error counts of all buses together."""
         each = [share.bus.health() for share in self._shares]
         errors: Counter[str] = Counter()
         for health in each:

@@ -57,7 +57,7 @@ class Plausibility:
         self._whole_s = float("nan")
 
     def whole(self, positions: Sequence[int], at_s: float) -> bool:
-        """Tell whether all positions of one answer can be true; they are noted only then."""
+        """Return whether all positions of one answer can be true; they are noted only then."""
         last, since_s = self._last, at_s - self._whole_s
         # Every tick: where all were last heard together there is one time for all of them.
         if not since_s >= 0.0 or None in last:
@@ -71,7 +71,7 @@ class Plausibility:
         return True
 
     def one(self, slot: int, position: int, at_s: float) -> bool:
-        """Tell whether one servo's position can be true; to be asked once for every answer."""
+        """Return whether one servo's position can be true; to be asked once for every answer."""
         last, odd = self._last[slot], self._odd[slot]
         if last is not None and not self._near(slot, last, self._at_s[slot], position, at_s):
             if odd and not self._near(slot, *odd[-1], position, at_s):
@@ -95,10 +95,10 @@ class Plausibility:
         self._damaged_s = at_s
 
     def disturbed(self, now_s: float) -> bool:
-        """Tell whether answers have been damaged of late."""
+        """Return whether answers have been damaged of late."""
         return now_s - self._damaged_s <= DISTURBED_S
 
     def pair(self, slot: int, first: int, first_s: float, second: int, second_s: float) -> bool:
-        """Tell whether two answers right after one another can both be true."""
+        """Return whether two answers right after one another can both be true."""
         reach = PAIR_STEPS + self._fastest[slot] * max(0.0, second_s - first_s)
         return abs(second - first) <= reach

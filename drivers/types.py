@@ -152,7 +152,7 @@ class ServoBus(Protocol):
         ...
 
     def health(self) -> BusHealth:
-        """Give byte and error counts."""
+        """Return byte and error counts."""
         ...
 
     def close(self) -> None:
@@ -257,7 +257,7 @@ class Camera(Protocol):
         ...
 
     def latest(self, now_s: float) -> Detections | None:
-        """Give the newest detections available at ``now_s``, or None before the first.
+        """Return the newest detections available at ``now_s``, or None before the first.
 
         Raises:
             CameraError: the source has failed for good.

@@ -36,12 +36,12 @@ def scale(a: Vec3, factor: float) -> Vec3:
 
 
 def dot(a: Vec3, b: Vec3) -> float:
-    """Give the inner product."""
+    """Return the inner product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vec3, b: Vec3) -> Vec3:
-    """Give the outer product."""
+    """Return the outer product."""
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -50,12 +50,12 @@ def cross(a: Vec3, b: Vec3) -> Vec3:
 
 
 def norm(a: Vec3) -> float:
-    """Give the length of a vector."""
+    """Return the length of a vector."""
     return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 def unit(a: Vec3) -> Vec3:
-    """Give the direction of a vector; straight ahead for the zero vector."""
+    """Return the direction of a vector; straight ahead for the zero vector."""
     length = norm(a)
     if length == 0.0:
         return (1.0, 0.0, 0.0)
@@ -63,23 +63,23 @@ def unit(a: Vec3) -> Vec3:
 
 
 def direction(yaw_pitch_rad: Angles2) -> Vec3:
-    """Give the unit vector with a yaw and pitch."""
+    """Return the unit vector with a yaw and pitch."""
     yaw, pitch = yaw_pitch_rad
     return (cos(pitch) * cos(yaw), cos(pitch) * sin(yaw), sin(pitch))
 
 
 def yaw_pitch(v: Vec3) -> Angles2:
-    """Give the yaw and pitch of a vector of any length."""
+    """Return the yaw and pitch of a vector of any length."""
     return (atan2(v[1], v[0]), atan2(v[2], hypot(v[0], v[1])))
 
 
 def angle_between(a: Vec3, b: Vec3) -> float:
-    """Give the angle between two vectors of any length, exact also for tiny angles."""
+    """Return the angle between two vectors of any length, exact also for tiny angles."""
     return atan2(norm(cross(a, b)), dot(a, b))
 
 
 def along_great_circle(start: Vec3, end: Vec3, fraction: float) -> Vec3:
-    """Give the unit vector a fraction of the way from one unit vector to another.
+    """Return the unit vector a fraction of the way from one unit vector to another.
 
     0 gives ``start``, 1 gives ``end``; the path is the shorter arc. Opposite vectors
     have no shortest arc: the turn then goes over the left.
@@ -130,7 +130,7 @@ def shortened(v: Vec3, offset_rad: float) -> Vec3:
 
 
 def rotation(head_rad: Angles3) -> Mat3:
-    """Give the rotation Rz(yaw) Ry(-pitch) Rx(roll) of a yaw-pitch-roll neck."""
+    """Return the rotation Rz(yaw) Ry(-pitch) Rx(roll) of a yaw-pitch-roll neck."""
     yaw, pitch, roll = head_rad
     cy, sy = cos(yaw), sin(yaw)
     cp, sp = cos(pitch), sin(pitch)
@@ -143,7 +143,7 @@ def rotation(head_rad: Angles3) -> Mat3:
 
 
 def angles_of(R: Mat3) -> Angles3:
-    """Give the yaw, pitch and roll of a rotation: the inverse of ``rotation``."""
+    """Return the yaw, pitch and roll of a rotation: the inverse of ``rotation``."""
     return (
         atan2(R[1][0], R[0][0]),
         asin(min(1.0, max(-1.0, R[2][0]))),
@@ -152,7 +152,7 @@ def angles_of(R: Mat3) -> Angles3:
 
 
 def rotate(R: Mat3, v: Vec3) -> Vec3:
-    """Give R v: child coordinates to parent coordinates."""
+    """Return R v: child coordinates to parent coordinates."""
     return (
         R[0][0] * v[0] + R[0][1] * v[1] + R[0][2] * v[2],
         R[1][0] * v[0] + R[1][1] * v[1] + R[1][2] * v[2],
@@ -161,7 +161,7 @@ def rotate(R: Mat3, v: Vec3) -> Vec3:
 
 
 def rotate_back(R: Mat3, v: Vec3) -> Vec3:
-    """Give R^T v: parent coordinates to child coordinates."""
+    """Return R^T v: parent coordinates to child coordinates."""
     return (
         R[0][0] * v[0] + R[1][0] * v[1] + R[2][0] * v[2],
         R[0][1] * v[0] + R[1][1] * v[1] + R[2][1] * v[2],
@@ -170,7 +170,7 @@ def rotate_back(R: Mat3, v: Vec3) -> Vec3:
 
 
 def compose(A: Mat3, B: Mat3) -> Mat3:
-    """Give A B."""
+    """Return A B."""
     rows = []
     for a in A:
         rows.append(

@@ -93,7 +93,6 @@ class Attention:
         top_down: TopDown,
         idle: Idle,
     ) -> None:
-        """Take the models it decides between."""
         self._params = params
         self._field_of_view = field_of_view
         self._bottom_up = bottom_up
@@ -122,7 +121,7 @@ class Attention:
         self._eye: tuple[Vec3, float] | None = None
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
-        """Give the target in force at ``t_s``."""
+        """Return the target in force at ``t_s``."""
         fresh = percept is not None and percept.age_s(t_s) <= self._params.stale_ms / 1e3
         if percept is not None and fresh and percept.captured_s != self._seen_s:
             self._seen_s = percept.captured_s
@@ -159,7 +158,7 @@ class Attention:
     def _compare(
         self, bodies: Bodies, seen: NDArray[np.bool_], state: GazeState, t_s: float
     ) -> _Choice:
-        """Give everything that the decision rests on."""
+        """Return everything that the decision rests on."""
         n, eye = len(bodies), state.p_world_head_m
         looks = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
         motion = self._bottom_up.step(bodies, eye, t_s, self._eye_velocity(eye, t_s), looks, seen)
@@ -182,14 +181,14 @@ class Attention:
         return _Choice(bodies, motion, wanted, rule, interest, total)
 
     def _eye_velocity(self, p_eye_m: Vec3, t_s: float) -> Vec3:
-        """Give how fast the head has carried the eyes since the decision before, m/s."""
+        """Return how fast the head has carried the eyes since the decision before, m/s."""
         before, self._eye = self._eye, (p_eye_m, t_s)
         if before is None or not 0.0 < t_s - before[1] <= _SPEED_OVER_S:
             return _STILL
         return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
 
     def _winner(self, made: _Choice, t_s: float) -> int:
-        """Give the row of the strongest, the present one being favoured."""
+        """Return the row of the strongest, the present one being favoured."""
         best = int(made.total.argmax())
         # A change of mind does not wait for the end of a fixation.
         changed = self._behaviour != self.top_down.behaviour
@@ -202,7 +201,7 @@ class Attention:
         return row if stays else best
 
     def _present_row(self, made: _Choice) -> int | None:
-        """Give the row of what is looked at now, None where it is no longer there."""
+        """Return the row of what is looked at now, None where it is no longer there."""
         if self._identity == _POINT:
             return len(made.bodies) if made.total[-1] > -inf else None
         if self._identity is None or self._identity[1] not in made.bodies.ids:
@@ -234,7 +233,7 @@ def _target(made: _Choice, row: int, captured_s: float) -> Target:
 
 
 def _strongest(made: _Choice, row: int) -> tuple[Pull, ...]:
-    """Give the pulls of a row and of the strongest others, term by term."""
+    """Return the pulls of a row and of the strongest others, term by term."""
     total = made.total
     if len(total) > 64:
         rows = np.argpartition(-total, _LISTED)[:_LISTED]

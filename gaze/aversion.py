@@ -114,7 +114,6 @@ class Aversion:
     """Semi-Markov MUTUAL <-> AWAY on faces; everything else passes through."""
 
     def __init__(self, params: AversionParams, rng: np.random.Generator) -> None:
-        """Take times, angles and dice; nothing happens before ``converse``."""
         self._rng = rng
         self.retune(params)
         self._mode: AversionMode = "none"
@@ -176,7 +175,7 @@ class Aversion:
             self._until_s = t_s if mode == "think" else t_s + self._mutual_s()
 
     def step(self, target: Target, p_world_head_m: Vec3, t_s: float) -> Target:
-        """Give the target itself, or a place beside the face while looking away.
+        """Return the target itself, or a place beside the face while looking away.
 
         A place beside a face has kind "away", the id of the face, the face's centre as
         centre (the head stays with the person) and a shift number of its own; the

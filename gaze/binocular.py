@@ -175,7 +175,6 @@ class BinocularController:
     """Drives one axis of both eyes; give the same target twice for the vertical one."""
 
     def __init__(self, params: BinocularParams) -> None:
-        """Take gains, delays and ranges."""
         par = self._params = params
         self._conjugate = Conjugate(
             par.gain_1_s,
@@ -209,7 +208,7 @@ class BinocularController:
         dt_s: float,
         saccade: tuple[float, float] | None = None,
     ) -> tuple[float, float]:
-        """Give the left and right eye angle in the head for the next period.
+        """Return the left and right eye angle in the head for the next period.
 
         left_rad, right_rad: direction in space of the target from each eye; None: not seen
         saccade: version and vergence that a saccade under way prescribes
@@ -235,7 +234,7 @@ class BinocularController:
         return self._eyes
 
     def _wishes(self, seen: _Moment | None, head: float, dt_s: float) -> tuple[float, float]:
-        """Give the conjugate and the vergence rate."""
+        """Return the conjugate and the vergence rate."""
         par = self._params
         gaze = self.version_rad + head
         place = _place(seen)
@@ -256,14 +255,14 @@ class BinocularController:
         return 0.5 * u_c, -side * par.converge_1_s * u_c / par.gain_1_s
 
     def _demand(self, dt_s: float) -> float | None:
-        """Give the vergence that the target asked for when it was seen."""
+        """Return the vergence that the target asked for when it was seen."""
         then = self._ago(self._params.vergence_delay_ms / 1e3, dt_s)
         if then is None or then.left is None or then.right is None:
             return None
         return then.right - then.left
 
     def _reflex(self, head: HeadMotion, dt_s: float) -> float:
-        """Give the conjugate rate that the head's turning and moving call for."""
+        """Return the conjugate rate that the head's turning and moving call for."""
         par = self._params
         turning = par.vor_gain * head.gate * self._canals.step(head.rate_rad_s, dt_s)
         if head.ahead_m_s == 0.0 and head.left_m_s == 0.0:
@@ -274,7 +273,7 @@ class BinocularController:
         )
 
     def _ago(self, delay_s: float, dt_s: float) -> _Moment | None:
-        """Give what there was a delay ago, None before the beginning."""
+        """Return what there was a delay ago, None before the beginning."""
         par = self._params
         longest = round(max(par.delay_ms, par.vergence_delay_ms) / 1e3 / dt_s)
         while len(self._past) > longest + 1:
@@ -283,7 +282,7 @@ class BinocularController:
         return self._past[-1 - back] if len(self._past) > back else None
 
     def _angles(self, u_c: float, u_d: float) -> tuple[float, float]:
-        """Give both eyes' angles, led by the servos' lag and kept in range."""
+        """Return both eyes' angles, led by the servos' lag and kept in range."""
         lead = self._params.servo_lead_ms / 1e3
         c, v = self.version_rad, self.vergence_rad
         return (
@@ -293,7 +292,7 @@ class BinocularController:
 
 
 def _place(seen: _Moment | None) -> float | None:
-    """Give where in space the target was: the retinal error plus the gaze of that moment."""
+    """Return where in space the target was: the retinal error plus the gaze of that moment."""
     if seen is None:
         return None
     errors = []

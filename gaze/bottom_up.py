@@ -117,7 +117,7 @@ class Pulls(NamedTuple):
 
     @property
     def total(self) -> Floats:
-        """Give A_i, the sum of all terms."""
+        """Return A_i, the sum of all terms."""
         total = self.slide + self.loom
         total += self.spin
         total += self.onset
@@ -125,7 +125,7 @@ class Pulls(NamedTuple):
 
 
 def slide_loom_spin(v: Floats, w: Floats, e: Floats) -> Terms:
-    """Give the three terms of eq 1 for all bodies at once.
+    """Return the three terms of eq 1 for all bodies at once.
 
     v, w: (n, 3) velocities (m/s) and angular velocities (rad/s)
     e:    (n, 3) or (3,) view directions of any length
@@ -136,13 +136,13 @@ def slide_loom_spin(v: Floats, w: Floats, e: Floats) -> Terms:
 
 
 def _eq_1(v: Floats, w: Floats, e: Floats) -> Terms:
-    """Give the terms of (3, n) vectors, e being of length 1."""
+    """Return the terms of (3, n) vectors, e being of length 1."""
     along = (v * e).sum(axis=0)
     return Terms(_length(v - along * e), np.abs(along), np.abs((w * e).sum(axis=0)))
 
 
 def _length(v: Floats) -> Floats:
-    """Give the lengths of the columns of a (3, n) array."""
+    """Return the lengths of the columns of a (3, n) array."""
     out: Floats = np.sqrt((v * v).sum(axis=0))
     return out
 
@@ -164,7 +164,7 @@ class _Memory(NamedTuple):
 
 
 def _never_seen(ids: Ids) -> _Memory:
-    """Give what is known of bodies that nothing is known of."""
+    """Return what is known of bodies that nothing is known of."""
     n = len(ids)
     return _Memory(ids, np.zeros((3, n)), np.full(n, -np.inf), np.full(n, -np.inf))
 
@@ -173,7 +173,6 @@ class BottomUp:
     """Eq 1 with a low-pass per body, and the pull of what has just come into view."""
 
     def __init__(self, params: BottomUpParams) -> None:
-        """Take form and weights."""
         self._params = params
         self.reset(0.0)
 
@@ -197,7 +196,7 @@ class BottomUp:
         gaze_world: Vec3 = _AHEAD,
         seen: NDArray[np.bool_] | None = None,
     ) -> Pulls:
-        """Give the smoothed pulls of all bodies, in their order; 0 for those not in view.
+        """Return the smoothed pulls of all bodies, in their order; 0 for those not in view.
 
         Must be called with no bodies, too, or what comes next is not known to be new.
 
@@ -214,7 +213,7 @@ class BottomUp:
         return self._blend(now, seen, t_s)
 
     def _terms(self, bodies: Bodies, p_eye: Vec3, v_eye: Vec3, gaze: Vec3) -> Floats:
-        """Give (3, n) slide, loom and spin as they are now."""
+        """Return (3, n) slide, loom and spin as they are now."""
         now = np.empty((3, len(bodies)))
         for start in range(0, len(bodies), BLOCK):
             some = slice(start, start + BLOCK)
@@ -271,7 +270,7 @@ class BottomUp:
             self._gone = self._gone._replace(seen_s=self._gone.seen_s + paused_s)
 
     def _entry_s(self, t_s: float) -> float:
-        """Give the time of entry of what is seen for the first time at ``t_s``.
+        """Return the time of entry of what is seen for the first time at ``t_s``.
 
         What the first moments show was there before: it entered long ago.
         """

@@ -47,7 +47,6 @@ class Breathing:
     """Sway of the neck as a closed form of the time."""
 
     def __init__(self, params: BreathingParams) -> None:
-        """Take depth and pace."""
         self._take(params)
         self.reset(0.0)
 
@@ -71,7 +70,7 @@ class Breathing:
         self._retuned_s = self._t_s
 
     def step(self, t_s: float) -> Angles3:
-        """Give the (yaw, pitch, roll) to add to the head's; yaw is always 0."""
+        """Return the (yaw, pitch, roll) to add to the head's; yaw is always 0."""
         self._t_s = t_s
         self._shown = self._sway(t_s)
         if self._left != _STILL:  # what a retune has left over, going within a second

@@ -15,11 +15,10 @@ class Leak:
     """Shared neural integrator: holds, or leaks back to straight ahead with T_N."""
 
     def __init__(self, hold_s: float) -> None:
-        """Take the time constant T_N; 0 holds for ever."""
         self._hold_s = hold_s
 
     def step(self, value: float, rate: float, dt_s: float) -> float:
-        """Give the integrated value one period later."""
+        """Return the integrated value one period later."""
         if self._hold_s == 0.0:
             return value + rate * dt_s
         kept = exp(-dt_s / self._hold_s)
@@ -45,7 +44,6 @@ class Conjugate:
         lead_s: float,
         fade_s: float,
     ) -> None:
-        """Take Kc, Gp, e_max, v_max, v_rej, Tf, h and the decay of a lost target's speed."""
         self._Kc, self._Gp = position_gain_1_s, velocity_gain
         self._max_error, self._max_speed = max_error_rad, max_speed_rad_s
         self._reject, self._smooth_s = reject_rad_s, smooth_s
@@ -65,7 +63,7 @@ class Conjugate:
             self._seen = target_rad
 
     def step(self, target_rad: float | None, gaze_rad: float, dt_s: float) -> float:
-        """Give the velocity wish; None: no target, what speed there was fades."""
+        """Return the velocity wish; None: no target, what speed there was fades."""
         if target_rad is None:
             self.speed_rad_s *= exp(-dt_s / self._fade_s)
             return self._Gp * clip(self.speed_rad_s, self._max_speed)
@@ -92,11 +90,10 @@ class Vergence:
     """Velocity wish of the angle between the eyes: first order, diverging slower."""
 
     def __init__(self, converge_1_s: float, diverge_1_s: float) -> None:
-        """Take Kd and Kdiv."""
         self._converge, self._diverge = converge_1_s, diverge_1_s
 
     def step(self, demand_rad: float | None, vergence_rad: float) -> float:
-        """Give the rate; None: an eye is covered and the angle is kept."""
+        """Return the rate; None: an eye is covered and the angle is kept."""
         if demand_rad is None:
             return 0.0
         error = demand_rad - vergence_rad

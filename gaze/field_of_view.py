@@ -57,7 +57,6 @@ class FieldOfView:
     """Tells which bodies either eye sees."""
 
     def __init__(self, params: FieldOfViewParams) -> None:
-        """Take the limits in degrees."""
         self.retune(params)
 
     def retune(self, params: FieldOfViewParams) -> None:
@@ -70,7 +69,7 @@ class FieldOfView:
         self._own = frozenset(params.own_kinds)
 
     def visible(self, bodies: Bodies, state: GazeState) -> NDArray[np.bool_]:
-        """Give (n,) whether each body's centre is in the field of at least one eye.
+        """Return (n,) whether each body's centre is in the field of at least one eye.
 
         One's own bodies are never among them; with occlusion neither are those that stand
         behind another body, one's own included, as seen from the head.
@@ -86,7 +85,7 @@ class FieldOfView:
         return seen
 
     def _in_field(self, p_world_m: Floats, state: GazeState) -> NDArray[np.bool_]:
-        """Give (n,) whether each point is in the field of at least one eye."""
+        """Return (n,) whether each point is in the field of at least one eye."""
         seen = np.empty(len(p_world_m), dtype=np.bool_)
         for start in range(0, len(seen), BLOCK):
             some = slice(start, start + BLOCK)
@@ -97,7 +96,7 @@ class FieldOfView:
         return seen
 
     def _in_one_field(self, p_world_m: Floats, state: GazeState, left: bool) -> NDArray[np.bool_]:
-        """Give (n,) whether each point is in the field of one eye."""
+        """Return (n,) whether each point is in the field of one eye."""
         p_eye = state.p_world_eye_left_m if left else state.p_world_eye_right_m
         rel = columns(p_world_m)
         rel -= np.array(p_eye)[:, None]
@@ -117,12 +116,12 @@ class FieldOfView:
 
 
 def columns(rows: Floats) -> Floats:
-    """Give (n, 3) vectors as (3, n), copied: numpy is many times slower on rows of three."""
+    """Return (n, 3) vectors as (3, n), copied: numpy is many times slower on rows of three."""
     return rows.T.copy(order="C")
 
 
 def hidden(rel_m: Floats, radius_m: Floats, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Give for each of ``rows`` whether any body's sphere lies wholly before its centre.
+    """Return for each of ``rows`` whether any body's sphere lies wholly before its centre.
 
     rel_m:    (n, 3) centres seen from the eye
     radius_m: (n,) radii
@@ -150,13 +149,13 @@ def hidden(rel_m: Floats, radius_m: Floats, rows: NDArray[np.intp]) -> NDArray[n
 
 
 def eye_axes(state: GazeState, left: bool) -> Mat3:
-    """Give R_world_eye of one eye: x along its line of sight, y left, z up."""
+    """Return R_world_eye of one eye: x along its line of sight, y left, z up."""
     angles: Angles2 = state.eye_left_rad if left else state.eye_right_rad
     return compose(state.R_world_head, rotation((angles[0], angles[1], 0.0)))
 
 
 def line_of_sight(state: GazeState, left: bool) -> Vec3:
-    """Give the unit vector along which one eye looks, in the world."""
+    """Return the unit vector along which one eye looks, in the world."""
     return rotate(
         state.R_world_head, direction(state.eye_left_rad if left else state.eye_right_rad)
     )

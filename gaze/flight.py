@@ -25,7 +25,6 @@ class Flight:
     """From one point in the world to another in the time that the saccade takes."""
 
     def __init__(self, saccade: Saccade, start: Vec3, end: Vec3, eye: Vec3, onset_s: float) -> None:
-        """Take both points, the centre between the eyes, and the time of onset."""
         self._profile, self._start, self._end = saccade.profile, start, end
         self._start_way, self._end_way = unit(sub(start, eye)), unit(sub(end, eye))
         self.onset_s = onset_s
@@ -33,7 +32,7 @@ class Flight:
         self.ends_s = onset_s + self._profile.duration_s(self.amplitude_rad)
 
     def at(self, eye: Vec3, t_s: float) -> Vec3:
-        """Give the gaze point, seen from where the eyes are now."""
+        """Return the gaze point, seen from where the eyes are now."""
         done = self._profile.displacement_rad(self.amplitude_rad, t_s - self.onset_s)
         share = done / self.amplitude_rad if self.amplitude_rad > 0.0 else 1.0
         a, b = sub(self._start, eye), sub(self._end, eye)
@@ -46,14 +45,14 @@ class Flight:
         return add(eye, scale(unit(way), 1.0 / ((1.0 - share) * near_a + share * near_b)))
 
     def landed(self, t_s: float) -> bool:
-        """Tell whether it is over."""
+        """Return whether it is over."""
         return t_s >= self.ends_s - 1e-9
 
 
 def scattered(
     end: Vec3, start: Vec3, eye: Vec3, along: float, across: float, rng: np.random.Generator
 ) -> Vec3:
-    """Give where a saccade lands whose noise grows with its size (Harris & Wolpert).
+    """Return where a saccade lands whose noise grows with its size (Harris & Wolpert).
 
     along, across: standard deviations as shares of the amplitude
     """

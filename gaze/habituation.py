@@ -90,7 +90,6 @@ class Habituation:
     """Keeps the interest in every identity and the places left."""
 
     def __init__(self, params: HabituationParams) -> None:
-        """Take the rates."""
         self._params = params
         self.reset(0.0)
 
@@ -119,7 +118,7 @@ class Habituation:
         attended_id: int,
         t_s: float,
     ) -> Floats:
-        """Give (n,) the interest 0..1 in each body.
+        """Return (n,) the interest 0..1 in each body.
 
         ids, p_world_m: the bodies in view and their centres, (n, 3)
         attended_id: what has been looked at since the step before; -1 for nothing
@@ -136,7 +135,7 @@ class Habituation:
         return interest
 
     def for_rule(self, interest: Floats) -> Floats:
-        """Give the interest in bodies that a rule points at: it does not go below the floor."""
+        """Return the interest in bodies that a rule points at: it does not go below the floor."""
         floor = self._params.rule_floor
         out: Floats = floor + (1.0 - floor) * interest
         return out
@@ -176,6 +175,6 @@ class Habituation:
 
 
 def _directions(rel_m: Floats) -> Floats:
-    """Give the directions of (n, 3) vectors."""
+    """Return the directions of (n, 3) vectors."""
     out: Floats = rel_m / np.maximum(np.sqrt((rel_m * rel_m).sum(axis=1, keepdims=True)), 1e-9)
     return out

@@ -167,7 +167,6 @@ class Head:
     def __init__(
         self, params: HeadParams, eye_limit_rad: float, neck_limit_rad: tuple[Angles2, Angles2]
     ) -> None:
-        """Take the smallest eye limit and the neck's ((yaw low, high), (pitch low, high))."""
         self.retune(params, eye_limit_rad, neck_limit_rad)
         self.reset(0.0, (0.0, 0.0, 0.0))
 
@@ -195,14 +194,14 @@ class Head:
         self._level = head_rad[2] == 0.0
 
     def offset_rad(self, pull: float) -> float:
-        """Give how far short of the target the head stops (eq 7, sign corrected)."""
+        """Return how far short of the target the head stops (eq 7, sign corrected)."""
         par = self._params
         z = 2.0 * (pull - par.pull_least) / (par.pull_most - par.pull_least) - 1.0
         full = radians(par.largest_offset_deg) / (1.0 + exp(min(700.0, 7.0 * z)))
         return full if par.literal_reach else min(full, self.trigger_rad)
 
     def goal_rad(self, facing_rad: Angles2, offset_rad: float) -> Angles2:
-        """Give the head's yaw and pitch goal: the arc to the target, shortened, in range."""
+        """Return the head's yaw and pitch goal: the arc to the target, shortened, in range."""
         yaw, pitch = yaw_pitch(shortened(direction(facing_rad), offset_rad))
         return self.in_range((yaw, pitch, 0.0))[:2]
 
@@ -225,7 +224,7 @@ class Head:
         return self._reaching(facing_rad, facing_rad, self._stops_short(target, facing_rad))
 
     def leads_s(self, target: Target, eccentricity_rad: float) -> float:
-        """Give how long the eyes wait because the head goes first."""
+        """Return how long the eyes wait because the head goes first."""
         first = target.top_down and eccentricity_rad >= self.trigger_rad
         return self._params.lead_ms / 1e3 if first else 0.0
 
@@ -238,7 +237,7 @@ class Head:
         since_eye_onset_s: float,
         t_s: float,
     ) -> Angles3:
-        """Give the head's yaw, pitch and roll for this instant.
+        """Return the head's yaw, pitch and roll for this instant.
 
         facing_rad: neck angles that would point the face straight at the target's centre
         gaze_rad: the same for the point itself that is looked at
@@ -291,7 +290,7 @@ class Head:
             self._aim(self._reaching(facing, gaze, short_rad), t_s)
 
     def _stops_short(self, target: Target, facing: Angles2) -> float:
-        """Give the angle by which the head stops short of the target."""
+        """Return the angle by which the head stops short of the target."""
         par = self._params
         if par.goal_by == "attention":
             return self.offset_rad(target.pull)
@@ -302,7 +301,7 @@ class Head:
         return min(short, self.trigger_rad)
 
     def _reaching(self, facing: Angles2, gaze: Angles2, offset_rad: float) -> Angles2:
-        """Give the goal for the centre; for the point itself if its eye could not get there."""
+        """Return the goal for the centre; for the point itself if its eye could not get there."""
         goal = self.goal_rad(facing, offset_rad)
         if facing == gaze or self._params.literal_reach:
             return goal
@@ -323,7 +322,7 @@ class Head:
         self._planned_s, self._ends_s = t_s, t_s + duration
 
     def _duration_s(self, amplitude_rad: float) -> float:
-        """Give the time of a head movement: peak speed grows with its size."""
+        """Return the time of a head movement: peak speed grows with its size."""
         par = self._params
         amplitude = degrees(amplitude_rad)
         peak = (4.0 / 3.0 * amplitude / 50.0 + 0.4) * par.base_speed_deg_s

@@ -174,7 +174,6 @@ class Idle:
     """Chooses the target when attention has none."""
 
     def __init__(self, params: IdleParams, rng: np.random.Generator | None = None) -> None:
-        """Take times, ranges and dice; without dice it only waits and then rests."""
         self._rng = rng
         self._take(params)
         self.reset(0.0)
@@ -216,7 +215,7 @@ class Idle:
         self._last, self._lost = target, False
 
     def step(self, t_s: float) -> Target:
-        """Give where to look with nothing in sight: wait, search, rest, glance."""
+        """Return where to look with nothing in sight: wait, search, rest, glance."""
         self._t_s = t_s
         if not self._lost:
             self._lose(t_s)
@@ -258,7 +257,7 @@ class Idle:
             self._rest_now(t_s)
 
     def _once_more(self, rng: np.random.Generator) -> bool:
-        """Tell whether another glance follows a glance at once."""
+        """Return whether another glance follows a glance at once."""
         return self._now.kind == "glance" and rng.random() < self._params.again_share
 
     def _rest_now(self, t_s: float) -> None:
@@ -290,7 +289,7 @@ class Idle:
         self._until_s = min(until_s, max(self._search_until_s, t_s + _SHORTEST_S))
 
     def _way_out(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:
-        """Give the yaw and pitch from the loss to where it was heading; 0 for what stood."""
+        """Return the yaw and pitch from the loss to where it was heading; 0 for what stood."""
         soon = yaw_pitch(add(rel, scale(v_world_m_s, 0.05)))
         now = yaw_pitch(rel)
         yaw, pitch = wrap(soon[0] - now[0]), soon[1] - now[1]

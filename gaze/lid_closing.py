@@ -10,7 +10,7 @@ from gazerig.gaze.saccade import min_jerk
 
 
 def closure(since_onset_s: float, close_s: float, hold_s: float, open_s: float) -> float:
-    """Give how far a lid is shut, 0..1, a time after the onset of a blink or wink."""
+    """Return how far a lid is shut, 0..1, a time after the onset of a blink or wink."""
     if since_onset_s <= 0.0 or since_onset_s >= close_s + hold_s + open_s:
         return 0.0
     if since_onset_s < close_s:
@@ -43,14 +43,14 @@ class Closing(NamedTuple):
 
     @property
     def length_s(self) -> float:
-        """Give how long it takes in all."""
+        """Return how long it takes in all."""
         return self.slow * (self.close_s + self.hold_s + self.open_s)
 
     def under_way(self, t_s: float) -> bool:
-        """Tell whether it has begun and is not over."""
+        """Return whether it has begun and is not over."""
         return self.onset_s <= t_s < self.onset_s + self.length_s
 
     def at(self, t_s: float) -> float:
-        """Give how far the upper lid is shut, 0..1; the lower one by lower_share of it."""
+        """Return how far the upper lid is shut, 0..1; the lower one by lower_share of it."""
         since_s = (t_s - self.onset_s) / self.slow
         return self.depth * closure(since_s, self.close_s, self.hold_s, self.open_s)

@@ -28,7 +28,7 @@ def pause_s(params: LidParams, per_min: float, length_s: float, rng: np.random.G
 
 
 def evokes(params: LidParams, shift_deg: float, rng: np.random.Generator) -> bool:
-    """Tell whether a gaze shift brings a blink with it (Evinger 1994)."""
+    """Return whether a gaze shift brings a blink with it (Evinger 1994)."""
     if params.evoked_literal:
         return shift_deg > params.evoked_literal_deg
     beyond = shift_deg - params.evoked_middle_deg
@@ -44,5 +44,5 @@ def depth(params: LidParams, rng: np.random.Generator) -> float:
 
 
 def doubled(params: LidParams, rng: np.random.Generator) -> bool:
-    """Tell whether a second blink comes right after this one."""
+    """Return whether a second blink comes right after this one."""
     return float(rng.random()) < params.double_share

@@ -25,7 +25,7 @@ _NOTHING = Pair(0.0, 0.0)
 
 
 def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> Pair:
-    """Give what goes with a vertical gaze, + is up, and a sleepiness of 0..1."""
+    """Return what goes with a vertical gaze, + is up, and a sleepiness of 0..1."""
     share = params.follow_up_share if eye_pitch_deg > 0.0 else 1.0
     upper = _bounded(params.rest_opening + params.follow_per_deg * share * eye_pitch_deg)
     lower = _bounded(params.lower_rest_opening - params.lower_follow_per_deg * eye_pitch_deg)
@@ -44,7 +44,6 @@ class LidsAtRest:
     """Openings without blinks and winks as a function of time."""
 
     def __init__(self, params: LidParams) -> None:
-        """Take how they follow and sink."""
         self._params = params
         self.reset(0.0)
 
@@ -79,12 +78,12 @@ class LidsAtRest:
         self._droop_to, self._droop_since_s = level, t_s
 
     def sleepiness(self, t_s: float) -> float:
-        """Give how sleepy the lids look by now, 0..1."""
+        """Return how sleepy the lids look by now, 0..1."""
         way = min_jerk((t_s - self._droop_since_s) / _DROOP_S)
         return self._droop_from + way * (self._droop_to - self._droop_from)
 
     def step(self, t_s: float, eye_pitch_deg: float) -> Pair:
-        """Give the openings for a vertical gaze."""
+        """Return the openings for a vertical gaze."""
         self._pitch_deg = eye_pitch_deg
         wanted = openings(self._params, eye_pitch_deg, self.sleepiness(t_s))
         self._shown = wanted if self._left == _NOTHING else self._glided(wanted, t_s)

@@ -40,7 +40,6 @@ class Lids:
     """Openings of upper and lower lids as a function of time, with their own dice."""
 
     def __init__(self, params: LidParams, rng: np.random.Generator) -> None:
-        """Take rates, shapes and dice."""
         self._params = params
         self._rest = LidsAtRest(params)
         self._rng = rng
@@ -107,7 +106,7 @@ class Lids:
         self._rest.sleepy(level, self._t_s)
 
     def step(self, t_s: float, eye_pitch_rad: float, shift_rad: float | None) -> Openings:
-        """Give the openings of the lids and whether a blink is under way.
+        """Return the openings of the lids and whether a blink is under way.
 
         shift_rad: size of a gaze shift that begins in this very tick, else None
         """
@@ -129,12 +128,12 @@ class Lids:
         )
 
     def closure(self, since_onset_s: float) -> float:
-        """Give how far a full blink has shut the upper lid, 0..1, a time after its onset."""
+        """Return how far a full blink has shut the upper lid, 0..1, a time after its onset."""
         _, close_s, hold_s, open_s, *_ = self._closing(0.0, self._params.hold_ms)
         return closure(since_onset_s, close_s, hold_s, open_s)
 
     def _due(self, t_s: float, shift_rad: float | None) -> bool:
-        """Tell whether a blink begins now; the dice of a shift are thrown once."""
+        """Return whether a blink begins now; the dice of a shift are thrown once."""
         par, blink = self._params, self._blink
         evoked = shift_rad is not None and evokes(par, degrees(abs(shift_rad)), self._rng)
         if any(wink is not None and wink.under_way(t_s) for wink in self._winks.values()):
@@ -159,14 +158,14 @@ class Lids:
         self._next_s = t_s + blink.length_s + pause_s
 
     def _closing(self, onset_s: float, hold_ms: float) -> Closing:
-        """Give a full closing of somebody awake."""
+        """Return a full closing of somebody awake."""
         par = self._params
         return Closing(
             onset_s, par.close_ms / 1e3, hold_ms / 1e3, par.open_ms / 1e3, par.lower_close_share
         )
 
     def _length_s(self) -> float:
-        """Give the length of the last blink, of an awake one before the first."""
+        """Return the length of the last blink, of an awake one before the first."""
         if self._blink is not None:
             return self._blink.length_s
         return self._closing(0.0, self._params.hold_ms).length_s
@@ -180,7 +179,7 @@ class Lids:
 
 
 def _shut(closing: Closing | None, t_s: float) -> Pair:
-    """Give how far a blink or wink has shut the upper and the lower lid, 0..1."""
+    """Return how far a blink or wink has shut the upper and the lower lid, 0..1."""
     shut = 0.0 if closing is None else closing.at(t_s)
     if closing is None or shut == 0.0:
         return _NOT_SHUT

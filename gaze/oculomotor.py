@@ -105,7 +105,7 @@ class Sway(Protocol):
         ...
 
     def step(self, t_s: float) -> Angles3:
-        """Give (yaw, pitch, roll) to add to the head's angles."""
+        """Return (yaw, pitch, roll) to add to the head's angles."""
         ...
 
 
@@ -194,7 +194,7 @@ class Oculomotor:
         self._started = True
 
     def step(self, target: Target, state: GazeState, t_s: float, dt_s: float) -> GazeCommand:
-        """Give the command for this tick.
+        """Return the command for this tick.
 
         state: head and eyes as measured now
         dt_s: time since the step before
@@ -291,7 +291,7 @@ class Oculomotor:
         return self._head.in_range((head[0] + yaw, head[1] + pitch, head[2] + roll))
 
     def _foreseen_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
-        """Give the head's pose at the time when an eye command of now takes effect."""
+        """Return the head's pose at the time when an eye command of now takes effect."""
         lag = self._params.eye_lag_ms / 1e3
         (yaw, pitch, roll), rates = state.head_rad, state.head_rate_rad_s
         return self._geometry.head_pose(
@@ -359,6 +359,6 @@ def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:
 
 
 def _meeting_point(state: GazeState) -> Vec3:
-    """Give a point 1 m along the mean of the measured lines of sight."""
+    """Return a point 1 m along the mean of the measured lines of sight."""
     way = unit(add(line_of_sight(state, left=True), line_of_sight(state, left=False)))
     return add(state.p_world_head_m, way)

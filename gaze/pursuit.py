@@ -104,7 +104,6 @@ class Pursuit:
     """Moves a gaze point after a target point."""
 
     def __init__(self, params: PursuitParams) -> None:
-        """Take gains and limits."""
         self.retune(params)
 
     def retune(self, params: PursuitParams) -> None:
@@ -115,7 +114,7 @@ class Pursuit:
         self._max_error_rad = radians(params.max_error_deg)
 
     def slip(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3) -> Slip:
-        """Give error and retinal slip; all points in the world, metres."""
+        """Return error and retinal slip; all points in the world, metres."""
         way, _ = _seen(gaze, eye)
         there, near = _seen(target, eye)
         across = _across(there, scale(v_target, near))
@@ -124,7 +123,7 @@ class Pursuit:
     def step(
         self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3, dt_s: float, closing: bool = True
     ) -> Vec3:
-        """Give the gaze point ``dt_s`` later; all points in the world, metres.
+        """Return the gaze point ``dt_s`` later; all points in the world, metres.
 
         target, v_target: where the target is now and its velocity
         eye: centre between the eyes, from which directions and nearness are seen
@@ -146,20 +145,20 @@ class Pursuit:
         return add(eye, scale(unit(add(way, move)), 1.0 / near))
 
     def _taken(self, speed_rad_s: Vec3) -> Vec3:
-        """Give the angular velocity that is taken over from a target's."""
+        """Return the angular velocity that is taken over from a target's."""
         if norm(speed_rad_s) > self._reject_rad_s:
             return (0.0, 0.0, 0.0)
         return scale(_shorter(speed_rad_s, self._max_rad_s), self._params.velocity_gain)
 
 
 def _seen(point: Vec3, eye: Vec3) -> tuple[Vec3, float]:
-    """Give the direction of a point and its nearness, one over its distance."""
+    """Return the direction of a point and its nearness, one over its distance."""
     rel = sub(point, eye)
     return unit(rel), 1.0 / max(norm(rel), 1.0 / _NEAREST_1_M)
 
 
 def _across(way: Vec3, v: Vec3) -> Vec3:
-    """Give the part of a vector that is perpendicular to a direction."""
+    """Return the part of a vector that is perpendicular to a direction."""
     along = way[0] * v[0] + way[1] * v[1] + way[2] * v[2]
     return sub(v, scale(way, along))
 

@@ -12,7 +12,6 @@ class Quintic:
     """
 
     def __init__(self, start: tuple[float, float, float], goal: float, duration_s: float) -> None:
-        """Take (position, speed, acceleration) at time 0, and where to be at rest when."""
         p, v, a = start
         T = duration_s
         d = goal - p
@@ -27,7 +26,7 @@ class Quintic:
         )
 
     def at(self, t_s: float) -> tuple[float, float, float]:
-        """Give position, speed and acceleration at a time since the start."""
+        """Return position, speed and acceleration at a time since the start."""
         if t_s >= self._T:
             return (self._goal, 0.0, 0.0)
         c0, c1, c2, c3, c4, c5 = self._c

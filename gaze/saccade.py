@@ -109,20 +109,20 @@ class Profile(Protocol):
     """What each kind of saccade knows of itself; sizes and angles in radians."""
 
     def duration_s(self, amplitude_rad: float) -> float:
-        """Give the time from onset to landing."""
+        """Return the time from onset to landing."""
         ...
 
     def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Give the highest speed."""
+        """Return the highest speed."""
         ...
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
-        """Give the angle covered ``t_s`` after onset."""
+        """Return the angle covered ``t_s`` after onset."""
         ...
 
 
 def min_jerk(s: float) -> float:
-    """Give f(s) = 6 s^5 - 15 s^4 + 10 s^3, held at 0 before 0 and at 1 after 1 (eq 2, eq 8)."""
+    """Return f(s) = 6 s^5 - 15 s^4 + 10 s^3, held at 0 before 0 and at 1 after 1 (eq 2, eq 8)."""
     if s <= 0.0:
         return 0.0
     if s >= 1.0:
@@ -134,22 +134,21 @@ class MinJerk:
     """Minimum jerk with a cap on the speed (Mitake et al., eqs 2-6)."""
 
     def __init__(self, max_speed_rad_s: float, shortest_s: float) -> None:
-        """Take L and T."""
         self._L = max_speed_rad_s
         self._T = shortest_s
         # Eq 3, A' = L / f'(0.5 T), where the paper misprints T' for f': f'(0.5 T) = 1.875 / T.
         self.largest_uncapped_rad = self._L * self._T / MIN_JERK_PEAK
 
     def duration_s(self, amplitude_rad: float) -> float:
-        """Give the time from onset to landing."""
+        """Return the time from onset to landing."""
         return self._T + self._cruise_s(amplitude_rad)
 
     def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Give the highest speed, never above L."""
+        """Return the highest speed, never above L."""
         return min(MIN_JERK_PEAK * amplitude_rad / self._T, self._L)
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
-        """Give the angle covered ``t_s`` after onset (eqs 5 and 6)."""
+        """Return the angle covered ``t_s`` after onset (eqs 5 and 6)."""
         T, A = self._T, amplitude_rad
         cruise = self._cruise_s(A)
         if cruise == 0.0:
@@ -162,7 +161,7 @@ class MinJerk:
         return uncapped * min_jerk((t_s - cruise) / T) + A - uncapped
 
     def _cruise_s(self, amplitude_rad: float) -> float:
-        """Give the time at full speed, (A - A') / L; eq 4's t_f is 0.5 T later."""
+        """Return the time at full speed, (A - A') / L; eq 4's t_f is 0.5 T later."""
         return max(0.0, (amplitude_rad - self.largest_uncapped_rad) / self._L)
 
 
@@ -176,12 +175,11 @@ class MainSequence:
     """
 
     def __init__(self, params: SaccadeParams) -> None:
-        """Take the constants."""
         self._L = radians(params.max_speed_deg_s)
         self._params = params
 
     def duration_s(self, amplitude_rad: float) -> float:
-        """Give the time from onset to landing: max(floor, 21 ms + 2.2 ms a degree)."""
+        """Return the time from onset to landing: max(floor, 21 ms + 2.2 ms a degree)."""
         par = self._params
         human = par.human_base_ms + par.human_per_deg_ms * degrees(amplitude_rad)
         # A low cap needs more time than people do.
@@ -189,12 +187,12 @@ class MainSequence:
         return max(par.device_floor_ms / 1e3, human / 1e3, capped)
 
     def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Give the highest speed, never above L."""
+        """Return the highest speed, never above L."""
         mean = amplitude_rad / self.duration_s(amplitude_rad)
         return min(self._params.human_peak_over_mean * mean, self._L)
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
-        """Give the angle covered ``t_s`` after onset."""
+        """Return the angle covered ``t_s`` after onset."""
         D = self.duration_s(amplitude_rad)
         if t_s <= 0.0 or amplitude_rad <= 0.0:
             return 0.0
@@ -212,13 +210,13 @@ class MainSequence:
         return amplitude_rad - _flank(V, flanks - rise, D - t_s)
 
     def _skew(self, amplitude_rad: float) -> float:
-        """Give the share of the rise in the time of rise and fall."""
+        """Return the share of the rise in the time of rise and fall."""
         over = (degrees(amplitude_rad) - 10.0) / 40.0
         return 0.45 - 0.20 * min(1.0, max(0.0, over))
 
 
 def _flank(peak_rad_s: float, length_s: float, t_s: float) -> float:
-    """Give the angle covered ``t_s`` into half a minimum-jerk movement of that peak speed."""
+    """Return the angle covered ``t_s`` into half a minimum-jerk movement of that peak speed."""
     whole = 2.0 * length_s
     return peak_rad_s * whole / MIN_JERK_PEAK * min_jerk(t_s / whole) if whole > 0.0 else 0.0
 
@@ -230,21 +228,20 @@ class LiteralFrame:
     """
 
     def __init__(self, share: float, frame_s: float) -> None:
-        """Take the share of the way and the length of a frame."""
         self._rate_1_s = -log(1.0 - share) / frame_s
         self._frame_s = frame_s
 
     def duration_s(self, amplitude_rad: float) -> float:
-        """Give the time until 0.05 deg remain, one frame at least."""
+        """Return the time until 0.05 deg remain, one frame at least."""
         ratio = max(1.0, amplitude_rad / _LITERAL_REST_RAD)
         return max(self._frame_s, log(ratio) / self._rate_1_s)
 
     def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Give the highest speed, which is the first."""
+        """Return the highest speed, which is the first."""
         return amplitude_rad * self._rate_1_s
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
-        """Give the angle covered ``t_s`` after onset."""
+        """Return the angle covered ``t_s`` after onset."""
         if t_s <= 0.0:
             return 0.0
         if t_s >= self.duration_s(amplitude_rad):
@@ -256,7 +253,6 @@ class Saccade:
     """Displacement of the eye along the great circle as a function of time."""
 
     def __init__(self, params: SaccadeParams) -> None:
-        """Take the profile and its constants."""
         self.retune(params)
 
     def retune(self, params: SaccadeParams) -> None:
@@ -265,19 +261,19 @@ class Saccade:
 
     @property
     def profile(self) -> Profile:
-        """Give the profile in force, which a saccade under way keeps to its end."""
+        """Return the profile in force, which a saccade under way keeps to its end."""
         return self._profile
 
     def duration_s(self, amplitude_rad: float) -> float:
-        """Give the time from onset to landing."""
+        """Return the time from onset to landing."""
         return self._profile.duration_s(amplitude_rad)
 
     def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Give the highest speed."""
+        """Return the highest speed."""
         return self._profile.peak_speed_rad_s(amplitude_rad)
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
-        """Give the angle covered ``t_s`` after onset."""
+        """Return the angle covered ``t_s`` after onset."""
         return self._profile.displacement_rad(amplitude_rad, t_s)
 
 

@@ -68,7 +68,7 @@ class Walk:
 
     @property
     def row_sums(self) -> tuple[float, ...]:
-        """Give the sum of every row as it stands, before it is normalised."""
+        """Return the sum of every row as it stands, before it is normalised."""
         return tuple(sum(row) for row in self.matrix)
 
 
@@ -187,14 +187,14 @@ class ScanpathParams:
 
 
 def normalised(matrix: ArrayLike) -> Floats:
-    """Give an (n, n) matrix with every row summing to 1."""
+    """Return an (n, n) matrix with every row summing to 1."""
     rows = np.asarray(matrix, dtype=float)
     out: Floats = rows / rows.sum(axis=1, keepdims=True)
     return out
 
 
 def without_refixations(matrix: ArrayLike) -> Floats:
-    """Give the chain of visits: the same walk with its self-transitions merged.
+    """Return the chain of visits: the same walk with its self-transitions merged.
 
     matrix: (n, n); a part that is never left for another keeps its row
     """
@@ -207,7 +207,6 @@ class Scanpath:
     """Replaces a face target by the point of the face that is due."""
 
     def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
-        """Take the model that ``params`` names, the measured walk and the dice."""
         self._rng = rng
         self.looks = _looks(params, walk, rng)
         self.reset(0.0)
@@ -259,7 +258,7 @@ class Scanpath:
         )
 
     def _find(self, face_id: int, percept: Percept | None) -> Face | None:
-        """Give the target's face, the last known one while it is out of sight."""
+        """Return the target's face, the last known one while it is out of sight."""
         if self._face is None or self._face.id != face_id:
             self._face = None
         if percept is not None:
@@ -303,7 +302,7 @@ def _owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _dwell(params: ScanpathParams, mean_s: float, sd_s: float) -> Draw:
-    """Give a part's dwell law at this robot's tempo and above its floor."""
+    """Return a part's dwell law at this robot's tempo and above its floor."""
     law = dwell_law(params.dwell_law, mean_s, sd_s)
     tempo, floor_s = params.tempo, params.shortest_dwell_ms / 1e3
     return lambda rng: max(law(rng) / tempo, floor_s)

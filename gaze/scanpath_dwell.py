@@ -29,7 +29,7 @@ _LEAST_CUT, _MOST_CUT = -30.0, 20.0
 
 
 def dwell_law(law: str, mean_s: float, sd_s: float) -> Draw:
-    """Give the function that draws dwell times of a law named in ``LAWS``.
+    """Return the function that draws dwell times of a law named in ``LAWS``.
 
     Raises:
         ValueError: no law has that name.
@@ -86,7 +86,7 @@ def _above(rng: np.random.Generator, tail: float) -> float:
 
 
 def _cut(variation: float) -> float | None:
-    """Give where a standard normal law must be cut to have this SD over mean; None: nowhere."""
+    """Return where a standard normal law must be cut to have this SD over mean; None: nowhere."""
     low, high = _LEAST_CUT, _MOST_CUT
     if variation >= _tail(high)[2]:
         return None
@@ -99,7 +99,7 @@ def _cut(variation: float) -> float | None:
 
 
 def _tail(cut: float) -> tuple[float, float, float]:
-    """Give of a standard normal law above ``cut``: probability, mean excess, SD over that."""
+    """Return of a standard normal law above ``cut``: probability, mean excess, SD over that."""
     tail = 0.5 * erfc(cut / sqrt(2.0))
     hazard = exp(-0.5 * cut * cut) / sqrt(2.0 * pi) / tail
     excess = hazard - cut

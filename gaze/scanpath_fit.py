@@ -240,7 +240,7 @@ def _never_and_always(
 def _dwell(
     seconds: Floats, params: FitParams, rng: np.random.Generator
 ) -> tuple[Interval, Interval]:
-    """Give mean and SD of dwell times with their intervals."""
+    """Return mean and SD of dwell times with their intervals."""
     n = len(seconds)
     drawn = [seconds[rng.integers(0, n, n)] for _ in range(params.resamples)]
     outer = 0.5 * (1.0 - params.confidence)

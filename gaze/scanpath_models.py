@@ -37,7 +37,7 @@ class FaceLooks(Protocol):
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Give the part looked at, None where it is none, and when that look ends, if known."""
+        """Return the part looked at, None where it is none, and when that look ends, if known."""
         ...
 
     def go_on(self, before: "FaceLooks") -> bool:
@@ -45,7 +45,7 @@ class FaceLooks(Protocol):
         ...
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
-        """Give what to look at; ``settled``: the gaze has arrived at the last look."""
+        """Return what to look at; ``settled``: the gaze has arrived at the last look."""
         ...
 
 
@@ -63,7 +63,6 @@ class MarkovWalk:
         start: int,
         rng: np.random.Generator,
     ) -> None:
-        """Take parts, (n, n) probabilities (rows from, columns to), dwell laws and the dice."""
         self._parts = tuple(parts)
         self._columns = tuple(PARTS.index(part) for part in parts)
         self._cumulative: list[list[float]] = np.cumsum(matrix, axis=1).tolist()
@@ -79,7 +78,7 @@ class MarkovWalk:
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Give the part looked at and when its dwell ends, None before the gaze is there."""
+        """Return the part looked at and when its dwell ends, None before the gaze is there."""
         return self._parts[self._part], self._until_s
 
     def go_on(self, before: FaceLooks) -> bool:
@@ -128,7 +127,6 @@ class SimpleCycle:
     """A fixed round of parts, each held for its own time after arrival."""
 
     def __init__(self, parts: Sequence[str], dwell_s: Sequence[float]) -> None:
-        """Take the parts in their order and the time on each."""
         self._parts = tuple(parts)
         self._columns = tuple(PARTS.index(part) for part in parts)
         self._dwell_s = tuple(dwell_s)
@@ -141,7 +139,7 @@ class SimpleCycle:
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Give the part looked at and when its time is over, None before the gaze is there."""
+        """Return the part looked at and when its time is over, None before the gaze is there."""
         return self._parts[self._at], self._until_s
 
     def go_on(self, before: FaceLooks) -> bool:
@@ -173,15 +171,15 @@ class FaceTracking:
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Give the nose, for ever."""
+        """Return the nose, for ever."""
         return "N", None
 
     def go_on(self, before: FaceLooks) -> bool:
-        """Tell whether the nose was looked at before."""
+        """Return whether the nose was looked at before."""
         return before.dwell[0] == "N"
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
-        """Give the centre."""
+        """Return the centre."""
         return Look(face.p_world_m, "N", False)
 
 
@@ -194,7 +192,6 @@ class RandomAngles:
     """
 
     def __init__(self, angle_deg: float, longest_s: float, rng: np.random.Generator) -> None:
-        """Take the largest angle, the longest interval, and the dice."""
         self._angle_rad = radians(angle_deg)
         self._longest_s = longest_s
         self._rng = rng
@@ -207,7 +204,7 @@ class RandomAngles:
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Give no part, and when the interval is over."""
+        """Return no part, and when the interval is over."""
         return None, self._until_s
 
     def go_on(self, before: FaceLooks) -> bool:

@@ -99,7 +99,6 @@ class ShiftRule:
     """Remembers the events and says when a saccade is due."""
 
     def __init__(self, params: ShiftParams, scatters: bool) -> None:
-        """Take thresholds and times, and whether landings scatter and are corrected."""
         self.retune(params, scatters)
         self.reset(0.0)
 
@@ -143,7 +142,7 @@ class ShiftRule:
         self._erred = None if self._scatters else False
 
     def due(self, slip: Slip, t_s: float) -> bool:
-        """Tell whether a saccade starts now; to be asked only between saccades."""
+        """Return whether a saccade starts now; to be asked only between saccades."""
         error = norm(slip.error_rad)
         if self._erred is None:
             self._erred = error > self._correct_rad
@@ -165,12 +164,12 @@ class ShiftRule:
 
     @property
     def waits(self) -> bool:
-        """Tell whether a new target has come and its saccade is still to start."""
+        """Return whether a new target has come and its saccade is still to start."""
         return self._due_s is not None
 
     @property
     def corrects(self) -> bool:
-        """Tell whether what the last saccade left waits for a correction."""
+        """Return whether what the last saccade left waits for a correction."""
         return bool(self._erred)
 
     def _go(self, t_s: float) -> bool:
@@ -179,7 +178,7 @@ class ShiftRule:
         return True
 
     def _crosses(self, slip: Slip, error_rad: float) -> bool:
-        """Tell whether the target meets the line of sight soon by its own motion."""
+        """Return whether the target meets the line of sight soon by its own motion."""
         closing = -dot(slip.error_rad, slip.slip_rad_s) / error_rad
         least, most = self._smooth_s
         return closing > 0.0 and least < error_rad / closing < most

@@ -62,7 +62,7 @@ class Rule:
 
     @property
     def body_id(self) -> int | None:
-        """Give the id of the one body it names, None where it names none."""
+        """Return the id of the one body it names, None where it names none."""
         return int(self.look_at[len(_BY_ID) :]) if self.look_at.startswith(_BY_ID) else None
 
 
@@ -135,7 +135,6 @@ class TopDown:
     """Applies the rule of the behaviour in force."""
 
     def __init__(self, params: TopDownParams) -> None:
-        """Take the rule set."""
         self._params = params
         self.behaviour = params.behaviour
         self.reset(0.0)
@@ -151,7 +150,7 @@ class TopDown:
 
     @property
     def behaviours(self) -> tuple[str, ...]:
-        """Give the behaviours that have a rule, in the order of the rules."""
+        """Return the behaviours that have a rule, in the order of the rules."""
         return tuple(self._params.rules)
 
     def reset(self, t_s: float) -> None:
@@ -178,7 +177,7 @@ class TopDown:
         p_world_eye_m: Vec3,
         favoured_id: int = -1,
     ) -> Wanted | None:
-        """Give what the rule points at among the bodies in view, None where nothing.
+        """Return what the rule points at among the bodies in view, None where nothing.
 
         seen: (n,) which bodies are in view
         favoured_id: the body that was looked at last for a rule's sake; it counts as
@@ -195,7 +194,7 @@ class TopDown:
     def _nearness(
         self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3, favoured_id: int
     ) -> Floats:
-        """Give the factor of each wanted row: (nearest distance / its distance)^nearness."""
+        """Return the factor of each wanted row: (nearest distance / its distance)^nearness."""
         if len(rows) <= 1:
             return np.ones(len(rows))
         rel = bodies.p_world_m[rows] - np.asarray(p_eye)
@@ -206,7 +205,7 @@ class TopDown:
         return factor
 
     def _rows(self, bodies: Bodies, rule: Rule) -> NDArray[np.intp]:
-        """Give the rows of the bodies that a rule names."""
+        """Return the rows of the bodies that a rule names."""
         if rule.point_world_m is not None:
             return np.zeros(0, dtype=np.intp)
         if rule.body_id is not None:

@@ -101,7 +101,7 @@ class Percept:
     faces: tuple[Face, ...] = ()
 
     def age_s(self, t_s: float) -> float:
-        """Give the age of the picture at ``t_s``."""
+        """Return the age of the picture at ``t_s``."""
         return t_s - self.captured_s
 
 
@@ -223,15 +223,15 @@ class HeadGeometry(Protocol):
     """What the oculomotor models must know of a head's build (gazerig.robot.kinematics has it)."""
 
     def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
-        """Give R_world_head and p_world_head_m for neck angles."""
+        """Return R_world_head and p_world_head_m for neck angles."""
         ...
 
     def facing(self, p_world_m: Vec3) -> Angles2:
-        """Give the neck yaw and pitch that point the head's x axis through a point."""
+        """Return the neck yaw and pitch that point the head's x axis through a point."""
         ...
 
     def eyes_on(
         self, p_world_m: Vec3, R_world_head: Mat3, p_world_head_m: Vec3
     ) -> tuple[Angles2, Angles2]:
-        """Give the left and right eye angles that fixate a point from a head pose."""
+        """Return the left and right eye angles that fixate a point from a head pose."""
         ...

@@ -19,7 +19,6 @@ class Canals:
     """
 
     def __init__(self, delay_s: float, storage_s: float) -> None:
-        """Take tau_vor and T_vs; a storage of 0 passes everything."""
         self._delay_s, self._storage_s = delay_s, storage_s
         self.reset()
 
@@ -29,7 +28,7 @@ class Canals:
         self._past: deque[float] = deque()
 
     def step(self, head_rate_rad_s: float, dt_s: float) -> float:
-        """Give the rate that the reflex acts on now."""
+        """Return the rate that the reflex acts on now."""
         if self._storage_s > 0.0:
             kept = exp(-dt_s / self._storage_s)
             self._slow = kept * self._slow + (1.0 - kept) * head_rate_rad_s
@@ -41,7 +40,7 @@ class Canals:
 
 
 def gate(amplitude_rad: float, since_landing_s: float = -inf) -> float:
-    """Give the share of the reflex left during a gaze shift and after its landing.
+    """Return the share of the reflex left during a gaze shift and after its landing.
 
     1 - min(0.9, 0.017 A) for A degrees while it lasts (negative times), back to 1 with
     a time constant of 40 ms after.
@@ -51,7 +50,7 @@ def gate(amplitude_rad: float, since_landing_s: float = -inf) -> float:
 
 
 def near_gain(ahead_m: float, distance_m: float) -> float:
-    """Give the eye turn per head turn that fixates a point: 1 + r / d.
+    """Return the eye turn per head turn that fixates a point: 1 + r / d.
 
     ahead_m: how far the eye sits ahead of the head's axis; distance_m: eye to point
     """
@@ -59,19 +58,19 @@ def near_gain(ahead_m: float, distance_m: float) -> float:
 
 
 def distance_m(vergence_rad: float, interocular_m: float) -> float:
-    """Give the distance at which both lines of sight meet, I / V (Zhang); never beyond 100 m."""
+    """Return the distance at which both lines of sight meet, I / V (Zhang); never beyond 100 m."""
     return interocular_m / max(vergence_rad, interocular_m / 100.0)
 
 
 def translational_rad_s(
     eye_rad: float, ahead_m_s: float, left_m_s: float, distance_m: float
 ) -> float:
-    """Give the eye rate against a translation of the head, in the head's frame."""
+    """Return the eye rate against a translation of the head, in the head's frame."""
     return -(left_m_s * cos(eye_rad) - ahead_m_s * sin(eye_rad)) / distance_m
 
 
 def negated(eye_rad: Angles2, head_before_rad: Angles3, head_rad: Angles3) -> Angles2:
-    """Give the eye angles of the rule (-x, -y, -z) (Nakamoto & Tsuruno 3.4), literally.
+    """Return the eye angles of the rule (-x, -y, -z) (Nakamoto & Tsuruno 3.4), literally.
 
     It is the inverse of the head's turn for one axis only; with two it errs by degrees.
     """

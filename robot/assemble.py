@@ -74,7 +74,7 @@ class Assembly(NamedTuple):
     retuner: Retuner
 
     def shown(self) -> ShownRig:
-        """Give how the rig is built now, as far as people are shown it."""
+        """Return how the rig is built now, as far as people are shown it."""
         rig, parts = self.retuner.rig, self.retuner.parts
         return ShownRig(
             parts.kinematics,
@@ -86,22 +86,22 @@ class Assembly(NamedTuple):
         )
 
     def camera(self) -> CameraParams:
-        """Give lens and place of the camera as they are believed now."""
+        """Return lens and place of the camera as they are believed now."""
         return self.retuner.camera
 
     @property
     def loop(self) -> LoopParams:
-        """Give the rate and the time for parking in force now."""
+        """Return the rate and the time for parking in force now."""
         return self.retuner.loop
 
     @property
     def park_rad(self) -> JointAngles:
-        """Give the pose before torque goes off, as it is now."""
+        """Return the pose before torque goes off, as it is now."""
         return self.retuner.park_rad
 
     @property
     def horizontal_field_deg(self) -> float:
-        """Give the camera's field of view as it is believed now."""
+        """Return the camera's field of view as it is believed now."""
         return self.retuner.horizontal_field_deg
 
 
@@ -209,7 +209,7 @@ def _robot(parts: Parts, poses: PoseHistory) -> Robot:
 
 
 def _as_chosen(rig: Rig, choice: Choice) -> Rig:
-    """Give the rig with what the command line says otherwise."""
+    """Return the rig with what the command line says otherwise."""
     gaze = rig.gaze
     if choice.rules is not None:
         gaze = replace(gaze, top_down=load_rules(choice.rules))
@@ -223,7 +223,7 @@ def _as_chosen(rig: Rig, choice: Choice) -> Rig:
 
 
 def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
-    """Give a rig's geometry and its oculomotor model, for looking without a camera."""
+    """Return a rig's geometry and its oculomotor model, for looking without a camera."""
     lid_dice, landing_dice = (
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
@@ -265,7 +265,7 @@ def _camera_params(
 
 
 def _wires(rig: Rig, choice: Choice, clock: Clock) -> _Wires:
-    """Give the real port, an emulated bus in this process, or one on a pseudo-terminal."""
+    """Return the real port, an emulated bus in this process, or one on a pseudo-terminal."""
     if not choice.mock:
         paths, here = ports_of(rig, choice.port), serial_ports()
         for name, path in paths.items():
@@ -292,7 +292,7 @@ def _nothing() -> None:
 def _teller(
     kinematics: Kinematics, mount: CameraMount, turns: PoseRing | None
 ) -> Callable[[float, Angles3], None] | None:
-    """Give what tells the camera's process how its camera is turned, None where nobody asks."""
+    """Return what tells the camera's process how its camera is turned, None where nobody asks."""
     if turns is None:
         return None
 
@@ -303,7 +303,7 @@ def _teller(
 
 
 def _true_head(devices: Mapping[str, Device], rig: Rig, poses: PoseHistory) -> HeadPose:
-    """Give where the emulated head is: from the servos themselves where they are at hand.
+    """Return where the emulated head is: from the servos themselves where they are at hand.
 
     It is built as the rig says now, whatever is believed of it later.
     """

@@ -171,7 +171,7 @@ class Audience:
         self._observers.note(tick)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
-        """Give the loop's ``stop`` as the recording needs it."""
+        """Return the loop's ``stop`` as the recording needs it."""
         return self._recorder.timed(stop) if self._recorder is not None else stop
 
     def open_files(self) -> None:
@@ -268,7 +268,7 @@ class Audience:
 
 
 def only_stops(order: OrderTaker) -> OrderTaker:
-    """Give what takes stop and resume alone; of the rest, it raises ValueError."""
+    """Return what takes stop and resume alone; of the rest, it raises ValueError."""
 
     def take(asked: Order) -> Ticket | None:
         if not isinstance(asked, Stop | Resume):

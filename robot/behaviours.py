@@ -31,37 +31,37 @@ class Happening(Protocol):
 
     @property
     def name(self) -> str:
-        """Give the behaviour that is tested."""
+        """Return the behaviour that is tested."""
         ...
 
     @property
     def asks(self) -> Literal["look", "return"]:
-        """Give how it is judged."""
+        """Return how it is judged."""
         ...
 
     @property
     def kind(self) -> str:
-        """Give the kind of thing."""
+        """Return the kind of thing."""
         ...
 
     @property
     def start_s(self) -> float:
-        """Give its beginning."""
+        """Return its beginning."""
         ...
 
     @property
     def end_s(self) -> float:
-        """Give its end."""
+        """Return its end."""
         ...
 
     @property
     def place_world_m(self) -> Vec3:
-        """Give where it happens."""
+        """Return where it happens."""
         ...
 
     @property
     def within_m(self) -> float:
-        """Give how far around."""
+        """Return how far around."""
         ...
 
 
@@ -109,7 +109,6 @@ class Behaviours:
     """Scores a run, tick by tick."""
 
     def __init__(self, events: Iterable[Happening], round_s: float) -> None:
-        """Take the events of one round and its length; rounds follow each other."""
         self._events = tuple(events)
         self._round_s = round_s
         self._watches: dict[int, _Watch] = {}
@@ -141,7 +140,7 @@ class Behaviours:
         self._answers[event.name].append(self._watches.pop(i).answer(event.asks))
 
     def figures(self) -> dict[str, dict[str, float | int | None]]:
-        """Give for each name: how many were seen, of how many, and how.
+        """Return for each name: how many were seen, of how many, and how.
 
         latency_s: median over the events seen (away: over those that drew the gaze off)
         share: of the events' time, the part in which what was asked for was looked at
@@ -150,7 +149,7 @@ class Behaviours:
 
 
 def _looks_at(tick: Tick, event: Happening) -> bool:
-    """Tell whether the target in force is what the event asks for."""
+    """Return whether the target in force is what the event asks for."""
     target = tick.target
     if target.kind != event.kind:
         return False

@@ -16,7 +16,7 @@ def setups(
     park_rad: Mapping[str, float],
     gentle_deg_s: float = ENTRY_DEG_S,
 ) -> tuple[ServoSetup, ...]:
-    """Give what a bus must know of all servos.
+    """Return what a bus must know of all servos.
 
     park_rad: parking pose of joints, 0 where not given: where servos that do not tell their
         place are taken to be
@@ -85,7 +85,7 @@ class Body:
         }
 
     def reach(self) -> tuple[JointLimit, ...]:
-        """Give the ranges and speeds that servos keep to as they were set up, as angles of now."""
+        """Return the ranges and speeds that servos were set up to keep, as angles of now."""
         return tuple(map(_as_set_up, self._set_up, self._joints))
 
     def start(self) -> JointAngles:
@@ -143,7 +143,7 @@ class Body:
         )
 
     def angles(self, steps: Sequence[float]) -> JointAngles:
-        """Give the joint angles of servo positions."""
+        """Return the joint angles of servo positions."""
         return tuple([angle(step) for angle, step in zip(self._to_rad, steps, strict=True)])
 
     def let_go(self) -> None:
@@ -187,7 +187,7 @@ class Body:
 
 
 def _counts_alike(one: JointParams, other: JointParams) -> bool:
-    """Tell whether both make the same angle of the same step."""
+    """Return whether both make the same angle of the same step."""
     return (one.sign, one.ratio, one.zero, one.linkage) == (
         other.sign,
         other.ratio,
@@ -197,7 +197,7 @@ def _counts_alike(one: JointParams, other: JointParams) -> bool:
 
 
 def _as_set_up(set_up: JointParams, now: JointParams) -> JointLimit:
-    """Give the limits of a servo that was set up with other parameters than are in force."""
+    """Return the limits of a servo that was set up with other parameters than are in force."""
     limit = set_up.limit()
     if _counts_alike(set_up, now):
         return limit

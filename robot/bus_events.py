@@ -9,7 +9,7 @@ _SERVO = re.compile(r"servo (\d+)")
 
 
 def drawn_together(events: Iterable[str]) -> list[str]:
-    """Give "servos 1-9: Return Delay Time 250 -> 0" for nine events that differ in their servo.
+    """Return "servos 1-9: Return Delay Time 250 -> 0" for nine events that differ in their servo.
 
     An event is "neck_yaw (servo 7): what" or "servo 7: what"; anything else stays as it is.
     """

@@ -105,7 +105,7 @@ def _film(choice: Choice) -> VideoFile | CameraReplay:
 
 
 def _source(rig: Rig, choice: Choice) -> Callable[[], PictureSource]:
-    """Give how to make the source, for the process that will use it."""
+    """Return how to make the source, for the process that will use it."""
     if choice.replay is not None:
         return partial(CameraReplay, choice.replay)
     if choice.video is not None:
@@ -123,7 +123,6 @@ class _MotionOfDrawn:
     """Finds what moves in drawn pictures, which know how the camera was turned."""
 
     def __init__(self, params: MotionParams) -> None:
-        """Take how to look."""
         self._enabled = params.enabled
         self._detector = MotionDetector(params)
         self._before: Mat3 | None = None

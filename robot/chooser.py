@@ -19,5 +19,5 @@ class Chooser(Protocol):
         ...
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
-        """Give the target in force at ``t_s``."""
+        """Return the target in force at ``t_s``."""
         ...

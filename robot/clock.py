@@ -8,7 +8,7 @@ class Clock(Protocol):
     """Monotonic seconds, and waiting for an absolute instant."""
 
     def now_s(self) -> float:
-        """Give the time."""
+        """Return the time."""
         ...
 
     def sleep_until(self, t_s: float) -> None:
@@ -20,7 +20,7 @@ class RealClock:
     """The host's monotonic clock."""
 
     def now_s(self) -> float:
-        """Give the host's monotonic time."""
+        """Return the host's monotonic time."""
         return time.monotonic()
 
     def sleep_until(self, t_s: float) -> None:
@@ -34,11 +34,10 @@ class SimulatedClock:
     """A number that is set: a simulated minute takes as long as its arithmetic."""
 
     def __init__(self, start_s: float = 0.0) -> None:
-        """Start at ``start_s``."""
         self._now_s = start_s
 
     def now_s(self) -> float:
-        """Give the number."""
+        """Return the number."""
         return self._now_s
 
     def sleep_until(self, t_s: float) -> None:

@@ -21,12 +21,12 @@ _LOAD_KG_M2 = {"neck_yaw": 2.0e-3, "neck_pitch": 3.0e-3, "neck_roll": 3.0e-3}
 
 
 def emulated_lines(rig: Rig) -> dict[str, Emulated]:
-    """Give what is on each bus of a rig, by the bus's name; servos in the order of joints."""
+    """Return what is on each bus of a rig, by the bus's name; servos in the order of joints."""
     return {name: _line(rig, name) for name in bus_names(rig)}
 
 
 def emulated_servo(rig: Rig, name: str) -> ServoSpec:
-    """Give the smart servo of one joint."""
+    """Return the smart servo of one joint."""
     joint = rig.joints[name]
     start, (low, high) = _start(joint, name), _stops(joint)
     load = _LOAD_KG_M2.get(name, 0.0) * (_steps_per_rad(joint) / joint.made().steepest) ** 2
@@ -35,7 +35,7 @@ def emulated_servo(rig: Rig, name: str) -> ServoSpec:
 
 
 def place_of(rig: Rig, joint: str) -> int:
-    """Give the place of a joint's servo among the true positions of what it is emulated on."""
+    """Return the place of a joint's servo among the true positions of what it is emulated on."""
     bus, servo_id = rig.joints[joint].bus, rig.joints[joint].id
     # A board tells all its channels, a chain the servos that it was made of.
     return servo_id if rig.bus_of(joint).kind in HOBBY_KINDS else joints_on(rig, bus).index(joint)
@@ -79,7 +79,7 @@ def _start(joint: JointParams, name: str) -> int:
 
 
 def _stops(joint: JointParams) -> tuple[float, float]:
-    """Give the first and last step of the servo that its mechanics allow."""
+    """Return the first and last step of the servo that its mechanics allow."""
     ends = (joint.min_deg - _STOP_BEYOND_DEG, joint.max_deg + _STOP_BEYOND_DEG)
     low, high = sorted(joint.steps(radians(end)) for end in ends)
     return low, high

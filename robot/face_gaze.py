@@ -16,7 +16,6 @@ class FaceGaze:
     """
 
     def __init__(self) -> None:
-        """Start with nothing seen."""
         self.points_face_m: list[tuple[float, float]] = []
         self.seconds: list[float] = []
         self._last_s: float | None = None
@@ -44,7 +43,7 @@ class FaceGaze:
 def on_face(
     p_world_eye_m: Vec3, way_world: Vec3, p_world_face_m: Vec3, R_world_face: Mat3
 ) -> tuple[float, float] | None:
-    """Give where a line of sight meets the plane of a face: (y, z) in the face's frame.
+    """Return where a line of sight meets the plane of a face: (y, z) in the face's frame.
 
     None where the line runs along the plane or away from it.
     """

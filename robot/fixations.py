@@ -53,12 +53,12 @@ class PartBoxes:
 
     @property
     def boxes(self) -> dict[str, Box]:
-        """Give the boxes that are there."""
+        """Return the boxes that are there."""
         every = ((part, getattr(self, part)) for part in PARTS)
         return {part: box for part, box in every if box is not None}
 
     def part_at(self, x: float, y: float) -> str | None:
-        """Give the part at a place, the smaller one where boxes overlap, None outside."""
+        """Return the part at a place, the smaller one where boxes overlap, None outside."""
         inside = [
             ((x1 - x0) * (y1 - y0), part)
             for part, (x0, y0, x1, y1) in self.boxes.items()
@@ -131,7 +131,7 @@ def fixations_of(
 
 
 def labelled(table: FixationTable, boxes: PartBoxes | None) -> tuple[Fixation, ...]:
-    """Give the fixations of a table, by their labels or else by the boxes they lie in.
+    """Return the fixations of a table, by their labels or else by the boxes they lie in.
 
     Raises:
         SetupError: there are neither labels nor boxes.
@@ -149,7 +149,7 @@ def labelled(table: FixationTable, boxes: PartBoxes | None) -> tuple[Fixation, .
 
 
 def usual_side(boxes: PartBoxes) -> float:
-    """Give the median of the boxes' shorter sides, the scale of what is one place."""
+    """Return the median of the boxes' shorter sides, the scale of what is one place."""
     return float(np.median([min(x1 - x0, y1 - y0) for x0, y0, x1, y1 in boxes.boxes.values()]))
 
 

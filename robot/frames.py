@@ -130,7 +130,7 @@ class PoseHistory:
             self._tell(t_s, head_rad)
 
     def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
-        """Give R_world_head and p_world_head_m at an instant, interpolated between ticks.
+        """Return R_world_head and p_world_head_m at an instant, interpolated between ticks.
 
         Before the oldest and after the newest entry that entry's pose is given.
 
@@ -164,7 +164,7 @@ class NewestPose(PoseHistory):
     """
 
     def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
-        """Give R_world_head and p_world_head_m as remembered last.
+        """Return R_world_head and p_world_head_m as remembered last.
 
         Raises:
             LookupError: nothing has been remembered yet.
@@ -176,7 +176,6 @@ class CameraMount:
     """Places the camera in the world."""
 
     def __init__(self, params: CameraParams) -> None:
-        """Take where it sits."""
         self.retune(params)
 
     def retune(self, params: CameraParams) -> None:
@@ -190,7 +189,7 @@ class CameraMount:
         self._R = compose(turn, _OPTICAL)
 
     def pose(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Mat3, Vec3]:
-        """Give R_world_camera and p_world_camera_m for a pose of the head."""
+        """Return R_world_camera and p_world_camera_m for a pose of the head."""
         if not self.on_head:
             return self._R, self._p
         return compose(R_world_head, self._R), add(p_world_head_m, rotate(R_world_head, self._p))
@@ -199,7 +198,7 @@ class CameraMount:
 def mounted_at(
     params: CameraParams, R_parent_camera: Mat3, p_parent_camera_m: Vec3
 ) -> CameraParams:
-    """Give the camera at another place: the inverse of what ``CameraMount`` makes of it.
+    """Return the camera at another place: the inverse of what ``CameraMount`` makes of it.
 
     R_parent_camera, p_parent_camera_m: its pose in the head, or in the world for a base mount
     """
@@ -216,7 +215,7 @@ def mounted_at(
 
 
 def standing_still(params: CameraParams, geometry: HeadGeometry) -> CameraParams:
-    """Give the mount on the base where a head camera is while the head looks straight ahead.
+    """Return the mount on the base where a head camera is while the head looks straight ahead.
 
     Films, and webcams beside an emulated head, do not turn with the head.
     """

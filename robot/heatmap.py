@@ -34,7 +34,7 @@ _LARGEST = 100_000_000  # bytes of a photograph
 
 
 def share_per_part(points_face_m: ArrayLike, seconds: ArrayLike) -> dict[str, float]:
-    """Give the share of time on each part, and "elsewhere"; they sum to 1.
+    """Return the share of time on each part, and "elsewhere"; they sum to 1.
 
     points_face_m: (n, 2) y, z; seconds: (n,)
 
@@ -79,7 +79,7 @@ def heatmap(
 
 
 def density_s_m2(points_face_m: Floats, seconds: Floats) -> Floats:
-    """Give seconds per square metre for every pixel of the canvas, (HEIGHT_PX, WIDTH_PX)."""
+    """Return seconds per square metre for every pixel of the canvas, (HEIGHT_PX, WIDTH_PX)."""
     columns, rows = np.rint(on_canvas(points_face_m)).astype(int).T
     inside = (columns >= 0) & (columns < WIDTH_PX) & (rows >= 0) & (rows < HEIGHT_PX)
     time = np.zeros((HEIGHT_PX, WIDTH_PX))

@@ -26,7 +26,7 @@ _Colour = tuple[int, int, int]
 
 
 def on_canvas(points_face_m: Floats) -> Floats:
-    """Give the pixels (column, row) of (n, 2) points (y, z) of the face frame."""
+    """Return the pixels (column, row) of (n, 2) points (y, z) of the face frame."""
     return np.asarray(points_face_m) * (PX_PER_M, -PX_PER_M) + _NOSE_PX
 
 

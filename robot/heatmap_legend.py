@@ -18,7 +18,7 @@ _SCALE_TOP, _SCALE_HIGH, _ROWS_TOP, _ROW_PX = 96, 260, 448, 38
 def with_legend(
     picture: Picture, most_s_cm2: float, total_s: float, shares: Mapping[str, float]
 ) -> Picture:
-    """Give the picture with a panel to its right.
+    """Return the picture with a panel to its right.
 
     most_s_cm2: what the top of the colour scale stands for
     shares: of the time, per part code and "elsewhere"

@@ -154,7 +154,7 @@ class JointParams:
 
     @property
     def facts(self) -> ServoFacts:
-        """Give what is known of its servo's model.
+        """Return what is known of its servo's model.
 
         Raises:
             KeyError: there is no such model; rigs that were checked have none such.
@@ -163,11 +163,11 @@ class JointParams:
 
     @property
     def zero(self) -> int:
-        """Give the servo position at 0 deg, in the unit of its model."""
+        """Return the servo position at 0 deg, in the unit of its model."""
         return self.zero_step if self.zero_step is not None else self.facts.middle
 
     def made(self) -> Linkage:
-        """Give what lies between servo and joint.
+        """Return what lies between servo and joint.
 
         Raises:
             ValueError: the linkage cannot be.
@@ -180,15 +180,15 @@ class JointParams:
         return Straight(facts.unit_steps * self.zero, slope)
 
     def steps(self, angle_rad: float) -> float:
-        """Give the servo position of a joint angle, not rounded."""
+        """Return the servo position of a joint angle, not rounded."""
         return self.made().steps(angle_rad)
 
     def angle_rad(self, steps: float) -> float:
-        """Give the joint angle of a servo position."""
+        """Return the joint angle of a servo position."""
         return self.made().angle_rad(steps)
 
     def limit(self) -> JointLimit:
-        """Give the limits in radians, and those of the servo's own protection."""
+        """Return the limits in radians, and those of the servo's own protection."""
         facts = self.facts
         return JointLimit(
             radians(self.min_deg),
@@ -203,7 +203,7 @@ class JointParams:
     def setup(
         self, name: str = "", rest_rad: float | None = None, gentle_deg_s: float = ENTRY_DEG_S
     ) -> ServoSetup:
-        """Give what the bus must know: the range rounded inwards, speed and acceleration there.
+        """Return what the bus must know: the range rounded inwards, speed and acceleration there.
 
         rest_rad: where the joint is taken to be when the torque comes on, for a servo that
             does not tell its place: the parking pose

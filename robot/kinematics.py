@@ -72,7 +72,6 @@ class Kinematics:
     def __init__(
         self, params: GeometryParams, joints: Iterable[str], lids: Mapping[str, LidEnds]
     ) -> None:
-        """Take the measures, the names of the joints, and the ends of every lid among them."""
         self.names = in_order(joints)
         self.one_pan, self.one_tilt = "eyes_pan" in self.names, "eyes_tilt" in self.names
         place = {name: i for i, name in enumerate(self.names)}
@@ -100,12 +99,12 @@ class Kinematics:
         self._span = tuple(wide - shut for shut, wide in ends)
 
     def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
-        """Give R_world_head and p_world_head_m (midway between the eyes)."""
+        """Return R_world_head and p_world_head_m (midway between the eyes)."""
         R = rotation(head_rad)
         return R, add(self._pivot, rotate(R, self._arm))
 
     def facing(self, p_world_m: Vec3) -> Angles2:
-        """Give the neck yaw and pitch that lead the head's x axis through a point.
+        """Return the neck yaw and pitch that lead the head's x axis through a point.
 
         The axis passes above the pivot by the arm's height, so the pitch is that of the
         point less the angle which that height takes up. A point nearer to the pivot than
@@ -123,7 +122,7 @@ class Kinematics:
     def eyes_on(
         self, p_world_m: Vec3, R_world_head: Mat3, p_world_head_m: Vec3
     ) -> tuple[Angles2, Angles2]:
-        """Give left and right (yaw, pitch) in the head that fixate a point.
+        """Return left and right (yaw, pitch) in the head that fixate a point.
 
         Eyes that cannot turn each by itself come as near to that as both together can.
         """
@@ -138,7 +137,7 @@ class Kinematics:
         return left, right
 
     def forward(self, joints: JointState) -> GazeState:
-        """Give where head and eyes are for measured joints."""
+        """Return where head and eyes are for measured joints."""
         q, rate = (*joints.position_rad, 0.0), (*joints.velocity_rad_s, 0.0)
         yaw, pitch, roll = self._neck
         head = (q[yaw], q[pitch], q[roll])
@@ -162,7 +161,7 @@ class Kinematics:
         )
 
     def inverse(self, command: GazeCommand) -> JointAngles:
-        """Give the joint angles of a command."""
+        """Return the joint angles of a command."""
         left, right, shut, span = (
             command.eye_left_rad,
             command.eye_right_rad,

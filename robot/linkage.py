@@ -21,15 +21,15 @@ class Linkage(Protocol):
     rising: bool
 
     def steps(self, angle_rad: float) -> float:
-        """Give the servo position of a joint angle, not rounded."""
+        """Return the servo position of a joint angle, not rounded."""
         ...
 
     def angle_rad(self, steps: float) -> float:
-        """Give the joint angle of a servo position."""
+        """Return the joint angle of a servo position."""
         ...
 
     def rate_rad(self, steps: float) -> float:
-        """Give how many radians a step is at a servo position, with its sign."""
+        """Return how many radians a step is at a servo position, with its sign."""
         ...
 
 
@@ -40,21 +40,20 @@ class Straight:
     """
 
     def __init__(self, zero: float, slope: float) -> None:
-        """Take where 0 is and the slope."""
         self._zero, self._slope, self._rate = zero, slope, 1.0 / slope
         self.steepest = abs(slope)
         self.rising = slope > 0.0
 
     def steps(self, angle_rad: float) -> float:
-        """Give the servo position of a joint angle, not rounded."""
+        """Return the servo position of a joint angle, not rounded."""
         return self._zero + self._slope * angle_rad
 
     def angle_rad(self, steps: float) -> float:
-        """Give the joint angle of a servo position."""
+        """Return the joint angle of a servo position."""
         return (steps - self._zero) * self._rate
 
     def rate_rad(self, steps: float) -> float:
-        """Give how many radians a step is, with its sign."""
+        """Return how many radians a step is, with its sign."""
         return self._rate
 
 
@@ -70,7 +69,6 @@ class Curve:
     """
 
     def __init__(self, angles_rad: Sequence[float], steps: Sequence[float]) -> None:
-        """Take the measured places."""
         if len(angles_rad) < 2 or len(angles_rad) != len(steps):
             raise ValueError("a linkage needs two places or more, each an angle and a position")
         up = steps[-1] > steps[0]
@@ -95,17 +93,17 @@ class Curve:
         self.steepest = max(abs(slope) for slope in self._slopes)
 
     def steps(self, angle_rad: float) -> float:
-        """Give the servo position of a joint angle, not rounded."""
+        """Return the servo position of a joint angle, not rounded."""
         i = min(max(bisect_right(self._angles, angle_rad) - 1, 0), self._last)
         return self._steps[i] + self._slopes[i] * (angle_rad - self._angles[i])
 
     def angle_rad(self, steps: float) -> float:
-        """Give the joint angle of a servo position."""
+        """Return the joint angle of a servo position."""
         i = self._segment(steps)
         return self._angles[i] + (steps - self._steps[i]) / self._slopes[i]
 
     def rate_rad(self, steps: float) -> float:
-        """Give how many radians a step is at a servo position, with its sign."""
+        """Return how many radians a step is at a servo position, with its sign."""
         return 1.0 / self._slopes[self._segment(steps)]
 
     def _segment(self, steps: float) -> int:

@@ -76,7 +76,6 @@ class Robot:
         lids: Lids,
         guard: Guard,
     ) -> None:
-        """Take the parts, real or simulated."""
         self.body = body
         self.camera = camera
         self.perception = perception
@@ -142,7 +141,7 @@ class Robot:
         self.order(Ask(menu, choice))
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Give what ``ask`` takes: menu -> choices, the present one first."""
+        """Return what ``ask`` takes: menu -> choices, the present one first."""
         return self._menus.offered(self.attention.top_down)
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:

@@ -99,7 +99,7 @@ _NAMES = {kind: name for name, kind in KINDS.items()}
 
 
 def as_json(order: Order) -> dict[str, object]:
-    """Give an order as plain JSON: its name under "order", and its fields."""
+    """Return an order as plain JSON: its name under "order", and its fields."""
     return {"order": _NAMES[type(order)], **order._asdict()}
 
 

@@ -13,7 +13,6 @@ class Planner:
     def __init__(
         self, plan: Callable[[float], str | None], ask: Callable[[str, str], None]
     ) -> None:
-        """Take the plan, seconds since the start -> behaviour, and the robot's ``ask``."""
         self._plan = plan
         self._ask = ask
         self._first_s: float | None = None

@@ -123,7 +123,7 @@ class PowerDown:
 
 
 def _at_work_here(frame: FrameType | None) -> bool:
-    """Tell whether this very file is at work: it can be interrupted only in what it calls."""
+    """Return whether this very file is at work: it can be interrupted only in what it calls."""
     return frame is not None and frame.f_code.co_filename == __file__
 
 

@@ -16,7 +16,7 @@ PARTLY = "in part reckoned from commands and known servo speeds, not measured"
 
 
 def reckoned_joints(tick: Tick) -> tuple[str, ...]:
-    """Give the joints whose servos tell nothing."""
+    """Return the joints whose servos tell nothing."""
     told = tick.joints.measured
     if not told:
         return ()
@@ -26,7 +26,7 @@ def reckoned_joints(tick: Tick) -> tuple[str, ...]:
 def basis_of(
     joints: Collection[str], reckoned: Collection[str], counts: Callable[[str], bool]
 ) -> Basis:
-    """Give what a figure rests on.
+    """Return what a figure rests on.
 
     joints: the rig's; counts: whether the figure rests on a joint of this name
     """

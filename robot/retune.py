@@ -98,7 +98,6 @@ class Retuner:
     """
 
     def __init__(self, parts: Parts, rig: Rig, placed: Placed) -> None:
-        """Take the parts as they were made of ``rig``."""
         self.rig = rig
         self.parts = parts
         self._placed = placed
@@ -108,22 +107,22 @@ class Retuner:
 
     @property
     def loop(self) -> LoopParams:
-        """Give the rate and the time for parking in force."""
+        """Return the rate and the time for parking in force."""
         return self.rig.loop
 
     @property
     def park_rad(self) -> JointAngles:
-        """Give the pose before torque goes off."""
+        """Return the pose before torque goes off."""
         return park_pose(self.rig)
 
     @property
     def camera(self) -> CameraParams:
-        """Give lens and place of the camera as they are believed."""
+        """Return lens and place of the camera as they are believed."""
         return self._placed.camera(self.rig)
 
     @property
     def horizontal_field_deg(self) -> float:
-        """Give the camera's field of view as it is believed."""
+        """Return the camera's field of view as it is believed."""
         return self.camera.horizontal_field_deg
 
     def prepare(self, base: Rig, rig: Rig) -> Tune:
@@ -213,7 +212,7 @@ class Retuner:
         return _beyond(parts.body.names, limits(joints), parts.body.reach())
 
     def _lasting(self, rig: Rig) -> dict[str, JointParams]:
-        """Give the joints with the servos that the bus was opened with."""
+        """Return the joints with the servos that the bus was opened with."""
         return {
             name: _with_servo(rig.joints[name], first)
             for name, first in self._started.joints.items()
@@ -225,7 +224,7 @@ _OF_THE_SERVO = ("id", "model", "firmware_min", "bus", "linkage", "servo_deg_s")
 
 
 def _with_servo(joint: JointParams, first: JointParams) -> JointParams:
-    """Give a joint with the servo of another; the same one where it has that already."""
+    """Return a joint with the servo of another; the same one where it has that already."""
     kept = {key: getattr(first, key) for key in _OF_THE_SERVO}
     if all(getattr(joint, key) == value for key, value in kept.items()):
         return joint

@@ -15,22 +15,22 @@ EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
 
 
 def limits(joints: Mapping[str, JointParams]) -> tuple[JointLimit, ...]:
-    """Give the joints' limits, in the order of ``in_order``."""
+    """Return the joints' limits, in the order of ``in_order``."""
     return tuple(joints[name].limit() for name in in_order(joints))
 
 
 def park_pose(rig: Rig) -> JointAngles:
-    """Give the pose before torque goes off."""
+    """Return the pose before torque goes off."""
     return tuple(radians(rig.park_deg.get(name, 0.0)) for name in in_order(rig.joints))
 
 
 def own_parts(rig: Rig) -> dict[str, Vec3]:
-    """Give the rig's own places of face parts in metres."""
+    """Return the rig's own places of face parts in metres."""
     return {code: (x / 1e3, y / 1e3, z / 1e3) for code, (x, y, z) in rig.face_parts_mm.items()}
 
 
 def lid_ends(rig: Rig) -> dict[str, LidEnds]:
-    """Give the joint angles of the rig's lids shut, and open."""
+    """Return the joint angles of the rig's lids shut, and open."""
     ends = {}
     for name in LIDS:
         shut, wide = rig.lid_joints.ends_deg(name)
@@ -40,19 +40,19 @@ def lid_ends(rig: Rig) -> dict[str, LidEnds]:
 
 
 def eye_limits(rig: Rig) -> EyeLimits:
-    """Give the eyes' ranges: the narrower of the joints' and the profile's."""
+    """Return the eyes' ranges: the narrower of the joints' and the profile's."""
     return (_eye(rig, "left"), _eye(rig, "right"))
 
 
 def head_limits(rig: Rig) -> tuple[float, tuple[Angles2, Angles2]]:
-    """Give the smallest eye limit and the neck's ((yaw low, high), (pitch low, high))."""
+    """Return the smallest eye limit and the neck's ((yaw low, high), (pitch low, high))."""
     smallest = min(abs(end) for eye in eye_limits(rig) for span in eye for end in span)
     neck = _span(rig, "neck_yaw", rig.ranges.neck_yaw_deg), _span(rig, "neck_pitch", 180.0)
     return smallest, neck
 
 
 def neck_span(rig: Rig, name: str) -> Angles2:
-    """Give the range of an axis of the neck; none where it is not there."""
+    """Return the range of an axis of the neck; none where it is not there."""
     return _span(rig, name, 180.0)
 
 
@@ -68,7 +68,7 @@ def _turned_by(rig: Rig, side: str, way: str) -> str:
 
 
 def _span(rig: Rig, name: str, most_deg: float) -> Angles2:
-    """Give a joint's range within +-most_deg, in radians; none where it is not there."""
+    """Return a joint's range within +-most_deg, in radians; none where it is not there."""
     joint = rig.joints.get(name)
     if joint is None:
         return (0.0, 0.0)
@@ -76,5 +76,5 @@ def _span(rig: Rig, name: str, most_deg: float) -> Angles2:
 
 
 def park_rad(rig: Rig) -> dict[str, float]:
-    """Give the parking pose by joint; joints left out go to 0."""
+    """Return the parking pose by joint; joints left out go to 0."""
     return {name: radians(angle) for name, angle in rig.park_deg.items()}

@@ -21,18 +21,18 @@ from gazerig.robot.rig_angles import park_rad
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
-    """Give the names of the buses that joints are on, "" for the one without a name first."""
+    """Return the names of the buses that joints are on, "" for the one without a name first."""
     used = {joint.bus for joint in rig.joints.values()}
     return tuple(name for name in ("", *rig.buses) if name in used)
 
 
 def joints_on(rig: Rig, name: str) -> tuple[str, ...]:
-    """Give the joints of one bus, in the order of all joints."""
+    """Return the joints of one bus, in the order of all joints."""
     return tuple(joint for joint in rig.names if rig.joints[joint].bus == name)
 
 
 def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
-    """Give the serial port of every bus: the rig's, or that given instead.
+    """Return the serial port of every bus: the rig's, or that given instead.
 
     given: a port for the bus without a name, or for the only one; NAME=PORT for another, and
         several with commas between
@@ -53,7 +53,7 @@ def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
 
 
 def rig_setups(rig: Rig) -> tuple[ServoSetup, ...]:
-    """Give what buses must know of a rig's servos, in the order of its joints."""
+    """Return what buses must know of a rig's servos, in the order of its joints."""
     return setups(rig.joints, park_rad(rig), rig.guard.gentle_speed_deg_s)
 
 

@@ -50,7 +50,7 @@ class Wanted:
     watched: Wished = Wished()
 
     def choice(self) -> Choice:
-        """Give what to assemble.
+        """Return what to assemble.
 
         Raises:
             SetupError: the options do not fit together.
@@ -214,7 +214,7 @@ def _never_raising(say: Callable[[str], None]) -> Callable[[str], None]:
 
 
 def _longest_s(made: Assembly, wanted: Wanted) -> float | None:
-    """Give how long to run: as asked, or one whole round of a scene in simulated time."""
+    """Return how long to run: as asked, or one whole round of a scene in simulated time."""
     if wanted.seconds is None and wanted.fast and made.scene is not None:
         return made.scene.round_s + 1.0  # and how the round ends
     return wanted.seconds

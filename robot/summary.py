@@ -23,7 +23,6 @@ class Summary:
     """Counts and shares over a run."""
 
     def __init__(self) -> None:
-        """Start with nothing counted."""
         self._target_s: defaultdict[str, float] = defaultdict(float)
         self._part_s: defaultdict[str, float] = defaultdict(float)
         self._limited: Counter[str] = Counter()
@@ -59,7 +58,7 @@ class Summary:
         return angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s
 
     def figures(self) -> dict[str, object]:
-        """Give what the ticks themselves tell; the caller adds bus, loop and pictures."""
+        """Return what the ticks themselves tell; the caller adds bus, loop and pictures."""
         last = self._last
         return {
             "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,
@@ -79,12 +78,12 @@ class Summary:
 
 
 def cyclopean(tick: Tick) -> Vec3:
-    """Give the mean of both lines of sight as the servos have them: a unit vector in the world."""
+    """Return the mean of both measured lines of sight: a unit vector in the world."""
     return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
 
 
 def gaze_error_rad(tick: Tick) -> float:
-    """Give the mean angle of both lines of sight, as the servos have them, off the intended point.
+    """Return the mean angle of both measured lines of sight off the intended point.
 
     Eyes that one linkage turns sideways stay parallel: what that leaves counts too.
     """
@@ -96,7 +95,7 @@ def gaze_error_rad(tick: Tick) -> float:
 
 
 def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
-    """Give a percentile of counted thousandths of a degree, None of nothing."""
+    """Return a percentile of counted thousandths of a degree, None of nothing."""
     if not counts_mdeg:
         return None
     values = sorted(counts_mdeg)
@@ -105,7 +104,7 @@ def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
 
 
 def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
-    """Give shares of the total, largest first."""
+    """Return shares of the total, largest first."""
     total = sum(seconds.values())
     if total <= 0.0:
         return {}

@@ -110,25 +110,25 @@ class Tuning:
 
     @property
     def name(self) -> str:
-        """Give the rig's name or path."""
+        """Return the rig's name or path."""
         return self._state.name
 
     @property
     def path(self) -> Path:
-        """Give the rig's file."""
+        """Return the rig's file."""
         return rig_file(self._state.name)
 
     @property
     def character_name(self) -> str:
-        """Give the character in force, "none" without one."""
+        """Return the character in force, "none" without one."""
         return self._state.character or NO_CHARACTER
 
     def files(self) -> tuple[Path, ...]:
-        """Give the files in use: the rig's, and those laid over it."""
+        """Return the files in use: the rig's, and those laid over it."""
         return self._state.files.paths
 
     def knobs(self) -> tuple[Knob, ...]:
-        """Give all parameters in the order of the file."""
+        """Return all parameters in the order of the file."""
         state, made = self._state, self._knobs
         # All but which entries there are stays as it is.
         if [knob.key for knob in made] != list(state.values):
@@ -136,11 +136,11 @@ class Tuning:
         return made
 
     def values(self) -> dict[str, Value]:
-        """Give key -> value in force of every knob."""
+        """Return key -> value in force of every knob."""
         return dict(self._state.values)
 
     def get(self, prefix: str = "") -> dict[str, Value]:
-        """Give the values in force whose keys begin so.
+        """Return the values in force whose keys begin so.
 
         Raises:
             gazerig.config.load.ConfigError: there is none; the message says what is near.
@@ -161,12 +161,12 @@ class Tuning:
             return self._put(self._state, changed(self._state.rig, changes))
 
     def unsaved(self) -> tuple[Change, ...]:
-        """Give what is in force and not in the files."""
+        """Return what is in force and not in the files."""
         state = self._state
         return _changes(state.saved, state.rig, state.was)
 
     def differs(self) -> tuple[Change, ...]:
-        """Give what differs from the defaults, those of the shipped rig."""
+        """Return what differs from the defaults, those of the shipped rig."""
         return _changes(self._defaults, self._state.rig, values(self._defaults))
 
     def revert(self) -> tuple[str, ...]:
@@ -208,7 +208,7 @@ class Tuning:
             return saved
 
     def characters(self) -> tuple[str, ...]:
-        """Give the characters there are, the one in force first; "none" is the rig itself."""
+        """Return the characters there are, the one in force first; "none" is the rig itself."""
         now = self.character_name
         return (now, *(n for n in (NO_CHARACTER, *shipped_names("characters")) if n != now))
 
@@ -274,7 +274,7 @@ class Tuning:
 
 
 def _defaults(rig: Rig) -> Rig:
-    """Give the shipped rig of the same name, else the one that all others are made of."""
+    """Return the shipped rig of the same name, else the one that all others are made of."""
     return load_rig(rig.name if rig.name in shipped_names("rigs") else _DEFAULTS)
 
 
@@ -290,7 +290,7 @@ def _refuse_lists(wanted: Mapping[str, Value]) -> None:
 
 
 def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[Change, ...]:
-    """Give each value that differs, as YAML; was: those before."""
+    """Return each value that differs, as YAML; was: those before."""
     found = flattened(after, differences(before, after))
     return tuple(
         Change(key, _text(was[key]) if key in was else None, _text(value))
@@ -311,7 +311,7 @@ def _text(value: Value) -> str:
 
 
 def _overlap(one: str, other: str) -> bool:
-    """Tell whether two keys are the same or one is above the other."""
+    """Return whether two keys are the same or one is above the other."""
     return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
 
 

@@ -32,7 +32,7 @@ JointAngles = tuple[float, ...]
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:
-    """Give a rig's joints in the order in which all sequences of joints have them."""
+    """Return a rig's joints in the order in which all sequences of joints have them."""
     there = set(names)
     return tuple(name for name in JOINTS if name in there)
 
@@ -104,7 +104,7 @@ class Verdict(NamedTuple):
     joints: tuple[str, ...] = ()
 
     def applied(self, joint: str) -> Applied:
-        """Give what became of one joint's wish.
+        """Return what became of one joint's wish.
 
         Raises:
             ValueError: there is no such joint; the message lists those there are.

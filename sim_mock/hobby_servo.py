@@ -53,17 +53,17 @@ class HobbyServo:
 
     @property
     def limp(self) -> bool:
-        """Tell whether no pulses come: a hand can turn it."""
+        """Return whether no pulses come: a hand can turn it."""
         return self.width_steps == 0
 
     @property
     def resting(self) -> bool:
-        """Tell whether it would not move in the next step."""
+        """Return whether it would not move in the next step."""
         return self.place_steps == self._next_steps()
 
     @property
     def straining(self) -> bool:
-        """Tell whether it pushes against something that does not give way."""
+        """Return whether it pushes against something that does not give way."""
         return not self._content() and self.resting
 
     def step(self) -> None:
@@ -95,7 +95,7 @@ class HobbyServo:
 
 
 def checked(spec: HobbySpec) -> HobbySpec:
-    """Give the spec if such a servo can exist.
+    """Return the spec if such a servo can exist.
 
     Raises:
         ValueError: a number is out of its range, named with the range.

@@ -8,7 +8,7 @@ from gazerig.sim_mock.scenes.scene import Person
 
 
 def true_part(person: Person, part: str | None) -> Vec3:
-    """Give where a part of a person's face truly is; None: the tip of the nose."""
+    """Return where a part of a person's face truly is; None: the tip of the nose."""
     if part is None:
         return person.p_world_face_m
     R = rotation((*person.face_yaw_pitch_rad, 0.0))
@@ -16,17 +16,17 @@ def true_part(person: Person, part: str | None) -> Vec3:
 
 
 def gaze_angles(pose: GazeState) -> Angles2:
-    """Give yaw and pitch in the world of the mean of both measured lines of sight."""
+    """Return yaw and pitch in the world of the mean of both measured lines of sight."""
     return yaw_pitch(_cyclopean(pose))
 
 
 def angles_of_place(p_world_m: Vec3, pose: GazeState) -> Angles2:
-    """Give yaw and pitch in the world from the middle of the eyes to a place."""
+    """Return yaw and pitch in the world from the middle of the eyes to a place."""
     return yaw_pitch(sub(p_world_m, _middle(pose)))
 
 
 def gaze_off_rad(p_world_m: Vec3, pose: GazeState) -> float:
-    """Give the angle between the measured gaze and a place, from the middle of the eyes."""
+    """Return the angle between the measured gaze and a place, from the middle of the eyes."""
     return angle_between(_cyclopean(pose), sub(p_world_m, _middle(pose)))
 
 

@@ -114,19 +114,19 @@ class Twin:
     # --- shares and steps
 
     def steps(self, shares: Sequence[float]) -> list[int]:
-        """Give steps of shares."""
+        """Return steps of shares."""
         pairs = zip(self.setups, shares, strict=True)
         return [round(s.min_steps + x * (s.max_steps - s.min_steps)) for s, x in pairs]
 
     def shares(self, steps: Sequence[float | None]) -> list[float]:
-        """Give shares of steps; far outside where there is none."""
+        """Return shares of steps; far outside where there is none."""
         return [
             -9.0 if at is None else (at - s.min_steps) / (s.max_steps - s.min_steps)
             for s, at in zip(self.setups, steps, strict=True)
         ]
 
     def seen(self, readings: Sequence[ServoReading | None]) -> list[float]:
-        """Give the shares that readings tell."""
+        """Return the shares that readings tell."""
         return self.shares([None if r is None else r.position_steps for r in readings])
 
     # --- the servos themselves, past the driver
@@ -143,7 +143,7 @@ class Twin:
         self.command(verb if board else f"{verb} {self.setups[place].id}", name)
 
     def reports(self) -> list[dict[str, object]]:
-        """Give what servos truly are, in the order of the whole."""
+        """Return what servos truly are, in the order of the whole."""
         by_bus = {}
         for name in self.buses:
             servos = json.loads(self.wires.command("status", name))["servos"]
@@ -151,16 +151,16 @@ class Twin:
         return [by_bus[self.on[p]][self.setups[p].id] for p in range(self.count)]
 
     def truth(self) -> list[float]:
-        """Give where servos truly are."""
+        """Return where servos truly are."""
         return self.shares([one.get("place", one.get("position")) for one in self.reports()])
 
     def goals(self) -> list[int | None]:
-        """Give the goals that servos truly have, in steps; None where there is none."""
+        """Return the goals that servos truly have, in steps; None where there is none."""
         found = [one.get("target", one.get("goal")) for one in self.reports()]
         return [goal or None for goal in found]
 
     def holding(self) -> list[bool]:
-        """Tell which servos truly hold their place."""
+        """Return which servos truly hold their place."""
         return [bool(one.get("target", one.get("torque"))) for one in self.reports()]
 
     def pulses_on(self) -> None:
@@ -224,12 +224,12 @@ class Twin:
         raise AssertionError(f"not in {patience_s} s: {readings}, {bus.faults()}, {bus.events()}")
 
     def near(self, shares: Sequence[float], goals: Sequence[float]) -> bool:
-        """Tell whether all are where they should be."""
+        """Return whether all are where they should be."""
         return all(abs(x - goal) <= NEAR_SHARE for x, goal in zip(shares, goals, strict=True))
 
 
 def _setups(kind: str, name: str) -> dict[int, ServoSetup]:
-    """Give the setups of one bus by their place in the whole."""
+    """Return the setups of one bus by their place in the whole."""
     model = {
         "dynamixel": "xl330-m077",
         "feetech": "sts3215",
@@ -247,7 +247,7 @@ def _setups(kind: str, name: str) -> dict[int, ServoSetup]:
 
 
 def line(kind: str, name: str) -> Emulated:
-    """Give what is emulated on one bus of a kind."""
+    """Return what is emulated on one bus of a kind."""
     low, high = RANGES[name]
     starts = {
         s.id: low + SHARES[place % 4] * (high - low) for place, s in _setups(kind, name).items()
@@ -296,7 +296,7 @@ def in_process(kind: str) -> InProcess:
 
 @contextmanager
 def twin_of(kind: str, place: str) -> Iterator[Twin]:
-    """Give a kind's servos ``in-process`` or behind a ``pty``."""
+    """Return a kind's servos ``in-process`` or behind a ``pty``."""
     if place == "in-process":
         yield Twin(kind, in_process(kind).wires, patient=False)
         return

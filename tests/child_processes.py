@@ -47,7 +47,7 @@ def end_with_parent() -> None:
 
 
 def _children(pid: int) -> Iterator[int]:
-    """Give the children of a process; each of its threads has a list of its own."""
+    """Return the children of a process; each of its threads has a list of its own."""
     with suppress(OSError):
         for thread in (_PROC / str(pid) / "task").iterdir():
             with suppress(OSError):
@@ -61,7 +61,7 @@ def _descendants(pid: int) -> Iterator[int]:
 
 
 def _command(pid: int) -> str:
-    """Give how a process was started; nothing where it has ended and is only not reaped."""
+    """Return how a process was started; nothing where it has ended and is only not reaped."""
     with suppress(OSError):
         return (_PROC / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ").decode().strip()
     return ""

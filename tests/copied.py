@@ -39,6 +39,6 @@ _WAYS = {FunctionType: _function, BuiltinMethodType: _method, struct.Struct: _sa
 
 
 def copied(thing: Any) -> Any:
-    """Give a deep copy that shares nothing that changes."""
+    """Return a deep copy that shares nothing that changes."""
     with patch.dict(copy._deepcopy_dispatch, _WAYS):  # type: ignore[attr-defined]
         return copy.deepcopy(thing)

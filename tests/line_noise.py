@@ -136,14 +136,14 @@ class Noisy:
         return DynamixelBus(self.port, setups, params)
 
     def truth(self) -> tuple[float, ...]:
-        """Give where the joints truly are."""
+        """Return where the joints truly are."""
         places = self.device.positions_steps()
         if self._make == "maestro":
             return tuple(places[i] for i in IDS)
         return places[: len(IDS)]  # without whoever has joined them
 
     def goals(self, t_s: float) -> list[int]:
-        """Give goals that swing slower than the joints' limits and reach the ends of the range."""
+        """Return goals that swing slower than the limits and reach the ends of the range."""
         half = 0.5 * (self.high - self.low)
         return [
             round(self.low + half * (1.0 + sin(2.0 * pi * 0.4 * t_s + 0.7 * i)))
@@ -151,7 +151,7 @@ class Noisy:
         ]
 
     def _led(self, readings: Sequence[ServoReading | None], goals: Sequence[int]) -> list[int]:
-        """Give goals as a guard does: from where a servo was taken back, no faster than armed."""
+        """Return goals as a guard does: from where a servo was taken back, no faster than armed."""
         most = SPEED_STEPS_S[self._make] * TICK_S
         for k, reading in enumerate(readings):
             if reading is not None and reading.rearmed:

@@ -138,7 +138,7 @@ class Driven(NamedTuple):
 
 @contextmanager
 def driven(kind: str, guarded: bool = True, watchdog: bool = True) -> Iterator[Driven]:
-    """Give a rig that a loop in another process drives."""
+    """Return a rig that a loop in another process drives."""
     with PtyBuses() as buses:
         rig = slow(kind)
         (path,) = buses.start(emulated_lines(rig)).values()

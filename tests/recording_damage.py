@@ -54,7 +54,7 @@ def recorded(path: Path, seconds: float = 0.5) -> bytes:
 
 
 def records(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Give kind, offset and length of every record."""
+    """Return kind, offset and length of every record."""
     at = 8
     while at + HEAD <= len(data) - 8:
         kind, length = data[at], int.from_bytes(data[at + 1 : at + HEAD], "little")

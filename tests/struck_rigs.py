@@ -46,7 +46,7 @@ class Case(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Give what it is called."""
+        """Return what it is called."""
         return "; ".join(self.begins)
 
 
@@ -161,7 +161,7 @@ class Outcome(NamedTuple):
 
     @property
     def survived(self) -> bool:
-        """Tell whether it ended well."""
+        """Return whether it ended well."""
         return self.end in ("came back", "left, named")
 
 
@@ -222,7 +222,7 @@ class Machine:
     # --- what is true
 
     def true_rad(self) -> list[float]:
-        """Give where the joints truly are."""
+        """Return where the joints truly are."""
         steps = {name: device.positions_steps() for name, device in self.devices.items()}
         return [
             linkage.angle_rad(steps[bus][place])
@@ -230,7 +230,7 @@ class Machine:
         ]
 
     def true_goal(self, i: int) -> int | None:
-        """Give the goal that joint's servo follows; None where it is limp."""
+        """Return the goal that joint's servo follows; None where it is limp."""
         bus, place = self._at[i]
         device = self.devices[bus]
         if isinstance(device, MaestroBoard):
@@ -243,7 +243,7 @@ class Machine:
     # --- ticks
 
     def wish(self, t_s: float) -> list[float]:
-        """Give a wave through the middle of every range, well below its limits."""
+        """Return a wave through the middle of every range, well below its limits."""
         wave = []
         for i, limit in enumerate(self.limits):
             middle = 0.5 * (limit.low_rad + limit.high_rad)
@@ -379,7 +379,7 @@ RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker", "pca9685"
 
 
 def rig_of(kind: str) -> Rig:
-    """Give the shipped rig of a kind, with the other board where its own has none."""
+    """Return the shipped rig of a kind, with the other board where its own has none."""
     rig = load_rig(RIGS[kind])
     return replace(rig, bus=BusConfig("/dev/i2c-1", kind)) if kind == "pca9685" else rig
 
@@ -388,13 +388,13 @@ FEW = ("left_eye_pan", "left_eye_tilt", "neck_yaw")
 
 
 def quick(rig: Rig) -> Rig:
-    """Give the rig with an eye and a turn of the neck alone, and short slow passages."""
+    """Return the rig with an eye and a turn of the neck alone, and short slow passages."""
     few = {name: joint for name, joint in rig.joints.items() if name in FEW}
     guard = replace(rig.guard, gentle_ms=200.0)
     return replace(rig, guard=guard, joints=few if len(few) == len(FEW) else rig.joints)
 
 
 def pair_of(rig: Rig, kind: str) -> tuple[str, int, int]:
-    """Give the bus of a kind, and the places of two of its joints."""
+    """Return the bus of a kind, and the places of two of its joints."""
     places = [i for i, name in enumerate(rig.names) if rig.bus_of(name).kind == kind]
     return rig.joints[rig.names[places[0]]].bus, places[1 % len(places)], places[-1]

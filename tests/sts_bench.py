@@ -61,7 +61,7 @@ class Bench:
         return self.read(servo_id, 56, 2, 15)
 
     def error(self, servo_id=1):
-        """Give the error byte of a ping."""
+        """Return the error byte of a ping."""
         [(_, error, _)] = self.ask(servo_id, PING)
         return error
 

@@ -89,7 +89,7 @@ def test_only_faces_are_looked_away_from() -> None:
 
 
 def angles_and_ways(model: Aversion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Give how far away the stays are and which way, 0 right and 90 up, degrees."""
+    """Return how far away the stays are and which way, 0 right and 90 up, degrees."""
     to_face = unit(sub(FACE, HEAD))
     found = [s.place for s in stays(model, seconds, 0.1) if s.kind == "away"]
     far = [degrees(angle_between(to_face, sub(p, HEAD))) for p in found]

@@ -56,7 +56,7 @@ def dark(t: float) -> None:
 
 
 def ramp_numbers(speed: float, dt: float) -> tuple[float, float, float, float]:
-    """Give onset, time to 90 %, steady gain, lag in seconds."""
+    """Return onset, time to 90 %, steady gain, lag in seconds."""
     trace = both(lambda t: speed * t, 1.6, dt)
     speeds = np.diff(trace.version, prepend=0.0) / dt
     starts = trace.t - dt
@@ -67,7 +67,7 @@ def ramp_numbers(speed: float, dt: float) -> tuple[float, float, float, float]:
 
 
 def response(out: np.ndarray, t: np.ndarray, hz: float) -> complex:
-    """Give the phasor of a signal over its last whole cycles, sin being 1."""
+    """Return the phasor of a signal over its last whole cycles, sin being 1."""
     keep = t > t[-1] - round(t[-1] * hz / 2) / hz + 1e-9
     return complex(2j * np.mean(out[keep] * np.exp(-2j * pi * hz * t[keep])))
 

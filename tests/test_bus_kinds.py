@@ -27,13 +27,13 @@ def twin(request):
 
 @pytest.fixture(params=KINDS)
 def here(request):
-    """Give a twin in this process: for what takes long, or needs no terminal."""
+    """Return a twin in this process: for what takes long, or needs no terminal."""
     with twin_of(request.param, "in-process") as made:
         yield made
 
 
 def holding(twin):
-    """Give a bus that holds every servo where it stands."""
+    """Return a bus that holds every servo where it stands."""
     twin.pulses_on()
     bus = twin.bus()
     bus.open()
@@ -63,7 +63,7 @@ def away(twin):
 
 
 def smart(twin):
-    """Give the places of servos that answer for themselves."""
+    """Return the places of servos that answer for themselves."""
     return [place for place, name in twin.on.items() if name not in BOARDS]
 
 
@@ -260,7 +260,7 @@ def test_one_silent_servo_costs_only_itself(here, held_here):
 
 
 def _says(bus, twin, place, what):
-    """Tell whether the bus says something of a servo by its joint's name."""
+    """Return whether the bus says something of a servo by its joint's name."""
     who = servo_label(twin.setups[place])
     return any(line.startswith(who) and what in line for line in bus.events())
 

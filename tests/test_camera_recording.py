@@ -30,7 +30,7 @@ TIMES_S = tuple(5000.0 + t for t in (0.0, 0.0333, 0.0671, 0.1, 0.2004, 0.2335))
 
 
 def shot(k: int, whole: bool = True) -> Shot:
-    """Give picture k (from 0) of noise, with all that can belong to it."""
+    """Return picture k (from 0) of noise, with all that can belong to it."""
     rng = np.random.default_rng(k)
     picture = rng.integers(0, 256, (48, 64, 3), np.uint8)
     if not whole:

@@ -48,7 +48,7 @@ def test_squares_and_ruler_on_the_page_are_as_long_as_they_say(paper: str) -> No
 
 
 def _runs(dark: np.ndarray) -> int:
-    """Give the longest run of dark pixels."""
+    """Return the longest run of dark pixels."""
     ends = np.flatnonzero(np.diff(np.concatenate(([0], dark.astype(int), [0]))))
     return int(np.max(ends[1::2] - ends[::2], initial=0))
 

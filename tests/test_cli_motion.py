@@ -34,7 +34,7 @@ def run(*words: str) -> Any:
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Path:
-    """Give a rig file of one's own."""
+    """Return a rig file of one's own."""
     mine = tmp_path / "mine.yaml"
     mine.write_text(DESK.read_text("utf-8"), encoding="utf-8")
     return mine

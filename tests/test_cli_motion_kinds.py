@@ -24,7 +24,7 @@ def run(*words: str) -> Any:
 
 @pytest.fixture
 def rigs(tmp_path: Path) -> dict[str, str]:
-    """Give the paths of rigs of one's own by kind."""
+    """Return the paths of rigs of one's own by kind."""
     texts = {name: shipped("rigs", name).read_text("utf-8") for name in ("maker", "feetech")}
     paths = {}
     for name, text in {**texts, "mixed": mixed_text()}.items():
@@ -185,7 +185,7 @@ def test_monitor_of_a_mixed_rig_as_json(rigs: dict[str, str]) -> None:
 
 @pytest.fixture
 def served(rigs: dict[str, str]) -> Iterator[tuple[str, str, PtyBuses]]:
-    """Give the mixed rig, what --port wants for its emulated buses, and what serves them."""
+    """Return the mixed rig, what --port wants for its emulated buses, and what serves them."""
     with PtyBuses() as buses:
         paths = buses.start(emulated_lines(load_rig(rigs["mixed"])))
         given = ",".join(f"{name}={path}" if name else path for name, path in paths.items())

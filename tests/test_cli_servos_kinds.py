@@ -36,7 +36,7 @@ def no_real_ports(monkeypatch, tmp_path):
 
 @pytest.fixture
 def mixed(tmp_path):
-    """Give the path of a rig with eyes on a Maestro, a Dynamixel and a Feetech neck servo."""
+    """Return the path of a rig with eyes on a Maestro, a Dynamixel and a Feetech neck servo."""
     path = tmp_path / "mixed.yaml"
     path.write_text(mixed_text(), encoding="utf-8")
     return str(path)

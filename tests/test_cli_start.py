@@ -28,7 +28,7 @@ Terminal = pytest.CaptureFixture[str]
 
 @pytest.fixture(autouse=True)
 def as_before(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Give a terminal of one width; what --debug sets is for one command."""
+    """Return a terminal of one width; what --debug sets is for one command."""
     monkeypatch.setenv("COLUMNS", "120")
     logger = logging.getLogger(DEBUG_LOGGER)
     level = logger.level

@@ -425,7 +425,7 @@ def there_is_none() -> None:
 
 
 def completing(words: tuple[str, ...]) -> dict[str, str]:
-    """Give what a shell says to a command whose words it completes."""
+    """Return what a shell says to a command whose words it completes."""
     return {
         "_GAZERIG_COMPLETE": "complete_bash",
         "COMP_WORDS": " ".join(("gazerig", *words)),

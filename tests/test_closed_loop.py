@@ -87,24 +87,24 @@ def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen
 
 @pytest.fixture(scope="module")
 def step() -> Seen:
-    """Give somebody who steps aside, pictures placed by the pose at their capture."""
+    """Return somebody who steps aside, pictures placed by the pose at their capture."""
     return watched("steps-aside", ARRIVED_S + 1.6)
 
 
 @pytest.fixture(scope="module")
 def step_by_newest() -> Seen:
-    """Give the same, pictures placed by the newest pose."""
+    """Return the same, pictures placed by the newest pose."""
     return watched("steps-aside", ARRIVED_S + 1.0, "newest")
 
 
 @pytest.fixture(scope="module")
 def walk() -> Seen:
-    """Give somebody who walks past."""
+    """Return somebody who walks past."""
     return watched("walks-past", 1.0 + 2.0 * HALF_WAY_M / WALK_M_S)
 
 
 def overshoot_deg(seen: Seen) -> float:
-    """Give how far the head's yaw goes past where it would face the person who has arrived."""
+    """Return how far the head's yaw goes past where it would face the person who has arrived."""
     after = seen.t_s > STEP_AT_S
     return float(seen.head_deg[after].max() - seen.facing_deg[-1])
 

@@ -275,7 +275,7 @@ def as_yaml(value: Any) -> str:
 
 
 def as_lists(value: Any) -> Any:
-    """Give tuples as lists, as they were before they were written."""
+    """Return tuples as lists, as they were before they were written."""
     if isinstance(value, tuple):
         return [as_lists(item) for item in value]
     return value

@@ -101,7 +101,7 @@ class Rig:
 
 
 def one(findings, level, where, words):
-    """Give the finding of this level at this place that says these words."""
+    """Return the finding of this level at this place that says these words."""
     named = [f for f in findings if f.level == level and f.where == where and words in f.what]
     assert len(named) == 1, [str(f) for f in findings]
     return named[0]
@@ -116,7 +116,7 @@ def found_as(kind, **other):
 
 
 def servo_state(kind, setup=None, found=None, corrupt=0, **values):
-    """Give a healthy servo with some registers otherwise."""
+    """Return a healthy servo with some registers otherwise."""
     setup = setup or setups_of(kind)[0]
     both = {
         "return_delay_time": 0,

@@ -88,7 +88,7 @@ def registers(twin, address, size, ids=(3, 1, 12, 7)):
 
 
 def near(readings, goals, steps=12):
-    """Tell whether all servos are where they should be, but for what friction leaves."""
+    """Return whether all servos are where they should be, but for what friction leaves."""
     return all(abs(at - goal) <= steps for at, goal in zip(places(readings), goals, strict=True))
 
 

@@ -81,7 +81,7 @@ def once(spoilt):
 
 
 def data_of(raw, servo_id, fast):
-    """Give the offset of the first byte of a servo's data in an answer of three."""
+    """Return the offset of the first byte of a servo's data in an answer of three."""
     size, head = ((len(raw) - 8) // 3, 8 + 2) if fast else (len(raw) // 3, 9)
     return head + size * IDS.index(servo_id)
 

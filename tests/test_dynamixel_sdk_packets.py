@@ -76,7 +76,7 @@ def rig():
 
 
 def resealed(raw, at, value):
-    """Give a packet with one byte changed and a right CRC."""
+    """Return a packet with one byte changed and a right CRC."""
     from fastcrc.crc16 import umts
 
     body = raw[:at] + bytes([value]) + raw[at + 1 : -2]

@@ -52,7 +52,7 @@ class Trace(NamedTuple):
 
 
 def walk(rng: np.random.Generator) -> list[tuple[float, Vec3, Vec3]]:
-    """Give when which point is looked at, and its velocity: a face that drifts, and things."""
+    """Return when which point is looked at, and its velocity: a face that drifts, and things."""
     t, last, plan = 0.0, -1, []
     while t < SECONDS:
         velocity: Vec3 = (0.0, 0.02, 0.0) if t % 20 > 12 else (0.0, 0.0, 0.0)
@@ -106,7 +106,7 @@ def look_about(seed: int, saccade: SaccadeParams) -> Trace:
 
 
 def judged(trace: Trace) -> np.ndarray:
-    """Give onset and end of every saccade that the judge sees, in ms."""
+    """Return onset and end of every saccade that the judge sees, in ms."""
     recording = pymovements.gaze.from_numpy(
         time=trace.ms,
         position=trace.gaze_deg.T,

@@ -71,7 +71,7 @@ def ticks() -> tuple[Assembly, list[Tick]]:
 
 @pytest.fixture(scope="module")
 def masks() -> list[NDArray[np.uint8]]:
-    """Give what moves in each picture."""
+    """Return what moves in each picture."""
     if not FILM.exists():
         pytest.skip(f"no film at {FILM}")
     return moving_masks()
@@ -79,7 +79,7 @@ def masks() -> list[NDArray[np.uint8]]:
 
 @pytest.fixture(scope="module")
 def fixations(ticks: tuple[Assembly, list[Tick]], masks: list[NDArray[np.uint8]]) -> list[Fixation]:
-    """Give all fixations but those of the first second, when nothing has been seen to move."""
+    """Return all fixations but those of the first second, when nothing has been seen to move."""
     made, seen = ticks
     found: dict[int, Fixation] = {}
     for before, tick in pairwise(seen):
@@ -100,14 +100,14 @@ def fixations(ticks: tuple[Assembly, list[Tick]], masks: list[NDArray[np.uint8]]
 
 
 def gaze_point(tick: Tick) -> Vec3:
-    """Give where the measured eyes look, as far away as what they look at."""
+    """Return where the measured eyes look, as far away as what they look at."""
     left, right = tick.pose.p_world_eye_left_m, tick.pose.p_world_eye_right_m
     eye = scale(add(left, right), 0.5)
     return add(eye, scale(cyclopean(tick), norm(sub(tick.target.p_world_m, eye))))
 
 
 def in_picture(made: Assembly, point: Vec3) -> tuple[float, float]:
-    """Give where the film shows a point of the world: its camera stands still."""
+    """Return where the film shows a point of the world: its camera stands still."""
     ahead = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     R, p = made.mount.pose(ahead, (0.0, 0.0, 0.0))
     lens = intrinsics_of_lens(None, radians(made.horizontal_field_deg), WIDTH, HEIGHT)
@@ -117,7 +117,7 @@ def in_picture(made: Assembly, point: Vec3) -> tuple[float, float]:
 
 
 def moving_masks() -> list[NDArray[np.uint8]]:
-    """Give for each picture, made smaller, what differs from the median of them all."""
+    """Return for each picture, made smaller, what differs from the median of them all."""
     film = cv2.VideoCapture(str(FILM))
     size = WIDTH // SHRINK, HEIGHT // SHRINK
     pictures = []

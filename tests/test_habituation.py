@@ -51,7 +51,7 @@ def shares(targets: list[Target]) -> dict[int, float]:
 
 
 def stays_s(targets: list[Target]) -> list[float]:
-    """Give how long each look lasted, without the last one, which the end cuts short."""
+    """Return how long each look lasted, without the last one, which the end cuts short."""
     return [len(list(same)) / 30 for _, same in groupby(t.id for t in targets)][:-1]
 
 

@@ -47,7 +47,7 @@ def some_views(
     angles: Sequence[Angles3] = (),
     seed: int = 0,
 ) -> list[NeckView]:
-    """Give what a detector would find, without pictures."""
+    """Return what a detector would find, without pictures."""
     rng = np.random.default_rng(seed)
     views = []
     for truly in angles or planned(scene):
@@ -66,7 +66,7 @@ def found_in(scene: BoardScene, views: list[NeckView], **params: Any) -> HandEye
 
 
 def off(found: HandEye, true: CameraParams) -> tuple[float, float]:
-    """Give by how many millimetres and degrees it is off."""
+    """Return by how many millimetres and degrees it is off."""
     at = found.mounted(true)
     mm = float(np.linalg.norm(np.array(at.position_mm) - true.position_mm))
     angles = (at.yaw_deg - true.yaw_deg, at.pitch_deg - true.pitch_deg, at.roll_deg - true.roll_deg)

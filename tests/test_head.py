@@ -96,7 +96,7 @@ def test_an_eye_held_aside_is_relieved_slowly() -> None:
 
 
 def aimed(params: HeadParams, centre: float, point: float, top_down: bool = False) -> float:
-    """Give where the head (eye range 20 deg) ends for a far centre and a point, in degrees."""
+    """Return where the head (eye range 20 deg) ends for a far centre and a point, in degrees."""
     model = Head(params, radians(20.0), NECK)
     target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 0.5, top_down, None, 1, "")
     facing, gaze, yaw = (radians(centre), 0.0), (radians(point), 0.0), 0.0
@@ -157,7 +157,7 @@ def test_larger_head_movements_are_faster(size: float, peak: float) -> None:
 
 
 def turned(params: HeadParams, yaw: float, pull: Callable[[float], float]) -> Floats:
-    """Give the head's yaws of 4 s with a face at a yaw whose pull changes; degrees."""
+    """Return the head's yaws of 4 s with a face at a yaw whose pull changes; degrees."""
     model, yaws = head(35.0, params), [0.0]
     place = (radians(yaw), 0.0)
     for k in range(800):

@@ -31,7 +31,7 @@ def yaw_deg(target: Target) -> float:
 
 
 def looks(targets: list[Target]) -> list[tuple[Target, float]]:
-    """Give each look once, with its length; the last, cut short, is left out."""
+    """Return each look once, with its length; the last, cut short, is left out."""
     found: list[tuple[Target, float]] = []
     count = 1
     for before, now in pairwise(targets):

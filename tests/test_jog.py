@@ -59,7 +59,7 @@ class Bench:
             self.port.faults.command(self.at.pop(due_s))
 
     def where(self) -> Mapping[str, float]:
-        """Give the true joint angles in degrees."""
+        """Return the true joint angles in degrees."""
         steps = self.chain.positions_steps()
         joints = [self.rig.joints[name] for name in JOINTS]
         return {

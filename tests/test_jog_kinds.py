@@ -41,7 +41,7 @@ class Bench:
         self.control = ManualControl(body, guard, self.clock, JogParams(speed_deg_s=40.0))
 
     def where(self) -> Mapping[str, float]:
-        """Give the true joint angles in degrees."""
+        """Return the true joint angles in degrees."""
         return {
             name: degrees(
                 joint.angle_rad(self.devices[joint.bus].positions_steps()[place_of(self.rig, name)])

@@ -373,7 +373,7 @@ def test_a_client_killed_with_a_lock_leaves_the_port_to_the_next(path):
 
 
 def locked(path):
-    """Tell whether a terminal is locked, without being kept out by the lock oneself."""
+    """Return whether a terminal is locked, without being kept out by the lock oneself."""
     import fcntl
     import struct
 

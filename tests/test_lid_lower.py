@@ -17,7 +17,7 @@ SHUT_S = 0.085  # after the onset: between close_ms and close_ms + hold_ms
 
 
 def lids(seed: int = 0, **params: float) -> Lids:
-    """Give lids that blink with every large shift and never else."""
+    """Return lids that blink with every large shift and never else."""
     always = LidParams(
         blinks_per_min=0.0, incomplete_share=0.0, evoked_literal=True, evoked_pause_ms=0.0
     )
@@ -37,7 +37,7 @@ def blinked(model: Lids, t_s: float, pitch_deg: float = 0.0) -> Openings:
 
 
 def largest_step(model: Lids, start_s: float, seconds: float) -> float:
-    """Give the largest change of a lower lid from one tick to the next."""
+    """Return the largest change of a lower lid from one tick to the next."""
     trace = [model.step(start_s + k * DT, 0.0, None)[3:] for k in range(round(seconds / DT))]
     return float(np.abs(np.diff(trace, axis=0)).max())
 

@@ -19,7 +19,7 @@ WITHOUT_SHRINKING = (Phase.explicit, Phase.generate)
 
 
 def steepest_opening() -> float:
-    """Give the steepest slope of an opening that takes 1 s."""
+    """Return the steepest slope of an opening that takes 1 s."""
     shut = [closure(1.0 + s, 0.0, 1.0, 1.0) for s in np.linspace(0.0, 1.0, 20_001)]
     return float(-np.diff(shut).min() * 20_000)
 
@@ -72,7 +72,7 @@ def happen(model: Lids, event: Event, other: LidParams, t_s: float) -> None:
 
 
 def fastest_per_s(params: LidParams) -> float:
-    """Give the steepest slope that blink, glide and droop may have together."""
+    """Return the steepest slope that blink, glide and droop may have together."""
     blink = max(STEEPEST / (params.close_ms / 1e3), OPENING / (params.open_ms / 1e3))
     return blink + STEEPEST / GLIDE_S + STEEPEST / DROOP_S
 

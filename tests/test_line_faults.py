@@ -25,7 +25,7 @@ def instruction(servo_id, code, params=b""):
 
 
 def good(servo_id):
-    """Give the status of an unspoilt read of the position."""
+    """Return the status of an unspoilt read of the position."""
     return status(servo_id, 0, struct.pack("<i", 2000 + servo_id))
 
 

@@ -66,7 +66,7 @@ class Bench:
         return seen
 
     def packets(self):
-        """Give what was sent since the last call."""
+        """Return what was sent since the last call."""
         sent, self.sent[:] = list(self.sent), []
         return sent
 

@@ -25,7 +25,7 @@ def lens(width: int, height: int) -> SimpleNamespace:
 
 
 def scene(k: int, width: int = 320, height: int = 240, step: int = 3) -> Pictures:
-    """Give ground with a square fifth of its width that moves right by ``step`` a picture."""
+    """Return ground with a square fifth of its width that moves right by ``step`` a picture."""
     out = GROUND[:height, :width].copy()
     side, x = width // 5, width // 8 + k * step
     out[height // 3 : height // 3 + side, x : x + side] = GROUND[300 : 300 + side, 500 : 500 + side]
@@ -43,7 +43,7 @@ def look(
 
 
 def last(pictures: list[Pictures], depth_m: NDArray[np.float64] | None = None) -> MovingBlob:
-    """Give the one thing found in the last of some pictures."""
+    """Return the one thing found in the last of some pictures."""
     detector = MotionDetector(MotionParams())
     for k, picture in enumerate(pictures):
         blobs = look(detector, picture, k * DT_S, depth_m)

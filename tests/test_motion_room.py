@@ -39,7 +39,7 @@ WALL, BOARD = textured(RNG, 700, 1400), textured(RNG, 160, 160)
 
 
 def turned(yaw_deg: float, pitch_deg: float) -> Array:
-    """Give R_world_camera (optical axes), turned right and up."""
+    """Return R_world_camera (optical axes), turned right and up."""
     a, b = np.radians(yaw_deg), np.radians(pitch_deg)
     yaw = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
     pitch = np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]])
@@ -63,7 +63,7 @@ def painted(picture: Array, texture: Array, centre: Array, half: Array, R: Array
 
 
 def picture(R: Array, boards: list[tuple[Array, float]], rng: np.random.Generator) -> NDArray:
-    """Give what the camera sees, with the noise of a small sensor."""
+    """Return what the camera sees, with the noise of a small sensor."""
     out = np.full((HEIGHT, WIDTH), 128.0)
     out = painted(out, WALL, np.array([0, 0, WALL_M]), np.array([6.0, 3.0, 0.0]), R)
     for centre, half in sorted(boards, key=lambda board: -board[0][2]):
@@ -72,7 +72,7 @@ def picture(R: Array, boards: list[tuple[Array, float]], rng: np.random.Generato
 
 
 def depth(R: Array, boards: list[tuple[Array, float]], rng: np.random.Generator) -> Array:
-    """Give distances along the optical axis, with holes."""
+    """Return distances along the optical axis, with holes."""
     x, y = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
     rays = np.stack(((x - K[0, 2]) / FOCAL, (y - K[1, 2]) / FOCAL, np.ones(x.shape)), -1) @ R.T
     p = R @ LEVER_M
@@ -86,7 +86,7 @@ def depth(R: Array, boards: list[tuple[Array, float]], rng: np.random.Generator)
 
 
 def ramp(speed_deg_s: float) -> Callable[[float], float]:
-    """Give a turn that takes 100 ms to get going; the middle of it looks straight ahead."""
+    """Return a turn that takes 100 ms to get going; the middle of it looks straight ahead."""
 
     def yaw_deg(t_s: float) -> float:
         since = max(0.0, t_s - 2 * DT_S)

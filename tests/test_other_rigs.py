@@ -57,7 +57,7 @@ def test_it_looks_at_its_visitor_blinks_and_lets_go(name: str, tmp_path: Path) -
 
 @pytest.fixture(scope="module")
 def maker() -> tuple[Assembly, list[Tick], tuple[str, ...]]:
-    """Give twelve seconds of the maker's eyes."""
+    """Return twelve seconds of the maker's eyes."""
     return ran(load_rig("maker"), 12.0)
 
 

@@ -71,7 +71,7 @@ def middle_of(depth_m: NDArray[Any], box: Box) -> Reading:
 
 
 def depth_of(face_m: float, wall_m: float = 3.0) -> NDArray[np.float32]:
-    """Give a wall and before it, in the middle, a face's surface 2.5 cm behind its nose."""
+    """Return a wall and before it, in the middle, a face's surface 2.5 cm behind its nose."""
     depth = np.full((HEIGHT, WIDTH), wall_m, np.float32)
     depth[140:260, 260:380] = face_m + 0.0248
     return depth
@@ -143,7 +143,7 @@ def blob_at(p: Vec3, v: Vec3, known: bool = True, **more: Any) -> MovingBlob:
 
 
 def walking(blob: MovingBlob, v_m_s: float = 0.5) -> Percept:
-    """Give what is seen of a face that has been walking to the right for a second."""
+    """Return what is seen of a face that has been walking to the right for a second."""
     perception = Perception(STILL, 69.0, Tracker(TrackParams()))
     for number in range(1, 31):
         x = -0.25 + v_m_s * number / 30

@@ -43,11 +43,11 @@ class Bench:
         self.placer = HobbyPlacer(self.hobby, self)
 
     def place_us(self) -> float:
-        """Give where the shaft truly is."""
+        """Return where the shaft truly is."""
         return self.board.here(self.channel).place_steps / 4
 
     def pulse(self) -> int:
-        """Give the pulse that the board gives now."""
+        """Return the pulse that the board gives now."""
         report = self.board.faults.reports()[self.channel]
         position = report["position"]
         assert isinstance(position, int)

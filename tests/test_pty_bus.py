@@ -181,12 +181,12 @@ def client(strict):
 
 
 def found(port, servo_id=1):
-    """Tell whether a servo answers."""
+    """Return whether a servo answers."""
     return PacketHandler(2.0).ping(port, servo_id)[1] == COMM_SUCCESS
 
 
 def unheard(port, servo_id=1):
-    """Tell whether a servo stays silent; who awaits silence waits for less of it."""
+    """Return whether a servo stays silent; who awaits silence waits for less of it."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(serial_port, "SDK_MARGIN_S", 0.1)
         return not found(port, servo_id)

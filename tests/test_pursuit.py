@@ -19,7 +19,7 @@ def point(yaw_deg: float, distance: float = 1.0) -> Vec3:
 
 
 def circling(yaw_deg: float, speed_deg_s: float) -> tuple[Vec3, Vec3]:
-    """Give a point on a circle of 1 m and its velocity."""
+    """Return a point on a circle of 1 m and its velocity."""
     place = point(yaw_deg)
     return place, scale((-place[1], place[0], 0.0), radians(speed_deg_s))
 
@@ -29,7 +29,7 @@ def yaw(p: Vec3) -> float:
 
 
 def follow(speed_deg_s: float, seconds: float, dt: float = DT) -> tuple[float, float]:
-    """Give the speed and the lag behind a circling target at the end, in degrees."""
+    """Return the speed and the lag behind a circling target at the end, in degrees."""
     pursuit, gaze, before = Pursuit(PursuitParams()), point(0.0), 0.0
     for k in range(1, round(seconds / dt) + 1):
         before = yaw(gaze)

@@ -34,7 +34,7 @@ def target_at(point: Vec3) -> Target:
 
 
 def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[Reply, float]:
-    """Give the reply, and the gaze error in deg of ideal joints that followed for a while."""
+    """Return the reply, and the gaze error in deg of ideal joints that followed for a while."""
     rig = loaded(name)
     kinematics, oculomotor = gaze_parts(rig, 0)
     spans = limits(rig.joints)

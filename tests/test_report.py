@@ -108,7 +108,7 @@ def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -
 
 
 def human_saccades(faster: float = 1.0, longer: float = 1.0) -> list[tuple[float, ...]]:
-    """Give saccades as people make them, or faster or longer ones."""
+    """Return saccades as people make them, or faster or longer ones."""
     dice = np.random.default_rng(3)
     sizes = np.concatenate([dice.uniform(1.5, 7.9, 40), dice.uniform(13.0, 40.0, 40)])
     peak = faster * 0.5 * (human.slowest_peak(sizes) + human.fastest_peak(sizes))

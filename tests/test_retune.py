@@ -113,7 +113,7 @@ class Judge:
 def some_changes(
     knob: Knob, rig: Rig, dice: np.random.Generator, walk: str
 ) -> Iterator[dict[str, Value]]:
-    """Give changes to low, high and random values of a knob; ``walk``: another walk."""
+    """Return changes to low, high and random values of a knob; ``walk``: another walk."""
     key, now = knob.key, value_of(rig, knob.key)
     match knob.kind:
         case "number" | "whole" if key.startswith("park_deg"):
@@ -164,7 +164,7 @@ COLLISION: dict[str, Value] = {
 
 @pytest.fixture
 def walk(tmp_path: Path) -> str:
-    """Give a walk that begins elsewhere."""
+    """Return a walk that begins elsewhere."""
     text = shipped("scanpaths", shipped_names("scanpaths")[0]).read_text(encoding="utf-8")
     path = tmp_path / "walk.yaml"
     path.write_text(text.replace("start: FR", "start: N"), encoding="utf-8")
@@ -222,7 +222,7 @@ STATE = {
 
 
 def inside(thing: Any, path: str, seen: dict[int, Any]) -> dict[str, Any]:
-    """Give path -> value of all parameters that a part holds, functions with what they hold."""
+    """Return path -> value of all parameters that a part holds, functions with what they hold."""
     if isinstance(thing, str | int | float | bool | None | type):
         return {path: thing}
     if id(thing) in seen or isinstance(thing, np.random.Generator):
@@ -259,7 +259,7 @@ OF_SIGHT = ("mount", "perception", "tracker", "kinematics", "head", "oculomotor"
 
 
 def parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]:
-    """Give what some of the running parts, the loop and the parking go by."""
+    """Return what some of the running parts, the loop and the parking go by."""
     parts = made.retuner.parts
     held = inside({name: getattr(parts, name) for name in names}, "", {})
     return {**held, "park": made.park_rad, "loop": (made.loop.rate_hz, made.loop.park_s)}
@@ -343,7 +343,7 @@ def in_use(key: str) -> dict[str, Value]:
 
 
 def acceptable(knob: Knob, base: Rig, dice: np.random.Generator, walk: str) -> Rig:
-    """Give the rig with another value of a knob."""
+    """Return the rig with another value of a knob."""
     for changes in some_changes(knob, base, dice, walk):
         try:
             other = changed(base, changes)

@@ -15,7 +15,7 @@ DT_S = 0.01
 
 
 def times(scene: Scene, dt_s: float = DT_S) -> list[float]:
-    """Give the instants of one round and a little of the next."""
+    """Return the instants of one round and a little of the next."""
     return np.arange(0.0, scene.round_s + 0.5, dt_s).tolist()
 
 

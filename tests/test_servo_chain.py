@@ -45,7 +45,7 @@ class Bench:
         )
 
     def error_of_read(self, servo_id: int, address: int, size: int) -> tuple[int, int]:
-        """Give error byte and number of bytes of a read."""
+        """Return error byte and number of bytes of a read."""
         answer = self.chain.receive(instruction(servo_id, 2, struct.pack("<HH", address, size)))
         return answer[8], len(answer) - 11
 

@@ -15,7 +15,7 @@ from gazerig.sim_mock.smart_servo.profile import (
 
 
 def path(made: Profile, most: int = 200_000, stride: int = 1) -> list[float]:
-    """Give all positions until the profile is done, or up to a stride more."""
+    """Return all positions until the profile is done, or up to a stride more."""
     out = [made.r]
     while made.running:
         out += made.ahead(stride)

@@ -35,7 +35,7 @@ SPECS = (
 
 
 def bus(specs=SPECS, bauds=None, now=lambda: 0.0):
-    """Give a port to servos, each at its own baud rate, or heard at every one."""
+    """Return a port to servos, each at its own baud rate, or heard at every one."""
     chain = build_dynamixel(specs, now)
     for servo, baud in zip(chain.servos, bauds or (), strict=False):
         servo.memory.set("baud_rate", BAUD_RATES.index(baud))

@@ -13,7 +13,7 @@ def slip(error_deg: float, slip_deg_s: float = 0.0) -> Slip:
 
 
 def settled(params: ShiftParams | None = None, scatters: bool = False) -> ShiftRule:
-    """Give a rule that has answered its first event and landed at 0."""
+    """Return a rule that has answered its first event and landed at 0."""
     rule = ShiftRule(params or ShiftParams(), scatters)
     rule.tell(1, 0.0, -1.0, -1.0)
     assert not rule.due(slip(0.0), 0.0)

@@ -132,7 +132,7 @@ def last_picture_s(ticks: list[Tick]) -> float:
 
 
 def phases(rig: Rig, ticks: list[Tick]) -> tuple[float, float, float]:
-    """Give when the last picture is stale, when the search begins and when it ends."""
+    """Return when the last picture is stale, when the search begins and when it ends."""
     stale_s = last_picture_s(ticks) + rig.gaze.attention.stale_ms / 1e3
     search_s = stale_s + rig.gaze.idle.hold_ms / 1e3
     return stale_s, search_s, search_s + rig.gaze.idle.search_ms / 1e3
@@ -233,5 +233,5 @@ def test_it_goes_on_with_the_first_new_pictures(
 
 
 def look(tick: Tick) -> Vec3:
-    """Give where the eyes are meant to look, from the head."""
+    """Return where the eyes are meant to look, from the head."""
     return sub(tick.gaze.gaze_point_world_m, tick.pose.p_world_head_m)

@@ -23,7 +23,7 @@ def command(bench, goal, speed=0, acceleration=0, time_ms=0):
 
 
 def led_to(bench):
-    """Give where the servo's profile is now."""
+    """Return where the servo's profile is now."""
     profile, drive = bench.chain.here(1).shaft.profile, bench.chain[1].drive
     return profile.r + drive.position_steps - drive.shaft.x
 

@@ -239,7 +239,7 @@ def test_a_thread_that_is_gone_ends_the_work() -> None:
 
 @pytest.fixture
 def devices(monkeypatch: pytest.MonkeyPatch) -> list[Device]:
-    """Give the devices behind the runs of this test."""
+    """Return the devices behind the runs of this test."""
     made: list[Device] = []
 
     def built(*words: Any) -> Device:

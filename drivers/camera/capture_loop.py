@@ -119,7 +119,7 @@ class CameraWatch:
 
 
 def failed(failure: Exception) -> CameraError:
-    """Give what to tell the loop of a fault that ended the looking."""
+    """Return what to tell the loop of a fault that ended the looking."""
     if isinstance(failure, CameraError):
         return CameraError(str(failure))
     return CameraError(

@@ -32,7 +32,6 @@ class ClockBridge:
     """
 
     def __init__(self, least_delay_s: float = 0.0) -> None:
-        """Take how late the least delayed picture arrives; the bridge cannot see that."""
         self._least_delay_s = least_delay_s
         self._best: deque[_Best] = deque(maxlen=_BUCKETS)
         self._bucket: int | None = None
@@ -44,11 +43,11 @@ class ClockBridge:
 
     @property
     def drift_ppm(self) -> float:
-        """Give how much faster the host's clock runs, in millionths."""
+        """Return how much faster the host's clock runs, in millionths."""
         return self._drift * 1e6
 
     def host_s(self, device_s: float, arrived_s: float) -> float:
-        """Give the host time of a device stamp whose picture arrived just now.
+        """Return the host time of a device stamp whose picture arrived just now.
 
         Later stamps never give earlier times, and no time lies after the arrival.
         """
@@ -64,11 +63,11 @@ class ClockBridge:
         return host_s
 
     def _line_s(self, device_s: float) -> float:
-        """Give host less device time at a device time."""
+        """Return host less device time at a device time."""
         return self._offset_s + self._drift * device_s
 
     def _jumped(self, device_s: float, difference_s: float) -> bool:
-        """Tell whether the clocks are no longer those of the line."""
+        """Return whether the clocks are no longer those of the line."""
         if self._last is None:
             return False
         off_s = difference_s - self._line_s(device_s)
@@ -105,11 +104,11 @@ class ClockBridge:
         self._offset_s = min(self._above_drift(best) for best in self._best)
 
     def _above_drift(self, best: _Best) -> float:
-        """Give a picture's difference with the drift since device time 0 taken out."""
+        """Return a picture's difference with the drift since device time 0 taken out."""
         return best.difference_s - self._drift * best.device_s
 
     def _slope(self) -> float:
-        """Give the median slope between pictures far enough apart."""
+        """Return the median slope between pictures far enough apart."""
         best = list(self._best)
         if len(best) < 2:
             return self._drift

@@ -97,7 +97,7 @@ def resized(depth_m: Depth, width_px: int, height_px: int) -> Depth:
 def _window(
     shape: tuple[int, ...], box_px: tuple[float, float, float, float] | None, shrink: float
 ) -> tuple[int, int, int, int]:
-    """Give the rows and columns to read: top, bottom, left, right."""
+    """Return the rows and columns to read: top, bottom, left, right."""
     height, width = shape[0], shape[1]
     if box_px is None or not np.isfinite(box_px).all():
         return (0, height, 0, width) if box_px is None else (0, 0, 0, 0)
@@ -110,7 +110,7 @@ def _window(
 
 
 def _nearest_layer(valid_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the nearest run of sorted distances without a gap that is large enough to be a thing."""
+    """Return the nearest run of sorted distances without a gap as large as a thing."""
     gaps = np.flatnonzero(np.diff(valid_m) > _GAP * valid_m[:-1]) + 1
     layers = np.split(valid_m, gaps)
     for layer in layers:

@@ -19,7 +19,6 @@ class RateWatch:
     """
 
     def __init__(self, name: str, stated_hz: float) -> None:
-        """Take what the camera is called and the rate it states; 0 or NaN where it states none."""
         self._name = name
         self._stated_hz = stated_hz if isfinite(stated_hz) and stated_hz > 0.0 else 0.0
         self._intervals_s: deque[float] = deque(maxlen=_WINDOW)
@@ -28,7 +27,7 @@ class RateWatch:
 
     @property
     def measured_hz(self) -> float | None:
-        """Give the measured rate, None before there is enough to tell."""
+        """Return the measured rate, None before there is enough to tell."""
         if len(self._intervals_s) < _LEAST:
             return None
         return 1.0 / median(self._intervals_s)
@@ -55,5 +54,5 @@ class RateWatch:
         )
 
     def _prompt(self, away_s: float) -> bool:
-        """Tell whether the reader was back before a picture could be missed."""
+        """Return whether the reader was back before a picture could be missed."""
         return self._stated_hz == 0.0 or away_s <= _PROMPT / self._stated_hz

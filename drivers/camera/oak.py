@@ -136,7 +136,7 @@ class OakSource:
         return device
 
     def _next_group(self) -> Any:
-        """Give the newest group of messages, None after a short wait without any."""
+        """Return the newest group of messages, None after a short wait without any."""
         try:
             group = self._queue.get(_SLICE)
             while group is not None and (newer := self._queue.tryGet()) is not None:
@@ -188,7 +188,7 @@ class OakSource:
 
 
 def _ended(pipeline: Any) -> Callable[[], None] | None:
-    """Give what stops a pipeline and waits for its threads."""
+    """Return what stops a pipeline and waits for its threads."""
     if pipeline is None:
         return None
 
@@ -203,5 +203,5 @@ def _ended(pipeline: Any) -> Callable[[], None] | None:
 
 
 def _line(error: BaseException) -> str:
-    """Give an error's words on one line."""
+    """Return an error's words on one line."""
     return " ".join(str(error).split())

@@ -21,7 +21,7 @@ _RIGHTS = (
 
 
 def find_oak(dai: Any, wanted: str = "", usb: Path = Path("/sys/bus/usb/devices")) -> Any:
-    """Give the DeviceInfo of the camera wanted, or of the first one.
+    """Return the DeviceInfo of the camera wanted, or of the first one.
 
     wanted: device id or name (USB port, IP address); usb: where the system lists USB devices
 
@@ -61,7 +61,7 @@ def _check_rights(dai: Any, info: Any) -> None:
 
 
 def _all_connected(dai: Any) -> Sequence[Any]:
-    """Give all cameras, with those in use and those without rights."""
+    """Return all cameras, with those in use and those without rights."""
     return list(
         dai.XLinkConnection.getAllConnectedDevices(
             dai.XLinkDeviceState.X_LINK_ANY_STATE, skipInvalidDevices=False
@@ -75,7 +75,7 @@ def _name(info: Any) -> str:
 
 
 def _plugged_in(usb: Path) -> bool:
-    """Tell whether the system sees an OAK at USB."""
+    """Return whether the system sees an OAK at USB."""
     for file in usb.glob("*/idVendor"):
         try:
             if file.read_text(encoding="ascii", errors="replace").strip() == _VENDOR:

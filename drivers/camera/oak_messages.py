@@ -16,17 +16,17 @@ _LEAST_FOCAL_PX = 10.0
 
 
 def names(group: Any) -> set[str]:
-    """Give which messages are in a group."""
+    """Return which messages are in a group."""
     return set(group.getMessageNames())
 
 
 def picture_of(group: Any) -> Picture | None:
-    """Give the colour picture of a group, None where it is none."""
+    """Return the colour picture of a group, None where it is none."""
     return bgr(group[COLOUR].getCvFrame())
 
 
 def depth_of(group: Any, width_px: int, height_px: int) -> Depth | None:
-    """Give the depth of a group in metres and in the size of its picture."""
+    """Return the depth of a group in metres and in the size of its picture."""
     if DEPTH not in names(group):
         return None
     mm = np.asarray(group[DEPTH].getFrame())
@@ -36,7 +36,7 @@ def depth_of(group: Any, width_px: int, height_px: int) -> Depth | None:
 
 
 def lens_of(group: Any) -> PictureLens | None:
-    """Give the lens that the picture carries, None where it carries none."""
+    """Return the lens that the picture carries, None where it carries none."""
     matrix = np.asarray(group[COLOUR].getTransformation().getIntrinsicMatrix(), dtype=float)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or matrix[0, 0] < _LEAST_FOCAL_PX:
         return None
@@ -48,7 +48,7 @@ def lens_of(group: Any) -> PictureLens | None:
 def faces_of(
     group: Any, width_px: int, height_px: int, min_confidence: float
 ) -> tuple[DetectedFace, ...] | None:
-    """Give the faces that the camera found, the largest first; None where it did not look.
+    """Return the faces that the camera found, the largest first; None where it did not look.
 
     Detections without five landmarks are left out: nobody could tell where they look.
     """

@@ -75,7 +75,7 @@ def read_archive(dai: Any, path: str) -> Any:
 
 
 def joined(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:
-    """Give the queue of message groups, each with all outputs of one instant."""
+    """Return the queue of message groups, each with all outputs of one instant."""
     sync = pipeline.create(dai.node.Sync)
     sync.setRunOnHost(True)
     sync.setSyncThreshold(timedelta(seconds=0.5 / rate_hz))

@@ -41,12 +41,12 @@ class CameraReplay:
 
     @property
     def length_s(self) -> float:
-        """Give how long one showing lasts."""
+        """Return how long one showing lasts."""
         self._opened()
         return self._times.length_s
 
     def due_s(self, number: int) -> float:
-        """Give the film time at which a picture is due."""
+        """Return the film time at which a picture is due."""
         self._opened()
         return self._times.due_s(number)
 
@@ -82,7 +82,7 @@ class CameraReplay:
         self._recording = None
 
     def _opened(self) -> Recording:
-        """Give the open file."""
+        """Return the open file."""
         if self._recording is None:
             raise CameraError(f"{self._path} is not open: call open() before reading")
         return self._recording

@@ -26,7 +26,6 @@ class PoseRing:
     """
 
     def __init__(self) -> None:
-        """Begin without poses."""
         context = multiprocessing.get_context("spawn")
         self._count = context.RawValue("q", 0)
         self._entries = context.RawArray("d", _ENTRIES * _WIDTH)
@@ -39,7 +38,7 @@ class PoseRing:
         self._count.value = count + 1
 
     def at(self, t_s: float) -> Floats | None:
-        """Give R_world_camera (3, 3) at a time; None where it is not remembered."""
+        """Return R_world_camera (3, 3) at a time; None where it is not remembered."""
         known = self._known()
         if not len(known) or t_s < known[0, 0] or t_s > known[-1, 0] + _NEWEST_SERVES_S:
             return None
@@ -57,12 +56,12 @@ class PoseRing:
         return np.asarray(U @ Vt)
 
     def turned(self, now_s: float, before_s: float) -> Floats | None:
-        """Give R_now_before (3, 3), which turns directions in camera axes; None where unknown."""
+        """Return R_now_before (3, 3), which turns directions in camera axes; None where unknown."""
         now, before = self.at(now_s), self.at(before_s)
         return None if now is None or before is None else np.asarray(now.T @ before)
 
     def _known(self) -> Floats:
-        """Give the entries that are whole, in the order of time: (n, 10)."""
+        """Return the entries that are whole, in the order of time: (n, 10)."""
         before = int(self._count.value)
         entries = np.frombuffer(self._entries, np.float64).reshape(_ENTRIES, _WIDTH).copy()
         after = int(self._count.value)

@@ -61,7 +61,7 @@ class CameraRecorder:
 
     @property
     def written(self) -> int:
-        """Give how many pictures are in the file."""
+        """Return how many pictures are in the file."""
         return 0 if self._writer is None else self._writer.written
 
     def open(self) -> None:

@@ -86,7 +86,7 @@ class BadMessage(ValueError):
 
 
 def nanoseconds(time_s: float) -> int:
-    """Give a time as MCAP counts it."""
+    """Return a time as MCAP counts it."""
     return round(time_s * 1e9)
 
 
@@ -167,7 +167,7 @@ def faces(data: bytes) -> tuple[DetectedFace, ...]:
 
 
 def _lens(of: PictureLens, shown: Picture, stamp: int) -> dict[str, Any]:
-    """Give a lens as the camera matrix of its picture."""
+    """Return a lens as the camera matrix of its picture."""
     fx, fy, cx, cy = of
     return {
         "timestamp": _stamp(stamp),

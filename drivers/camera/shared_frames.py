@@ -34,7 +34,6 @@ class SlotWriter:
     """Puts arrays into slots; memory grows with them."""
 
     def __init__(self) -> None:
-        """Begin without memory."""
         self._memory: SharedMemory | None = None
         self._slot_bytes = 0
         self._stamp = 0
@@ -58,7 +57,7 @@ class SlotWriter:
         self._memory = None
 
     def _room(self, nbytes: int) -> SharedMemory:
-        """Give memory whose slots hold so many bytes."""
+        """Return memory whose slots hold so many bytes."""
         if self._memory is None or nbytes > self._slot_bytes:
             self.close()
             self._slot_bytes = -(-nbytes // _STAMP_BYTES) * _STAMP_BYTES
@@ -71,7 +70,6 @@ class SlotReader:
     """Takes arrays out of slots."""
 
     def __init__(self) -> None:
-        """Begin without memory."""
         self._memory: SharedMemory | None = None
 
     def take(self, where: Where) -> NDArray[Any] | None:
@@ -109,7 +107,7 @@ class SlotReader:
 def _views(
     memory: SharedMemory, slot: int, slot_bytes: int
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-    """Give the stamp and the bytes of a slot."""
+    """Return the stamp and the bytes of a slot."""
     start = slot * (slot_bytes + _STAMP_BYTES)
     buffer = memory.buf
     assert buffer is not None  # it is open

@@ -60,7 +60,7 @@ class PictureSource(Protocol):
 
 
 def bgr(pixels: Any) -> Picture | None:
-    """Give what a camera or file delivered as a read-only BGR picture; None where it is none.
+    """Return what a camera or file delivered as a read-only BGR picture; None where it is none.
 
     pixels: (h, w) or (h, w, 1) grey, (h, w, 3) BGR or (h, w, 4) BGR with alpha, 8 bits, or
         16 of which the upper 8 are kept

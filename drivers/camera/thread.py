@@ -68,7 +68,7 @@ class CameraThread:
         self._thread.start()
 
     def latest(self, now_s: float) -> Detections | None:
-        """Give what the newest picture showed, or None before the first.
+        """Return what the newest picture showed, or None before the first.
 
         Raises:
             CameraError: the source is gone for good, or looking has failed.

@@ -56,11 +56,11 @@ class VideoFile:
         return self._opened().times.note
 
     def due_s(self, number: int) -> float:
-        """Give the film time at which a picture is due."""
+        """Return the film time at which a picture is due."""
         return self._opened().times.due_s(number)
 
     def number_at(self, film_s: float) -> int:
-        """Give the number of the newest picture at a film time; below 1 before the first."""
+        """Return the number of the newest picture at a film time; below 1 before the first."""
         return self._opened().times.number_at(film_s)
 
     def picture(self, number: int) -> Picture:
@@ -112,7 +112,7 @@ class VideoFile:
         self._reel = None
 
     def _opened(self) -> Reel:
-        """Give the open file."""
+        """Return the open file."""
         if self._reel is None:
             raise CameraError(f"{self._path} is not open: call open() before reading")
         return self._reel

@@ -18,7 +18,6 @@ class FilmPace:
     """Film time begins at the first wait and runs with the host's clock."""
 
     def __init__(self) -> None:
-        """Begin before the first picture."""
         self._zero_s: float | None = None
         self._taken = 0
 

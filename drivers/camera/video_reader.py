@@ -28,7 +28,7 @@ class Reel(Protocol):
     times: FilmTimes
 
     def picture(self, number: int) -> Picture:
-        """Give a picture, counted through all repeats, not before the last one given."""
+        """Return a picture, counted through all repeats, not before the last one given."""
         ...
 
     def close(self) -> None:
@@ -56,7 +56,7 @@ def open_reel(path: Path) -> Reel:
 
 
 def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
-    """Give the picture rate to use, and a note where the stated one is no rate."""
+    """Return the picture rate to use, and a note where the stated one is no rate."""
     low, high = _RATES_HZ
     if isfinite(stated_hz) and low <= stated_hz <= high:
         return stated_hz, ""
@@ -83,7 +83,7 @@ class _Still:
         self._last = 1
 
     def picture(self, number: int) -> Picture:
-        """Give the picture."""
+        """Return the picture."""
         _check_forward(number, self._last)
         self._last = number
         return self._picture
@@ -96,7 +96,6 @@ class _Film:
     """A film read from its start, again and again."""
 
     def __init__(self, path: Path) -> None:
-        """Open the film and see whether its last picture is there."""
         self._path = path
         self._capture = _open_film(path)
         stated = usable_rate_hz(self._capture.get(cv2.CAP_PROP_FPS))

@@ -33,14 +33,14 @@ class FilmTimes(NamedTuple):
     note: str = ""
 
     def due_s(self, number: int) -> float:
-        """Give the film time at which a picture is due."""
+        """Return the film time at which a picture is due."""
         if not self.starts_s:
             return (number - 1) / self.rate_hz
         showing, index = divmod(number - 1, len(self.starts_s))
         return showing * self.length_s + self.starts_s[index]
 
     def number_at(self, film_s: float) -> int:
-        """Give the number of the newest picture at a film time; below 1 before the first."""
+        """Return the number of the newest picture at a film time; below 1 before the first."""
         if not self.starts_s:
             number = int(film_s * self.rate_hz) + 1
         else:
@@ -56,7 +56,7 @@ class FilmTimes(NamedTuple):
 
 
 def even(times_s: Sequence[float], rate_hz: float) -> bool:
-    """Tell whether pictures come at a rate, but for rounding; too few are taken as even."""
+    """Return whether pictures come at a rate, but for rounding; too few are taken as even."""
     if len(times_s) < _LEAST:
         return True
     off = np.asarray(times_s) - times_s[0] - np.arange(len(times_s)) / rate_hz
@@ -64,7 +64,7 @@ def even(times_s: Sequence[float], rate_hz: float) -> bool:
 
 
 def rising(times_s: Sequence[float]) -> list[float]:
-    """Give the times with those that do not rise put right; [] where few do.
+    """Return the times with those that do not rise put right; [] where few do.
 
     The last picture of a film often carries none.
     """
@@ -78,7 +78,7 @@ def rising(times_s: Sequence[float]) -> list[float]:
 
 
 def measured_rate_hz(times_s: Sequence[float]) -> float | None:
-    """Give the rate at which pictures come if they come evenly, else None."""
+    """Return the rate at which pictures come if they come evenly, else None."""
     if len(times_s) < _LEAST:
         return None
     rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0])
@@ -105,7 +105,7 @@ def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> FilmTime
 
 
 def by_table(times_s: Sequence[float]) -> FilmTimes:
-    """Give the times as they are; the last picture stays as long as most do."""
+    """Return the times as they are; the last picture stays as long as most do."""
     starts = tuple(t - times_s[0] for t in times_s)
     last_s = median(b - a for a, b in zip(starts, starts[1:], strict=False))
     length_s = starts[-1] + last_s

@@ -151,6 +151,6 @@ class Webcam:
 
     @staticmethod
     def _stamp_s(capture: cv2.VideoCapture, arrived_s: float) -> float:
-        """Give the kernel's stamp of the last picture where it is on our clock."""
+        """Return the kernel's stamp of the last picture where it is on our clock."""
         stamp_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         return stamp_s if 0.0 <= arrived_s - stamp_s <= _OLDEST_STAMP_S else arrived_s

@@ -114,12 +114,12 @@ class Model(NamedTuple):
 
     @property
     def no_load_steps_s(self) -> float:
-        """Give the speed without load at the rated voltage."""
+        """Return the speed without load at the rated voltage."""
         return self.no_load_rpm / 60.0 * STEPS_PER_TURN
 
     @property
     def current_unit_ma(self) -> float:
-        """Give one unit of Present Current, 0 where the model has none."""
+        """Return one unit of Present Current, 0 where the model has none."""
         if self.current_limit is None:
             return 0.0
         if self.family == "x330":
@@ -250,7 +250,7 @@ def registers_of(model: Model) -> tuple[Register, ...]:
 
 
 def _fit(register: Register, model: Model) -> Register | None:
-    """Give the register as this model has it, None where it has none."""
+    """Return the register as this model has it, None where it has none."""
     name = register.name
     if model.current_limit is None and name in ("current_limit", "goal_current"):
         return None
@@ -262,7 +262,7 @@ def _fit(register: Register, model: Model) -> Register | None:
 
 
 def _initials(model: Model) -> dict[str, int | None]:
-    """Give the start values that depend on the model."""
+    """Return the start values that depend on the model."""
     return {
         "model_number": model.number,
         "temperature_limit": model.temperature_limit,
@@ -277,7 +277,7 @@ def _initials(model: Model) -> dict[str, int | None]:
 
 
 def _ranges(model: Model) -> dict[str, tuple[int, int]]:
-    """Give the ranges that depend on the model."""
+    """Return the ranges that depend on the model."""
     small = model.family == "x330"
     return {
         "baud_rate": (0, 6 if small else 7),
@@ -290,7 +290,7 @@ def _ranges(model: Model) -> dict[str, tuple[int, int]]:
 
 
 def _lowest_voltage(model: Model) -> int:
-    """Give the low end of both voltage limits, 0.1 V; the 5 V models go below their initial."""
+    """Return the low end of both voltage limits, 0.1 V; the 5 V models go below their initial."""
     return 31 if model.rated_v == 5.0 else model.min_voltage
 
 

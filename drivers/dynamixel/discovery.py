@@ -164,7 +164,7 @@ def ask(port: BusPort, request: bytes, quiet_s: float) -> Heard:
 
 
 def _wire_s(port: BusPort, request: bytes, length: int) -> float:
-    """Give the time that bytes take on the wire at the port's baud rate."""
+    """Return the time that bytes take on the wire at the port's baud rate."""
     return (len(request) + length) * 10.0 / float(getattr(port, "baudrate", FACTORY_BAUD))
 
 

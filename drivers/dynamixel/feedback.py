@@ -114,7 +114,7 @@ class Readings:
         ]
 
     def believes(self, slot: int, heard: Heard[Sample]) -> bool:
-        """Tell whether one servo's answer can be true; to be asked once for every answer."""
+        """Return whether one servo's answer can be true; to be asked once for every answer."""
         return self.places.one(slot, heard.sample.position, heard.at_s)
 
     def one(self, slot: int, heard: Heard[Sample]) -> ServoReading:

@@ -123,7 +123,7 @@ def _begun_header(tail: bytes) -> int:
 
 
 def _end(raw: bytes, at: int) -> int | None:
-    """Give where the status that starts at ``at`` ends, None where none does."""
+    """Return where the status that starts at ``at`` ends, None where none does."""
     if len(raw) - at < STATUS_OVERHEAD or raw[at + 7] != STATUS:
         return None
     length = int.from_bytes(raw[at + 5 : at + 7], "little")

@@ -91,17 +91,17 @@ _ALONE = (
 
 
 def alone_turns() -> Turns[View]:
-    """Give the views for servos that are asked alone."""
+    """Return the views for servos that are asked alone."""
     return Turns(_ALONE, _ALONE)
 
 
 def direct_turns() -> Turns[View]:
-    """Give the views of servos whose registers are read where they are."""
+    """Return the views of servos whose registers are read where they are."""
     return Turns((DIRECT, LONGER), _DIRECT_SPARE)
 
 
 def indirect_turns(block: IndirectBlock) -> Turns[View]:
-    """Give the views of servos with ``INDIRECT_MAP`` in this block."""
+    """Return the views of servos with ``INDIRECT_MAP`` in this block."""
     base, armed = block.data_base, (*ARMED, *SENSED)
     both = ("temperature", *armed, "voltage")
     usual = (View(base, 13, "BBBhii", both[:-1]), View(base + 1, 14, "BBhiiH", both[1:]))

@@ -34,12 +34,12 @@ class Registers:
         self.refusal = 0
 
     def ping(self, servo_id: int) -> int | None:
-        """Give the model number, None where nobody answers."""
+        """Return the model number, None where nobody answers."""
         found = self.identify(servo_id)
         return None if found is None else found.model_number
 
     def identify(self, servo_id: int) -> Identity | None:
-        """Give model number and firmware, None where nobody answers."""
+        """Return model number and firmware, None where nobody answers."""
         for _ in range(self._tries):
             number, firmware, result, error = self._packets.identify(self._port, servo_id)
             if self._good(servo_id, result, error):
@@ -47,13 +47,13 @@ class Registers:
         return None
 
     def read(self, servo_id: int, name: str) -> int | None:
-        """Give a register's value, None where no good answer came."""
+        """Return a register's value, None where no good answer came."""
         register = REGISTERS[name]
         data = self.read_bytes(servo_id, register.address, register.size)
         return None if data is None else int.from_bytes(data, "little", signed=register.signed)
 
     def read_bytes(self, servo_id: int, address: int, length: int) -> bytes | None:
-        """Give bytes of the control table, None where no good answer came."""
+        """Return bytes of the control table, None where no good answer came."""
         for _ in range(self._tries):
             self._let_late_ones_pass(servo_id)
             data, result, error = self._packets.readTxRx(self._port, servo_id, address, length)

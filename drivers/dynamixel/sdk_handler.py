@@ -69,7 +69,7 @@ class SdkPackets(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has n
         return (data if len(data) == length else [0] * length), result, error
 
     def ping(self, port: Any, dxl_id: int) -> tuple[int, int, int]:
-        """Give model number, result and error."""
+        """Return model number, result and error."""
         number, _, result, error = self.identify(port, dxl_id)
         return number, result, error
 
@@ -97,6 +97,6 @@ def _read_packet(servo_id: int, address: int, length: int) -> list[int]:
 
 
 def _as_the_sdk_lays_out(servo_id: int, error: int, params: bytes) -> list[int]:
-    """Give an unstuffed status as a list; header and CRC, checked already, are zeros."""
+    """Return an unstuffed status as a list; header and CRC, checked already, are zeros."""
     length = len(params) + STATUS_OVERHEAD - 7
     return [0, 0, 0, 0, servo_id, length & 0xFF, length >> 8, 0x55, error, *params, 0, 0]

@@ -41,7 +41,6 @@ class DynamixelSupervisor(Supervisor):
         readings: Readings,
         covered: bool,
     ) -> None:
-        """Take the bus and those who know; ``covered``: group readings tell all there is."""
         super().__init__(line, setups, recovery, health)
         self._watchdog = watchdog
         self._readings = readings
@@ -95,7 +94,7 @@ class DynamixelSupervisor(Supervisor):
         return not sample.blank
 
     def _limp(self, servo_id: int, torque: int | None) -> bool:
-        """Tell whether a servo has no torque that should have, and nothing known is the reason."""
+        """Return whether a servo has no torque that should, and nothing known is the reason."""
         return self.engaged and torque == 0 and servo_id not in self._health.faults
 
     def _suspect(self, servo_id: int) -> None:

@@ -58,7 +58,7 @@ class PlainGroup:
         self.columns = _columns(1, 2, view, self._stride)
 
     def whole(self, raw: bytes) -> Values | None:
-        """Give all values, None where anything at all is not as it should be."""
+        """Return all values, None where anything at all is not as it should be."""
         if len(raw) != self.reply_length:
             return None
         values = self._layout.unpack(raw)
@@ -128,7 +128,7 @@ class FastGroup:
         self.columns = _columns(1, 3, view, self._stride)
 
     def whole(self, raw: bytes) -> Values | None:
-        """Give all values, None where anything at all is not as it should be."""
+        """Return all values, None where anything at all is not as it should be."""
         if len(raw) != self.reply_length:
             return None
         values = self._layout.unpack(raw)
@@ -193,7 +193,7 @@ _OTHERS = HEADER + bytes((BROADCAST,))
 
 
 def _past_packet(raw: bytes) -> int:
-    """Give where a packet of all that stands in front ends, 0 where none does."""
+    """Return where a packet of all that stands in front ends, 0 where none does."""
     if not raw.startswith(_OTHERS) or len(raw) < len(_OTHERS) + 2:
         return 0
     length = int.from_bytes(raw[5:7], "little")
@@ -205,7 +205,7 @@ _LONGEST = 2048
 
 
 def _columns(error: int, first: int, view: View, stride: int) -> Columns:
-    """Give the slices of every field in a tuple of ``stride`` numbers a servo."""
+    """Return the slices of every field in a tuple of ``stride`` numbers a servo."""
     # A fast answer has one number before the first servo's, a plain one its head.
     named = {name: slice(first + i, None, stride) for i, name in enumerate(view.fields)}
     return Columns(slice(error, None, stride), **named)

@@ -109,7 +109,7 @@ class Register(NamedTuple):
         return "eeprom" if self.address < EEPROM_END else "ram"
 
     def encode(self, value: int) -> bytes:
-        """Give a value as it is written.
+        """Return a value as it is written.
 
         Raises:
             ValueError: it does not fit.
@@ -120,13 +120,13 @@ class Register(NamedTuple):
         return raw.to_bytes(self.size, "little")
 
     def decode(self, data: bytes) -> int:
-        """Give the value that bytes stand for."""
+        """Return the value that bytes stand for."""
         raw = int.from_bytes(data, "little")
         return raw if self.sign is None else from_sign_magnitude(raw, self.sign)
 
 
 def to_sign_magnitude(value: int, sign: int) -> int:
-    """Give a number as magnitude with its sign in bit ``sign``.
+    """Return a number as magnitude with its sign in bit ``sign``.
 
     Raises:
         ValueError: the magnitude does not fit below that bit.
@@ -137,7 +137,7 @@ def to_sign_magnitude(value: int, sign: int) -> int:
 
 
 def from_sign_magnitude(raw: int, sign: int) -> int:
-    """Give the number that a magnitude with its sign in bit ``sign`` stands for."""
+    """Return the number that a magnitude with its sign in bit ``sign`` stands for."""
     magnitude = raw & (1 << sign) - 1
     return -magnitude if raw >> sign & 1 else magnitude
 
@@ -238,12 +238,12 @@ def name_errors(status: int) -> tuple[str, ...]:
 
 
 def speed_units(speed_steps_s: float) -> int:
-    """Give a speed in units of Goal Speed, at least 1: there 0 means no limit."""
+    """Return a speed in units of Goal Speed, at least 1: there 0 means no limit."""
     return max(1, min(FASTEST, int(speed_steps_s)))
 
 
 def acceleration_units(accel_steps_s2: float | None) -> int:
-    """Give an acceleration in units of Acceleration, never more than asked for but at least 1.
+    """Return an acceleration in units of Acceleration, never more than asked for but at least 1.
 
     None: 0, as fast as it can.
     """

@@ -49,7 +49,7 @@ def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
 
 
 def checksum(body: bytes) -> int:
-    """Give the checksum over the bytes from the id to the last param."""
+    """Return the checksum over the bytes from the id to the last param."""
     return ~sum(body) & 0xFF
 
 
@@ -150,7 +150,7 @@ def bytes_missing(raw: bytes, count: int, length: int) -> int:
 
 
 def _header(raw: bytes, start: int) -> int:
-    """Give where the next header is: the last FF FF of a row; -1 where none is."""
+    """Return where the next header is: the last FF FF of a row; -1 where none is."""
     at = raw.find(HEADER, start)
     while 0 <= at < len(raw) - 2 and raw[at + 2] == 0xFF:
         at = raw.find(HEADER, at + 1)
@@ -158,7 +158,7 @@ def _header(raw: bytes, start: int) -> int:
 
 
 def _end(raw: bytes, at: int) -> int | None:
-    """Give where the status that starts at ``at`` ends, None where none does."""
+    """Return where the status that starts at ``at`` ends, None where none does."""
     if len(raw) - at < STATUS_OVERHEAD:
         return None
     length = raw[at + 3]

@@ -109,12 +109,12 @@ class Readings:
         ]
 
     def believes(self, slot: int, heard: Heard[Sample]) -> bool:
-        """Tell whether one servo's answer can be true; to be asked once for every answer."""
+        """Return whether one servo's answer can be true; to be asked once for every answer."""
         position = nearest_turn(heard.sample.position, *self._ranges[slot], STEPS_PER_TURN)
         return self.places.one(slot, position, heard.at_s)
 
     def all_believed(self, heard: Mapping[int, Heard[Sample]]) -> bool:
-        """Tell whether everybody has answered in one exchange, and all of it can be true."""
+        """Return whether everybody has answered in one exchange, and all of it can be true."""
         if len(heard) < len(self._ranges):
             return False
         answers = list(heard.values())
@@ -130,7 +130,7 @@ class Readings:
     def confirmed(
         self, slot: int, first: Heard[Sample], second: Heard[Sample]
     ) -> Heard[Sample] | None:
-        """Give what two answers right after one another both say; None where they differ."""
+        """Return what two answers right after one another both say; None where they differ."""
         one, other = first.sample, second.sample
         alike = (
             abs(one.temperature - other.temperature) <= ALIKE_C

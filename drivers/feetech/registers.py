@@ -44,25 +44,25 @@ class StsRegisters:
         self.error = 0
 
     def ping(self, servo_id: int) -> bool:
-        """Tell whether a servo is there.
+        """Return whether a servo is there.
 
         With an adapter that echoes only ``identify`` can tell.
         """
         return self._exchange(servo_id, instruction(servo_id, PING), 0) is not None
 
     def identify(self, servo_id: int) -> Identity | None:
-        """Give model number and firmware, None where nobody answers."""
+        """Return model number and firmware, None where nobody answers."""
         data = self.read_bytes(servo_id, 0, IDENTITY_LENGTH)
         return None if data is None else Identity(data[3] | data[4] << 8, 100 * data[0] + data[1])
 
     def read(self, servo_id: int, name: str) -> int | None:
-        """Give a register's value, None where no good answer came."""
+        """Return a register's value, None where no good answer came."""
         register = REGISTERS[name]
         data = self.read_bytes(servo_id, register.address, register.size)
         return None if data is None else register.decode(data)
 
     def read_bytes(self, servo_id: int, address: int, length: int) -> bytes | None:
-        """Give bytes of the control table, None where no good answer came."""
+        """Return bytes of the control table, None where no good answer came."""
         # The echo of a question has two params: an answer of two is asked for as three.
         asked = 3 if length == 2 else length
         status = self._exchange(servo_id, read(servo_id, address, asked), asked)

@@ -70,7 +70,7 @@ class Found(NamedTuple):
 
     @property
     def version(self) -> str:
-        """Give the firmware as the maker writes it, "3.10"."""
+        """Return the firmware as the maker writes it, "3.10"."""
         return f"{self.firmware // 100}.{self.firmware % 100}"
 
 
@@ -145,7 +145,7 @@ def everybody(
 
 
 def anybody(port: BusPort) -> bool:
-    """Tell whether anyone answers a ping to everybody; their answers may spoil each other."""
+    """Return whether anyone answers a ping to everybody; their answers may spoil each other."""
     question = instruction(BROADCAST, PING)
     port.drain()
     port.write(question)

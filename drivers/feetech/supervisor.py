@@ -169,7 +169,7 @@ class FeetechSupervisor(Supervisor):
             self._doubted.add(servo_id)
 
     def _armed(self, servo_id: int, sample: Sample) -> bool:
-        """Tell whether speed and torque limits are as they were written."""
+        """Return whether speed and torque limits are as they were written."""
         setup = self._setups[servo_id]
         strength = sample.limit if setup.strength is None else round(setup.strength * TORQUE_FULL)
         armed = acceleration_units(setup.max_accel_steps_s2), strength
@@ -215,7 +215,7 @@ class FeetechSupervisor(Supervisor):
             self._suspects.add(servo_id)
 
     def _known_reason(self, servo_id: int) -> bool:
-        """Tell whether it is known why a servo has no torque."""
+        """Return whether it is known why a servo has no torque."""
         if servo_id not in self._health.faults:
             return False
         return servo_id not in self._health.latches or bool(self._bits(servo_id) & TAKES_TORQUE)

@@ -90,7 +90,7 @@ _ALONE = tuple(View(ARMED.address - more) for more in range(1, 11))
 
 
 def together_turns(torque_every: int) -> Turns[View]:
-    """Give the views of the group's reading; every so many tell the torque as well."""
+    """Return the views of the group's reading; every so many tell the torque as well."""
     usual = [ARMED, *(SENSED, LONGER) * torque_every][:torque_every]
     if torque_every == 1:
         usual.append(View(ARMED.address - 1))
@@ -98,10 +98,10 @@ def together_turns(torque_every: int) -> Turns[View]:
 
 
 def alone_turns() -> Turns[View]:
-    """Give the views for servos that are asked alone."""
+    """Return the views for servos that are asked alone."""
     return Turns(_ALONE, _ALONE)
 
 
 def again_turns() -> Turns[View]:
-    """Give the views of readings that confirm others."""
+    """Return the views of readings that confirm others."""
     return Turns(_SECOND, _SECOND)

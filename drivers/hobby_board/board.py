@@ -93,16 +93,24 @@ class Board(Protocol):
     """
 
     @property
-    def line(self) -> Exchange: ...
+    def line(self) -> Exchange:
+        """Return the line to the board."""
+        ...
 
     @property
-    def texts(self) -> BoardTexts: ...
+    def texts(self) -> BoardTexts:
+        """Return the board's words in messages."""
+        ...
 
     @property
-    def timing(self) -> Timing: ...
+    def timing(self) -> Timing:
+        """Return the board's time limits."""
+        ...
 
     @property
-    def damage(self) -> Sequence[str]: ...
+    def damage(self) -> Sequence[str]:
+        """Return what was found broken since the last call."""
+        ...
 
     def check(self, setup: ServoSetup) -> None:
         """Refuse a servo that no channel of the board can have.

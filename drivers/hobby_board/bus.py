@@ -248,7 +248,7 @@ class HobbyBoardBus:
                 channel.stop()
 
     def health(self) -> BusHealth:
-        """Give byte and error counts of all exchanges."""
+        """Return byte and error counts of all exchanges."""
         errors = {kind: count for kind, count in self._line.errors.items() if count}
         return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
 

@@ -56,7 +56,7 @@ class Channel:
             self.ramp.shaft_steps = self.goal_steps
 
     def clip(self, steps: float) -> int:
-        """Give the nearest goal within the limits.
+        """Return the nearest goal within the limits.
 
         Raises:
             ValueError: it is not a number.
@@ -129,7 +129,7 @@ class Channel:
         self._at_s = now_s
 
     def strange(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
-        """Tell whether a pulse cannot come from the goals of late.
+        """Return whether a pulse cannot come from the goals of late.
 
         led_away: an error or a restart has led it towards its home for a moment
         """
@@ -145,7 +145,7 @@ class Channel:
         return not low - room <= pulse_steps <= high + room
 
     def _reached(self, steps: float) -> float:
-        """Give where a goal ends, as far as the board's own range is known."""
+        """Return where a goal ends, as far as the board's own range is known."""
         return min(self._top, max(self._bottom, steps))
 
     def _forget(self, now_s: float) -> None:
@@ -153,7 +153,7 @@ class Channel:
             self._recent.popleft()
 
     def room_steps(self) -> float:
-        """Give how far a pulse may be from where it is expected."""
+        """Return how far a pulse may be from where it is expected."""
         return FINE_STEPS + self.ramp.speed_steps_s * BEHIND_S
 
     def found(self, pulse_steps: int) -> None:
@@ -204,7 +204,7 @@ class Channel:
             self._placed = True
 
     def inside(self) -> bool:
-        """Tell whether the pulse is within the limits."""
+        """Return whether the pulse is within the limits."""
         return self.setup.min_steps <= self.ramp.pulse_steps <= self.setup.max_steps
 
     def rearm(self) -> None:
@@ -213,7 +213,7 @@ class Channel:
         self.ramp.shaft_steps = self.ramp.pulse_steps
 
     def reading(self, at_s: float) -> ServoReading:
-        """Give where it is taken to be; never measured."""
+        """Return where it is taken to be; never measured."""
         anew, self.rearmed = self.rearmed, False
         return ServoReading(
             round(self.ramp.shaft_steps),

@@ -43,7 +43,7 @@ class Ramp:
         self.pulse_steps = pulse_steps
 
     def longest_s(self, way_steps: float) -> float:
-        """Give a time within which the board has led a pulse so far, from rest."""
+        """Return a time within which the board has led a pulse so far, from rest."""
         speed, accel = self.speed_steps_s, self.accel_steps_s2
         cruise_s = way_steps / speed if speed else 0.0
         return cruise_s + (2.0 * sqrt(way_steps / accel) if accel else 0.0)

@@ -17,9 +17,13 @@ class Released(NamedTuple):
 class Stoppable(Protocol):
     """As much of a board as letting go needs."""
 
-    def stop(self, channels: Sequence[int], last_try: bool = False) -> None: ...
+    def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
+        """Ask the board to send no more pulses to channels."""
+        ...
 
-    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None: ...
+    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+        """Return the pulses that the board sends now, None where it cannot tell."""
+        ...
 
 
 def switch_off(board: Stoppable, channels: Sequence[int]) -> Released:

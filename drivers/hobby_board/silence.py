@@ -22,7 +22,6 @@ class Silence:
     """
 
     def __init__(self, log: EventLog, lateness: HostLateness) -> None:
-        """Take where to say it, and the answers that come late, which is no board's fault."""
         self._log, self._lateness = log, lateness
         self.missed = 0
         self._told = False
@@ -31,7 +30,7 @@ class Silence:
         self._since_s, self._due_s, self._wait_s = 0.0, -inf, AGAIN_FIRST_S
 
     def due(self, now_s: float) -> bool:
-        """Tell whether to ask now."""
+        """Return whether to ask now."""
         return now_s >= self._due_s
 
     def miss(self, now_s: float, heard_s: float = -inf) -> None:
@@ -74,5 +73,5 @@ class Silence:
         self._told, self._back_s = False, None
 
     def seconds(self, now_s: float) -> float:
-        """Give for how long nothing has been heard; 0 where the last answer came."""
+        """Return for how long nothing has been heard; 0 where the last answer came."""
         return now_s - self._since_s if self.missed else 0.0

@@ -215,7 +215,7 @@ class Supervisor:
             self._log.add(f"{who} restarted: set up anew")
 
     def _noise_of_late(self, now_s: float) -> bool:
-        """Tell whether bytes have been damaged of late, to the board or from it."""
+        """Return whether bytes have been damaged of late, to the board or from it."""
         errors = self._line.errors
         damages = sum(errors[name] for name in self._board.damage)
         if damages != self._damages:
@@ -275,7 +275,7 @@ class Supervisor:
     # --- what others may know
 
     def believed(self, channel: Channel) -> bool:
-        """Tell whether anything is known of where a channel is."""
+        """Return whether anything is known of where a channel is."""
         return channel not in self._pending
 
     @property

@@ -39,7 +39,7 @@ class MaestroBus(HobbyBoardBus):
         self._maestro.line.send(self._maestro.line.speech.go_home())
 
     def moving(self) -> bool | None:
-        """Tell whether any channel with a limit is on its way; None where nobody can say.
+        """Return whether any channel with a limit is on its way; None where nobody can say.
 
         The Micro Maestro knows no such question.
 

@@ -59,7 +59,7 @@ _CRC_POLYNOMIAL = 0x91
 
 
 def crc7(data: bytes) -> int:
-    """Give the check byte of a command: CRC-7, polynomial 0x91, lowest bit first."""
+    """Return the check byte of a command: CRC-7, polynomial 0x91, lowest bit first."""
     crc = 0
     for byte in data:
         crc ^= byte
@@ -96,7 +96,7 @@ class Speech:
     channels: int = 12
 
     def command(self, code: int, *data: int) -> bytes:
-        """Give the bytes of any command.
+        """Return the bytes of any command.
 
         Raises:
             ValueError: a data byte has its highest bit set.
@@ -159,7 +159,7 @@ class Speech:
 
 
 def split(number: int) -> tuple[int, int]:
-    """Give a number's two data bytes of seven bits, the low one first.
+    """Return a number's two data bytes of seven bits, the low one first.
 
     Raises:
         ValueError: it does not fit into them.

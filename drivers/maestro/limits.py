@@ -17,7 +17,7 @@ MOST_ACCEL = 255
 
 
 def speed_units(steps_s: float) -> int:
-    """Give the smallest speed limit that is not below a speed; 0, unlimited, where none is.
+    """Return the smallest speed limit that is not below a speed; 0, unlimited, where none is.
 
     Raises:
         ValueError: it is not a positive number.
@@ -26,7 +26,7 @@ def speed_units(steps_s: float) -> int:
 
 
 def accel_units(steps_s2: float | None) -> int:
-    """Give the smallest acceleration limit that is not below one; 0, unlimited, where none is.
+    """Return the smallest acceleration limit that is not below one; 0, unlimited, where none is.
 
     Raises:
         ValueError: it is not a positive number.

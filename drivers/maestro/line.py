@@ -100,7 +100,7 @@ class Line:
         return not found[0]
 
     def unheard(self) -> int:
-        """Give the errors that ``send_checked`` has found since the last call."""
+        """Return the errors that ``send_checked`` has found since the last call."""
         register, self._unheard = self._unheard, 0
         return register
 
@@ -122,7 +122,7 @@ class Line:
         return None
 
     def takes_crc(self) -> bool:
-        """Tell whether the board wants the check bytes that it is sent.
+        """Return whether the board wants the check bytes that it is sent.
 
         One that does not answers too, but finds an error in every command.
         """

@@ -76,7 +76,7 @@ def serial_ports(host: Host | None = None) -> tuple[SerialPort, ...]:
 
 
 def _lasting_names(by_id: Path) -> dict[str, str]:
-    """Give the lasting name of every device that has one."""
+    """Return the lasting name of every device that has one."""
     if not by_id.is_dir():
         return {}
     return {os.path.realpath(link): str(link) for link in sorted(by_id.iterdir())}
@@ -88,7 +88,7 @@ def lasting_name(device: str, by_id: Path | None = None) -> str | None:
 
 
 def access(device: str) -> Access:
-    """Tell whether this user may open a path."""
+    """Return whether this user may open a path."""
     try:
         found = os.stat(device)
     except OSError:
@@ -142,7 +142,7 @@ def _program(process: Path) -> str:
 
 
 def latency_file(device: str, host: Host | None = None) -> Path | None:
-    """Give the file that holds the adaptor's latency timer, None where it has none."""
+    """Return the file that holds the adaptor's latency timer, None where it has none."""
     name = Path(os.path.realpath(device)).name
     file = (host or Host()).latency / name / "latency_timer"
     return file if file.is_file() else None

@@ -41,7 +41,7 @@ class BusPort(Protocol):
     port_name: str
 
     def now_s(self) -> float:
-        """Give the time."""
+        """Return the time."""
         ...
 
     def setBaudRate(self, baudrate: int) -> bool:
@@ -61,7 +61,7 @@ class BusPort(Protocol):
         ...
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
-        """Give ``length`` bytes, or those that came before the deadline.
+        """Return ``length`` bytes, or those that came before the deadline.
 
         Raises:
             BusLost: the port is gone.
@@ -126,7 +126,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     # --- what the driver's control loop uses
 
     def now_s(self) -> float:
-        """Give host monotonic seconds."""
+        """Return host monotonic seconds."""
         return time.monotonic()
 
     def write(self, data: bytes) -> None:
@@ -152,7 +152,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             self._wait_for_room(deadline_s)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
-        """Give ``length`` bytes, or those that came before the deadline.
+        """Return ``length`` bytes, or those that came before the deadline.
 
         Raises:
             BusLost: the port is gone.
@@ -298,7 +298,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             raise self._lost(error) from error
 
     def readPort(self, length: int) -> bytes:
-        """Give ``length`` bytes, or those that came before the packet's deadline."""
+        """Return ``length`` bytes, or those that came before the packet's deadline."""
         return self.read_until(length, self._deadline_s)
 
     def writePort(self, packet: bytes | list[int]) -> int:
@@ -315,11 +315,11 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._deadline_s = time.monotonic() + msec / 1000.0
 
     def isPacketTimeout(self) -> bool:
-        """Tell whether the packet's deadline has passed."""
+        """Return whether the packet's deadline has passed."""
         return time.monotonic() >= self._deadline_s
 
     def getCurrentTime(self) -> float:
-        """Give monotonic milliseconds."""
+        """Return monotonic milliseconds."""
         return time.monotonic() * 1000.0
 
 

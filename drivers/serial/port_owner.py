@@ -21,7 +21,7 @@ def is_i2c(device: str) -> bool:
 
 
 def usb_of(device: str, ports: Sequence[SerialPort]) -> str:
-    """Give the USB vendor and product id of a port, "" where it has none or is not listed."""
+    """Return the USB vendor and product id of a port, "" where it has none or is not listed."""
     real = os.path.realpath(device)
     return next((port.usb for port in ports if os.path.realpath(port.device) == real), "")
 

@@ -37,7 +37,7 @@ class LastingPort:
 
     @property
     def down(self) -> bool:
-        """Tell whether the port is gone."""
+        """Return whether the port is gone."""
         return self._link.down
 
     def lose(self, lost: BusLost, now_s: float) -> None:

@@ -22,7 +22,7 @@ class Reconnect:
         self._next_s = now_s + FIRST_S
 
     def due(self, now_s: float) -> bool:
-        """Tell whether to try now."""
+        """Return whether to try now."""
         return now_s >= self._next_s
 
     def failed(self, now_s: float, longest_s: float = LAST_S) -> None:
@@ -36,5 +36,5 @@ class Reconnect:
         return now_s - self._since_s
 
     def gone_for_s(self, now_s: float) -> float:
-        """Give for how long the port has been gone."""
+        """Return for how long the port has been gone."""
         return now_s - self._since_s if self.down else 0.0

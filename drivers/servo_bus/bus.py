@@ -352,7 +352,7 @@ class SmartServoBus(ABC):
                 self._log.add(f"{self._line.who(servo_id)} {what}: {CUT}")
 
     def health(self) -> BusHealth:
-        """Give byte and error counts of all exchanges."""
+        """Return byte and error counts of all exchanges."""
         errors = {kind: count for kind, count in self._line.errors.items() if count}
         return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
 

@@ -65,7 +65,7 @@ class Health:
             self._log.add(f"{servo_label(self._setups[servo_id])}: the fault is gone")
 
     def exhausted(self, servo_id: int, now_s: float) -> bool:
-        """Tell whether a servo has restarted too often of late; that is a fault then."""
+        """Return whether a servo has restarted too often of late; that is a fault then."""
         lately = [t_s for t_s in self._restarts.get(servo_id, []) if now_s - t_s < WITHIN_S]
         self._restarts[servo_id] = lately
         if len(lately) < MOST_RESTARTS:
@@ -119,7 +119,7 @@ class Health:
 
     @property
     def returning(self) -> bool:
-        """Tell whether it is still to be said what a silence of all was."""
+        """Return whether it is still to be said what a silence of all was."""
         return self._nobody_since is not None
 
     def heard_again(self, now_s: float, lateness: HostLateness) -> None:
@@ -167,7 +167,7 @@ class Health:
                 self._log.add(f"{servo_label(self._setups[servo_id])} {what}")
 
     def silent_for_s(self, now_s: float) -> float:
-        """Give for how long nobody at all has answered."""
+        """Return for how long nobody at all has answered."""
         if len(self._silent_since) < len(self._setups):
             return 0.0
         return now_s - max(self._silent_since.values())

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 
 def clipped(steps: Sequence[int], limits: Sequence[tuple[int, int]]) -> list[int]:
-    """Give goals inside their (lowest, highest) steps.
+    """Return goals inside their (lowest, highest) steps.
 
     Raises:
         ValueError: a goal is not a number, or there are not as many as servos.

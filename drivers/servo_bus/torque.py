@@ -170,7 +170,7 @@ def find_ailing(line: Line, ids: Sequence[int]) -> dict[int, int]:
 def heal_tripped(
     line: Line, ids: Sequence[int], watchdog: int, clip: Callable[[int, int], int]
 ) -> tuple[int, ...]:
-    """Give servos whose bus watchdog has tripped their present position as goal and arm it anew.
+    """Return servos whose bus watchdog has tripped their present position as goal and arm it anew.
 
     A tripped servo stands still and refuses goals. ``clip(id, steps)`` keeps a goal inside
     the limits. Returns the servos that were healed.

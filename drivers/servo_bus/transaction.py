@@ -216,7 +216,7 @@ class Line:
         return found
 
     def _ends_s(self, answer_bytes: int) -> float:
-        """Give until when an answer to what was just sent is waited for.
+        """Return until when an answer to what was just sent is waited for.
 
         In the loop others are waiting, and how late answers are has been measured.
         """

@@ -31,7 +31,7 @@ class Turns(Generic[Window]):
         self.troubled = False
 
     def next(self) -> Window:
-        """Give the window of the next reading."""
+        """Return the window of the next reading."""
         if self.troubled:
             self._odd ^= 1
             return self._spare[(self._pair + self._odd) % len(self._spare)]

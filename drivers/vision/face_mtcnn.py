@@ -103,7 +103,7 @@ class MtcnnDetector:
         return _squared(every[_merged(every, np.concatenate(scores))[:_MOST]])
 
     def _pnet(self, level: int) -> cv2.dnn.Net:
-        """Give the proposing network of one scale."""
+        """Return the proposing network of one scale."""
         while level >= len(self._pnets):
             self._pnets.append(cv2.dnn.readNetFromONNX(self._pnet_file))
         return self._pnets[level]
@@ -221,14 +221,14 @@ def _squared(boxes: Floats) -> Floats:
 
 
 def _merged(boxes: Floats, scores: NDArray[np.floating]) -> Rows:
-    """Give the rows that stay when boxes with too much in common merge, the surest first."""
+    """Return the rows that stay when boxes with too much in common merge, the surest first."""
     rects = np.hstack([boxes[:, :2], boxes[:, 2:] - boxes[:, :2]])
     keep = cv2.dnn.NMSBoxes(rects, scores, 0.0, _SAME)  # type: ignore[arg-type]
     return np.asarray(keep, dtype=np.intp).reshape(-1)
 
 
 def _outermost(boxes: Floats, scores: Floats32) -> Rows:
-    """Give the rows that stay when a box mostly inside a surer one, or around it, goes."""
+    """Return the rows that stay when a box mostly inside a surer one, or around it, goes."""
     kept: list[int] = []
     area = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1)
     for i in np.argsort(-scores, kind="stable").tolist():

@@ -30,7 +30,7 @@ class Applied(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Give how far from the wish the joint is."""
+        """Return how far from the wish the joint is."""
         return self.measured - self.wished
 
     def __str__(self) -> str:
@@ -69,7 +69,7 @@ class Moved(NamedTuple):
 
     @property
     def arrived(self) -> bool:
-        """Tell whether every joint that was to move came near its wish."""
+        """Return whether every joint that was to move came near its wish."""
         return self.ended == "arrived"
 
     def __str__(self) -> str:
@@ -78,11 +78,11 @@ class Moved(NamedTuple):
         return f"{self.ended} ({'; '.join(reasons)})" if reasons else self.ended
 
     def of(self, joint: str) -> Applied:
-        """Give one joint's part."""
+        """Return one joint's part."""
         return next(part for part in self.joints if part.joint == joint)
 
     def remarkable(self) -> tuple[Applied, ...]:
-        """Give the joints that something is to be said of."""
+        """Return the joints that something is to be said of."""
         return tuple(part for part in self.joints if part.reasons)
 
 
@@ -100,12 +100,12 @@ class Notes:
                 self._by_joint.setdefault(joint, {})[reason] = None
 
     def of(self, joint: str) -> tuple[str, ...]:
-        """Give the reasons of one joint, with those of all."""
+        """Return the reasons of one joint, with those of all."""
         return (*self._by_joint.get(joint, {}), *self._by_joint.get("all", {}))
 
 
 def outcome(step: Step, wish: JointAngles, notes: Notes) -> tuple[Applied, ...]:
-    """Give every joint's part of how a movement ended."""
+    """Return every joint's part of how a movement ended."""
     verdict, joints = step.verdict, step.joints
     told = joints.measured or (True,) * len(verdict.joints)
     rows = zip(verdict.joints, wish, verdict.command_rad, joints.position_rad, told, strict=True)
@@ -116,7 +116,7 @@ def outcome(step: Step, wish: JointAngles, notes: Notes) -> tuple[Applied, ...]:
 
 
 def standing(step: Step, wish: JointAngles, moving: Iterable[int], near_rad: float) -> str | None:
-    """Give how joints that stand have ended: at their wish, or where the guard keeps them."""
+    """Return how joints that stand have ended: at their wish, or where the guard keeps them."""
     joints, command = step.joints, step.verdict.command_rad
     held = False
     for i in moving:

@@ -69,12 +69,12 @@ class OneHobby:
 
     @property
     def place_us(self) -> float:
-        """Give the pulse that it has been sent to."""
+        """Return the pulse that it has been sent to."""
         return self._goal / US_STEPS
 
     @property
     def pulse_us(self) -> float:
-        """Give the pulse that it gets now, on its way to that."""
+        """Return the pulse that it gets now, on its way to that."""
         return self._pulse / US_STEPS
 
     def open(self) -> float | None:

@@ -81,7 +81,7 @@ Done = Callable[[Step], str | None]
 
 
 def no_reason() -> str | None:
-    """Give no reason to stop."""
+    """Return no reason to stop."""
     return None
 
 
@@ -116,7 +116,7 @@ class ManualControl:
 
     @property
     def goal_rad(self) -> JointAngles:
-        """Give the goals in force."""
+        """Return the goals in force."""
         return self._goal
 
     def start(self) -> JointAngles:
@@ -273,7 +273,7 @@ def parked(control: ManualControl, park_deg: Mapping[str, float], again: Again) 
 
 
 def duration_s(distance_rad: float, params: JogParams) -> float:
-    """Give the time of a way from rest to rest that keeps to speed and acceleration."""
+    """Return the time of a way from rest to rest that keeps to speed and acceleration."""
     far = degrees(abs(distance_rad))
     slow = _PEAK_SPEED * far / params.speed_deg_s
     return max(0.05, slow, sqrt(_PEAK_ACCEL * far / params.accel_deg_s2))

@@ -87,7 +87,7 @@ def look_at(
 
 
 def judged(p_world_m: Vec3, pose: GazeState, moved: Moved, converges: bool = True) -> LookedAt:
-    """Give how measured eyes point at a point.
+    """Return how measured eyes point at a point.
 
     converges: as in LookedAt
     """

@@ -31,7 +31,7 @@ TIMEOUT_S = 0.5
 
 
 def range_us(setup: ServoSetup) -> tuple[int, int]:
-    """Give Min and Max of a channel, us: the joint's range rounded outwards."""
+    """Return Min and Max of a channel, us: the joint's range rounded outwards."""
     step = UNIT_US * US_STEPS
     return (
         UNIT_US * floor(setup.min_steps / step),
@@ -40,7 +40,7 @@ def range_us(setup: ServoSetup) -> tuple[int, int]:
 
 
 def wide_range(setup: ServoSetup) -> tuple[int, int] | None:
-    """Give Min and Max of a channel where a new board's would cut the joint's range."""
+    """Return Min and Max of a channel where a new board's would cut the joint's range."""
     low, high = range_us(setup)
     if setup.min_steps >= FACTORY_US[0] * US_STEPS and setup.max_steps <= FACTORY_US[1] * US_STEPS:
         return None
@@ -48,7 +48,7 @@ def wide_range(setup: ServoSetup) -> tuple[int, int] | None:
 
 
 def start_limits(setup: ServoSetup) -> tuple[int, int]:
-    """Give Speed and Acceleration of a channel, which the board keeps to from its start on.
+    """Return Speed and Acceleration of a channel, which the board keeps to from its start on.
 
     In the board's units (0.25 us in 10 ms; that in 80 ms), 0 for unlimited. A board keeps five
     bits of a speed and how often they are doubled: what it shows is what it keeps.
@@ -87,7 +87,7 @@ def instructions(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool)
 
 
 def settings_file(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool) -> str:
-    """Give the same as a settings file of Pololu's programs.
+    """Return the same as a settings file of Pololu's programs.
 
     Channels of no joint are servos without pulses, as from the factory.
     """

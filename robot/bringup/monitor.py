@@ -62,7 +62,7 @@ class Monitor:
 
 
 def as_json(sample: Sample, start_s: float) -> dict[str, object]:
-    """Give a sample as plain values, times in seconds since the start."""
+    """Return a sample as plain values, times in seconds since the start."""
     return {
         "t_s": round(sample.at_s - start_s, 3),
         "took_ms": round(1e3 * sample.took_s, 1),

@@ -9,7 +9,7 @@ from gazerig.robot.bringup.servo_kind import Found
 
 
 def servo_plain(kind: BusKind, servo: Found) -> dict[str, object]:
-    """Give a servo as JSON can hold it."""
+    """Return a servo as JSON can hold it."""
     return {
         "kind": kind,
         "id": servo.id,
@@ -21,7 +21,7 @@ def servo_plain(kind: BusKind, servo: Found) -> dict[str, object]:
 
 
 def board_plain(looked: Looked) -> dict[str, object]:
-    """Give a Maestro as JSON can hold it; pulses in us, 0 for none."""
+    """Return a Maestro as JSON can hold it; pulses in us, 0 for none."""
     board = looked.board
     if board is None:
         raise ValueError("no board answered")

@@ -60,14 +60,14 @@ class Looked:
 
     @property
     def somebody(self) -> bool:
-        """Tell whether anyone of this kind has answered."""
+        """Return whether anyone of this kind has answered."""
         return bool(self.found) or self.board is not None
 
 
 def plan(
     usb: str, kinds: Sequence[BusKind], rates: Sequence[int] | None
 ) -> tuple[tuple[BusKind, int], ...]:
-    """Give which kinds to ask at which rates, in order.
+    """Return which kinds to ask at which rates, in order.
 
     usb: vendor and product id of the port, "" where it has none
     kinds: those that are wished; rates: likewise, None for all
@@ -127,7 +127,7 @@ def _board(port: BusPort, usb: str, baud: int) -> Looked:
 
 
 def found_of(rounds: Iterable[Looked]) -> list[tuple[BusKind, Found]]:
-    """Give all servos that answered, with their kinds."""
+    """Return all servos that answered, with their kinds."""
     return [(one.kind, servo) for one in rounds for servo in one.found]
 
 

@@ -55,11 +55,11 @@ class OneServo(Protocol):
         ...
 
     def position(self) -> int:
-        """Give the present position in steps."""
+        """Return the present position in steps."""
         ...
 
     def load(self) -> float:
-        """Give the present current as a share of the stall current, signed; 0 where unknown."""
+        """Return the present current as a share of the stall current, signed; 0 where unknown."""
         ...
 
     def hold(self, strength: float, speed_steps_s: float) -> None:
@@ -74,7 +74,7 @@ class OneServo(Protocol):
         ...
 
     def holds(self) -> bool:
-        """Tell whether the torque is on."""
+        """Return whether the torque is on."""
         ...
 
     def send(self, goal_steps: int) -> None:
@@ -98,7 +98,7 @@ class Asked:
         self.who = who
 
     def value(self, register: str) -> int:
-        """Give a register's value.
+        """Return a register's value.
 
         Raises:
             BusLost: it does not answer any more.

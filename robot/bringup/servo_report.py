@@ -9,7 +9,7 @@ _JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 
 
 def grouped(findings: Sequence[Finding]) -> list[tuple[Level, str, str, str]]:
-    """Give level, places, what and remedy, the worst first; the same at several places once."""
+    """Return level, places, what and remedy, the worst first; the same at several places once."""
     groups: dict[tuple[Level, str, str], list[str]] = {}
     for finding in findings:
         groups.setdefault((finding.level, finding.what, finding.remedy), []).append(finding.where)
@@ -39,7 +39,7 @@ def runs(numbers: Sequence[int]) -> str:
 
 
 def as_plain(finding: Finding, bus: str) -> dict[str, object]:
-    """Give a finding as JSON can hold it; bus: the name of its bus, "" for the main one."""
+    """Return a finding as JSON can hold it; bus: the name of its bus, "" for the main one."""
     return {
         "bus": bus,
         "level": finding.level,

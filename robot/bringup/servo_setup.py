@@ -90,7 +90,7 @@ def refuse_model(found: Found, kind: ServoKind, setup: ServoSetup, where: str) -
 def assign(
     port: BusPort, kind: ServoKind, found: Found, setup: ServoSetup, baud: int, tell: Tell
 ) -> SetUp:
-    """Give the servo found the id of a joint and the bus's baud rate, and see that it has them.
+    """Return the servo found the id of a joint and the bus's baud rate, and see that it has them.
 
     Its torque goes off. Whatever goes wrong, the message says where the servo now answers.
 

@@ -61,7 +61,7 @@ class SingleJoint:
         self._servo.let_go()
 
     def position(self) -> tuple[int, float]:
-        """Give the present position and the time of the reading."""
+        """Return the present position and the time of the reading."""
         value = self._servo.position()
         self._at_s = self._clock.now_s()
         return value, self._at_s

@@ -1,5 +1,4 @@
-"""One smart servo by itself, for calibrating; implements
-gazerig.robot.bringup.servo_access.OneServo.
+"""One smart servo by itself, for calibrating; implements ``servo_access.OneServo``.
 
 Where it has a bus watchdog that is armed while the torque is on, so a servo that is left alone
 stops. Where its memory has a lock its limits are opened with the lock shut: the servo obeys and

@@ -78,7 +78,7 @@ class Held(NamedTuple):
     tilt_down_deg: float
 
     def differs(self, other: "Held", params: ViewParams) -> bool:
-        """Tell whether it tells something that the other does not."""
+        """Return whether it tells something that the other does not."""
         moved = max(abs(a - b) for a, b in zip(self[:4], other[:4], strict=True))
         tilted = hypot(
             self.tilt_right_deg - other.tilt_right_deg, self.tilt_down_deg - other.tilt_down_deg
@@ -97,12 +97,12 @@ class Coverage(NamedTuple):
 
     @property
     def enough(self) -> bool:
-        """Tell whether a calibration can be made of them."""
+        """Return whether a calibration can be made of them."""
         return not self.missing
 
 
 def held(seen: SeenBoard, guess: Intrinsics, width_px: int, height_px: int) -> Held | None:
-    """Tell how the board is held, None where its pose cannot be found.
+    """Return how the board is held, None where its pose cannot be found.
 
     guess: a lens that is about right; the field of view of the data sheet will do
     """
@@ -144,7 +144,6 @@ class ViewCollector:
     def __init__(
         self, guess: Intrinsics, width_px: int, height_px: int, params: ViewParams | None = None
     ) -> None:
-        """Take a lens that is about right and the size of the pictures."""
         self.params = params if params is not None else ViewParams()
         self._guess, self._size = guess, (width_px, height_px)
         self._held: list[Held] = []

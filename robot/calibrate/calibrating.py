@@ -39,7 +39,7 @@ class Person(Protocol):
         ...
 
     def agrees(self, question: str, live: Callable[[], str]) -> bool:
-        """Give their yes or no, as ``wait``."""
+        """Return their yes or no, as ``wait``."""
         ...
 
 
@@ -120,7 +120,7 @@ def by_motion(
 
 
 def _find_stops(single: SingleJoint, person: Person, params: StopSearchParams) -> Marks:
-    """Give both stops, the zero still open; the person says which way it went."""
+    """Return both stops, the zero still open; the person says which way it went."""
     positive, negative = ends_of(single.name)
     way = single.joint.sign
     single.take_on(params)

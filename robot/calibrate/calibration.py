@@ -84,13 +84,12 @@ class Unwrapped:
     """
 
     def __init__(self) -> None:
-        """Begin before the first sample."""
         self._at: int | None = None
         self._seen_s = 0.0
 
     @property
     def steps(self) -> int | None:
-        """Give the unwrapped position, in 0..4095 at the first sample; None before it."""
+        """Return the unwrapped position, in 0..4095 at the first sample; None before it."""
         return self._at
 
     def see(self, position_steps: int, t_s: float) -> int:
@@ -116,12 +115,12 @@ class Unwrapped:
 
 
 def ends_of(joint_name: str) -> tuple[str, str]:
-    """Give the names of a joint's positive and negative end."""
+    """Return the names of a joint's positive and negative end."""
     return next(ends for part, ends in ENDS.items() if joint_name.endswith(part))
 
 
 def _plain(value: Value) -> Value:
-    """Give whole numbers of a linkage as such: 1500 us is no more exact as 1500.0."""
+    """Return whole numbers of a linkage as such: 1500 us is no more exact as 1500.0."""
     if not isinstance(value, tuple):
         return value
     return tuple((_short(angle), _short(at)) for angle, at in value)
@@ -132,7 +131,7 @@ def _short(number: float) -> float:
 
 
 def is_lid(joint_name: str) -> bool:
-    """Tell whether a joint moves a lid: its ends are what matters, and it has no straight ahead."""
+    """Return whether a joint moves a lid: its ends matter, and it has no straight ahead."""
     return joint_name.endswith("_lid")
 
 
@@ -240,7 +239,7 @@ def _refuse_unfit(name: str, made: Calibration, joint: JointParams, margin_deg: 
 
 
 def applied(joint: JointParams, made: Calibration) -> JointParams:
-    """Give the joint as calibrated.
+    """Return the joint as calibrated.
 
     Raises:
         ValueError: the joint's own rules refuse it.
@@ -254,7 +253,7 @@ def changes(
     made: Calibration | Places,
     park_deg: Mapping[str, float],
 ) -> dict[str, Value]:
-    """Give dotted keys of the rig file and their new values, those alone that differ.
+    """Return dotted keys of the rig file and their new values, those alone that differ.
 
     Values that stood on the old range follow: a lid's shut and open angle go to its ends,
     a parking angle outside the new range to its nearer end.

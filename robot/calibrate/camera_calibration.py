@@ -94,14 +94,14 @@ class LensCalibration:
 
     @property
     def horizontal_field_deg(self) -> float:
-        """Give the field of view from edge to edge, at the height of the optical axis."""
+        """Return the field of view from edge to edge, at the height of the optical axis."""
         edges = np.array([(-0.5, self.intrinsics.cy_px), (self.width_px - 0.5,) * 2])
         edges[1, 1] = self.intrinsics.cy_px
         (left, _, _), (right, _, _) = rays(edges, self.intrinsics).tolist()
         return degrees(atan2(right, 1.0) - atan2(left, 1.0))
 
     def params(self) -> LensParams:
-        """Give it as it is written down."""
+        """Return it as it is written down."""
         i = self.intrinsics
         k1, k2, p1, p2, k3 = (round(k, 6) for k in i.distortion)
         focal, centre = (round(i.fx_px, 2), round(i.fy_px, 2)), (round(i.cx_px, 2), i.cy_px)
@@ -164,7 +164,7 @@ def calibrate_lens(
 def _usable(
     views: Sequence[SeenBoard], guess: Intrinsics, width: int, height: int, params: ViewParams
 ) -> list[int]:
-    """Give the numbers of the views that tell something new, or refuse if they are too few."""
+    """Return the numbers of the views that tell something new, or refuse if they are too few."""
     collector = ViewCollector(guess, width, height, params)
     usable = [k for k, seen in enumerate(views) if not collector.offer(seen)]
     if not collector.coverage.enough:
@@ -207,7 +207,7 @@ def _calibrated(views: Sequence[SeenBoard], width: int, height: int, flags: int)
 
 
 def _outlier(fit: _Fit, ratio: float) -> int | None:
-    """Give the view that fits worst, if it fits much worse than is usual."""
+    """Return the view that fits worst, if it fits much worse than is usual."""
     worst = int(np.argmax(fit.view_rms_px))
     usual = float(np.median(fit.view_rms_px))
     return worst if fit.view_rms_px[worst] > max(ratio * usual, _GOOD_PX) else None
@@ -236,7 +236,7 @@ def _judge(fit: _Fit, width: int, height: int, params: LensCalibrationParams) ->
 
 
 def _folds(lens: Intrinsics, width: int, height: int) -> bool:
-    """Tell whether a pixel near the picture's edge is reached from two directions or none."""
+    """Return whether a pixel near the picture's edge is reached from two directions or none."""
     x, y = np.linspace(0.0, width - 1.0, 9), np.linspace(0.0, height - 1.0, 9)
     pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     back = project(rays(pixels, lens), lens)

@@ -97,7 +97,6 @@ class LensSteps:
     def __init__(
         self, board: CharucoBoard, view_rad: float, params: LensCalibrationParams | None = None
     ) -> None:
-        """Take the board and about how far the camera sees from edge to edge."""
         self._board, self._view_rad = board, view_rad
         self._params = params if params is not None else LensCalibrationParams()
         self._collector: ViewCollector | None = None
@@ -125,7 +124,7 @@ class LensSteps:
         return LensStep(shot.number, corners, not why, why, self._collector.coverage)
 
     def tried(self) -> tuple[LensCalibration | None, str]:
-        """Give the lens, or None and why more views are needed.
+        """Return the lens, or None and why more views are needed.
 
         Raises:
             gazerig.robot.calibrate.camera_calibration.CameraCalibrationRefused: more views will
@@ -140,7 +139,7 @@ class LensSteps:
             return None, str(refused)
 
     def result(self) -> LensCalibration:
-        """Give the lens.
+        """Return the lens.
 
         Raises:
             gazerig.robot.calibrate.camera_calibration.CameraCalibrationRefused: the views do not
@@ -168,7 +167,7 @@ class Neck(Protocol):
         ...
 
     def angles(self) -> Angles3:
-        """Give yaw, pitch and roll as last measured."""
+        """Return yaw, pitch and roll as last measured."""
         ...
 
 

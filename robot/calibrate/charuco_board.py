@@ -59,7 +59,7 @@ class BoardParams:
             )
 
     def scaled(self, factor: float) -> "BoardParams":
-        """Give the same board as a printer made it that prints everything so much larger.
+        """Return the same board as a printer made it that prints everything so much larger.
 
         Raises:
             ValueError: the factor is no sensible one.
@@ -87,7 +87,6 @@ class CharucoBoard:
     """One board: what it looks like, and where it is in a picture."""
 
     def __init__(self, params: BoardParams | None = None) -> None:
-        """Take its measures."""
         self.params = par = params if params is not None else BoardParams()
         self._board = cv2.aruco.CharucoBoard(
             (par.columns, par.rows),
@@ -127,7 +126,7 @@ class CharucoBoard:
 
 
 def _grey(picture: Picture) -> Picture | None:
-    """Give a grey picture, None where there is none to speak of."""
+    """Return a grey picture, None where there is none to speak of."""
     if picture.ndim not in (2, 3) or min(picture.shape[:2]) < 16:
         return None
     if picture.ndim == 2 or picture.shape[2] == 1:
@@ -137,6 +136,6 @@ def _grey(picture: Picture) -> Picture | None:
 
 
 def _spread(corners_m: Floats) -> bool:
-    """Tell whether corners lie in a plane, not on a line."""
+    """Return whether corners lie in a plane, not on a line."""
     flat = corners_m[:, :2] - corners_m[:, :2].mean(axis=0)
     return bool(np.linalg.matrix_rank(flat, tol=1e-6) == 2)

@@ -26,7 +26,7 @@ class BoardPose(NamedTuple):
 
 
 def board_poses(seen: SeenBoard, lens: Intrinsics) -> tuple[BoardPose, ...]:
-    """Give the one or two poses that explain the corners, the better one first."""
+    """Return the one or two poses that explain the corners, the better one first."""
     if len(seen.ids) < LEAST_CORNERS:
         return ()
     points, corners = seen.corners_board_m, seen.corners_px[:, None]

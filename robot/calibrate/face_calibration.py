@@ -68,20 +68,20 @@ class FaceCalibration:
 
     @property
     def part(self) -> str | None:
-        """Give the part that is due, None at the end."""
+        """Return the part that is due, None at the end."""
         return None if self.ended or self.at >= len(ORDER) else ORDER[self.at]
 
     @property
     def step_mm(self) -> float:
-        """Give how far one key moves the gaze."""
+        """Return how far one key moves the gaze."""
         return STEPS_MM[self.step]
 
     def place_mm(self, part: str) -> Vec3:
-        """Give where a part is now, in the face frame."""
+        """Return where a part is now, in the face frame."""
         return self.places_mm[ORDER.index(part)]
 
     def moved_mm(self, part: str) -> tuple[float, float]:
-        """Give how far a part has been moved to its owner's left and up."""
+        """Return how far a part has been moved to its owner's left and up."""
         _, y0, z0 = self.starts_mm[ORDER.index(part)]
         _, y, z = self.place_mm(part)
         return y - y0, z - z0
@@ -97,7 +97,7 @@ def begun(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
 
 
 def pressed(state: FaceCalibration, key: Key) -> FaceCalibration:
-    """Give what a key makes of it; after the end, keys do nothing."""
+    """Return what a key makes of it; after the end, keys do nothing."""
     part = state.part
     if part is None:
         return state
@@ -119,19 +119,19 @@ def pressed(state: FaceCalibration, key: Key) -> FaceCalibration:
 
 
 def point_world_m(place_mm: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> Vec3:
-    """Give where a place in the face frame is, for a face that is there and turned so."""
+    """Return where a place in the face frame is, for a face that is there and turned so."""
     x, y, z = place_mm
     return add(p_world_face_m, rotate(R_world_face, (x / 1e3, y / 1e3, z / 1e3)))
 
 
 def place_in_face_mm(p_world_m: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> Vec3:
-    """Give the place in the face frame of a point in the world: the way back."""
+    """Return the place in the face frame of a point in the world: the way back."""
     x, y, z = rotate_back(R_world_face, sub(p_world_m, p_world_face_m))
     return x * 1e3, y * 1e3, z * 1e3
 
 
 def changes(state: FaceCalibration) -> dict[str, Vec3]:
-    """Give the chosen places as dotted keys of a rig file and values, to 0.1 mm."""
+    """Return the chosen places as dotted keys of a rig file and values, to 0.1 mm."""
     return {
         f"face_parts_mm.{part}": _tenths(state.place_mm(part))
         for part in ORDER

@@ -68,11 +68,11 @@ class FaceSteering:
 
     @property
     def aimed(self) -> bool:
-        """Tell whether both eyes are on the part and nothing waits to be done."""
+        """Return whether both eyes are on the part and nothing waits to be done."""
         return self.face is not None and self._entered_s is None and self.error_deg <= AIMED_DEG
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
-        """Give the part that is due as target, or where to wait while nobody is seen."""
+        """Return the part that is due as target, or where to wait while nobody is seen."""
         self.face = face = self._nearest(percept, state.p_world_head_m, t_s)
         part = self.state.part
         if face is None or percept is None or part is None:
@@ -127,7 +127,7 @@ class FaceSteering:
         return degrees(gaze_error(tick.target.p_world_m, tick.pose, self._converges).whole)
 
     def _nearest(self, percept: Percept | None, p_head: Vec3, t_s: float) -> Face | None:
-        """Give the face looked at for as long as it is seen, else the nearest."""
+        """Return the face looked at for as long as it is seen, else the nearest."""
         if percept is None or not percept.faces or percept.age_s(t_s) > STALE_S:
             return None
         followed = self.face.id if self.face is not None else None

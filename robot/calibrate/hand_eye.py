@@ -169,7 +169,7 @@ class HandEye:
     angle_std_deg: Vec3
 
     def mounted(self, params: CameraParams) -> CameraParams:
-        """Give the camera where it was found, rounded to 0.1 mm and 0.01 deg."""
+        """Return the camera where it was found, rounded to 0.1 mm and 0.01 deg."""
         found = mounted_at(params, self.R_head_camera, self.p_head_camera_m)
         x, y, z = (round(mm, 1) for mm in found.position_mm)
         return replace(
@@ -227,7 +227,7 @@ def camera_on_head(
 
 
 def turns_deg(R_world_head: Sequence[Mat3]) -> tuple[float, float]:
-    """Give the root mean square turn between any two poses about the main axis and the second.
+    """Return the root mean square turn between any two poses about the main axis and the second.
 
     Where the second is 0, the head turned about one axis only, and how far along it the
     camera sits cannot be told.
@@ -282,7 +282,7 @@ def _judge(fit: Fit, params: HandEyeParams, width_px: int) -> None:
 
 
 def _outlier(fit: Fit, ratio: float) -> int | None:
-    """Give the view that fits worst, if it fits much worse than is usual."""
+    """Return the view that fits worst, if it fits much worse than is usual."""
     worst = int(np.argmax(fit.view_rms_px))
     usual = float(np.median(fit.view_rms_px))
     return worst if fit.view_rms_px[worst] > max(ratio * usual, _GOOD_PX) else None
@@ -313,7 +313,7 @@ def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: Han
 
 
 def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pose]]:
-    """Give places of camera and board by OpenCV's closed forms, those that are any."""
+    """Return places of camera and board by OpenCV's closed forms, those that are any."""
     posed = [(view, poses[0]) for view in views if (poses := board_poses(view.seen, lens))]
     if len(posed) < 3:
         return []
@@ -336,13 +336,13 @@ def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pos
 
 
 def _off(sights: Sights, camera: Pose, board: Pose) -> float:
-    """Give the usual reprojection error of a start, by which starts are compared."""
+    """Return the usual reprojection error of a start, by which starts are compared."""
     errors = np.abs(sights.errors(start(sights, camera, board)))
     return float(np.median(np.where(np.isfinite(errors), errors, inf)))
 
 
 def _middle(poses: Sequence[Pose]) -> Pose:
-    """Give the pose in the middle of several: median place, mean rotation."""
+    """Return the pose in the middle of several: median place, mean rotation."""
     u, _, vt = np.linalg.svd(np.sum([pose.R for pose in poses], axis=0))
     R = u @ np.diag((1.0, 1.0, np.linalg.det(u @ vt))) @ vt
     return Pose(R, np.median([pose.p for pose in poses], axis=0))

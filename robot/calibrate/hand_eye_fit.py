@@ -45,7 +45,7 @@ class Pose(NamedTuple):
     p: Floats
 
     def then(self, child: "Pose") -> "Pose":
-        """Give the child's frame in this one's parent."""
+        """Return the child's frame in this one's parent."""
         return Pose(self.R @ child.R, self.R @ child.p + self.p)
 
     def moved(self, step: Floats) -> "Pose":
@@ -77,7 +77,7 @@ class Guess(NamedTuple):
         )
 
     def lens(self, calibrated: Intrinsics) -> Intrinsics:
-        """Give the lens as it seems from here."""
+        """Return the lens as it seems from here."""
         zoom, right, down = self.lens_off.tolist()
         return Intrinsics(
             calibrated.fx_px * (1.0 + zoom),
@@ -129,7 +129,7 @@ class Sights(NamedTuple):
         )
 
     def errors(self, guess: Guess) -> Floats:
-        """Give by how much each corner is seen off: (2 n,) pixels, nan behind the camera."""
+        """Return by how much each corner is seen off: (2 n,) pixels, nan behind the camera."""
         world = self.corners_board_m @ guess.board.R.T + guess.board.p
         head = np.einsum("nji,nj->ni", self.R_world_head, world - self.p_world_head_m)
         # The turns are so small that their squares do not count.
@@ -138,7 +138,7 @@ class Sights(NamedTuple):
         return np.asarray((shown - self.corners_px).ravel(), dtype=np.float64)
 
     def slopes(self, guess: Guess) -> tuple[Floats, Floats]:
-        """Give how errors grow with the shared numbers (2 n, 15) and the head's turns (2 n, 3)."""
+        """Return the slopes of errors by shared numbers (2 n, 15) and head turns (2 n, 3)."""
         columns = []
         for k in range(_SHARED + 3):
             step = np.zeros(_SHARED + 3 * self.views)
@@ -148,7 +148,7 @@ class Sights(NamedTuple):
         return np.stack(columns[:_SHARED], axis=1), np.stack(columns[_SHARED:], axis=1)
 
     def system(self, guess: Guess, errors: Floats) -> tuple[Floats, Floats]:
-        """Give the normal equations (m, m) and (m,) of all m = 15 + 3 views numbers."""
+        """Return the normal equations (m, m) and (m,) of all m = 15 + 3 views numbers."""
         shared, own = self.slopes(guess)
         weight = _weights(errors)[:, None]
         inner = np.zeros((_SHARED + 3 * self.views,) * 2)
@@ -169,7 +169,7 @@ class Sights(NamedTuple):
         return inner, pull
 
     def cost(self, guess: Guess, errors: Floats, bound: float) -> float:
-        """Give Huber's cost of the errors and that of the turns."""
+        """Return Huber's cost of the errors and that of the turns."""
         if not np.isfinite(errors).all():
             return float("inf")
         size = np.abs(errors)
@@ -178,7 +178,7 @@ class Sights(NamedTuple):
         return float(costs.sum()) / _CORNER_PX**2 + 0.5 * float((off * off).sum())
 
     def _usual(self, guess: Guess) -> Floats:
-        """Give how far lens and joints are usually off: (3 + 3 views,)."""
+        """Return how far lens and joints are usually off: (3 + 3 views,)."""
         turns = np.full(guess.turns_rad.size, self.joint_error_rad)
         return np.concatenate((self.lens_error, turns))
 
@@ -202,7 +202,7 @@ class Fit:
     joint_error_deg: float
 
     def spread(self) -> Floats:
-        """Give standard deviations (6,) of the camera's turn (rad) and place (m)."""
+        """Return standard deviations (6,) of the camera's turn (rad) and place (m)."""
         sights, errors = self.sights, self.sights.errors(self.guess)
         shared, own = sights.slopes(self.guess)
         weight, of_row = _weights(errors), np.repeat(sights.view, 2)
@@ -231,7 +231,7 @@ class Fit:
 
 
 def start(sights: Sights, camera: Pose, board: Pose) -> Guess:
-    """Give a guess with the lens as calibrated and the heads where the joints say."""
+    """Return a guess with the lens as calibrated and the heads where the joints say."""
     return Guess(camera, board, np.zeros(3), np.zeros((sights.views, 3)))
 
 
@@ -274,7 +274,7 @@ def _ended(sights: Sights, guess: Guess, errors: Floats) -> Fit:
 
 
 def _solved(inner: Floats, pull: Floats, damping: float) -> Floats | None:
-    """Give the damped step, None where there is none."""
+    """Return the damped step, None where there is none."""
     try:
         step = np.linalg.solve(inner + damping * np.diag(np.diag(inner)), -pull)
     except np.linalg.LinAlgError:
@@ -283,11 +283,11 @@ def _solved(inner: Floats, pull: Floats, damping: float) -> Floats | None:
 
 
 def _bound(errors: Floats) -> float:
-    """Give the size beyond which errors count less, in pixels."""
+    """Return the size beyond which errors count less, in pixels."""
     return max(_HUBER * 1.4826 * float(np.median(np.abs(errors))), 1e-3)
 
 
 def _weights(errors: Floats) -> Floats:
-    """Give the weight of each error, 1/px^2."""
+    """Return the weight of each error, 1/px^2."""
     weight = np.minimum(1.0, _bound(errors) / np.maximum(np.abs(errors), 1e-12))
     return np.asarray(weight / _CORNER_PX**2, dtype=np.float64)

@@ -22,17 +22,17 @@ Place = tuple[float, float]
 
 
 def angle_now(joint: JointParams, position: float) -> float:
-    """Give the angle of a position as the rig file has it, to a tenth of a degree."""
+    """Return the angle of a position as the rig file has it, to a tenth of a degree."""
     return round(degrees(joint.angle_rad(position * joint.facts.unit_steps)), 1) + 0.0
 
 
 def between(one: float, other: float, count: int) -> list[float]:
-    """Give so many positions spread evenly between two, in whole units."""
+    """Return so many positions spread evenly between two, in whole units."""
     return [float(round(one + (other - one) * i / (count + 1))) for i in range(1, count + 1)]
 
 
 def likely_angle(joint: JointParams, position: float, one: Place, other: Place) -> float:
-    """Give what angle a position between two marked ones will be: the old curve, bent to fit."""
+    """Return what angle a position between two marked ones will be: the old curve, bent to fit."""
     (low, at_low), (high, at_high) = one, other
     was_low, was_high = angle_now(joint, at_low), angle_now(joint, at_high)
     if was_low == was_high:

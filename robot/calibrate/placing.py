@@ -56,7 +56,7 @@ class Steerer(Person, Protocol):
         ...
 
     def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        """Give the number they say, or the proposed one where they agree to it."""
+        """Return the number they say, or the proposed one where they agree to it."""
         ...
 
 
@@ -184,7 +184,7 @@ class HandPlacer:
         """Leave it where it is: it is limp."""
 
     def live(self) -> str:
-        """Give the position in words."""
+        """Return the position in words."""
         return self._watched.live()
 
 

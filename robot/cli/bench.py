@@ -27,13 +27,13 @@ def ports_here() -> tuple[SerialPort, ...]:
 
 
 def usb_id(path: str) -> str:
-    """Give the USB vendor and product id of a port, "" where it has none."""
+    """Return the USB vendor and product id of a port, "" where it has none."""
     return usb_of(path, ports_here())
 
 
 @contextlib.contextmanager
 def to_open(path: str, on_traffic: Callable[[], None] | None = None) -> Iterator[BusPort]:
-    """Give a port that is not opened yet, closed again at the end.
+    """Return a port that is not opened yet, closed again at the end.
 
     on_traffic: called whenever bytes are sent or waited for
     """
@@ -45,7 +45,7 @@ def to_open(path: str, on_traffic: Callable[[], None] | None = None) -> Iterator
 
 
 def console() -> Console:
-    """Give the place for results; long lines are the terminal's business."""
+    """Return the place for results; long lines are the terminal's business."""
     return Console(soft_wrap=True, highlight=False)
 
 

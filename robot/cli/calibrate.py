@@ -109,7 +109,7 @@ def calibrate_joints(
 
 
 def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
-    """Give the joints to calibrate, in the order of the rig."""
+    """Return the joints to calibrate, in the order of the rig."""
     for name in asked or ():
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
@@ -154,7 +154,7 @@ def refuse_unwritable(rig: str, out: Path | None) -> None:
 
 
 def _wanted(rig: Rig, found: Mapping[str, Made]) -> dict[str, tuple[object, Value]]:
-    """Give key -> old and new value for all joints found."""
+    """Return key -> old and new value for all joints found."""
     wanted: dict[str, tuple[object, Value]] = {}
     for name, made in found.items():
         for key, value in changes(name, rig.joints[name], made, rig.park_deg).items():

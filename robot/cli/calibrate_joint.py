@@ -199,7 +199,7 @@ def _hobby(bench: Bench, name: str, bus: str) -> Made:
 
 
 def _hand(wire: Wires, bus: str, servo_id: int) -> Callable[[int], None] | None:
-    """Give what turns an emulated servo by some steps; None on real wires."""
+    """Return what turns an emulated servo by some steps; None on real wires."""
     if wire.buses is None:
         return None
 

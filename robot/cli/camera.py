@@ -127,7 +127,7 @@ def calibrate_camera(
 
 
 def lens_changes(lens: LensCalibration) -> dict[str, Any]:
-    """Give a measured lens as dotted keys of a rig file and values."""
+    """Return a measured lens as dotted keys of a rig file and values."""
     params = lens.params()
     return {
         "camera.horizontal_field_deg": round(lens.horizontal_field_deg, 2),
@@ -142,7 +142,7 @@ def lens_changes(lens: LensCalibration) -> dict[str, Any]:
 
 
 def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
-    """Give a camera found on the head as dotted keys of a rig file and values.
+    """Return a camera found on the head as dotted keys of a rig file and values.
 
     With it goes the lens that belongs to this place, at the size it was measured on.
     """
@@ -160,7 +160,7 @@ def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
 
 
 def sure_as(lens: LensCalibration) -> HandEyeParams:
-    """Give what hand-eye calibration may assume of a lens that was just measured."""
+    """Return what hand-eye calibration may assume of a lens that was just measured."""
     focal = max(lens.focal_std_px) / lens.intrinsics.fx_px * 100.0
     centre = max(lens.centre_std_px) * 640.0 / lens.width_px
     return HandEyeParams(lens_error_percent=max(focal, 0.02), centre_error_px=max(centre, 0.1))
@@ -309,7 +309,7 @@ def _kinematics(rig: Rig) -> Kinematics:
 
 
 def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardParams:
-    """Give the board as asked for and as printed."""
+    """Return the board as asked for and as printed."""
     marker_mm = square_mm * _BOARD.marker_mm / _BOARD.square_mm
     try:
         return BoardParams(columns, rows, square_mm, marker_mm).scaled(ruler_mm / RULER_MM)

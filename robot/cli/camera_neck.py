@@ -32,7 +32,6 @@ class JoggedNeck:
     """A gazerig.robot.calibrate.camera_steps.Neck that goes through the guard, as jogging does."""
 
     def __init__(self, control: Any, mock: BoardScene | None, stopped: Stopped) -> None:
-        """Take a started ManualControl, and the scene that must know of the head."""
         self._control, self._mock, self._stopped = control, mock, stopped
         self._angles: Angles3 = (0.0, 0.0, 0.0)
 
@@ -57,7 +56,7 @@ class JoggedNeck:
             self._mock.head_rad = self._angles
 
     def angles(self) -> Angles3:
-        """Give yaw, pitch and roll as last measured."""
+        """Return yaw, pitch and roll as last measured."""
         return self._angles
 
 
@@ -65,7 +64,7 @@ class JoggedNeck:
 def moving_neck(
     rig: Rig, mock: BoardScene | None, port: str | None, stopped: Stopped, yes: bool
 ) -> Iterator[JoggedNeck]:
-    """Give a neck that moves gently; whatever happens, it ends with the torque off.
+    """Return a neck that moves gently; whatever happens, it ends with the torque off.
 
     mock: the simulated board, for which the servos are emulated too
 

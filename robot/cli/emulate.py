@@ -179,20 +179,20 @@ def _boards(text: str) -> Pca9685Line:
 
 
 def _of_rig(name: str, firmware: int | None) -> dict[str, Emulated]:
-    """Give what is on every bus of a rig by the bus's name, "" for the only one."""
+    """Return what is on every bus of a rig by the bus's name, "" for the only one."""
     lines = {bus: _aged(one, firmware) for bus, one in emulated_lines(load_rig(name)).items()}
     return lines if len(lines) > 1 else dict(zip(("",), lines.values(), strict=True))
 
 
 def _aged(line: Emulated, firmware: int | None) -> Emulated:
-    """Give all servos of a line one firmware; None: that which they have."""
+    """Return all servos of a line one firmware; None: that which they have."""
     if firmware is None or isinstance(line, MaestroLine | Pca9685Line):
         return line
     return replace(line, servos=tuple(s._replace(firmware=firmware) for s in line.servos))
 
 
 def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
-    """Give a device at another baud rate, None for its own.
+    """Return a device at another baud rate, None for its own.
 
     Raises:
         SetupError: it does not know this rate.
@@ -207,14 +207,14 @@ def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
 
 
 def _link(link: Path | None, bus: str) -> str | None:
-    """Give the link to a bus; names tell those of a rig apart."""
+    """Return the link to a bus; names tell those of a rig apart."""
     if link is None:
         return None
     return f"{link}-{bus}" if bus else str(link)
 
 
 def _chosen(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSettings, ...]:
-    """Give every bus the choices that its kind knows.
+    """Return every bus the choices that its kind knows.
 
     Raises:
         SetupError: one is no choice, or nobody knows its case.

@@ -117,7 +117,7 @@ def epilog(examples: Iterable[tuple[str, str]]) -> str:
 
 
 def complete_shipped(kind: str) -> Callable[[str], list[str]]:
-    """Give what completes the names of a kind of shipped file, e.g. "characters"."""
+    """Return what completes the names of a kind of shipped file, e.g. "characters"."""
     return lambda incomplete: [name for name in shipped_names(kind) if name.startswith(incomplete)]
 
 

@@ -253,7 +253,7 @@ class _Sitting:
 
 
 def shown(steering: FaceSteering) -> str:
-    """Give the line that shows where a person is: part, how far moved, step."""
+    """Return the line that shows where a person is: part, how far moved, step."""
     state = steering.state
     if state.part is None or steering.face is None:
         return "no face is seen"

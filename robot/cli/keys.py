@@ -42,7 +42,7 @@ _BEGUN = re.compile(r"\x1b(?:\[[0-9;?]*|O)?$")
 
 
 def keys_of(text: str) -> tuple[list[Key], str]:
-    """Give the keys in what a terminal has sent, and the rest that a sequence begins with."""
+    """Return the keys in what a terminal has sent, and the rest that a sequence begins with."""
     begun = _BEGUN.search(text)
     rest = begun[0] if begun is not None else ""
     text = text[: len(text) - len(rest)]
@@ -91,7 +91,7 @@ class Keys(Protocol):
         ...
 
     def next(self, ready: bool) -> Key | None:
-        """Give the next key, None where there is none; ``ready``: the last one has been done."""
+        """Return the next key, None where there is none; ``ready``: the last one has been done."""
         ...
 
 
@@ -119,7 +119,7 @@ class TerminalKeys:
             termios.tcsetattr(sys.stdin, termios.TCSANOW, self._before)
 
     def next(self, ready: bool) -> Key | None:
-        """Give the next key, None where none has been pressed; ``ready`` does not matter."""
+        """Return the next key, None where none has been pressed; ``ready`` does not matter."""
         if not self._ready and select.select([sys.stdin.fileno()], [], [], 0.0)[0]:
             try:
                 data = os.read(sys.stdin.fileno(), 256)
@@ -135,7 +135,6 @@ class LineKeys:
     """Keys from lines of a file or a pipe, each when the eyes have done what went before."""
 
     def __init__(self, lines: Lines) -> None:
-        """Take where the lines come from."""
         self._lines = lines
         self._ready: list[Key] = []
 
@@ -152,7 +151,7 @@ class LineKeys:
         """Leave nothing behind."""
 
     def next(self, ready: bool) -> Key | None:
-        """Give the next key where the eyes are ready for it.
+        """Return the next key where the eyes are ready for it.
 
         Raises:
             SetupError: a line is no key, or there are no more.
@@ -178,7 +177,6 @@ class PageKeys:
     """Keys pressed as buttons of the page, side by side with those of another source."""
 
     def __init__(self, others: Keys) -> None:
-        """Take the other source."""
         self._others = others
         self._pressed: Queue[Key] = Queue(_MOST_WAITING)
 
@@ -212,7 +210,7 @@ class PageKeys:
         return None
 
     def next(self, ready: bool) -> Key | None:
-        """Give the next key of either, those of the page first."""
+        """Return the next key of either, those of the page first."""
         try:
             return self._pressed.get_nowait()
         except Empty:

@@ -99,7 +99,7 @@ class LineWriter:
         return bool(self._lines) or self._status is not None
 
     def _reader_gone(self) -> bool:
-        """Tell whether a pipe has lost its reader, which else only the next line would find."""
+        """Return whether a pipe has lost its reader, which else only the next line would find."""
         try:
             if not stat.S_ISFIFO(os.fstat(self._fd).st_mode):
                 return False

@@ -119,7 +119,7 @@ def main() -> None:
 
 
 def rig_files() -> list[Path]:
-    """Give the YAML files of this folder that look like rigs."""
+    """Return the YAML files of this folder that look like rigs."""
     return [path for path in Path(".").glob("*.yaml") if _looks_like_a_rig(path)]
 
 

@@ -143,7 +143,7 @@ def _table(sample: Sample, joints: Mapping[str, JointParams], rate: float) -> Ta
 
 
 def _columns(joints: Collection[JointParams]) -> tuple[str, ...]:
-    """Give the headings; a hobby servo's place is its pulse width in us."""
+    """Return the headings; a hobby servo's place is its pulse width in us."""
     units = dict.fromkeys("step" if joint.facts.measured else "us" for joint in joints)
     goal = "goal deg" if len(units) == 1 else "goal"  # 80 columns are soon full
     return (goal, "at deg", "/".join(units), "deg/s", "load %", "C", "V")

@@ -140,7 +140,7 @@ class _Way(NamedTuple):
 def _commanded(
     rig: Rig, way: _Way, speed: float, hold: bool, park: bool
 ) -> Iterator[ManualControl]:
-    """Give a rig that holds where it is; whatever happens, it ends with the torque off."""
+    """Return a rig that holds where it is; whatever happens, it ends with the torque off."""
     if not way.mock:
         with clear_errors(
             way.rig, way.port
@@ -221,7 +221,7 @@ def _never() -> str | None:
 
 
 def _enter() -> str | None:
-    """Tell whether Enter was pressed, without waiting."""
+    """Return whether Enter was pressed, without waiting."""
     if not select.select([sys.stdin], [], [], 0.0)[0]:
         return None
     try:

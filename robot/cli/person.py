@@ -51,11 +51,11 @@ class Lines:
 
     @property
     def scripted(self) -> bool:
-        """Tell whether they come from a file."""
+        """Return whether they come from a file."""
         return self._file is not None
 
     def next(self, wait_s: float) -> str | None:
-        """Give the next line, None where none came in time.
+        """Return the next line, None where none came in time.
 
         Raises:
             EOFError: there are no more.
@@ -103,7 +103,7 @@ class TerminalPerson:
         self._ask(question, live, ("",))
 
     def agrees(self, question: str, live: Callable[[], str] | None = None) -> bool:
-        """Give yes or no; see gazerig.robot.calibrate.calibrating.Person."""
+        """Return yes or no; see gazerig.robot.calibrate.calibrating.Person."""
         if self._yes:
             say(f"{question} yes (--yes)")
             return True

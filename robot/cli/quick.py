@@ -64,7 +64,7 @@ def hold_standard_files() -> None:
 
 
 def is_quick(words: Sequence[str], environ: Mapping[str, str]) -> bool:
-    """Tell whether gazerig.robot.cli.tune alone can do what was typed, or complete it for a shell.
+    """Return whether cli/tune.py alone can do what was typed, or complete it for a shell.
 
     words: what stands after ``gazerig``
     """

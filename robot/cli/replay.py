@@ -196,7 +196,7 @@ def _show(
 
 
 def _built(config_yaml: str) -> "ShownRig | None":
-    """Give how the recorded rig was built; None, with a word why, where nobody can tell."""
+    """Return how the recorded rig was built; None, with a word why, where nobody can tell."""
     from gazerig.config.load import ConfigError, load
     from gazerig.config.schema import Rig
     from gazerig.robot.assemble import gaze_parts
@@ -266,7 +266,7 @@ def agreement(result: "Rerun") -> str:
 def beside(
     was: Mapping[str, object], now: Mapping[str, object], within: str = ""
 ) -> Iterator[tuple[str, str, str]]:
-    """Give the figures of two runs side by side: name and both in words."""
+    """Return the figures of two runs side by side: name and both in words."""
     for name in dict.fromkeys((*was, *now)):
         one, other = was.get(name), now.get(name)
         if isinstance(one, Mapping) or isinstance(other, Mapping):

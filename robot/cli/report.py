@@ -293,14 +293,14 @@ def _tell_findings(findings: "Sequence[Finding]") -> None:
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
-    """Give two short names that differ."""
+    """Return two short names that differ."""
     if first.stem != second.stem:
         return first.stem, second.stem
     return f"{first.stem} (A)", f"{second.stem} (B)"
 
 
 def page_file(out: Path) -> Path:
-    """Give the file of a page, whose name ends so that a browser opens it as one."""
+    """Return the file of a page, whose name ends so that a browser opens it as one."""
     if out.suffix.lower() in _PAGES:
         return out
     # Not with_suffix: what follows the dot of "evening-0.5" is no ending.

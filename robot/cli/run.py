@@ -200,7 +200,7 @@ def _told(
 
 
 def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
-    """Tell whether a run had faults, and say which joints they held."""
+    """Return whether a run had faults, and say which joints they held."""
     held = [
         str(JointFault(joint, reason, count["times"], count["seconds"]))
         for joint, reasons in figures["joint_faults"].items()

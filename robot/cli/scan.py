@@ -75,7 +75,7 @@ def scan(
 def _paths(
     rig: str, mock: bool, port: str | None, found: Sequence[SerialPort]
 ) -> Iterator[list[tuple[str, bool]]]:
-    """Give the ports to search, a rig's or one, and whether each is an I2C bus."""
+    """Return the ports to search, a rig's or one, and whether each is an I2C bus."""
     if not mock:
         path = port if port is not None else _only_port(found)
         yield [(path, is_i2c(path))]
@@ -134,7 +134,7 @@ def parse_bauds(text: str) -> tuple[int, ...] | None:
 
 
 def _only_port(ports: Sequence[SerialPort]) -> str:
-    """Give the one port on USB; asking strange devices needs a person's word."""
+    """Return the one port on USB; asking strange devices needs a person's word."""
     usb = [port for port in ports if port.usb]
     if len(usb) == 2 and usb[0].usb == usb[1].usb and usb[0].usb.startswith(POLOLU):
         # Both ports of one Maestro: its Command Port is the first.

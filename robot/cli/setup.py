@@ -121,7 +121,7 @@ def _step(rig: Rig, bus: str, one: ServoSetup, port: str | None, mock: bool, yes
 
 
 def _fresh(rig: Rig, one: ServoSetup, kind: ServoKind) -> Emulated:
-    """Give a servo as it comes from the factory."""
+    """Return a servo as it comes from the factory."""
     spec = (ServoSpec(FACTORY_ID, one.model, rig.joints[one.name].zero),)
     if kind.name == "feetech":
         return FeetechLine(spec, kind.factory_baud)

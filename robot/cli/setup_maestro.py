@@ -111,7 +111,7 @@ def _greeted(line: BusPort, params: MaestroParams) -> Line:
 
 
 def on_usb(path: str) -> bool:
-    """Tell whether a port is a board's own on USB, and not one of adaptor and serial pins."""
+    """Return whether a port is a board's own on USB, and not one of adaptor and serial pins."""
     usb = bench.usb_id(path)
     if usb:
         return usb.startswith(POLOLU)
@@ -172,7 +172,7 @@ def _walked(
 
 
 def _rest(setup: ServoSetup) -> int:
-    """Give the pulse at which a joint rests, within its range."""
+    """Return the pulse at which a joint rests, within its range."""
     middle = (setup.min_steps + setup.max_steps) // 2
     rest = middle if setup.rest_steps is None else setup.rest_steps
     return min(max(rest, setup.min_steps), setup.max_steps)
@@ -211,7 +211,7 @@ def _channel(board: Line, setup: ServoSetup, joint: JointParams, yes: bool) -> b
 
 
 def wiggle(setup: ServoSetup, joint: JointParams) -> tuple[int, int, int]:
-    """Give the rest place and two places about it, in steps, all within the joint's range."""
+    """Return the rest place and two places about it, in steps, all within the joint's range."""
     made, rest = joint.made(), _rest(setup)
     angle = made.angle_rad(rest)
     least, most = radians(joint.min_deg), radians(joint.max_deg)

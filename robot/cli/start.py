@@ -12,7 +12,7 @@ _BEGIN = (
 
 
 def next_steps(ports: Iterable[SerialPort], rigs: Iterable[Path], running: bool) -> str:
-    """Give what makes sense now, as lines.
+    """Return what makes sense now, as lines.
 
     ports: serial ports of this computer; rigs: rig files in this folder
     running: a rig runs on this computer already

@@ -37,7 +37,7 @@ class SteeringPerson(TerminalPerson):
             self._by_keys(servo)
 
     def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        """Give the number they say, Enter is the proposed one; see Steerer."""
+        """Return the number they say, Enter is the proposed one; see Steerer."""
         asked = f"{question} [{proposed:g}]"
         say(asked)
         while True:

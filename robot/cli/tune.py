@@ -69,7 +69,7 @@ def complete_choice(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def _menus() -> dict[str, tuple[str, ...]]:
-    """Give the running rig's menus, none where none runs: a shell shows no errors."""
+    """Return the running rig's menus, none where none runs: a shell shows no errors."""
     try:
         with RunningRig.connect() as rig:
             return rig.menus()

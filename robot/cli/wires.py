@@ -39,7 +39,7 @@ class Wires(NamedTuple):
     buses: PtyBuses | None
 
     def opened_by(self) -> dict[str, BusPort]:
-        """Give the ports, not opened yet."""
+        """Return the ports, not opened yet."""
         return {name: port_of(path) for name, path in self.paths.items()}
 
     def command(self, text: str, bus: str) -> None:
@@ -56,7 +56,7 @@ class Wires(NamedTuple):
 def wires(
     rig: Rig, mock: bool, port: str | None, devices: Mapping[str, Emulated] | None = None
 ) -> Iterator[Wires]:
-    """Give the ports to open; emulated buses end with the block.
+    """Return the ports to open; emulated buses end with the block.
 
     devices: what is emulated on some buses instead of the rig's servos
 
@@ -85,6 +85,6 @@ def bus_label(rig: Rig, name: str) -> str:
 
 
 def setups_on(rig: Rig, name: str) -> tuple[ServoSetup, ...]:
-    """Give what a bus must know of its servos, in the order of the joints."""
+    """Return what a bus must know of its servos, in the order of the joints."""
     every = dict(zip(rig.names, rig_setups(rig), strict=True))
     return tuple(every[joint] for joint in joints_on(rig, name))

@@ -11,8 +11,7 @@ RETRY_S = 1.0
 
 
 class GuardedBus:
-    """Puts signs of life and the guardian's doings into a bus; implements
-    gazerig.drivers.types.ServoBus.
+    """Puts signs of life and the guardian's doings into a bus; implements ``ServoBus``.
 
     Every read and write is a sign of life. A loop that hung and wakes again finds the torque
     off: it switches it off once more, confirmed, then takes hold where the joints are, as

@@ -22,7 +22,6 @@ class ControlsView:
     """Three tabs: lead, joints, tuning."""
 
     def __init__(self, server: viser.ViserServer, teller: Teller) -> None:
-        """Build a window below the camera picture; ``teller`` takes what people do to the rig."""
         # A window of its own: below words that grow and shrink, a button would slip away from
         # under the mouse.
         window = server.gui.add_panel()

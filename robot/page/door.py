@@ -74,7 +74,8 @@ class Door:
         """Prepare to listen.
 
         Args:
-            host: the address; port: a free port of it
+            host: the address
+            port: a free port of it
             inside: the Unix socket of the server
             ask: called in the door's thread with what is sent to the rig
             stop: takes stops, beside and before all else

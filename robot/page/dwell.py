@@ -39,7 +39,6 @@ class Dwell:
     """Gathers fixations by face part."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._seconds: defaultdict[str, float] = defaultdict(float)
         self._bins: dict[str, Counter[int]] = {part: Counter() for part in PARTS}
         self._counts: Counter[str] = Counter()
@@ -54,12 +53,12 @@ class Dwell:
         self._bins[part][min(BINS - 1, int(fixation.duration_s / BIN_S))] += 1
 
     def shares(self) -> dict[str, float]:
-        """Give each part's share of the time on parts; empty before the first fixation."""
+        """Return each part's share of the time on parts; empty before the first fixation."""
         whole = sum(self._seconds.values())
         return {part: self._seconds[part] / whole for part in PARTS} if whole > 0.0 else {}
 
     def drawing(self) -> str:
-        """Give a row a part as HTML: share of the time, and how long the rests were."""
+        """Return a row a part as HTML: share of the time, and how long the rests were."""
         shares = self.shares()
         most = max(shares.values(), default=1.0)
         rows = [

@@ -29,7 +29,7 @@ _CLOSE_PATIENCE_S = 2.0
 
 
 def telling(who: str, data: bytes) -> bytes:
-    """Give the message for what a person asks for.
+    """Return the message for what a person asks for.
 
     who: a word that comes back with the answer
     data: a JSON object, compact (no blanks between its parts), an order's "order" first
@@ -38,13 +38,13 @@ def telling(who: str, data: bytes) -> bytes:
 
 
 def told(message: bytes) -> tuple[str, bytes]:
-    """Give who asks and the JSON object of a message that ``telling`` made."""
+    """Return who asks and the JSON object of a message that ``telling`` made."""
     who, _, data = message[1:].partition(b" ")
     return who.decode(), data
 
 
 def overtaken(earlier: bytes, later: bytes) -> bool:
-    """Tell whether a change of a parameter need not be made, as a later one makes it again."""
+    """Return whether a change of a parameter need not be made, as a later one makes it again."""
     who, first = told(earlier)
     again, second = told(later)
     if who != again or not (first.startswith(_CHANGE) and second.startswith(_CHANGE)):
@@ -54,7 +54,7 @@ def overtaken(earlier: bytes, later: bytes) -> bool:
 
 
 def urgent(message: bytes) -> bool:
-    """Tell whether a message cannot wait: an order, or the page's own words."""
+    """Return whether a message cannot wait: an order, or the page's own words."""
     return message[:1] != TELL or told(message)[1].startswith(_URGENT)
 
 

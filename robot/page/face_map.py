@@ -35,7 +35,6 @@ class FaceMap:
     """
 
     def __init__(self) -> None:
-        """Start empty."""
         self.seconds = 0.0
         self._time: Floats = np.zeros((HIGH_PX, WIDE_PX))
         self._last_s: float | None = None
@@ -54,7 +53,7 @@ class FaceMap:
             self.seconds += snapshot.t_s - last_s
 
     def picture(self) -> Picture:
-        """Give the map over a drawn face, RGB (HIGH_PX, WIDE_PX, 3): yellow is where most was."""
+        """Return the map over a drawn face, RGB (HIGH_PX, WIDE_PX, 3): yellow is where most was."""
         blurred = cv2.GaussianBlur(self._time, (0, 0), _SPREAD_M * PX_PER_M / SHRINK)
         top = float(blurred.max())
         share = blurred / top if top > 0.0 else blurred
@@ -65,7 +64,7 @@ class FaceMap:
 
 
 def gaze_on_face(snapshot: Snapshot) -> tuple[float, float] | None:
-    """Give where the measured gaze meets the face it is meant for, (y, z) in that face's frame.
+    """Return where the measured gaze meets the face it is meant for, (y, z) in that face's frame.
 
     None while the eyes jump, where no face is the target, or where the gaze misses its plane.
     """

@@ -22,29 +22,29 @@ class Fed(Protocol):
         ...
 
     def knobs(self) -> Iterable[Knob]:
-        """Give all parameters."""
+        """Return all parameters."""
         ...
 
     def values(self) -> Mapping[str, Value]:
-        """Give all values in force."""
+        """Return all values in force."""
         ...
 
     def unsaved(self) -> Iterable[Change]:
-        """Give what is in force and not in the file."""
+        """Return what is in force and not in the file."""
         ...
 
     def characters(self) -> Sequence[str]:
-        """Give the characters there are."""
+        """Return the characters there are."""
         ...
 
     @property
     def character_name(self) -> str:
-        """Give the one in force."""
+        """Return the one in force."""
         ...
 
     @property
     def path(self) -> Path:
-        """Give the rig's file."""
+        """Return the rig's file."""
         ...
 
 

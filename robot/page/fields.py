@@ -23,7 +23,6 @@ class CameraField:
     """The camera as a pyramid as wide as its picture."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Begin with nothing to be seen; the pyramid comes with the first picture's shape."""
         self._scene = scene
         self._shape: tuple[float, float] | None = None
         self._frustum: viser.CameraFrustumHandle | None = None
@@ -61,7 +60,6 @@ class EyeFields:
     """The edge of each eye's field of attention, turning with the eye."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Begin with nothing to be seen."""
         self._scene = scene
         self._field_deg: tuple[float, float, float, float] | None = None
         self._frames = tuple(
@@ -97,7 +95,7 @@ class EyeFields:
 
 
 def field_edge(field_deg: tuple[float, float, float, float], *, left: bool) -> Floats:
-    """Give points (72, 3) on the edge of an eye's field in the eye's frame, x ahead, in metres.
+    """Return points (72, 3) on the edge of an eye's field in the eye's frame, x ahead, in metres.
 
     field_deg: limits towards temple, nose, above and below; between two of them the edge is
     a quarter of an ellipse (gaze.field_of_view)
@@ -106,7 +104,7 @@ def field_edge(field_deg: tuple[float, float, float, float], *, left: bool) -> F
 
 
 def _edge_point(field_deg: tuple[float, float, float, float], turn: float, left: bool) -> Vec3:
-    """Give the point on the edge in the direction ``turn`` from the left, towards above."""
+    """Return the point on the edge in the direction ``turn`` from the left, towards above."""
     temporal, nasal, up, down = np.radians(field_deg).tolist()
     side, high = cos(turn), sin(turn)
     to_side = temporal if (side > 0.0) == left else nasal

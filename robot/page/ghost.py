@@ -38,7 +38,6 @@ class GhostView:
     """The ghost in the scene."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Put it into the scene, unseen."""
         self._scene = scene
         self._frame = scene.add_frame("/ghost", show_axes=False, visible=False)
         x, y, z = SHELL_HALF_AXES_M
@@ -115,6 +114,6 @@ class GhostView:
 
 
 def _apart(ghost: Ghost, snapshot: Snapshot) -> bool:
-    """Tell whether the wished head is so far off the measured one that both can be seen."""
+    """Return whether the wished head is so far off the measured one that both can be seen."""
     turned = np.array(ghost.R_world_head) - np.array(snapshot.R_world_head)
     return float(np.abs(turned).max()) > _APART

@@ -66,7 +66,6 @@ class HeadView:
     """The rig in the scene, with those parts that its joints move."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Put neck, head and eyes into the scene, at rest, as if every joint were there."""
         self._scene = scene
         self._joints: tuple[str, ...] = ()
         self._foot = self._add("/foot", turned(_FOOT), _METAL, (0.0, 0.0, FLOOR_M))
@@ -186,7 +185,7 @@ class HeadView:
             eye.lower.visible = eye.upper.visible or f"{eye.side}_lower_lid" in joints
 
     def _lower(self, snapshot: Snapshot) -> list[float]:
-        """Give how far the lower lids are open; one that nothing moves stands where they meet."""
+        """Return how far the lower lids are open; one that nothing moves stands where they meet."""
         openings = snapshot.lower_lids or (0.0, 0.0)
         return [
             opening if f"{side}_lower_lid" in self._joints else 0.0
@@ -216,10 +215,10 @@ class HeadView:
 
 
 def lid_turn(opening: float) -> Turn:
-    """Give the turn of an upper lid that is open so far, 0..1."""
+    """Return the turn of an upper lid that is open so far, 0..1."""
     return turned_up(_SHUT_RAD + opening * (_OPEN_RAD - _SHUT_RAD))
 
 
 def lower_lid_turn(opening: float) -> Turn:
-    """Give the turn of a lower lid that is open so far, 0..1."""
+    """Return the turn of a lower lid that is open so far, 0..1."""
     return turned_up(_SHUT_RAD + opening * (_LOWER_OPEN_RAD - _SHUT_RAD))

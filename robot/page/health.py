@@ -27,7 +27,7 @@ NO_FEEDBACK = "no feedback"
 
 
 def health(snapshot: Snapshot) -> str:
-    """Give everything of the machine's health."""
+    """Return everything of the machine's health."""
     level = "stopped" if snapshot.stopped else snapshot.level
     reasons = (snapshot.stopped,) if snapshot.stopped else snapshot.reasons
     said = "".join(f"<div>{escape(reason)}</div>" for reason in reasons)
@@ -44,7 +44,7 @@ def health(snapshot: Snapshot) -> str:
 
 
 def servo_table(servos: Servos, joints: tuple[str, ...], reckoned: tuple[str, ...] = ()) -> str:
-    """Give a row a joint: temperature, load, voltage, ticks without an answer, faults.
+    """Return a row a joint: temperature, load, voltage, ticks without an answer, faults.
 
     reckoned: joints whose servos tell nothing
     """
@@ -80,7 +80,7 @@ def _row(servos: Servos, i: int, joint: str, reckoned: bool) -> str:
 
 
 def _figures(servos: Servos, i: int) -> str:
-    """Give temperature, load and voltage."""
+    """Return temperature, load and voltage."""
     warmth, load, volts = (
         _at(servos.temperature_c, i),
         _at(servos.load, i),
@@ -103,7 +103,7 @@ def _said(servos: Servos, i: int) -> str:
 
 
 def strain_of_heat(servos: Servos, i: int) -> Strain:
-    """Tell how a servo's temperature stands to what the guard bears."""
+    """Return how a servo's temperature stands to what the guard bears."""
     warmth, limits = _at(servos.temperature_c, i), servos.limits
     if warmth is None or limits is None:
         return ""
@@ -111,7 +111,7 @@ def strain_of_heat(servos: Servos, i: int) -> Strain:
 
 
 def strain_of_load(servos: Servos, i: int) -> Strain:
-    """Tell how a servo's load stands to what may last."""
+    """Return how a servo's load stands to what may last."""
     load, limits = _at(servos.load, i), servos.limits
     if load is None or limits is None:
         return ""
@@ -119,7 +119,7 @@ def strain_of_load(servos: Servos, i: int) -> Strain:
 
 
 def strain_of_voltage(servos: Servos, i: int) -> Strain:
-    """Tell how a servo's voltage stands to its own limits."""
+    """Return how a servo's voltage stands to its own limits."""
     volts, limits = _at(servos.voltage_v, i), servos.limits
     if volts is None or limits is None:
         return ""

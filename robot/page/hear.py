@@ -104,7 +104,7 @@ class PageHear:
         return self._ordered(order if getattr(order, "who", PAGE) else signed(order, PAGE))
 
     def _ordered(self, order: Order) -> str | None:
-        """Give an order, and return what it cannot do, None where it does all or nobody waits."""
+        """Return an order, and return what it cannot do, None where it does all or nobody waits."""
         ticket = self._order(order)
         if ticket is None or not isinstance(order, LookAt | Jog | Resume):
             return None

@@ -62,14 +62,14 @@ def label(knob: PageKnob, unsaved: bool) -> str:
 
 
 def step_of(low: float, high: float) -> float:
-    """Give a slider's step: 1, 2 or 5 times a power of ten, some hundreds to the range."""
+    """Return a slider's step: 1, 2 or 5 times a power of ten, some hundreds to the range."""
     fine = (high - low) / _SLIDER_STEPS
     ten = 10.0 ** floor(log10(fine))
     return next(n * ten for n in (1.0, 2.0, 5.0, 10.0) if n * ten >= fine * (1.0 - 1e-9))
 
 
 def slides(knob: PageKnob, value: object) -> bool:
-    """Tell whether a slider can set a parameter finely enough."""
+    """Return whether a slider can set a parameter finely enough."""
     if knob.kind not in ("number", "whole") or isinstance(value, bool):
         return False
     if knob.optional and knob.default is None:  # a slider cannot be put back to null
@@ -187,7 +187,7 @@ class KnobControl:
                 self._put(self.knob.key, value)
 
     def _meant(self, shown: object) -> object:
-        """Give the choice that a name stands for; anything else is itself."""
+        """Return the choice that a name stands for; anything else is itself."""
         return next((c for c in self.knob.choices if str(c) == shown), shown)
 
     def show(self, value: object, unsaved: bool) -> None:
@@ -210,7 +210,7 @@ class KnobControl:
             self._handle.label = label(self.knob, unsaved)
 
     def can_show(self, value: object) -> bool:
-        """Tell whether this control can show a value: a slider cannot show null."""
+        """Return whether this control can show a value: a slider cannot show null."""
         return self._form is not None or value is not None
 
     def remove(self) -> None:

@@ -29,7 +29,6 @@ class LayersView:
     """The layers in the scene."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Put them into the scene, unseen."""
         self._ghost = GhostView(scene)
         self._camera = CameraField(scene)
         self._eyes = EyeFields(scene)

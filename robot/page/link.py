@@ -208,11 +208,11 @@ class Page:
         return True
 
     def url(self) -> str | None:
-        """Give the page's address, token included, once it is there and as long as it is."""
+        """Return the page's address, token included, once it is there and as long as it is."""
         return self._url
 
     def notice(self) -> str | None:
-        """Give the next line for the person in front of the rig, each one once."""
+        """Return the next line for the person in front of the rig, each one once."""
         return self._notices.popleft() if self._notices else None
 
     def _take(self, message: bytes) -> None:

@@ -18,7 +18,6 @@ class LoopTiming:
     """
 
     def __init__(self, rate_hz: float) -> None:
-        """Take the rate that the loop was told to keep."""
         self._period_s = 1.0 / rate_hz
         self._rows: deque[tuple[float, float, int]] = deque()
         self._last_s: float | None = None
@@ -38,7 +37,7 @@ class LoopTiming:
             self._rows.popleft()
 
     def figures(self) -> Timing | None:
-        """Give the figures, None before the second tick."""
+        """Return the figures, None before the second tick."""
         if not self._rows:
             return None
         table = np.array(self._rows)

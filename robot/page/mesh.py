@@ -38,14 +38,14 @@ def turned(profile: Sequence[tuple[float, float]], around: int = _AROUND) -> Mes
 
 
 def cap(radius_m: float, half_angle_rad: float, rings: int = 12) -> Mesh:
-    """Give the part of a sphere within an angle of its x axis; pi is the whole sphere."""
+    """Return the part of a sphere within an angle of its x axis; pi is the whole sphere."""
     angles = np.linspace(half_angle_rad, 0.0, rings)
     dome = turned([(radius_m * sin(a), radius_m * cos(a)) for a in angles])
     return Mesh(dome.vertices[:, (2, 0, 1)], dome.faces)
 
 
 def ellipsoid(half_axes_m: Vec3, bulge: float = 1.0, rings: int = 13) -> Mesh:
-    """Give an ellipsoid; a bulge below 1 fills it out towards a rounded box."""
+    """Return an ellipsoid; a bulge below 1 fills it out towards a rounded box."""
     angles = np.linspace(-pi / 2, pi / 2, rings)
     ball = turned([(cos(a), sin(a)) for a in angles], around=2 * rings)
     filled = np.sign(ball.vertices) * np.abs(ball.vertices) ** bulge
@@ -53,12 +53,12 @@ def ellipsoid(half_axes_m: Vec3, bulge: float = 1.0, rings: int = 13) -> Mesh:
 
 
 def disc(radius_m: float) -> Mesh:
-    """Give a flat disc that faces up."""
+    """Return a flat disc that faces up."""
     return turned([(radius_m, 0.0), (0.0, 0.0)])
 
 
 def lid(radius_m: float, sweep_rad: float) -> Mesh:
-    """Give a lid: the slice of a sphere swept about y, from its edge at +x upwards."""
+    """Return a lid: the slice of a sphere swept about y, from its edge at +x upwards."""
     sweep = np.linspace(0.0, sweep_rad, 24)
     across = np.linspace(pi, 0.0, 32)
     points = np.stack(
@@ -73,7 +73,7 @@ def lid(radius_m: float, sweep_rad: float) -> Mesh:
 
 
 def ring(radius_m: float, thickness_m: float) -> Mesh:
-    """Give a torus about x."""
+    """Return a torus about x."""
     angles = np.linspace(0.0, 2.0 * pi, 17)
     band = turned([(radius_m + thickness_m * cos(a), thickness_m * sin(a)) for a in angles])
     return Mesh(band.vertices[:, (2, 0, 1)], band.faces)

@@ -182,7 +182,7 @@ class Onlooker:
     def _gaze_px(
         self, tick: Tick, found: Detections, lens: Intrinsics
     ) -> tuple[float, float] | None:
-        """Give where in the picture the gaze goes, None when it is outside."""
+        """Return where in the picture the gaze goes, None when it is outside."""
         R, p = self._mount.pose(*self._poses.head_pose(found.captured_s))
         x, y, z = rotate_back(R, sub(tick.gaze.gaze_point_world_m, p))
         if z < 0.05:

@@ -132,7 +132,6 @@ class PeopleView:
     """Everything seen, and the target."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Start with nobody there."""
         self._scene = scene
         self._faces: dict[int, _FaceView] = {}
         self._bodies: dict[int, _BodyView] = {}
@@ -164,14 +163,14 @@ class PeopleView:
 
 
 def fixated_part(face: SeenFace, p_world_target_m: Vec3) -> int | None:
-    """Give the row of the part that the target lies on, or None where it lies on none."""
+    """Return the row of the part that the target lies on, or None where it lies on none."""
     away_m = np.linalg.norm(np.array(face.parts_world_m) - p_world_target_m, axis=1)
     nearest = int(away_m.argmin())
     return nearest if away_m[nearest] < FIXATED_WITHIN_M else None
 
 
 def _parts_in_face(face: SeenFace) -> Floats:
-    """Give the parts (8, 3) in the face's frame, to the millimetre."""
+    """Return the parts (8, 3) in the face's frame, to the millimetre."""
     from_centre_m = np.array(face.parts_world_m) - face.p_world_m
     in_face_m: Floats = from_centre_m @ np.array(face.R_world_face)
     return in_face_m.round(3)

@@ -27,7 +27,6 @@ class Picking:
     def __init__(
         self, mount: CameraMount, poses: PoseHistory, camera: Callable[[], CameraParams]
     ) -> None:
-        """Take where the camera sits, where the head was, and what gives the lens as set now."""
         self._mount = mount
         self._poses = poses
         self._camera = camera
@@ -38,7 +37,7 @@ class Picking:
         self._tick = tick
 
     def point(self, x: float, y: float) -> Vec3 | None:
-        """Give the point of the world at a place of the newest picture, None without one.
+        """Return the point of the world at a place of the newest picture, None without one.
 
         x, y: 0..1 from the left and from the top
         """
@@ -68,7 +67,7 @@ class Picking:
 
 
 def distance_m(percept: Percept | None, p_world_m: Vec3, way_world: Vec3) -> float:
-    """Give how far away a clicked thing counts as: as far as what is seen there.
+    """Return how far away a clicked thing counts as: as far as what is seen there.
 
     p_world_m, way_world: where the camera is and the unit direction of the click
     """

@@ -47,7 +47,7 @@ def draw_detections(
 
 
 def ground(detections: Detections, depth: bool) -> Picture | None:
-    """Give what ``draw_detections`` is to draw on: the picture, or the depth as asked for.
+    """Return what ``draw_detections`` is to draw on: the picture, or the depth as asked for.
 
     A camera that measures no depth gives its picture with words that say so.
     """
@@ -62,7 +62,7 @@ def ground(detections: Detections, depth: bool) -> Picture | None:
 
 
 def depth_picture(depth_m: Depth) -> Picture:
-    """Give distances as colours, at most PICTURE_WIDTH_PX wide, with their scale at the foot.
+    """Return distances as colours, at most PICTURE_WIDTH_PX wide, with their scale at the foot.
 
     depth_m: (height, width), NaN where unknown, which is shown dark. Red is NEAREST_M or less,
     blue FARTHEST_M or more; equal ratios of distance are equal steps of colour.

@@ -47,19 +47,19 @@ def quaternion(R: Mat3) -> Turn:
 
 
 def along(direction: Vec3) -> Turn:
-    """Give the turn that lays the x axis along a direction, without roll."""
+    """Return the turn that lays the x axis along a direction, without roll."""
     x, y, z = direction
     return _turned(atan2(y, x), -atan2(z, hypot(x, y)))
 
 
 def upright_along(direction: Vec3) -> Turn:
-    """Give the turn that lays the z axis along a direction."""
+    """Return the turn that lays the z axis along a direction."""
     x, y, z = direction
     return _turned(atan2(y, x), atan2(hypot(x, y), z))
 
 
 def turned_up(angle_rad: float) -> Turn:
-    """Give the turn that lifts the x axis by an angle."""
+    """Return the turn that lifts the x axis by an angle."""
     return _turned(0.0, -angle_rad)
 
 

@@ -27,7 +27,6 @@ class ReplayView:
     """The controls of a recording that is shown."""
 
     def __init__(self, gui: viser.GuiApi, tell: Tell, duration_s: float) -> None:
-        """Make the controls; they stand at the beginning."""
         self._tell = tell
         self._asked_s: float | None = None
         self._events: Sequence[tuple[float, str]] = ()

@@ -41,7 +41,6 @@ class MainSequence:
     """Gathers saccades and draws them."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._seen: deque[SeenSaccade] = deque(maxlen=KEPT)
         self.count = 0
 
@@ -51,7 +50,7 @@ class MainSequence:
         self.count += 1
 
     def drawing(self) -> str:
-        """Give both pictures as HTML."""
+        """Return both pictures as HTML."""
         sizes = [s.amplitude_deg for s in self._seen]
         widest = _room(_WIDEST_DEG, sizes)
         speeds = [s.peak_deg_s for s in self._seen]
@@ -73,7 +72,7 @@ class MainSequence:
 
 
 def _room(choices: tuple[float, ...], values: list[float]) -> float:
-    """Give the smallest end of an axis that holds all values, else the largest there is."""
+    """Return the smallest end of an axis that holds all values, else the largest there is."""
     most = max(values, default=0.0)
     return next((choice for choice in choices if choice >= most), choices[-1])
 

@@ -78,7 +78,6 @@ class Snapshots:
     """
 
     def __init__(self, rate_hz: float, rig: ShownRig | None = None) -> None:
-        """Take the loop's rate, and how the rig is built where that is known."""
         self.rig = rig
         self._rate_hz = rate_hz
         self._ticks: deque[Tick] = deque(maxlen=_TICKS_KEPT)
@@ -97,7 +96,7 @@ class Snapshots:
         self._ticks.append(tick)
 
     def take(self, said: Said) -> Snapshot | None:
-        """Give a snapshot of the newest tick, None before the first."""
+        """Return a snapshot of the newest tick, None before the first."""
         trail: list[Trail] = []
         events: list[SeenEvent] = []
         worst: Level = "ok"
@@ -139,7 +138,7 @@ class Snapshots:
             self._unanswered.update(tick.joints.missing)
 
     def _timed(self, t_s: float) -> Timing | None:
-        """Give the loop's figures, worked out twice a second."""
+        """Return the loop's figures, worked out twice a second."""
         if t_s - self._figures_s >= _TIMING_S:
             self._figures, self._figures_s = self._timing.figures(), t_s
         return self._figures
@@ -153,7 +152,7 @@ def snapshot(
     seeing: str = "",
     rig: ShownRig | None = None,
 ) -> Snapshot:
-    """Give what the page is shown of a single tick.
+    """Return what the page is shown of a single tick.
 
     rig: how it is built, for the wish's ghost, the camera and the servos' limits
     """
@@ -201,14 +200,14 @@ def snapshot(
 
 
 def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
-    """Give a name a joint; a recording may know none, then they are numbered."""
+    """Return a name a joint; a recording may know none, then they are numbered."""
     names = tick.verdict.joints or (rig.kinematics.names if rig is not None else ())
     count = len(tick.joints.position_rad)
     return names if len(names) == count else tuple(f"joint {i + 1}" for i in range(count))
 
 
 def _reckoned(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Give the joints whose place is told by nobody; where nothing is said of it, none."""
+    """Return the joints whose place is told by nobody; where nothing is said of it, none."""
     if not joints.measured:
         return ()
     told = zip(names, joints.measured, strict=True)
@@ -229,7 +228,7 @@ def _faces(tick: Tick) -> tuple[SeenFace, ...]:
 
 
 def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
-    """Give what moves and is no face."""
+    """Return what moves and is no face."""
     if tick.percept is None:
         return ()
     bodies = tick.percept.bodies
@@ -241,7 +240,7 @@ def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
 
 
 def _ghost(tick: Tick, rig: ShownRig) -> Ghost:
-    """Give where the wish would have head and eyes."""
+    """Return where the wish would have head and eyes."""
     at_rest = (0.0,) * len(tick.wish_rad)
     pose: GazeState = rig.kinematics.forward(JointState(tick.wish_rad, at_rest, at_rest, ()))
     return Ghost(
@@ -255,7 +254,7 @@ def _ghost(tick: Tick, rig: ShownRig) -> Ghost:
 
 
 def _camera(tick: Tick, rig: ShownRig) -> SeenCamera | None:
-    """Give where the camera is now, None before its first picture, whose shape it needs."""
+    """Return where the camera is now, None before its first picture, whose shape it needs."""
     found = tick.detections
     if found is None:
         return None
@@ -335,7 +334,7 @@ def seeing_words(tick: Tick, residual: ResidualFigures) -> str:
 
 
 def target_name(target: Target) -> str:
-    """Give a target's name for people, e.g. "face 3: left eye"."""
+    """Return a target's name for people, e.g. "face 3: left eye"."""
     name = target.kind if target.id < 0 else f"{target.kind} {target.id}"
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
 

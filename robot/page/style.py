@@ -36,7 +36,7 @@ def frame(inner: str) -> str:
 
 
 def pill(words: str, colour: str) -> str:
-    """Give words on a coloured ground."""
+    """Return words on a coloured ground."""
     return (
         f"<span style='background:{colour};color:#fff;border-radius:9px;padding:0 9px;"
         f"margin:1px 6px 1px 0;font-weight:600;display:inline-block'>{escape(words)}</span>"
@@ -44,7 +44,7 @@ def pill(words: str, colour: str) -> str:
 
 
 def heading(words: str, aside: str = "") -> str:
-    """Give a line above a picture or table, with something smaller at its right end."""
+    """Return a line above a picture or table, with something smaller at its right end."""
     return (
         "<div style='font-size:12px;font-weight:600;margin-top:4px'>"
         f"<span style='float:right;font-weight:400;opacity:.7'>{escape(aside)}</span>"
@@ -53,17 +53,17 @@ def heading(words: str, aside: str = "") -> str:
 
 
 def counted(n: int, what: str) -> str:
-    """Give a number of things, e.g. "1 saccade", "2 saccades"."""
+    """Return a number of things, e.g. "1 saccade", "2 saccades"."""
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
 
 
 def note(words: str) -> str:
-    """Give a small line, for sources and explanations."""
+    """Return a small line, for sources and explanations."""
     return f"<div style='font-size:11px;opacity:.75;line-height:1.35'>{escape(words)}</div>"
 
 
 def svg(height: float, parts: Iterable[str]) -> str:
-    """Give a drawing LINE_PX wide and as high as asked for, scaled to the panel's width."""
+    """Return a drawing LINE_PX wide and as high as asked for, scaled to the panel's width."""
     return (
         f"<svg viewBox='0 0 {LINE_PX} {height:.0f}' width='100%' "
         f"style='display:block;font-family:inherit'>{''.join(parts)}</svg>"
@@ -71,7 +71,7 @@ def svg(height: float, parts: Iterable[str]) -> str:
 
 
 def box(x: float, y: float, width: float, height: float, colour: str, says: str = "") -> str:
-    """Give a filled rectangle; ``says`` is shown under the mouse."""
+    """Return a filled rectangle; ``says`` is shown under the mouse."""
     title = f"<title>{escape(says)}</title>" if says else ""
     return (
         f"<rect x='{x:.1f}' y='{y:.1f}' width='{max(width, 0.4):.1f}' height='{height:.1f}' "
@@ -80,13 +80,13 @@ def box(x: float, y: float, width: float, height: float, colour: str, says: str 
 
 
 def line(points: Iterable[tuple[float, float]], colour: str, wide: float = 1.0) -> str:
-    """Give a line through points."""
+    """Return a line through points."""
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     return f"<polyline points='{path}' fill='none' stroke='{colour}' stroke-width='{wide}'/>"
 
 
 def text(x: float, y: float, words: str, size: float = 10.0, anchor: str = "start") -> str:
-    """Give words whose baseline begins, ends or is centred at a point."""
+    """Return words whose baseline begins, ends or is centred at a point."""
     return (
         f"<text x='{x:.1f}' y='{y:.1f}' font-size='{size}' text-anchor='{anchor}' "
         f"fill='currentColor'>{escape(words)}</text>"

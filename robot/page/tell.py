@@ -26,7 +26,6 @@ class Teller:
     """
 
     def __init__(self, feed: socket.socket, clock: Clock | None = None) -> None:
-        """Take the socket to the rig; clock: what limits requests by the second."""
         self._feed = feed
         self._clock = clock if clock is not None else RealClock()
         self._rate = Rate(_PER_S, _BURST)
@@ -35,7 +34,7 @@ class Teller:
         self.leads: Callable[[str], object] = _unnamed
 
     def order(self, order: Order, who: str) -> bool:
-        """Give an order; False where the rig does not take it now."""
+        """Return an order; False where the rig does not take it now."""
         if isinstance(order, LookAt | Jog):
             self.leads(self.name(who))
             order = order._replace(who=self.name(who))

@@ -46,7 +46,6 @@ class Timeline:
     """Gathers what the strip shows."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._rows: dict[str, deque[_Stretch]] = {
             "target": deque(), "part": deque(), "guard": deque(),
         }  # fmt: skip
@@ -88,11 +87,11 @@ class Timeline:
             self._events.popleft()
 
     def stretches(self, row: str) -> tuple[tuple[float, float, str], ...]:
-        """Give start, end and what of each stretch of a row: target, part or guard."""
+        """Return start, end and what of each stretch of a row: target, part or guard."""
         return tuple(stretch[:3] for stretch in self._rows[row])
 
     def drawing(self) -> str:
-        """Give the strip as HTML."""
+        """Return the strip as HTML."""
         now_s = self._now_s
         if now_s is None:
             return note("waiting for the rig")
@@ -125,13 +124,13 @@ class Timeline:
 
 
 def _x(t_s: float, now_s: float) -> float:
-    """Give where in the drawing an instant lies, held at its left edge."""
+    """Return where in the drawing an instant lies, held at its left edge."""
     ago = max(-STRIP_S, t_s - now_s)
     return _RIGHT_PX + ago * (_RIGHT_PX - _LEFT_PX) / STRIP_S
 
 
 def _ground() -> Iterable[str]:
-    """Give the names of the rows, their lines, and the axis of time."""
+    """Return the names of the rows, their lines, and the axis of time."""
     for name, y in _ROWS_PX.items():
         yield text(2.0, y + (28.0 if name == "saccades" else 10.5), name, 10.0)
     yield line(((_LEFT_PX, 76.5), (_RIGHT_PX, 76.5)), PALE)
@@ -146,7 +145,7 @@ def _ground() -> Iterable[str]:
 def _band(
     row: str, stretch: _Stretch, now_s: float, high: float, colour: str, label: str
 ) -> Iterable[str]:
-    """Give one stretch as a bar, with its name inside where there is room."""
+    """Return one stretch as a bar, with its name inside where there is room."""
     x0, x1 = _x(stretch.start_s, now_s), _x(stretch.end_s, now_s)
     says = PART_NAMES.get(stretch.what, stretch.what)
     yield box(x0, _ROWS_PX[row], x1 - x0 - 0.3, high, colour, says)

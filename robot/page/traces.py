@@ -77,7 +77,7 @@ GROUPS = {
 
 
 def groups_of(joints: Iterable[str]) -> dict[str, tuple[Group, ...]]:
-    """Give what can be shown of a rig: groups of the joints that are there, without empty ones."""
+    """Return what can be shown of a rig: groups of joints that are there, none empty."""
     there = frozenset(joints)
     menu: dict[str, tuple[Group, ...]] = {}
     for name, groups in GROUPS.items():
@@ -94,7 +94,6 @@ class Traces:
     """
 
     def __init__(self) -> None:
-        """Start empty."""
         self._rows: deque[Trail] = deque()
         self.joints: tuple[str, ...] = ()
         self.reckoned: frozenset[str] = frozenset()
@@ -113,7 +112,7 @@ class Traces:
             self._rows.popleft()  # one older row closes the axis
 
     def table(self, over_s: float) -> tuple[Floats, Floats]:
-        """Give the last seconds, thinned to MOST_POINTS: times and joints.
+        """Return the last seconds, thinned to MOST_POINTS: times and joints.
 
         Returns seconds before the newest (n,) and degrees (n, 3, joints): wish, permitted and
         measured.
@@ -128,7 +127,7 @@ class Traces:
 
 
 def mean_deg(angles_deg: Floats, group: Group, joints: tuple[str, ...]) -> Floats:
-    """Give wish, permitted and measured (n, 3) of a group, from those of the joints."""
+    """Return wish, permitted and measured (n, 3) of a group, from those of the joints."""
     mean: Floats = angles_deg[:, :, [joints.index(name) for name in group.joints]].mean(axis=2)
     return mean
 
@@ -148,7 +147,6 @@ class TracesView:
     """Two menus, and a plot for each group of what is chosen."""
 
     def __init__(self, gui: viser.GuiApi, place: viser.GuiTabHandle) -> None:
-        """Put the menus into a place of the page; the plots come with their first data."""
         self._gui = gui
         self._place = place
         with place:
@@ -212,7 +210,7 @@ class TracesView:
 
 
 def _result(reckoned: bool) -> uplot.Series:
-    """Give the line of what came of the wish: dashed and pale where nobody measured it."""
+    """Return the line of what came of the wish: dashed and pale where nobody measured it."""
     name, colour, width = _RECKONED if reckoned else _MEASURED
     line = uplot.Series(label=name, stroke=colour, width=width, points={"show": False})
     if reckoned:
@@ -221,7 +219,7 @@ def _result(reckoned: bool) -> uplot.Series:
 
 
 def _columns(ago_s: Floats, angles_deg: Floats) -> tuple[Floats, ...]:
-    """Give x, the three lines, and one that spans at least _LEAST_SPAN_DEG around them."""
+    """Return x, the three lines, and one that spans at least _LEAST_SPAN_DEG around them."""
     low, high = float(angles_deg.min()), float(angles_deg.max())
     room = angles_deg[:, 2].copy()
     if high - low < _LEAST_SPAN_DEG and len(room) > 1:

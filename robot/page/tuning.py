@@ -233,12 +233,12 @@ class TuningPanel:
 
 
 def group_of(knob: PageKnob) -> str:
-    """Give the group a parameter is listed in: as in the file, two names deep."""
+    """Return the group a parameter is listed in: as in the file, two names deep."""
     return ".".join(knob.group.split(".")[:2]) if knob.group else "rig"
 
 
 def found(text: str, knobs: Iterable[PageKnob]) -> list[str]:
-    """Give the keys in which, with what they mean, every word of a text occurs."""
+    """Return the keys in which, with what they mean, every word of a text occurs."""
     words = text.lower().split()
     return [
         knob.key

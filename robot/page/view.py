@@ -187,7 +187,7 @@ class View:
                 self._draw()
 
     def _stop_state(self) -> dict[str, object]:
-        """Give what the stop button must know: a recording can neither be stopped nor resumed.
+        """Return what the stop button must know: a recording can neither be stopped nor resumed.
 
         blind: joints without feedback, which do not take hold where they are but jump
         """
@@ -300,10 +300,12 @@ def serve(
     """Open the page's server, and its door on the first free port.
 
     Args:
-        host, port: the address; a busy port moves on to the next
+        host: the address
+        port: the first to try; a busy one moves on to the next
         token: what browsers must show
         folder: that only this user can enter, for the server's socket
-        teller: hands on what is asked for; stop: hands on stops
+        teller: hands on what is asked for
+        stop: hands on stops
 
     Raises:
         OSError: see ``free_port``.

@@ -13,7 +13,7 @@ _LEAST_FULL = 1.0
 
 
 def winner(snapshot: Snapshot) -> str:
-    """Give what is looked at, the reason, and what is in force."""
+    """Return what is looked at, the reason, and what is in force."""
     return frame(
         f"<div style='font-size:15px;font-weight:600'>{escape(snapshot.target_name)}</div>"
         f"<div style='min-height:1.5em'>{escape(snapshot.why)}</div>"
@@ -22,7 +22,7 @@ def winner(snapshot: Snapshot) -> str:
 
 
 def pulls(snapshot: Snapshot) -> str:
-    """Give the pulls that were compared, term by term, the strongest first."""
+    """Return the pulls that were compared, term by term, the strongest first."""
     return frame(_pulls(snapshot.pulls))
 
 
@@ -58,7 +58,7 @@ def _pulls(pulls: tuple[Pull, ...]) -> str:
 
 
 def _row(pull: Pull, full: float, *, winner: bool) -> str:
-    """Give one body: its name and figures above a bar of its terms."""
+    """Return one body: its name and figures above a bar of its terms."""
     bars = "".join(
         f"<div title='{term} {getattr(pull, term):.2f}' style='background:{_COLOURS[term]};"
         f"width:{100.0 * max(0.0, getattr(pull, term)) / full:.1f}%'></div>"

@@ -18,7 +18,6 @@ class BodyTap(Body):
     """A body before a body: every call goes on to it, and what it gives is noted."""
 
     def __init__(self, body: Body, note: Callable[[Heard], None]) -> None:
-        """Take the body that does the work, and who wants to know."""
         # Not set up as a body of its own: it has no joints, only the other's.
         self.bus, self.names = body.bus, body.names
         self._body = body
@@ -31,7 +30,7 @@ class BodyTap(Body):
         return self._body.retune(joints, gentle_deg_s)
 
     def reach(self) -> tuple[JointLimit, ...]:
-        """Give the ranges and speeds that servos keep to as they were set up."""
+        """Return the ranges and speeds that servos keep to as they were set up."""
         return self._body.reach()
 
     def start(self) -> JointAngles:
@@ -51,7 +50,7 @@ class BodyTap(Body):
         self._body.write(command_rad)
 
     def angles(self, steps: Sequence[float]) -> JointAngles:
-        """Give the joint angles of servo positions."""
+        """Return the joint angles of servo positions."""
         return self._body.angles(steps)
 
     def let_go(self) -> None:

@@ -133,7 +133,7 @@ def _eyes(trace: Trace) -> tuple[_Eye, ...]:
 
 
 def _lids(trace: Trace, side: str, k: int) -> tuple[tuple[str, str, str, Floats], ...]:
-    """Give the columns of one eye's lids, those that are there."""
+    """Return the columns of one eye's lids, those that are there."""
     every = (
         ("lid", "upper", trace.lids[:, k]),
         ("lower_lid", "lower", trace.lower_lids[:, k]),
@@ -221,7 +221,7 @@ def _write_eye(
 
 
 def _even_rows(values: Floats, rate_hz: float) -> Iterator[list[str]]:
-    """Give one row a slot of the control loop: n/a in slots that it missed.
+    """Return one row a slot of the control loop: n/a in slots that it missed.
 
     A physiological recording is sampled evenly; readers go by the number of a row.
     """

@@ -67,7 +67,7 @@ def csv_files(stem: Path) -> tuple[Path, ...]:
 
 
 def columns(joints: Collection[str]) -> tuple[str, ...]:
-    """Give the columns of the samples of a rig with these joints.
+    """Return the columns of the samples of a rig with these joints.
 
     x_deg, y_deg: the cyclopean gaze; lids: 0 shut .. 1 open; event: blink, else the movement;
     target, part: what the eyes are on, and in a saccade what they go to
@@ -135,7 +135,7 @@ def _event_row(stretch: Stretch) -> list[str]:
 
 
 def _fixation_rows(stretches: Sequence[Stretch]) -> Iterator[list[str]]:
-    """Give one row a stay: fixation and pursuit of one part, without a saccade between, are one."""
+    """Return one row a stay: fixation and pursuit of one part without a saccade are one."""
     stay: Stretch | None = None
     for s in (s for s in stretches if s.event != "blink"):
         rests = s.event in ("fixation", "pursuit")

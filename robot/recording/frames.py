@@ -77,23 +77,23 @@ class Frames:
 
     @property
     def packed_bytes(self) -> int:
-        """Give how much memory the snapshots take."""
+        """Return how much memory the snapshots take."""
         return sum(map(len, self._packed))
 
     def at(self, at_s: float) -> int:
-        """Give the number of the snapshot that shows a time: the last that is not later."""
+        """Return the number of the snapshot that shows a time: the last that is not later."""
         return max(bisect_right(self._times, at_s + 1e-9) - 1, 0)
 
     def message(self, number: int) -> bytes:
-        """Give a snapshot as the message that goes to the page."""
+        """Return a snapshot as the message that goes to the page."""
         return zlib.decompress(self._packed[number])
 
     def bare(self, number: int) -> bytes:
-        """Give a snapshot's message without what happened before it, which is shown but once."""
+        """Return a snapshot's message without what happened before it, which is shown but once."""
         return pack(replace(unpack(self.message(number)), trail=(), events=()))
 
     def recalled(self, first: int, number: int) -> bytes:
-        """Give a snapshot's message with the joints and events of those from ``first`` on."""
+        """Return a snapshot's message with the joints and events of those from ``first`` on."""
         from_s = self._times[number] - RECALL_S
         closely = self.at(self._times[number] - _CLOSELY_S)
         trail: list[Trail] = []
@@ -108,12 +108,12 @@ class Frames:
         return pack(shown)
 
     def picture_at(self, at_s: float) -> int | None:
-        """Give the number of the picture in force at a time, None before the first."""
+        """Return the number of the picture in force at a time, None before the first."""
         number = bisect_right(self._picture_times, at_s + 1e-9) - 1
         return number if number >= 0 else None
 
     def picture(self, number: int) -> bytes:
-        """Give a picture as JPEG."""
+        """Return a picture as JPEG."""
         self._pictures.seek(self._places[number])
         return self._pictures.read(self._places[number + 1] - self._places[number])
 
@@ -156,13 +156,12 @@ class Noticing:
     """
 
     def __init__(self) -> None:
-        """Start with nothing noticed."""
         self.behaviour = self.conversation = ""
         self._saccades, self._blinks = 0, 0
         self._grave = ""
 
     def note(self, tick: Tick, at_s: float) -> list[Mark]:
-        """Give what begins in this tick."""
+        """Return what begins in this tick."""
         found = []
         if tick.gaze.saccades > self._saccades:
             found.append(Mark(at_s, "saccade", f"saccade to {tick.target.kind}"))

@@ -95,16 +95,16 @@ class Trace(NamedTuple):
 
     @property
     def rate_hz(self) -> float:
-        """Give the usual rate of the ticks."""
+        """Return the usual rate of the ticks."""
         return 1.0 / float(np.median(np.diff(self.time_s)))
 
     def basis(self, of: str) -> Basis:
-        """Tell whether "left", "right" or "cyclopean" gaze, "head" or "lids" are measured."""
+        """Return whether "left", "right" or "cyclopean" gaze, "head" or "lids" are measured."""
         return basis_of(self.joints, self.reckoned, _RESTS_ON[of].__contains__)
 
 
 def in_space(pose: GazeState) -> InSpace:
-    """Give where both eyes and the cyclopean gaze point in space."""
+    """Return where both eyes and the cyclopean gaze point in space."""
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
     return InSpace(_degrees(left), _degrees(right), _degrees(add(left, right)))
 
@@ -125,7 +125,6 @@ class Tracing:
     """Gathers one run, tick by tick; some 200 bytes a tick."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._angles = array("d")
         self._codes = array("l")
         self._numbers: dict[LookedAt, int] = {}
@@ -164,7 +163,7 @@ class Tracing:
         self._codes.extend((movement, tick.gaze.blink and known, self._number(tick)))
 
     def trace(self) -> Trace:
-        """Give the columns so far.
+        """Return the columns so far.
 
         Raises:
             ValueError: there are fewer than two ticks.
@@ -198,7 +197,7 @@ class Tracing:
         self._led = tick.led
 
     def _number(self, tick: Tick) -> int:
-        """Give the number of what the eyes are on, which a new target is only once they go there.
+        """Return the number of what the eyes are on, which a new target is only once they go there.
 
         The gaze goes to a new target with a saccade, after its latency; without one only
         where the new target is so near that it needs none.
@@ -217,7 +216,7 @@ class Tracing:
 
 
 def target_words(target: Target) -> str:
-    """Give kind and id of a target, e.g. "face 3"."""
+    """Return kind and id of a target, e.g. "face 3"."""
     return target.kind if target.id < 0 else f"{target.kind} {target.id}"
 
 

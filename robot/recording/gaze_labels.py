@@ -35,7 +35,7 @@ class Labels(NamedTuple):
     looked_at: Ints
 
     def event(self) -> list[str]:
-        """Give one word a sample: "blink" under a blink, else what the eyes do."""
+        """Return one word a sample: "blink" under a blink, else what the eyes do."""
         words = np.array(MOVEMENTS, dtype=object)[self.movement]
         return list(np.where(self.blink, "blink", words))
 
@@ -67,7 +67,7 @@ def labels_of(trace: Trace) -> Labels:
 
 
 def lag_of(trace: Trace) -> float:
-    """Give the lag of the measured gaze behind the planned one, 0 .. LONGEST_LAG_S.
+    """Return the lag of the measured gaze behind the planned one, 0 .. LONGEST_LAG_S.
 
     That at which the speeds of both correlate best during saccades and just after: speeds,
     as the gaze may be off by a constant, and saccades, as at rest all lags fit alike.
@@ -87,7 +87,7 @@ def lag_of(trace: Trace) -> float:
 
 
 def stretches_of(trace: Trace, labels: Labels) -> tuple[Stretch, ...]:
-    """Give all stretches in the order of their onsets; a blink overlaps what the eyes do."""
+    """Return all stretches in the order of their onsets; a blink overlaps what the eyes do."""
     key = labels.movement * len(trace.names) + labels.looked_at
     # A target that changes under way does not make two saccades of one.
     key = np.where(labels.movement == _SACCADE, -1, key)
@@ -120,7 +120,7 @@ def _steadied(movement: Ints, time_s: Floats) -> Ints:
 
 
 def _runs(key: Ints) -> list[tuple[int, int]]:
-    """Give first and last index of every run of equal values."""
+    """Return first and last index of every run of equal values."""
     breaks = np.flatnonzero(np.diff(key)) + 1
     firsts = [0, *breaks.tolist()]
     return list(zip(firsts, [*(b - 1 for b in breaks.tolist()), len(key) - 1], strict=True))
@@ -146,14 +146,14 @@ def _blink(trace: Trace, labels: Labels, first: int, last: int) -> Stretch:
 
 
 def _until(trace: Trace, last: int) -> float:
-    """Give when the sample after the last one of a stretch was taken."""
+    """Return when the sample after the last one of a stretch was taken."""
     if last + 1 < len(trace.time_s):
         return float(trace.time_s[last + 1])
     return float(trace.time_s[last]) + 1.0 / trace.rate_hz
 
 
 def speed_deg_s(time_s: Floats, gaze_deg: Floats) -> Floats:
-    """Give the angular speed (n,) of a gaze (n, 2) over two samples each."""
+    """Return the angular speed (n,) of a gaze (n, 2) over two samples each."""
     x, y = gaze_deg.T
     dx, dy = np.gradient(x, time_s), np.gradient(y, time_s)
     speed: Floats = np.hypot(dx * np.cos(np.radians(y)), dy)
@@ -161,7 +161,7 @@ def speed_deg_s(time_s: Floats, gaze_deg: Floats) -> Floats:
 
 
 def _apart_deg(a_deg: Floats, b_deg: Floats) -> float:
-    """Give the great-circle angle between two directions (x, y)."""
+    """Return the great-circle angle between two directions (x, y)."""
     (xa, ya), (xb, yb) = np.radians(a_deg), np.radians(b_deg)
     # Haversine: exact for small angles.
     h = np.sin((yb - ya) / 2) ** 2 + np.cos(ya) * np.cos(yb) * np.sin((xb - xa) / 2) ** 2

@@ -71,7 +71,7 @@ _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3
 
 
 def flat(tick: Tick, percept_number: int | None, dt_s: float, before: tuple[Heard, ...]) -> Flat:
-    """Give a tick as plain tuples: pickled, they cost a third of the named ones.
+    """Return a tick as plain tuples: pickled, they cost a third of the named ones.
 
     percept_number: which of the percepts handed over the tick went by
     """
@@ -133,7 +133,7 @@ def as_json(values: Flat) -> Json:
 
 
 def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
-    """Give the moment that ``as_json`` named.
+    """Return the moment that ``as_json`` named.
 
     percepts: those read so far, by number
 
@@ -170,7 +170,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
 
 
 def flat_percept(number: int, percept: Percept) -> Flat:
-    """Give a percept as plain tuples and arrays, under the number that ticks refer to."""
+    """Return a percept as plain tuples and arrays, under the number that ticks refer to."""
     faces = [_face_values(face) for face in percept.faces]
     return (number, percept.captured_s, _body_values(percept.bodies), faces)
 
@@ -189,7 +189,7 @@ def percept_as_json(values: Flat) -> Json:
 
 
 def percept_from_json(data: Json) -> tuple[int, Percept]:
-    """Give the number and the percept.
+    """Return the number and the percept.
 
     Raises:
         KeyError, TypeError, ValueError: the data is none.
@@ -221,7 +221,7 @@ def _heard(data: Json) -> Heard:
 
 
 def _plain(one: Heard) -> Flat:
-    """Give one thing that the machine said as plain values."""
+    """Return one thing that the machine said as plain values."""
     if isinstance(one, Measured):
         return (one.t_s, _named(JointState, tuple(one.joints)))
     return tuple(one)
@@ -257,7 +257,7 @@ def _listed(value: Any) -> Any:
 
 
 def _finite(value: Any) -> bool:
-    """Tell whether JSON can write all numbers in it."""
+    """Return whether JSON can write all numbers in it."""
     if isinstance(value, float):
         return isfinite(value)
     if isinstance(value, tuple | list):

@@ -56,7 +56,7 @@ class PictureEncoder:
             self._come.set()
 
     def taken(self) -> Iterator[tuple[float, bytes]]:
-        """Give what has been encoded: time of the exposure and JPEG, each once."""
+        """Return what has been encoded: time of the exposure and JPEG, each once."""
         while self._made:
             yield self._made.popleft()
 

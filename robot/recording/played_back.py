@@ -26,7 +26,6 @@ class PlayedBody(Body):
     """
 
     def __init__(self, body: Body) -> None:
-        """Take the body that moves."""
         # Not set up as a body of its own: it has no joints, only the other's.
         self.bus, self.names = body.bus, body.names
         self._body = body
@@ -52,7 +51,7 @@ class PlayedBody(Body):
         return self._body.retune(joints, gentle_deg_s)
 
     def reach(self) -> tuple[JointLimit, ...]:
-        """Give the ranges and speeds that servos keep to as they were set up."""
+        """Return the ranges and speeds that servos keep to as they were set up."""
         return self._body.reach()
 
     def start(self) -> JointAngles:
@@ -62,7 +61,7 @@ class PlayedBody(Body):
         return said.goals_rad if said is not None else goals
 
     def read(self, t_s: float) -> JointState:
-        """Give the recorded joints; a reading more than there were gives the newest again."""
+        """Return the recorded joints; a reading more than there were gives the newest again."""
         joints = self._body.read(t_s)
         said = self._next(Measured)
         if said is not None:
@@ -74,7 +73,7 @@ class PlayedBody(Body):
         self._body.write(command_rad)
 
     def angles(self, steps: Sequence[float]) -> JointAngles:
-        """Give the joint angles of servo positions."""
+        """Return the joint angles of servo positions."""
         return self._body.angles(steps)
 
     def let_go(self) -> None:
@@ -100,7 +99,7 @@ class PlayedBody(Body):
         self._body.stop()
 
     def _next(self, kind: type[H]) -> H | None:
-        """Give the next thing of a kind; what comes before it was not asked for."""
+        """Return the next thing of a kind; what comes before it was not asked for."""
         if not any(isinstance(one, kind) for one in self._said):
             return None
         while True:
@@ -116,12 +115,11 @@ class PlayedPerception(Perception):
     """
 
     def __init__(self, mount: CameraMount, horizontal_field_deg: float) -> None:
-        """Take what a perception takes; nothing is tracked anew."""
         super().__init__(mount, horizontal_field_deg, Tracker(TrackParams()))
         self.percept: Percept | None = None
 
     def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:
-        """Give the recorded percept."""
+        """Return the recorded percept."""
         return self.percept
 
 
@@ -132,7 +130,7 @@ class NoCamera:
         """Start looking."""
 
     def latest(self, now_s: float) -> Detections | None:
-        """Give nothing."""
+        """Return nothing."""
         return None
 
     def events(self) -> tuple[str, ...]:

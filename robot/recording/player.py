@@ -43,7 +43,6 @@ class Player:
     """Plays one recording; begins at its beginning, standing still."""
 
     def __init__(self, duration_s: float, marks: Sequence[Mark] = ()) -> None:
-        """Take the length, and what can be stepped to, in order of time."""
         self._duration_s = duration_s
         self._marks = {kind: tuple(m.at_s for m in marks if m.kind == kind) for kind in KINDS}
         self._from_s, self._since_s = 0.0, 0.0
@@ -51,7 +50,7 @@ class Player:
         self._sought_s: float | None = None
 
     def state(self, now_s: float) -> State:
-        """Give where it stands; at the end it stops."""
+        """Return where it stands; at the end it stops."""
         at_s = self._from_s
         if self._playing:
             at_s += (now_s - self._since_s) * self._speed

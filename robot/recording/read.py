@@ -114,7 +114,7 @@ class RunRecording:
         return f"{name} lacks {lost} ticks that could not be kept" if lost else ""
 
     def ticks(self) -> Iterator[Tick]:
-        """Give the ticks, bit for bit, but for detections and pictures (``detections=None``).
+        """Return the ticks, bit for bit, but for detections and pictures (``detections=None``).
 
         Raises:
             BadRecording: the file is damaged.
@@ -122,7 +122,7 @@ class RunRecording:
         return (moment.tick for moment in self.moments())
 
     def moments(self) -> Iterator[Moment]:
-        """Give the ticks with what else entered them.
+        """Return the ticks with what else entered them.
 
         Raises:
             BadRecording: the file is damaged.
@@ -144,7 +144,7 @@ class RunRecording:
             yield moment
 
     def pictures(self) -> Iterator[tuple[float, bytes]]:
-        """Give the camera's pictures: time of the exposure and JPEG.
+        """Return the camera's pictures: time of the exposure and JPEG.
 
         Raises:
             BadRecording: the file is damaged.
@@ -156,7 +156,7 @@ class RunRecording:
             yield picture
 
     def health(self) -> Iterator[dict[str, Any]]:
-        """Give the bus counts and the servos' figures, as recorded once a second.
+        """Return the bus counts and the servos' figures, as recorded once a second.
 
         Raises:
             BadRecording: the file is damaged.
@@ -167,7 +167,7 @@ class RunRecording:
             yield message
 
     def _messages(self, wanted: set[str]) -> Iterator[tuple[str, memoryview]]:
-        """Give topic and data of the messages of some topics, in the order of the file."""
+        """Return topic and data of the messages of some topics, in the order of the file."""
         topics: dict[int, str] = {}
         with _opened(self.path) as file:
             for place in self._chunks:
@@ -247,7 +247,7 @@ def _refuse_leap(before_s: float | None, t_s: float) -> None:
 def _wanted(
     records: memoryview, topics: dict[int, str], wanted: set[str]
 ) -> Iterator[tuple[str, memoryview]]:
-    """Give topic and data of the wanted messages of an unpacked chunk; learn its channels."""
+    """Return topic and data of the wanted messages of an unpacked chunk; learn its channels."""
     at = 0
     while at < len(records):
         kind, length = records[at], int.from_bytes(records[at + 1 : at + _HEAD], "little")

@@ -96,11 +96,11 @@ class Recorder:
         self._beside = None
 
     def tapped(self, body: Body) -> Body:
-        """Give a body to take the place of a robot's, so that all it says is recorded."""
+        """Return a body to take the place of a robot's, so that all it says is recorded."""
         return BodyTap(body, self._heard.append)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
-        """Give a loop's ``stop`` that notes the time since the loop began."""
+        """Return a loop's ``stop`` that notes the time since the loop began."""
 
         def noted(seconds: float) -> str | None:
             self._seconds = seconds
@@ -174,7 +174,7 @@ class Recorder:
         return self._path if self._opened and self._link.failed else None
 
     def _number(self, percept: Percept | None) -> int | None:
-        """Give a percept's number, handing it over where it is new; None where it is lost."""
+        """Return a percept's number, handing it over where it is new; None where it is lost."""
         if percept is None:
             return None
         if percept is not self._percept:

@@ -122,7 +122,7 @@ class Replay:
             self._picture = number
 
     def _due(self, state: State, now_s: float) -> bool:
-        """Tell whether the page is to know: at once what a person changed, else now and then."""
+        """Return whether the page is to know: at once what a person changed, else now and then."""
         told = self._told
         if told is None or state._replace(at_s=told.at_s) != told:
             return True
@@ -141,7 +141,7 @@ class Replay:
 
 
 def introduction(frames: Frames) -> dict[str, object]:
-    """Give what a page needs to know of a recording once: marks along it, and its events."""
+    """Return what a page needs to know of a recording once: marks along it, and its events."""
     events = [m for m in frames.marks if m.kind == "event"]
     return {
         "marks": {

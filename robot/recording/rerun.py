@@ -53,7 +53,7 @@ class Rerun(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Tell whether every tick came out the same."""
+        """Return whether every tick came out the same."""
         return self.agreeing == self.ticks
 
 
@@ -212,7 +212,7 @@ class _Compared:
             self._differs = differs
 
     def result(self, joints: Joints, tx_same: bool | None, notes: tuple[str, ...]) -> Rerun:
-        """Give what came out."""
+        """Return what came out."""
         return Rerun(
             joints, self.ticks, self._agreeing, self._first_s, self._differs, tx_same,
             self._was.figures(), self._is.figures(), notes,
@@ -279,7 +279,7 @@ def _joints(joints: str | None, changed: bool) -> Joints:
 
 
 def recorded_rig(recording: RunRecording) -> Rig:
-    """Give the rig with everything that was in force when the run began.
+    """Return the rig with everything that was in force when the run began.
 
     Raises:
         BadRecording: this version does not know what the recorded one was made of.
@@ -291,7 +291,7 @@ def recorded_rig(recording: RunRecording) -> Rig:
 def _rig(
     recording: RunRecording, rig: Rig | str | None, character: str | None, folder: Path
 ) -> Rig:
-    """Give the rig to run with: the recorded one, unless another was asked for."""
+    """Return the rig to run with: the recorded one, unless another was asked for."""
     if isinstance(rig, str):
         return load_rig(rig, character)
     text = rig_text(rig) if rig is not None else recording.info.config_yaml

@@ -60,7 +60,7 @@ class RunEnd:
 
 
 def versions() -> dict[str, str]:
-    """Give the versions of Python, of this package and of those that do its arithmetic."""
+    """Return the versions of Python, of this package and of those that do its arithmetic."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for package in ("gazerig", "numpy", "scipy", "opencv-contrib-python-headless"):
         try:
@@ -71,7 +71,7 @@ def versions() -> dict[str, str]:
 
 
 def started_ns(info: RunInfo) -> int:
-    """Give the wall clock at the start in nanoseconds since 1970.
+    """Return the wall clock at the start in nanoseconds since 1970.
 
     Raises:
         ValueError: it is no time of ISO 8601.
@@ -80,7 +80,7 @@ def started_ns(info: RunInfo) -> int:
 
 
 def as_text(value: RunInfo | RunEnd) -> dict[str, str]:
-    """Give the fields as MCAP metadata: YAML as it is, all else as JSON."""
+    """Return the fields as MCAP metadata: YAML as it is, all else as JSON."""
     plain = asdict(value)
     return {k: v if k.endswith("_yaml") else json.dumps(v) for k, v in plain.items()}
 

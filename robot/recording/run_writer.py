@@ -60,7 +60,7 @@ class RunWriter:
         return Written(count(fmt.TICK, 0), count(fmt.PICTURE, 0), self._file.tell())
 
     def time_ns(self, at_s: float) -> int:
-        """Give the wall clock at a time since the first tick."""
+        """Return the wall clock at a time since the first tick."""
         return self._started_ns + round(at_s * _WHOLE_NS)
 
     def add(self, message: fmt.Message) -> None:
@@ -166,7 +166,7 @@ class _Straight:
 
 
 def _plain(value: Any) -> Any:
-    """Give a number of numpy's as Python's own."""
+    """Return a number of numpy's as Python's own."""
     if hasattr(value, "item"):
         return value.item()
     raise TypeError(f"{type(value).__name__} is no part of a recording")

@@ -17,7 +17,6 @@ class Scribe:
     """Writes one run, in the order in which it is told."""
 
     def __init__(self, writer: RunWriter) -> None:
-        """Take the file."""
         self._writer = writer
         self._first_s: float | None = None
         self._at_s = 0.0

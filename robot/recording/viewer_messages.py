@@ -28,13 +28,13 @@ _AIM = {"r": 1.0, "g": 0.3, "b": 0.2, "a": 1.0}
 
 
 def stamp(ns: int) -> dict[str, int]:
-    """Give a time in nanoseconds as viewers take it."""
+    """Return a time in nanoseconds as viewers take it."""
     sec, nsec = divmod(ns, 1_000_000_000)
     return {"sec": sec, "nsec": nsec}
 
 
 def image(jpeg: bytes, captured_s: float, at_ns: int) -> Json:
-    """Give a JPEG as foxglove.CompressedImage, with its exposure in the rig's own time."""
+    """Return a JPEG as foxglove.CompressedImage, with its exposure in the rig's own time."""
     return {
         "timestamp": stamp(at_ns),
         "frame_id": "camera",
@@ -45,7 +45,7 @@ def image(jpeg: bytes, captured_s: float, at_ns: int) -> Json:
 
 
 def line(words: str, at_ns: int) -> Json:
-    """Give words as foxglove.Log."""
+    """Return words as foxglove.Log."""
     return {
         "timestamp": stamp(at_ns), "level": _INFO, "message": words, "name": "gazerig", "file": "",
         "line": 0,
@@ -53,7 +53,7 @@ def line(words: str, at_ns: int) -> Json:
 
 
 def joint_states(names: Sequence[str], joints: JointState, at_ns: int) -> Json:
-    """Give joints as they are as foxglove.JointStates: rad and rad/s."""
+    """Return joints as they are as foxglove.JointStates: rad and rad/s."""
     rows = zip(names, joints.position_rad, joints.velocity_rad_s, strict=True)
     return {
         "timestamp": stamp(at_ns),
@@ -62,7 +62,7 @@ def joint_states(names: Sequence[str], joints: JointState, at_ns: int) -> Json:
 
 
 def transforms(pose: GazeState, at_ns: int) -> Json:
-    """Give head and eyes as measured as foxglove.FrameTransforms."""
+    """Return head and eyes as measured as foxglove.FrameTransforms."""
     head = _transform("world", "head", pose.p_world_head_m, pose.R_world_head, at_ns)
     eyes = (
         ("left_eye", pose.p_world_eye_left_m, pose.eye_left_rad),
@@ -76,7 +76,7 @@ def transforms(pose: GazeState, at_ns: int) -> Json:
 
 
 def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json:
-    """Give faces, lines of sight and the point aimed at as foxglove.SceneUpdate."""
+    """Return faces, lines of sight and the point aimed at as foxglove.SceneUpdate."""
     sights: list[Vec3] = []
     for p, angles in (
         (pose.p_world_eye_left_m, pose.eye_left_rad),
@@ -100,7 +100,7 @@ def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json
 
 
 def quaternion(R: Mat3) -> dict[str, float]:
-    """Give a rotation matrix as a unit quaternion with w >= 0 (Shepperd's signs by halves)."""
+    """Return a rotation matrix as a unit quaternion with w >= 0 (Shepperd's signs by halves)."""
     (a, b, c), (d, e, f), (g, h, i) = R
     return {
         "x": copysign(0.5 * sqrt(max(0.0, 1.0 + a - e - i)), h - f),

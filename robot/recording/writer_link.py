@@ -58,7 +58,7 @@ class WriterLink:
 
     @property
     def alive(self) -> bool:
-        """Tell whether there is somebody to hand over to."""
+        """Return whether there is somebody to hand over to."""
         return self._socket is not None
 
     def post(self, kind: str, values: Any) -> bool:

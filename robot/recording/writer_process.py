@@ -93,7 +93,7 @@ def _take(scribe: Scribe, kind: str, values: Any) -> None:
 
 
 def _told(rig: socket.socket, parent: int) -> Iterator[tuple[str, Any] | None]:
-    """Give what is handed over, None where nothing comes for a while, until the end.
+    """Return what is handed over, None where nothing comes for a while, until the end.
 
     parent: the program's process; one that it forked may hold the socket open after its death
     """

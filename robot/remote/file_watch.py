@@ -50,7 +50,6 @@ class Settling:
     """Tells from one look after the other when a file holds something new that stays."""
 
     def __init__(self, first: Look | None) -> None:
-        """Take what the file is when it was last read."""
         self.known(first)
 
     def known(self, now: Look | None) -> None:

@@ -17,7 +17,7 @@ class FileTuning(Tuning, Protocol):
     """The parameters of a running rig, and the files they come from."""
 
     def files(self) -> Iterable[Path]:
-        """Give the files in use: the rig's, and those laid over it."""
+        """Return the files in use: the rig's, and those laid over it."""
         ...
 
     def reload(self, path: Path) -> object:
@@ -74,7 +74,7 @@ class LiveControl:
         self._server.close()
 
     def _files(self) -> tuple[Path, ...]:
-        """Give the files in use, those from before where a new one cannot be found."""
+        """Return the files in use, those from before where a new one cannot be found."""
         version, files = self._in_use
         now = self._tuning.version
         if now != version:

@@ -42,7 +42,7 @@ class Knob(Protocol):
 
     @property
     def key(self) -> str:
-        """Give the dotted key."""
+        """Return the dotted key."""
         ...
 
     def _asdict(self) -> dict[str, object]: ...
@@ -53,17 +53,17 @@ class Change(Protocol):
 
     @property
     def key(self) -> str:
-        """Give the dotted key."""
+        """Return the dotted key."""
         ...
 
     @property
     def old(self) -> object:
-        """Give what it is compared with."""
+        """Return what it is compared with."""
         ...
 
     @property
     def new(self) -> object:
-        """Give what is in force."""
+        """Return what is in force."""
         ...
 
 
@@ -72,17 +72,17 @@ class Saved(Protocol):
 
     @property
     def path(self) -> Path:
-        """Give the file."""
+        """Return the file."""
         ...
 
     @property
     def backup(self) -> Path | None:
-        """Give where the old file was kept, None where nothing was written."""
+        """Return where the old file was kept, None where nothing was written."""
         ...
 
     @property
     def changes(self) -> Sequence[Change]:
-        """Give what was written."""
+        """Return what was written."""
         ...
 
 
@@ -95,11 +95,11 @@ class Tuning(Protocol):
         ...
 
     def knobs(self) -> Iterable[Knob]:
-        """Give all parameters."""
+        """Return all parameters."""
         ...
 
     def get(self, prefix: str) -> Mapping[str, Value]:
-        """Give the values in force whose keys begin so."""
+        """Return the values in force whose keys begin so."""
         ...
 
     def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
@@ -107,11 +107,11 @@ class Tuning(Protocol):
         ...
 
     def unsaved(self) -> Iterable[Change]:
-        """Give what is in force and not in the file."""
+        """Return what is in force and not in the file."""
         ...
 
     def differs(self) -> Iterable[Change]:
-        """Give what differs from the defaults."""
+        """Return what differs from the defaults."""
         ...
 
     def save(self, path: Path | None = None) -> Saved:
@@ -123,7 +123,7 @@ class Tuning(Protocol):
         ...
 
     def characters(self) -> Sequence[str]:
-        """Give the characters there are."""
+        """Return the characters there are."""
         ...
 
     def character(self, name: str) -> object:
@@ -139,7 +139,7 @@ class Orderable(Protocol):
         ...
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Give what there is to ask for."""
+        """Return what there is to ask for."""
         ...
 
 
@@ -147,7 +147,6 @@ class Pulse:
     """The newest tick, and whether the loop lives."""
 
     def __init__(self, clock: Clock) -> None:
-        """Take the clock of the loop."""
         self._clock = clock
         self._newest: Tick | None = None
         self._ticks = 0
@@ -175,7 +174,7 @@ class Pulse:
         return self._ticks >= wanted
 
     def words(self) -> dict[str, object]:
-        """Give the newest tick as plain values: degrees, seconds, words."""
+        """Return the newest tick as plain values: degrees, seconds, words."""
         tick = self._newest
         if tick is None:
             return {"ticks": 0, "stopped": "", "said": []}
@@ -277,7 +276,7 @@ class Requests:
         raise ValueError(f"not understood; there is {'; '.join(REQUESTS)}")
 
     def _all_knobs(self) -> list[tuple[str, object]]:
-        """Give key and plain values of every parameter; writing them all takes 4 ms."""
+        """Return key and plain values of every parameter; writing them all takes 4 ms."""
         knobs = self._tuning.knobs()
         if knobs is not self._knobs[0]:
             self._knobs = knobs, [(knob.key, plain(knob._asdict())) for knob in knobs]

@@ -134,7 +134,7 @@ class RunningRig:
         raise NoRig(f"{len(found)} rigs are running: {names}; say which with --pid (pid=...)")
 
     def __enter__(self) -> "RunningRig":
-        """Give the connection itself."""
+        """Return the connection itself."""
         return self
 
     def __exit__(
@@ -152,20 +152,20 @@ class RunningRig:
         self._wire.close()
 
     def status(self) -> dict[str, Any]:
-        """Give what the rig does: its name, target and why, guard level, joints, what it said."""
+        """Return what the rig does: its name, target and why, guard level, joints, what it said."""
         return cast(dict[str, Any], self._asked("status"))
 
     def get(self, prefix: str = "") -> dict[str, JsonValue]:
-        """Give the values in force of all keys that begin with ``prefix``."""
+        """Return the values in force of all keys that begin with ``prefix``."""
         return cast(dict[str, JsonValue], self._asked("get", prefix=prefix))
 
     def knobs(self, prefix: str = "") -> tuple[KnobInfo, ...]:
-        """Give the rules and defaults of all keys that begin with ``prefix``."""
+        """Return the rules and defaults of all keys that begin with ``prefix``."""
         found = cast(list[dict[str, Any]], self._asked("knobs", prefix=prefix))
         return tuple(_knob(one) for one in found)
 
     def knob(self, key: str) -> KnobInfo:
-        """Give one parameter's rule and default.
+        """Return one parameter's rule and default.
 
         Raises:
             Refused: there is no such key.
@@ -192,11 +192,11 @@ class RunningRig:
         return self._notes(self._asked("set", changes=dict(changes)))
 
     def unsaved(self) -> tuple[Difference, ...]:
-        """Give what is in force and not in the rig's file."""
+        """Return what is in force and not in the rig's file."""
         return _differences(self._asked("unsaved"))
 
     def differs(self) -> tuple[Difference, ...]:
-        """Give what differs from the defaults."""
+        """Return what differs from the defaults."""
         return _differences(self._asked("differs"))
 
     def save(self, path: Path | str | None = None) -> SavedFile:
@@ -215,7 +215,7 @@ class RunningRig:
         return self._notes(self._asked("revert"))
 
     def characters(self) -> tuple[str, ...]:
-        """Give the characters that can be laid over the rig."""
+        """Return the characters that can be laid over the rig."""
         return tuple(cast(list[str], self._asked("characters")))
 
     def character(self, name: str) -> tuple[str, ...]:
@@ -227,7 +227,7 @@ class RunningRig:
         return self._notes(self._asked("character", name=name))
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Give what ``ask`` takes: menu -> choices, the present one first."""
+        """Return what ``ask`` takes: menu -> choices, the present one first."""
         said = cast(dict[str, list[str]], self._asked("menus"))
         return {menu: tuple(choices) for menu, choices in said.items()}
 

@@ -32,7 +32,6 @@ class RemoteServer:
     """Listens while a rig runs."""
 
     def __init__(self, requests: Requests, say: Callable[[str], None]) -> None:
-        """Take what carries out requests, and who is told of errors in this program."""
         self._requests = requests
         self._say = say
         self._clock = RealClock()

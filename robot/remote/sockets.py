@@ -33,13 +33,12 @@ class Garbled(ValueError):
     """
 
     def __init__(self, message: str, over: bool) -> None:
-        """Take the message, and whether the connection is of no more use."""
         super().__init__(message)
         self.over = over
 
 
 def folder(environ: Mapping[str, str], uid: int) -> Path:
-    """Give the folder of a user's sockets; it need not be there."""
+    """Return the folder of a user's sockets; it need not be there."""
     for runtime in (environ.get("XDG_RUNTIME_DIR"), f"/run/user/{uid}"):
         # unset, or left over from another user by sudo or su
         if runtime and os.path.isdir(runtime) and os.stat(runtime).st_uid == uid:
@@ -66,7 +65,7 @@ def make_private(path: Path, uid: int) -> None:
 
 
 def is_private(path: Path, uid: int) -> bool:
-    """Tell whether a path is a folder, no link, of this user and shut to all others."""
+    """Return whether a path is a folder, no link, of this user and shut to all others."""
     try:
         found = path.lstat()
     except FileNotFoundError:
@@ -75,7 +74,7 @@ def is_private(path: Path, uid: int) -> bool:
 
 
 def sockets(path: Path) -> dict[int, Path]:
-    """Give the sockets in a folder by the process that made them, dead ones among them."""
+    """Return the sockets in a folder by the process that made them, dead ones among them."""
     found = path.glob("*.sock") if path.is_dir() else ()
     return {int(p.stem): p for p in sorted(found) if p.stem.isdecimal()}
 
@@ -155,7 +154,6 @@ class Wire:
     """One end of a connection."""
 
     def __init__(self, end: socket.socket, longest: int) -> None:
-        """Take a connected socket, and the longest line that may come through it."""
         self._end = end
         self._longest = longest
         self._clock = RealClock()
@@ -196,7 +194,7 @@ class Wire:
         self._end.close()
 
     def _line(self, first_s: float | None, rest_s: float) -> bytes:
-        """Give one line without its end."""
+        """Return one line without its end."""
         held = self._rest or self._received(first_s)
         due_s = self._clock.now_s() + rest_s
         while b"\n" not in held:

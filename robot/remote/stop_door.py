@@ -80,11 +80,11 @@ class _Fixed:
     version = 0
 
     def knobs(self) -> Iterable[Knob]:
-        """Give none."""
+        """Return none."""
         return ()
 
     def get(self, prefix: str) -> Mapping[str, Value]:
-        """Give none."""
+        """Return none."""
         return {}
 
     def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
@@ -92,7 +92,7 @@ class _Fixed:
         raise _refused()
 
     def unsaved(self) -> Iterable[Change]:
-        """Give none: nothing was changed."""
+        """Return none: nothing was changed."""
         return ()
 
     def differs(self) -> Iterable[Change]:
@@ -108,7 +108,7 @@ class _Fixed:
         raise _refused()
 
     def characters(self) -> Sequence[str]:
-        """Give none."""
+        """Return none."""
         return ()
 
     def character(self, name: str) -> object:

@@ -186,5 +186,5 @@ BY_KEY = {band.key: band for band in BANDS}
 
 
 def applies(band: Band, mode: str) -> bool:
-    """Tell whether a band applies in a mode of conversation."""
+    """Return whether a band applies in a mode of conversation."""
     return not band.mode or mode in band.mode.split()

@@ -40,7 +40,7 @@ class Blink(NamedTuple):
 
     @property
     def duration_s(self) -> float:
-        """Give the whole length."""
+        """Return the whole length."""
         return self.close_s + self.hold_s + self.open_s
 
 
@@ -48,7 +48,6 @@ class BlinkFinder:
     """Takes one opening after the other and gives each blink when it is over."""
 
     def __init__(self) -> None:
-        """Begin with no trace."""
         self.clear()
 
     def clear(self) -> None:
@@ -125,7 +124,7 @@ def _shape(trace: list[tuple[float, float]], usual: float) -> Blink | None:
 
 
 def _phase(t: list[float], speed: list[float], peak: int) -> tuple[float, float]:
-    """Give when the speed rises above its foot before its peak, and falls below it after."""
+    """Return when the speed rises above its foot before its peak, and falls below it after."""
     foot = _FOOT_SHARE * speed[peak]
     first = last = peak
     while first > 0 and speed[first] > foot:

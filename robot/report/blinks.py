@@ -17,14 +17,14 @@ _PART_S = 10.0
 
 
 def intervals(run: Gathered) -> Floats:
-    """Give seconds from blink to blink; the second of a double one counts as the same."""
+    """Return seconds from blink to blink; the second of a double one counts as the same."""
     onsets = np.array([blink.onset_s for blink in run.blinks])
     apart = np.diff(onsets)
     return apart[apart > _DOUBLE_S]
 
 
 def shapes(blinks: Sequence[Blink]) -> Floats:
-    """Give (n, 4) closing, shut and opening in ms, and fastest closing over fastest opening."""
+    """Return (n, 4) closing, shut and opening in ms, and fastest closing over fastest opening."""
     rows = [
         (1e3 * b.close_s, 1e3 * b.hold_s, 1e3 * b.open_s, b.close_peak_1_s / b.open_peak_1_s)
         for b in blinks
@@ -33,7 +33,7 @@ def shapes(blinks: Sequence[Blink]) -> Floats:
 
 
 def evoked(run: Gathered) -> Floats:
-    """Give (n, 2) amplitude of each saccade in deg and whether a blink went with it."""
+    """Return (n, 2) amplitude of each saccade in deg and whether a blink went with it."""
     onsets = np.array([blink.onset_s for blink in run.blinks])
     rows = []
     for saccade in run.saccades:
@@ -46,7 +46,7 @@ def evoked(run: Gathered) -> Floats:
 
 
 def measures(run: Gathered) -> list[Measured]:
-    """Give what there is to say about lids."""
+    """Return what there is to say about lids."""
     seen, asked = shapes(run.blinks), shapes(run.asked_blinks)
     large = evoked(run)
     large = large[large[:, 0] >= _EVOKING_DEG]
@@ -65,7 +65,7 @@ def measures(run: Gathered) -> list[Measured]:
 
 
 def _counts(run: Gathered) -> Floats:
-    """Give (n, 2) blinks and seconds of every ten seconds of the run."""
+    """Return (n, 2) blinks and seconds of every ten seconds of the run."""
     if not len(run.rows):
         return np.zeros((0, 2))
     first, last = run.column("t")[[0, -1]]

@@ -131,7 +131,7 @@ def drawn(runs: Sequence[Shown], progress: Progress) -> tuple[Picture, ...]:
 
 
 def _numbers(finding: Finding, run: Gathered) -> dict[str, object]:
-    """Give a finding as plain JSON; what is not known is null.
+    """Return a finding as plain JSON; what is not known is null.
 
     basis: "measured", "partly reckoned" or "reckoned"
     """

@@ -56,7 +56,7 @@ class Drawing(NamedTuple):
 
 
 def caption_of(drawing: Drawing, runs: Sequence[Shown]) -> str:
-    """Give the caption of a figure of these runs."""
+    """Return the caption of a figure of these runs."""
     return drawing.caption.replace("{measured}", basis_words(runs, drawing.group))
 
 

@@ -93,7 +93,7 @@ def differences_of(a: Sequence[Measured], b: Sequence[Measured]) -> tuple[Differ
 
 
 def chance(a: Measured, b: Measured, rng: np.random.Generator) -> float:
-    """Give how often events dealt out at random differ in their figure as much as these."""
+    """Return how often events dealt out at random differ in their figure as much as these."""
     rows, n = np.concatenate([a.rows, b.rows]), len(a.rows)
     seen = abs(figure(b.of, b.rows) - figure(a.of, a.rows))
     as_much = drawn_count = 0
@@ -107,7 +107,7 @@ def chance(a: Measured, b: Measured, rng: np.random.Generator) -> float:
 
 
 def chance_of_shape(a: Measured, b: Measured) -> float:
-    """Give the Kolmogorov-Smirnov chance of two distributions, nan of rows that are none."""
+    """Return the Kolmogorov-Smirnov chance of two distributions, nan of rows that are none."""
     if a.rows.ndim != 1 or len(np.unique(np.concatenate([a.rows, b.rows]))) <= 2:
         return nan
     return float(stats.ks_2samp(a.rows, b.rows).pvalue)

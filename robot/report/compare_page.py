@@ -107,7 +107,7 @@ def compare_page(
     differences: Sequence[Difference],
     pictures: Sequence[Picture],
 ) -> str:
-    """Give the page as HTML that needs no other file."""
+    """Return the page as HTML that needs no other file."""
     sections = tuple(
         Section(
             group,
@@ -127,7 +127,7 @@ def compare_page(
 
 
 def banners(abouts: tuple[About, About], runs: Sequence[Gathered]) -> tuple[str, ...]:
-    """Give what a reader must know first: which runs were not measured, and that they differ so."""
+    """Return what a reader must know first: which runs were not measured, or differ in it."""
     told = [
         f"{about.name}: {words}"
         for about, run in zip(abouts, runs, strict=True)
@@ -148,7 +148,7 @@ def mixed(abouts: tuple[About, About], runs: Sequence[Gathered]) -> str:
 
 
 def _left_out(abouts: tuple[About, About], runs: Sequence[Gathered], group: str) -> tuple[str, ...]:
-    """Give why a section says less than it could, and of which run."""
+    """Return why a section says less than it could, and of which run."""
     each = [dict.fromkeys(left_out(run.joints, group)) for run in runs]
     both = [why for why in each[0] if why in each[1]]
     return (
@@ -169,7 +169,7 @@ def _basis(basis: Basis) -> str:
 def _facts(
     abouts: tuple[About, About], runs: Sequence[Gathered]
 ) -> tuple[tuple[str, str, str], ...]:
-    """Give what is known of both runs, side by side."""
+    """Return what is known of both runs, side by side."""
     first, second = (dict(about.facts) for about in abouts)
     names = dict.fromkeys((*first, *second))
     counts = [

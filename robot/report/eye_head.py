@@ -43,7 +43,7 @@ class Shift(NamedTuple):
 
 
 def rate(t_s: Floats, x: Floats, half: int = 4) -> Floats:
-    """Give a speed by differences over 2 x ``half`` samples, 0 at the ends."""
+    """Return a speed by differences over 2 x ``half`` samples, 0 at the ends."""
     out = np.zeros_like(x)
     if len(x) > 2 * half:
         span = np.maximum(t_s[2 * half :] - t_s[: -2 * half], 1e-6)
@@ -52,7 +52,7 @@ def rate(t_s: Floats, x: Floats, half: int = 4) -> Floats:
 
 
 def gaze_shifts(run: Gathered) -> list[Shift]:
-    """Give the shifts that began with the head at rest."""
+    """Return the shifts that began with the head at rest."""
     t, head, gaze = run.column("t"), run.column("head_yaw"), run.column("gaze_yaw")
     speed, moves = rate(t, head), np.abs(run.column("target_yaw_rate"))
     large = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG and s.commanded is not None]
@@ -88,7 +88,7 @@ def _shift(
 
 
 def stretches(mask: NDArray[np.bool_], t_s: Floats, shift: Floats, least_s: float) -> list[slice]:
-    """Give the runs of rows where ``mask`` holds and the target stays the same."""
+    """Return the runs of rows where ``mask`` holds and the target stays the same."""
     edges = np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0))
     out = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):
@@ -100,7 +100,7 @@ def stretches(mask: NDArray[np.bool_], t_s: Floats, shift: Floats, least_s: floa
 
 
 def vor(run: Gathered) -> Floats:
-    """Give (n, 2) gain of the eyes against the head and the head's speed, one row a stretch.
+    """Return (n, 2) gain of the eyes against the head and the head's speed, one row a stretch.
 
     What the eyes have to do is the target's motion seen from the head, less the head's: a near
     target asks for more than the head turns, and that is no fault of the gain.
@@ -130,7 +130,7 @@ def vor(run: Gathered) -> Floats:
 
 
 def measures(run: Gathered) -> list[Measured]:
-    """Give what there is to say about eyes and head."""
+    """Return what there is to say about eyes and head."""
     shifts = gaze_shifts(run)
     seen = np.array([(s.aside_deg, s.head_deg) for s in shifts]).reshape(-1, 2)
     beyond = seen[seen[:, 0] > human.STAHL_FREE_DEG]
@@ -149,6 +149,6 @@ def measures(run: Gathered) -> list[Measured]:
 
 
 def _slope(rows: Floats) -> float:
-    """Give degrees of head for each degree beyond the eyes' own range."""
+    """Return degrees of head for each degree beyond the eyes' own range."""
     beyond = rows[:, 0] - human.STAHL_FREE_DEG
     return float(beyond @ rows[:, 1] / (beyond @ beyond))

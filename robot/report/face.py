@@ -33,7 +33,7 @@ class Visit(NamedTuple):
 
 
 def visits(run: Gathered) -> list[Visit]:
-    """Give the visits to parts in their order."""
+    """Return the visits to parts in their order."""
     out: list[Visit] = []
     for f in run.fixations:
         if f.part is None or not f.on_face:
@@ -47,7 +47,7 @@ def visits(run: Gathered) -> list[Visit]:
 
 
 def shifts(run: Gathered) -> Floats:
-    """Give (n, 2) from and to of shifts between parts, as indices of PARTS."""
+    """Return (n, 2) from and to of shifts between parts, as indices of PARTS."""
     seen = visits(run)
     rows = [
         (a.part, b.part)
@@ -58,20 +58,20 @@ def shifts(run: Gathered) -> Floats:
 
 
 def counted(rows: Floats) -> Floats:
-    """Give (8, 8) counts of shifts, rows from."""
+    """Return (8, 8) counts of shifts, rows from."""
     out = np.zeros((N, N))
     np.add.at(out, (rows[:, 0].astype(int), rows[:, 1].astype(int)), 1.0)
     return out
 
 
 def on_parts(run: Gathered) -> Floats:
-    """Give (n, 2) part and seconds of every fixation on one."""
+    """Return (n, 2) part and seconds of every fixation on one."""
     rows = [(PARTS.index(f.part), f.duration_s) for f in run.fixations if f.part is not None]
     return np.array(rows, dtype=float).reshape(-1, 2)
 
 
 def share(rows: Floats) -> Floats:
-    """Give the share of time on each part, (8,)."""
+    """Return the share of time on each part, (8,)."""
     time = np.bincount(rows[:, 0].astype(int), weights=rows[:, 1], minlength=N)
     out: Floats = time / time.sum()
     return out
@@ -79,7 +79,7 @@ def share(rows: Floats) -> Floats:
 
 @cache
 def human_share() -> Floats:
-    """Give the share of time that people spend on each part (Nakamoto & Tsuruno), (8,).
+    """Return the share of time that people spend on each part (Nakamoto & Tsuruno), (8,).
 
     Asked for thousands of times by figures of samples drawn again, so computed once.
     """
@@ -89,7 +89,7 @@ def human_share() -> Floats:
 
 
 def points(run: Gathered) -> Floats:
-    """Give (n, 3) y and z on the face in metres, and seconds, of fixations meant for a face.
+    """Return (n, 3) y and z on the face in metres, and seconds, of fixations meant for a face.
 
     They may well lie beside it.
     """
@@ -115,7 +115,7 @@ def density(rows: Floats) -> Floats:
 
 @cache
 def expected_density() -> Floats:
-    """Give the density that people's share of time on the parts makes; computed once."""
+    """Return the density that people's share of time on the parts makes; computed once."""
     places = np.array([PARTS_FACE_M[part][1:] for part in PARTS])
     out = density(np.column_stack([places, human_share()]))
     out.setflags(write=False)
@@ -123,7 +123,7 @@ def expected_density() -> Floats:
 
 
 def measures(run: Gathered) -> list[Measured]:
-    """Give what there is to say about the gaze on faces."""
+    """Return what there is to say about the gaze on faces."""
     parts, moves, seen = on_parts(run), shifts(run), visits(run)
     on_eyes = np.isin(parts[:, 0], _EYES).astype(float)
     never = human.matrix() == 0.0
@@ -158,7 +158,7 @@ def _axes(run: Gathered) -> list[Measured]:
 
 
 def axes(run: Gathered) -> Floats:
-    """Give (n, 7) medians of fixations on a face.
+    """Return (n, 7) medians of fixations on a face.
 
     Columns: where the left, then the right pupil axis passes the point looked at (y, z, in mm
     of the face's plane); angles off it, in deg; vergence beyond what is due, in deg.
@@ -175,12 +175,12 @@ def axes(run: Gathered) -> Floats:
 
 
 def _share_apart(rows: Floats) -> float:
-    """Give half the sum of the differences to people's shares: 0 alike, 1 nothing in common."""
+    """Return half the sum of the differences to people's shares: 0 alike, 1 nothing in common."""
     return float(0.5 * np.abs(share(rows) - human_share()).sum())
 
 
 def _rows_apart(rows: Floats) -> float:
-    """Give that difference of the rows of the transition matrix, weighted by their shifts."""
+    """Return that difference of the rows of the transition matrix, weighted by their shifts."""
     counts = counted(rows)
     total = counts.sum(axis=1)
     here = total > 0.0
@@ -194,7 +194,7 @@ def _weighted(rows: Floats) -> float:
 
 
 def _alike(rows: Floats) -> float:
-    """Give the correlation of the heat map with that expected of people."""
+    """Return the correlation of the heat map with that expected of people."""
     ours = density(rows).ravel()
     if ours.std() == 0.0:  # all of it beside the face
         return 0.0

@@ -69,7 +69,7 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
 
 
 def _mean_blink(shown: Shown, column: str = "lid") -> np.ndarray | None:
-    """Give the lid openings about every blink on one time axis, (n, times)."""
+    """Return the lid openings about every blink on one time axis, (n, times)."""
     t, lid = shown.run.column("t"), shown.run.column(column)
     inside = [
         b.onset_s for b in shown.run.blinks if t[0] < b.onset_s - 0.1 < b.onset_s + 0.5 < t[-1]

@@ -15,7 +15,7 @@ _LOWEST_HZ, _HIGHEST_HZ, _COHERENT = 0.08, 1.0, 0.6
 
 
 def followed(run: Gathered) -> Floats:
-    """Give (n, 3) target speed in deg/s, gain, and lag in ms: one row a stretch."""
+    """Return (n, 3) target speed in deg/s, gain, and lag in ms: one row a stretch."""
     t = run.column("t")
     if len(t) < 20:
         return np.zeros((0, 3))
@@ -39,7 +39,7 @@ def followed(run: Gathered) -> Floats:
 
 
 def response(run: Gathered) -> Floats:
-    """Give (n, 3) frequency in Hz, gain, and phase in deg of the slow gaze against its target.
+    """Return (n, 3) frequency in Hz, gain, and phase in deg of the slow gaze against its target.
 
     By cross spectra of both speeds, sideways; what saccades did is bridged. Only where the
     two go together: a frequency that the target does not have tells nothing.
@@ -61,7 +61,7 @@ def response(run: Gathered) -> Floats:
 
 
 def measures(run: Gathered) -> list[Measured]:
-    """Give what there is to say about following."""
+    """Return what there is to say about following."""
     rows = followed(run)
     return [
         Measured("pursuit_gain", rows[:, 1], median),

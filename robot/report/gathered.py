@@ -98,35 +98,35 @@ class Gathered:
     joints: RunJoints = RunJoints()
 
     def column(self, name: str) -> Floats:
-        """Give a column of Row by its name."""
+        """Return a column of Row by its name."""
         out: Floats = self.rows[:, Row._fields.index(name)]
         return out
 
     @property
     def seconds(self) -> float:
-        """Give the length of the run."""
+        """Return the length of the run."""
         t = self.column("t")
         return float(t[-1] - t[0]) if len(t) else 0.0
 
     @property
     def rate_hz(self) -> float:
-        """Give the median tick rate, 0 of nothing."""
+        """Return the median tick rate, 0 of nothing."""
         t = self.column("t")
         return float(1.0 / np.median(np.diff(t))) if len(t) > 1 else 0.0
 
     @property
     def mode(self) -> str:
-        """Give the mode of conversation that was in force for longest."""
+        """Return the mode of conversation that was in force for longest."""
         modes = self.column("mode")
         return MODES[int(np.bincount(modes.astype(int)).argmax())] if len(modes) else "none"
 
     def between(self, start_s: float, end_s: float) -> slice:
-        """Give the rows from ``start_s`` until before ``end_s``."""
+        """Return the rows from ``start_s`` until before ``end_s``."""
         first, last = np.searchsorted(self.column("t"), (start_s, end_s))
         return slice(int(first), int(last))
 
     def slow(self, before_s: float = 0.015, after_s: float = 0.04) -> NDArray[np.bool_]:
-        """Give (n,) whether each row is clear of saccades."""
+        """Return (n,) whether each row is clear of saccades."""
         clear = np.ones(len(self.rows), dtype=bool)
         for saccade in self.saccades:
             clear[self.between(saccade.onset_s - before_s, saccade.end_s + after_s)] = False
@@ -137,7 +137,6 @@ class Gathering:
     """Takes the ticks of a run, one after the other, and gives what was gathered."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self._events, self._asked_lids = GazeEvents(), BlinkFinder()
         self._flat = array("d")
         self._saccades: list[Saccade] = []
@@ -175,7 +174,7 @@ class Gathering:
             self._flat.extend(row_of(tick, self._mode))
 
     def gathered(self) -> Gathered:
-        """Give all of it as it is now."""
+        """Return all of it as it is now."""
         rows = np.array(self._flat).reshape(-1, len(Row._fields))
         return Gathered(
             rows,
@@ -189,7 +188,7 @@ class Gathering:
 
 
 def row_of(tick: Tick, mode: int) -> Row:
-    """Give the columns of one tick."""
+    """Return the columns of one tick."""
     pose, target, names = tick.pose, tick.target, tick.verdict.joints
     head, left, right = pose.p_world_head_m, pose.p_world_eye_left_m, pose.p_world_eye_right_m
     sight_left, sight_right = line_of_sight(pose, True), line_of_sight(pose, False)
@@ -235,7 +234,7 @@ _PHASES = ("fixate", "saccade", "pursue")
 
 
 def _rates(rel: Vec3, v: Vec3) -> tuple[float, float]:
-    """Give yaw and pitch rate of a point that moves, seen from a head that stands still."""
+    """Return yaw and pitch rate of a point that moves, seen from a head that stands still."""
     x, y, z = rel
     level2 = x * x + y * y
     if level2 < 1e-6:
@@ -247,7 +246,7 @@ def _rates(rel: Vec3, v: Vec3) -> tuple[float, float]:
 
 
 def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
-    """Give the target's face, or else the one looked at, with its time; and whether it is."""
+    """Return the target's face, or else the one looked at, with its time; and whether it is."""
     if tick.percept is None:
         return None, False
     captured_s, found = tick.percept.captured_s, None
@@ -263,13 +262,13 @@ def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
 
 
 def _turned_deg(face: Face, head: Vec3) -> float:
-    """Give how far a face is turned away from the robot's."""
+    """Return how far a face is turned away from the robot's."""
     R = face.R_world_face
     return degrees(angle_between((R[0][0], R[1][0], R[2][0]), sub(head, face.p_world_m)))
 
 
 def _on_plane(face: Face, since_s: float, head: Vec3, way: Vec3) -> tuple[float, float]:
-    """Give where the gaze meets the face's plane, (y, z) from the nose, nan where it does not."""
+    """Return where the gaze meets the face's plane, (y, z) from the nose, nan where it does not."""
     R = face.R_world_face
     out = scale((R[0][0], R[1][0], R[2][0]), PLANE_M)
     centre = add(add(face.p_world_m, scale(face.v_world_m_s, since_s)), out)

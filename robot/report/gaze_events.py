@@ -64,7 +64,7 @@ class Saccade(NamedTuple):
 
     @property
     def end_s(self) -> float:
-        """Give when it landed."""
+        """Return when it landed."""
         return self.onset_s + self.duration_s
 
 
@@ -86,7 +86,7 @@ class Fixation(NamedTuple):
 
     @property
     def end_s(self) -> float:
-        """Give when the next saccade began."""
+        """Return when the next saccade began."""
         return self.start_s + self.duration_s
 
 
@@ -98,7 +98,6 @@ class GazeEvents:
     """Finds events in ticks as they come; an event is told when it is over."""
 
     def __init__(self) -> None:
-        """Begin with nothing seen."""
         self._saccades = SaccadeFinder()
         self._blinks = BlinkFinder()
         self._commands: deque[Commanded] = deque(maxlen=4)
@@ -107,7 +106,7 @@ class GazeEvents:
 
     @property
     def in_saccade(self) -> bool:
-        """Tell whether the measured gaze is jumping, as known some 10 ms late."""
+        """Return whether the measured gaze is jumping, as known some 10 ms late."""
         return self._saccades.under_way
 
     def note(self, tick: Tick) -> tuple[Event, ...]:
@@ -131,7 +130,7 @@ class GazeEvents:
         return self._landed(jump, blink)
 
     def _landed(self, jump: Jump, blink: Blink | None) -> tuple[Event, ...]:
-        """Give the fixation that a saccade has ended, and the saccade."""
+        """Return the fixation that a saccade has ended, and the saccade."""
         events: list[Event] = [] if blink is None else [blink]
         fixation = self._rest.over(jump.onset_s)
         if fixation is not None:
@@ -192,7 +191,7 @@ class _Flight:
 
     @property
     def command(self) -> Commanded:
-        """Give it as far as it is known."""
+        """Return it as far as it is known."""
         return Commanded(
             self._start_s,
             self._last_s - self._start_s,
@@ -225,7 +224,7 @@ class _Rest:
         self._kinds[tick.target.kind, tick.target.part] += 1
 
     def over(self, end_s: float) -> Fixation | None:
-        """Give the fixation, None where there was none worth the name."""
+        """Return the fixation, None where there was none worth the name."""
         if self._start_s is None or end_s - self._start_s < SHORTEST_S:
             return None
         part = _most(self._parts, None)
@@ -236,7 +235,7 @@ class _Rest:
 
 
 def part_looked_at(tick: Tick, way: Vec3) -> tuple[str | None, int]:
-    """Give the face part that the measured gaze passes, and the face's id, -1 off all faces.
+    """Return the face part that the measured gaze passes, and the face's id, -1 off all faces.
 
     way: unit vector of the gaze in the world
     """
@@ -252,7 +251,7 @@ def part_looked_at(tick: Tick, way: Vec3) -> tuple[str | None, int]:
 
 
 def beside_m(way: Vec3, rel_m: Vec3) -> float:
-    """Give how far a line of sight passes from a place; both from the eye."""
+    """Return how far a line of sight passes from a place; both from the eye."""
     if dot(way, rel_m) <= 0.0:
         return norm(rel_m)
     return norm(cross(way, rel_m))

@@ -37,14 +37,14 @@ DWELL_SD_S = (0.35, 0.25, 0.14, 0.22, 0.30, 0.30, 0.38, 0.15)
 
 
 def matrix() -> Floats:
-    """Give Nakamoto & Tsuruno's eq 1 with every row summing to 1, (8, 8), rows from."""
+    """Return Nakamoto & Tsuruno's eq 1 with every row summing to 1, (8, 8), rows from."""
     printed = np.array(_PRINTED)
     out: Floats = printed / printed.sum(axis=1, keepdims=True)
     return out
 
 
 def visit_matrix(steps: Floats) -> Floats:
-    """Give the chain of visits of a chain of steps: without staying, (n, n)."""
+    """Return the chain of visits of a chain of steps: without staying, (n, n)."""
     away = steps * (1.0 - np.eye(len(steps)))
     total = away.sum(axis=1, keepdims=True)
     out: Floats = np.divide(away, total, out=np.zeros_like(away), where=total > 0.0)
@@ -52,7 +52,7 @@ def visit_matrix(steps: Floats) -> Floats:
 
 
 def stationary(steps: Floats) -> Floats:
-    """Give the share of steps that a chain spends in each of its states, (n,)."""
+    """Return the share of steps that a chain spends in each of its states, (n,)."""
     values, vectors = np.linalg.eig(steps.T)
     share = np.real(vectors[:, np.argmin(np.abs(values - 1.0))])
     out: Floats = share / share.sum()
@@ -60,27 +60,27 @@ def stationary(steps: Floats) -> Floats:
 
 
 def time_share(steps: Floats, dwell_s: ArrayLike) -> Floats:
-    """Give the share of time in each state when a step in it lasts for ``dwell_s``, (n,)."""
+    """Return the share of time in each state when a step in it lasts for ``dwell_s``, (n,)."""
     time = stationary(steps) * np.asarray(dwell_s)
     out: Floats = time / time.sum()
     return out
 
 
 def visit_s(steps: Floats, dwell_s: ArrayLike) -> Floats:
-    """Give the mean length of a visit, its refixations merged, (n,)."""
+    """Return the mean length of a visit, its refixations merged, (n,)."""
     out: Floats = np.asarray(dwell_s) / (1.0 - np.diag(steps))
     return out
 
 
 def slowest_peak(amplitude_deg: ArrayLike) -> Floats:
-    """Give the lower edge of human peak speeds: Baloh's curve less 15 % between people."""
+    """Return the lower edge of human peak speeds: Baloh's curve less 15 % between people."""
     a = np.asarray(amplitude_deg, dtype=float)
     out: Floats = 0.85 * BALOH_DEG_S * (1.0 - np.exp(-a / ROUND_DEG))
     return out
 
 
 def fastest_peak(amplitude_deg: ArrayLike) -> Floats:
-    """Give the upper edge: the higher of Bahill's and Collewijn's curves and 15 %."""
+    """Return the upper edge: the higher of Bahill's and Collewijn's curves and 15 %."""
     a = np.asarray(amplitude_deg, dtype=float)
     bahill = BAHILL_DEG_S * (1.0 - np.exp(-a / ROUND_DEG))
     collewijn = COLLEWIJN_DEG_S * (1.0 - np.exp(-a / COLLEWIJN_ROUND_DEG))
@@ -89,33 +89,33 @@ def fastest_peak(amplitude_deg: ArrayLike) -> Floats:
 
 
 def shortest_ms(amplitude_deg: ArrayLike) -> Floats:
-    """Give the lower edge of human durations, 21 ms + 2.2 ms a degree less a quarter."""
+    """Return the lower edge of human durations, 21 ms + 2.2 ms a degree less a quarter."""
     out: Floats = 0.75 * (21.0 + 2.2 * np.asarray(amplitude_deg, dtype=float))
     return out
 
 
 def longest_ms(amplitude_deg: ArrayLike) -> Floats:
-    """Give the upper edge, 25 ms + 2.4 ms a degree (Lee, Badler & Badler 2002) and a quarter."""
+    """Return the upper edge, 25 ms + 2.4 ms a degree (Lee, Badler & Badler 2002) and a quarter."""
     out: Floats = 1.25 * (25.0 + 2.4 * np.asarray(amplitude_deg, dtype=float))
     return out
 
 
 def peak_at(amplitude_deg: ArrayLike) -> Floats:
-    """Give the share of acceleration: .45 up to 10 deg, .20 from 50 (Collewijn et al. 1988)."""
+    """Return the share of acceleration: .45 up to 10 deg, .20 from 50 (Collewijn et al. 1988)."""
     over = (np.asarray(amplitude_deg, dtype=float) - 10.0) / 40.0
     out: Floats = 0.45 - 0.25 * np.clip(over, 0.0, 1.0)
     return out
 
 
 def head_deg(eccentricity_deg: ArrayLike) -> Floats:
-    """Give the mean head movement for a gaze shift (Stahl 1999)."""
+    """Return the mean head movement for a gaze shift (Stahl 1999)."""
     beyond = np.abs(np.asarray(eccentricity_deg, dtype=float)) - STAHL_FREE_DEG
     out: Floats = STAHL_SLOPE * np.maximum(0.0, beyond)
     return out
 
 
 def evoked_blink(amplitude_deg: ArrayLike) -> Floats:
-    """Give the chance of a blink with a gaze shift: .5 at 17, .97 at 33 deg (Evinger 1994)."""
+    """Return the chance of a blink with a gaze shift: .5 at 17, .97 at 33 deg (Evinger 1994)."""
     a = np.asarray(amplitude_deg, dtype=float)
     out: Floats = 1.0 / (1.0 + np.exp(-0.217 * (a - 17.0)))
     return out

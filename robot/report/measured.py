@@ -35,7 +35,7 @@ class Measured:
 
     @property
     def events(self) -> int:
-        """Give the number of events."""
+        """Return the number of events."""
         return len(self.rows) if self.count is None else self.count
 
 
@@ -67,7 +67,7 @@ def judged(measured: Measured, band: Band) -> Finding:
 
 
 def drawn(measured: Measured, rng: np.random.Generator, draws: int = _DRAWS) -> Floats:
-    """Give the figure of ``draws`` bootstrap samples of the events (Efron 1979)."""
+    """Return the figure of ``draws`` bootstrap samples of the events (Efron 1979)."""
     rows, n = measured.rows, len(measured.rows)
     values = [figure(measured.of, rows[rng.integers(0, n, n)]) for _ in range(draws)]
     found = np.array([value for value in values if isfinite(value)])
@@ -75,32 +75,32 @@ def drawn(measured: Measured, rng: np.random.Generator, draws: int = _DRAWS) -> 
 
 
 def figure(of: Statistic, rows: Floats) -> float:
-    """Give the figure of rows, nan of none."""
+    """Return the figure of rows, nan of none."""
     if not len(rows):
         return nan
     return float(of(rows))
 
 
 def median(rows: Floats) -> float:
-    """Give the median."""
+    """Return the median."""
     return float(np.median(rows))
 
 
 def mean(rows: Floats) -> float:
-    """Give the mean, which is the share where rows are 0 or 1."""
+    """Return the mean, which is the share where rows are 0 or 1."""
     return float(np.mean(rows))
 
 
 def spread_over_mean(rows: Floats) -> float:
-    """Give the standard deviation over the mean."""
+    """Return the standard deviation over the mean."""
     return float(np.std(rows, ddof=1) / np.mean(rows)) if len(rows) > 1 else nan
 
 
 def one_over_mean(rows: Floats) -> float:
-    """Give events a second of the intervals between them."""
+    """Return events a second of the intervals between them."""
     return float(1.0 / np.mean(rows))
 
 
 def longest(rows: Floats) -> float:
-    """Give the largest."""
+    """Return the largest."""
     return float(np.max(rows))

@@ -39,7 +39,7 @@ class ModelWalk:
         return np.array([self._dwells(part, int(n), rng).sum() for n in steps])
 
     def share(self, rng: np.random.Generator) -> Floats:
-        """Give the share of time on each part, (8,)."""
+        """Return the share of time on each part, (8,)."""
         mean = [float(self._dwells(part, _DRAWS, rng).mean()) for part in range(len(self._laws))]
         return human.time_share(self._steps, mean)
 
@@ -49,12 +49,12 @@ class ModelWalk:
 
 
 def published() -> ModelWalk:
-    """Give the walk of Nakamoto & Tsuruno, eq 1 and table 1."""
+    """Return the walk of Nakamoto & Tsuruno, eq 1 and table 1."""
     return ModelWalk(human.matrix(), human.DWELL_MEAN_S, human.DWELL_SD_S)
 
 
 def own(params: ScanpathParams, walk: Walk) -> ModelWalk | None:
-    """Give the walk that a rig's parameters ask for, None where it has another model."""
+    """Return the walk that a rig's parameters ask for, None where it has another model."""
     if params.model != "markov":
         return None
     merged = params.diagonal == "whole_visit"

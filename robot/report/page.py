@@ -29,7 +29,7 @@ class Picture(NamedTuple):
 
     @property
     def data_uri(self) -> str:
-        """Give it as the page holds it."""
+        """Return it as the page holds it."""
         return f"data:image/png;base64,{b64encode(self.png).decode()}"
 
 
@@ -75,7 +75,7 @@ class Section(NamedTuple):
 def report_page(
     about: About, run: Gathered, findings: Sequence[Finding], pictures: Sequence[Picture]
 ) -> str:
-    """Give the page of one run as HTML that needs no other file."""
+    """Return the page of one run as HTML that needs no other file."""
     styles = about.styles | {f"conversation {run.mode}"} | run.joints.styles
     sections = tuple(
         Section(
@@ -97,12 +97,12 @@ def report_page(
 
 
 def left_out(joints: RunJoints, group: str) -> tuple[str, ...]:
-    """Give why a section says less than it could of another rig."""
+    """Return why a section says less than it could of another rig."""
     return joints.all_left_out(band.key for band in BANDS if band.group == group)
 
 
 def banner(joints: RunJoints) -> str:
-    """Give what a reader must know first where servos tell nothing, "" where all measure."""
+    """Return what a reader must know first where servos tell nothing, "" where all measure."""
     if not joints.reckoned:
         return ""
     if joints.whole_basis == "reckoned":
@@ -165,17 +165,17 @@ def gauge(finding: Finding) -> Gauge:
 
 
 def band_words(band: Band) -> str:
-    """Give a band as text."""
+    """Return a band as text."""
     return f"{number(band.low)} to {with_unit(band.high, band.unit)}"
 
 
 def with_unit(value: float, unit: str) -> str:
-    """Give a number with its unit; shares have none."""
+    """Return a number with its unit; shares have none."""
     return number(value) if unit in ("", "share") else f"{number(value)} {unit}"
 
 
 def number(value: float) -> str:
-    """Give a number with as many digits as are of use."""
+    """Return a number with as many digits as are of use."""
     size = abs(value)
     if size >= 100.0:
         return f"{value:.0f}"
@@ -187,7 +187,7 @@ def number(value: float) -> str:
 
 
 def _facts(run: Gathered) -> tuple[tuple[str, str], ...]:
-    """Give what the ticks themselves say of the run."""
+    """Return what the ticks themselves say of the run."""
     total = sum(run.kinds.values()) or 1.0
     shares = sorted(run.kinds.items(), key=lambda item: -item[1])
     return (

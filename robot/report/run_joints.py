@@ -23,36 +23,36 @@ class RunJoints:
     reckoned: tuple[str, ...] = ()
 
     def has(self, *names: str) -> bool:
-        """Tell whether any of some joints is there."""
+        """Return whether any of some joints is there."""
         return not self.names or not frozenset(names).isdisjoint(self.names)
 
     @property
     def parallel(self) -> bool:
-        """Tell whether one linkage turns both eyes sideways."""
+        """Return whether one linkage turns both eyes sideways."""
         return "eyes_pan" in self.names
 
     @property
     def styles(self) -> frozenset[str]:
-        """Give which notes of the bands apply."""
+        """Return which notes of the bands apply."""
         return frozenset((PARALLEL,)) if self.parallel else frozenset()
 
     def basis(self, group: str) -> Basis:
-        """Tell what a section of the report rests on: its lids, or eyes and neck."""
+        """Return what a section of the report rests on: its lids, or eyes and neck."""
         lids = group == LIDS
         return basis_of(self.names, self.reckoned, lambda name: name.endswith("_lid") == lids)
 
     @property
     def whole_basis(self) -> Basis:
-        """Tell what the whole report rests on."""
+        """Return what the whole report rests on."""
         each = {self.basis(group) for group in GROUPS if group != LIDS or self.has(*UPPER)}
         return each.pop() if len(each) == 1 else "partly reckoned"
 
     def left_out(self, key: str) -> str:
-        """Give why a measure or a figure can say nothing of these joints, "" where it can."""
+        """Return why a measure or a figure can say nothing of these joints, "" where it can."""
         return next((why for keys, cannot, why in _RULES if key in keys and cannot(self)), "")
 
     def all_left_out(self, keys: Iterable[str]) -> tuple[str, ...]:
-        """Give why some of these measures and figures are left out, each reason once."""
+        """Return why some of these measures and figures are left out, each reason once."""
         return tuple(dict.fromkeys(why for key in keys if (why := self.left_out(key))))
 
 
@@ -112,7 +112,7 @@ def joints_of(names: Iterable[str], reckoned: Iterable[str]) -> RunJoints:
 def openings(
     left: float, right: float, names: Sequence[str], pair: tuple[str, str]
 ) -> tuple[float, float] | None:
-    """Give the openings of two lids, None without any; one that is alone stands for both.
+    """Return the openings of two lids, None without any; one that is alone stands for both.
 
     pair: joints of the left and the right one; names: of the rig, all where empty
     """

@@ -59,7 +59,7 @@ class Jump(NamedTuple):
 
     @property
     def mean_deg_s(self) -> float:
-        """Give the mean speed."""
+        """Return the mean speed."""
         return self.amplitude_deg / self.duration_s
 
 
@@ -86,7 +86,6 @@ class SaccadeFinder:
     """Takes one direction after the other and gives each saccade when it is over."""
 
     def __init__(self) -> None:
-        """Begin with no trace."""
         self.under_way = False
         self.clear()
 
@@ -120,7 +119,7 @@ class SaccadeFinder:
         return self._judge(speed)
 
     def _speed(self) -> _Speed:
-        """Give the speed at the middle sample, and learn the slow motion from it."""
+        """Return the speed at the middle sample, and learn the slow motion from it."""
         a, b, c, d, e = self._samples
         (bx, by, bz), (dx, dy, dz) = b.way, d.way
         sharp_s = d.t_s - b.t_s
@@ -210,7 +209,7 @@ class SaccadeFinder:
 
 
 def _crossing(below: _Speed, above: _Speed, level: float) -> float:
-    """Give when the speed passed a level between two samples."""
+    """Return when the speed passed a level between two samples."""
     span = above.relative_deg_s - below.relative_deg_s
     share = (level - below.relative_deg_s) / span if span > 0.0 else 0.0
     return below.t_s + min(1.0, max(0.0, share)) * (above.t_s - below.t_s)

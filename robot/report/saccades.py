@@ -15,7 +15,7 @@ _SOON_S, _PAUSE_S = 0.1, 2.0
 
 
 def table(run: Gathered) -> Floats:
-    """Give (n, 4) amplitude in deg, duration in ms, peak in deg/s, time of the peak 0..1.
+    """Return (n, 4) amplitude in deg, duration in ms, peak in deg/s, time of the peak 0..1.
 
     Only saccades that had been asked for: a servo that swings back makes none.
     """
@@ -28,7 +28,7 @@ def table(run: Gathered) -> Floats:
 
 
 def asked_table(run: Gathered) -> Floats:
-    """Give (n, 3) amplitude in deg, duration in ms and peak in deg/s as commanded."""
+    """Return (n, 3) amplitude in deg, duration in ms and peak in deg/s as commanded."""
     asked = [s.commanded for s in run.saccades if s.commanded is not None]
     rows = [(c.amplitude_deg, 1e3 * c.duration_s, c.peak_deg_s) for c in asked]
     found = np.array(rows).reshape(-1, 3)
@@ -36,7 +36,7 @@ def asked_table(run: Gathered) -> Floats:
 
 
 def measures(run: Gathered) -> list[Measured]:
-    """Give what there is to say about saccades."""
+    """Return what there is to say about saccades."""
     seen, asked = table(run), asked_table(run)
     every = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG]
     unasked = np.array([s.commanded is None for s in every], dtype=float)
@@ -61,7 +61,7 @@ _DURATIONS = (
 
 
 def _peak(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float) -> Measured:
-    """Give whether each peak speed lies between the human curves."""
+    """Return whether each peak speed lies between the human curves."""
 
     def inside(rows: Floats) -> Floats:
         a = rows[(rows[:, 0] >= low_deg) & (rows[:, 0] < high_deg)]
@@ -72,7 +72,7 @@ def _peak(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float
 
 
 def _duration(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float) -> Measured:
-    """Give whether each duration lies between the human lines."""
+    """Return whether each duration lies between the human lines."""
 
     def inside(rows: Floats) -> Floats:
         a = rows[(rows[:, 0] >= low_deg) & (rows[:, 0] < high_deg)]
@@ -83,13 +83,13 @@ def _duration(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: f
 
 
 def _intervals(run: Gathered) -> Floats:
-    """Give seconds from each saccade asked for to the next."""
+    """Return seconds from each saccade asked for to the next."""
     onsets = np.array([s.onset_s for s in run.saccades if s.commanded is not None])
     return np.diff(onsets)
 
 
 def _pauses(run: Gathered) -> Floats:
-    """Give seconds from the end of each saccade to the next, of those that follow soon."""
+    """Return seconds from the end of each saccade to the next, of those that follow soon."""
     asked = [s for s in run.saccades if s.commanded is not None]
     ends = np.array([s.end_s for s in asked])
     onsets = np.array([s.onset_s for s in asked])
@@ -99,7 +99,7 @@ def _pauses(run: Gathered) -> Floats:
 
 
 def rest_errors(run: Gathered) -> Floats:
-    """Give per fixation the median angle of the lines of sight off the target, in deg."""
+    """Return per fixation the median angle of the lines of sight off the target, in deg."""
     off = 0.5 * (run.column("off_left") + run.column("off_right"))
     parts = [off[run.between(f.start_s + 0.04, f.end_s)] for f in run.fixations]
     return np.array([np.median(part) for part in parts if len(part)])

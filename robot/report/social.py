@@ -17,14 +17,14 @@ _FACING_DEG = 12.0
 
 
 def on_face(run: Gathered) -> NDArray[np.bool_]:
-    """Give (n,) whether the gaze is inside the oval of a face."""
+    """Return (n,) whether the gaze is inside the oval of a face."""
     y, z = run.column("face_y") / _HALF_WIDE_M, run.column("face_z") / _HALF_HIGH_M
     inside: NDArray[np.bool_] = np.nan_to_num(y * y + z * z, nan=9.0) <= 1.0
     return inside
 
 
 def bouts(run: Gathered, mask: NDArray[np.bool_]) -> Floats:
-    """Give (n, 3) begin, end, and whether it was cut off by the run, of each time it holds."""
+    """Return (n, 3) begin, end, and whether it was cut off by the run, of each time it holds."""
     t = run.column("t")
     if not len(t):
         return np.zeros((0, 3))
@@ -43,17 +43,17 @@ def bouts(run: Gathered, mask: NDArray[np.bool_]) -> Floats:
 
 
 def looks(run: Gathered) -> Floats:
-    """Give the times of looks at a face, cut ones included."""
+    """Return the times of looks at a face, cut ones included."""
     return bouts(run, on_face(run))
 
 
 def mutual(run: Gathered) -> Floats:
-    """Give the times in which both faces are turned to each other."""
+    """Return the times in which both faces are turned to each other."""
     return bouts(run, on_face(run) & (run.column("face_off") < _FACING_DEG))
 
 
 def measures(run: Gathered) -> list[Measured]:
-    """Give what there is to say about looks at people."""
+    """Return what there is to say about looks at people."""
     seen = looks(run)
     whole = _lengths(seen[seen[:, 2] == 0.0])
     both = mutual(run)

@@ -107,7 +107,7 @@ class Collisions:
         self._keeper = [kept.get(pair, 0) for pair in self._pairs]
 
     def __bool__(self) -> bool:
-        """Tell whether there is any pair to watch."""
+        """Return whether there is any pair to watch."""
         return bool(self._pairs)
 
     def look(
@@ -175,7 +175,7 @@ class Collisions:
             self.exits[joint] = max(farther, key=lambda angle: abs(angle - now))
 
     def _agrees(self, joint: int, exit_rad: float, motion: Motion) -> bool:
-        """Tell whether a joint that leaves another box as well goes the same way."""
+        """Return whether a joint that leaves another box as well goes the same way."""
         now = motion.command[joint]
         return (self.exits.get(joint, exit_rad) - now) * (exit_rad - now) >= 0.0
 
@@ -192,7 +192,7 @@ def _span(joint: int, low_deg: float, high_deg: float, margin_deg: float) -> _Sp
 
 
 def _room(span: _Span, limit: JointLimit) -> bool:
-    """Tell whether a joint can be outside its half of the box."""
+    """Return whether a joint can be outside its half of the box."""
     return limit.low_rad <= span.below or limit.high_rad >= span.above
 
 
@@ -230,7 +230,7 @@ def _wall_off(span: _Span, motion: Motion) -> None:
 
 
 def _crosses(span: _Span, motion: Motion, wish: JointAngles) -> bool:
-    """Tell whether a joint's way to its wish leads into its half of the box."""
+    """Return whether a joint's way to its wish leads into its half of the box."""
     i = span.joint
     if not isfinite(wish[i]):
         return False
@@ -242,5 +242,5 @@ def _crosses(span: _Span, motion: Motion, wish: JointAngles) -> bool:
 
 
 def _is_out(span: _Span, position: JointAngles) -> bool:
-    """Tell whether a joint is measured outside its half of the box."""
+    """Return whether a joint is measured outside its half of the box."""
     return not span.low <= position[span.joint] <= span.high

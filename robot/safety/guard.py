@@ -119,7 +119,7 @@ class Guard:
         self._slow_down(i)
 
     def _within_reach(self) -> tuple[JointLimit, ...]:
-        """Give the limits in force, once joints have come to rest: those that servos keep."""
+        """Return the limits in force, once joints have come to rest: those that servos keep."""
         if self._reach is None:
             return self._wanted
         pairs = zip(self._wanted, self._reach(), strict=True)
@@ -190,18 +190,18 @@ class Guard:
 
     @property
     def limits(self) -> tuple[JointLimit, ...]:
-        """Give the limits in force, which new ones take the place of once joints keep them."""
+        """Return the limits in force, which new ones take the place of once joints keep them."""
         return tuple(self._limits)
 
     @property
     def gentle(self) -> bool:
-        """Tell whether any joint is still on its slow way."""
+        """Return whether any joint is still on its slow way."""
         return any(self._gentle)
 
     def check(
         self, wish_rad: JointAngles, joints: JointState, picture_age_s: float, t_s: float
     ) -> Verdict:
-        """Give what may be sent now.
+        """Return what may be sent now.
 
         wish_rad: any numbers at all
         picture_age_s: age of the newest picture; infinity before the first
@@ -265,7 +265,7 @@ class Guard:
         )
 
     def _all_well(self, joints: JointState) -> bool:
-        """Tell whether nothing but limits, ages and distances need be looked at."""
+        """Return whether nothing but limits, ages and distances need be looked at."""
         return not (
             self._soft
             or not self._health.fine
@@ -367,7 +367,7 @@ class Guard:
         return _Hold("stale picture") if unseen else None
 
     def _is_stuck(self, i: int, joints: JointState, fresh: bool) -> bool:
-        """Tell whether a joint is told to move and does not."""
+        """Return whether a joint is told to move and does not."""
         if self._stuck.holds(i, self._t_s):
             return True
         # Where a servo tells nothing, its place is no news of what it met.

@@ -172,7 +172,7 @@ class Health:
             self.held[i] = "hot" if self._hot[i] else "voltage" if self._no_volts[i] else ""
 
     def _heat(self, i: int, celsius: float | None) -> float:
-        """Give what is left, from 1 when warm to 0 when hot."""
+        """Return what is left, from 1 when warm to 0 when hot."""
         if celsius is None:
             return 1.0
         warm = self._limits[i].hottest_c - self._params.warm_c
@@ -181,7 +181,7 @@ class Health:
         return min(max((hot - celsius) / (hot - warm), 0.0), 1.0)
 
     def _load(self, i: int, load: float | None, dt_s: float) -> float:
-        """Give what is left, from 1 at half the bearable heat of the motor to 0 at all of it.
+        """Return what is left, from 1 at half the bearable heat of the motor to 0 at all of it.
 
         Heat goes with the square of the current; it is given off as fast as the lasting
         load makes it.
@@ -194,7 +194,7 @@ class Health:
         return min(max(2.0 - 2.0 * filled, 0.0), 1.0)
 
     def _volts(self, i: int, volts: float | None, dt_s: float) -> float:
-        """Give what is left, from 1 inside the margin to 0 at the servo's own limit."""
+        """Return what is left, from 1 inside the margin to 0 at the servo's own limit."""
         if volts is None:
             return 1.0
         room = min(volts - self._limits[i].lowest_v, self._limits[i].highest_v - volts)
@@ -209,6 +209,6 @@ class Health:
 
 
 def _told(column: Sequence[float | None], i: int) -> float | None:
-    """Give one joint's value, None where it is not known."""
+    """Return one joint's value, None where it is not known."""
     value = column[i] if column else None
     return value if value is not None and isfinite(value) else None

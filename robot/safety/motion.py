@@ -36,7 +36,6 @@ class Motion:
     """
 
     def __init__(self, limits: tuple[JointLimit, ...]) -> None:
-        """Begin in the middle of every range."""
         self.limits = list(limits)
         self.command = [0.5 * (limit.low_rad + limit.high_rad) for limit in limits]
         self.speed = [0.0] * len(limits)
@@ -78,7 +77,7 @@ class Motion:
         self.let_be(i)
 
     def keeps(self, i: int, limit: JointLimit) -> bool:
-        """Tell whether a joint that moves as it does keeps another limit as well."""
+        """Return whether a joint that moves as it does keeps another limit as well."""
         p, v = self.command[i], self.speed[i]
         room = limit.high_rad - p if v > 0.0 else p - limit.low_rad
         return abs(v) <= limit.speed_rad_s and v * v <= 2.0 * limit.accel_rad_s2 * max(0.0, room)
@@ -89,13 +88,13 @@ class Motion:
         self.low[i], self.high[i] = min(limit.low_rad, now), max(limit.high_rad, now)
 
     def keeps_below(self, i: int, wall_rad: float) -> bool:
-        """Tell whether a joint is below a wall and can stop there."""
+        """Return whether a joint is below a wall and can stop there."""
         p, v = self.command[i], self.speed[i]
         stop = p + 0.5 * v * v / self.limits[i].accel_rad_s2 if v > 0.0 else p
         return stop <= wall_rad + _ROUNDING_RAD
 
     def keeps_above(self, i: int, wall_rad: float) -> bool:
-        """Tell whether a joint is above a wall and can stop there."""
+        """Return whether a joint is above a wall and can stop there."""
         p, v = self.command[i], self.speed[i]
         stop = p - 0.5 * v * v / self.limits[i].accel_rad_s2 if v < 0.0 else p
         return stop >= wall_rad - _ROUNDING_RAD
@@ -177,7 +176,7 @@ class Motion:
 
 
 def reachable_speed(room_rad: float, accel: float, dt_s: float) -> float:
-    """Give the highest speed for one step after which a stop within the room is possible.
+    """Return the highest speed for one step after which a stop within the room is possible.
 
     Solves v dt + v^2 / 2a = room for v.
     """
@@ -186,7 +185,7 @@ def reachable_speed(room_rad: float, accel: float, dt_s: float) -> float:
 
 
 def _faster(v: float, accel: float, soft: float, dt_s: float) -> float:
-    """Give the highest speed after one step: braking to rest is hard, what follows is soft."""
+    """Return the highest speed after one step: braking to rest is hard, what follows is soft."""
     if v >= 0.0:
         return v + soft * dt_s
     at_rest_s = -v / accel

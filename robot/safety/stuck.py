@@ -103,7 +103,7 @@ class Stuck:
         self._until_s[i] = nan
 
     def holds(self, i: int, t_s: float) -> bool:
-        """Tell whether a joint was found stuck and has not waited long enough."""
+        """Return whether a joint was found stuck and has not waited long enough."""
         if t_s >= self._until_s[i]:
             self.forget(i)
         return t_s < self._until_s[i]

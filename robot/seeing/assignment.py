@@ -16,7 +16,7 @@ FORBIDDEN: Final = 1e6
 
 
 def likeliest_pairs(costs: Floats) -> list[tuple[int, int]]:
-    """Give the pairs (row, column) that cost least together; as many pairs as can be.
+    """Return the pairs (row, column) that cost least together; as many pairs as can be.
 
     costs: (n, m) at least 0, FORBIDDEN where a pair cannot be
     Source: Crouse, "On implementing 2D rectangular assignment algorithms", as in SciPy.

@@ -129,14 +129,14 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
 
 
 def face_parts(pose: FacePose) -> Floats:
-    """Give the eight parts in the order of gaze.types.PARTS: (8, 3), camera frame."""
+    """Return the eight parts in the order of gaze.types.PARTS: (8, 3), camera frame."""
     parts_face_m = _lengthened(_PARTS_FACE_M, pose.length)
     parts: Floats = parts_face_m @ np.array(pose.R_camera_face).T + pose.p_camera_m
     return parts
 
 
 def _front_seen(points: Floats) -> bool:
-    """Tell whether eyes and mouth run round the way they do on a face seen from its front.
+    """Return whether eyes and mouth run round the way they do on a face seen from its front.
 
     The sign of a projected triangle tells exactly which side of its plane is seen; one
     without any size tells nothing.
@@ -146,7 +146,7 @@ def _front_seen(points: Floats) -> bool:
 
 
 def _spans(points: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Give the ways from right to left eye and from the eyes' middle to the mouth's."""
+    """Return the ways from right to left eye and from the eyes' middle to the mouth's."""
     (ax, ay), (bx, by), _, (cx, cy), (dx, dy) = points.tolist()
     return (bx - ax, by - ay), (0.5 * (cx + dx - ax - bx), 0.5 * (cy + dy - ay - by))
 
@@ -202,7 +202,7 @@ def _most_probable(seen: Floats, noise: float) -> Floats | None:
 
 
 def _length_slopes(place_slopes: Floats, turn: Floats) -> Floats:
-    """Give how the ten coordinates move with the length, from how they move with the place."""
+    """Return how the ten coordinates move with the length, from how they move with the place."""
     upright = cv2.Rodrigues(turn)[0][:, 1]
     per_metre = (place_slopes @ upright).reshape(5, 2)
     slopes: Floats = (per_metre * _LANDMARKS_FRONTAL_M[:, 1:2]).ravel()

@@ -66,7 +66,6 @@ class HeadTurnResidual:
     """Gathers the figures picture by picture."""
 
     def __init__(self) -> None:
-        """Start with nothing seen."""
         self._speeds: deque[float] = deque(maxlen=_SAMPLES)
         self._shift_by_turn = self._turn_by_turn = 0.0
         self._before: tuple[float, Vec3, dict[int, Vec3]] | None = None
@@ -93,7 +92,7 @@ class HeadTurnResidual:
             self._stands(t_s, views, seen)
 
     def figures(self) -> ResidualFigures:
-        """Give the figures."""
+        """Return the figures."""
         if not self._speeds:
             return ResidualFigures(None, None, 0)
         late = self._shift_by_turn / self._turn_by_turn if self._turn_by_turn > 0.0 else 0.0
@@ -120,14 +119,14 @@ class HeadTurnResidual:
 
 
 def turning_rad_s(R_before: Mat3, R_after: Mat3, dt_s: float) -> Vec3:
-    """Give the angular velocity that turns one orientation into another, for small turns."""
+    """Return the angular velocity that turns one orientation into another, for small turns."""
     R = compose(R_after, transposed(R_before))
     half = 0.5 / dt_s
     return ((R[2][1] - R[1][2]) * half, (R[0][2] - R[2][0]) * half, (R[1][0] - R[0][1]) * half)
 
 
 def transposed(R: Mat3) -> Mat3:
-    """Give the inverse of a rotation."""
+    """Return the inverse of a rotation."""
     return (
         (R[0][0], R[1][0], R[2][0]),
         (R[0][1], R[1][1], R[2][1]),

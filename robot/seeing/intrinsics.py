@@ -51,18 +51,18 @@ class Intrinsics:
 
     @property
     def distorts(self) -> bool:
-        """Tell whether straight lines become bent in its pictures."""
+        """Return whether straight lines become bent in its pictures."""
         return any(self.distortion)
 
     @property
     def matrix(self) -> Floats:
-        """Give the 3x3 camera matrix."""
+        """Return the 3x3 camera matrix."""
         return np.array(
             [(self.fx_px, 0.0, self.cx_px), (0.0, self.fy_px, self.cy_px), (0.0, 0.0, 1.0)]
         )
 
     def scaled(self, factor_x: float, factor_y: float) -> "Intrinsics":
-        """Give the intrinsics of the same pictures made wider and higher by these factors.
+        """Return the intrinsics of the same pictures made wider and higher by these factors.
 
         Raises:
             ValueError: a factor is not above 0.
@@ -77,7 +77,7 @@ class Intrinsics:
 
 
 def intrinsics_of_view(view_rad: float, width_px: int, height_px: int) -> Intrinsics:
-    """Give the intrinsics of square pixels with the axis in the middle of the picture.
+    """Return the intrinsics of square pixels with the axis in the middle of the picture.
 
     view_rad: horizontal field of view, from edge to edge
 
@@ -93,7 +93,7 @@ def intrinsics_of_view(view_rad: float, width_px: int, height_px: int) -> Intrin
 def intrinsics_of_lens(
     lens: LensParams | None, view_rad: float, width_px: int, height_px: int
 ) -> Intrinsics:
-    """Give the intrinsics of pictures of a size, as measured where that can be told.
+    """Return the intrinsics of pictures of a size, as measured where that can be told.
 
     Pictures of another size but the same shape are taken for the measured ones scaled.
     Of another shape it is unknown which edges the camera cut off, so the field of view
@@ -108,7 +108,7 @@ def intrinsics_of_lens(
 
 
 def fits(lens: LensParams, width_px: int, height_px: int) -> bool:
-    """Tell whether pictures of a size show the field that the lens was measured on."""
+    """Return whether pictures of a size show the field that the lens was measured on."""
     if width_px <= 0 or height_px <= 0:
         return False
     shape = (width_px * lens.height_px) / (height_px * lens.width_px)
@@ -116,7 +116,7 @@ def fits(lens: LensParams, width_px: int, height_px: int) -> bool:
 
 
 def project(points_camera_m: ArrayLike, intrinsics: Intrinsics) -> Floats:
-    """Give where points (n, 3) appear: (n, 2) pixels, nan for points not before the camera."""
+    """Return where points (n, 3) appear: (n, 2) pixels, nan for points not before the camera."""
     p = np.asarray(points_camera_m, dtype=np.float64).reshape(-1, 3)
     z = np.where(p[:, 2:] > 0.0, p[:, 2:], np.nan)
     i = intrinsics
@@ -128,7 +128,7 @@ def project(points_camera_m: ArrayLike, intrinsics: Intrinsics) -> Floats:
 
 
 def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
-    """Give the directions (n, 3) through pixels (n, 2), with z = 1 and distortion undone."""
+    """Return the directions (n, 3) through pixels (n, 2), with z = 1 and distortion undone."""
     points = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)
     i = intrinsics
     found = np.ones((len(points), 3))
@@ -143,7 +143,7 @@ def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
 
 
 def undistorted(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
-    """Give where pixels (n, 2) would be if the lens did not distort."""
+    """Return where pixels (n, 2) would be if the lens did not distort."""
     i = intrinsics
     points: Floats = rays(points_px, i)[:, :2] * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
     return points

@@ -56,7 +56,7 @@ class MotionFinder:
 def motion_finder(
     params: MotionParams, lens: LensParams | None, field_rad: float, turns: PoseRing | None
 ) -> Motion:
-    """Give what finds motion, for the process that will look at the pictures."""
+    """Return what finds motion, for the process that will look at the pictures."""
     return MotionFinder(params, lens, field_rad, turns)
 
 

@@ -89,7 +89,7 @@ class Perception:
         self._intrinsics: Intrinsics | None = None
 
     def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:
-        """Give the percept of the newest picture, None before the first."""
+        """Return the percept of the newest picture, None before the first."""
         if detections is None or detections.number == self._number:
             return self._percept
         self._number = detections.number
@@ -110,7 +110,7 @@ class Perception:
         return self._percept
 
     def residual(self) -> ResidualFigures:
-        """Tell how fast still things seem to move while the head turns."""
+        """Return how fast still things seem to move while the head turns."""
         return self._residual.figures()
 
     def _sightings(
@@ -124,7 +124,7 @@ class Perception:
         return [f for f in faces if f is not None], [t for t in things if t is not None]
 
     def _known(self, t_s: float) -> list[Known]:
-        """Give where the faces of the last picture are expected now."""
+        """Return where the faces of the last picture are expected now."""
         return [
             (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
             for t in self._tracks
@@ -145,7 +145,7 @@ class Perception:
         self._residual.step(t_s, turn, self._p_camera, seen)
 
     def _face(self, track: Track) -> Face:
-        """Give a tracked face with its eight parts."""
+        """Return a tracked face with its eight parts."""
         R = track.R_world_face
         assert R is not None  # faces are tracked with their pose
         p, size = track.p_world_m, track.face_size
@@ -167,7 +167,7 @@ class Perception:
         )
 
     def _lens(self, found: Detections) -> Intrinsics:
-        """Give the intrinsics of a picture: as measured, as the camera says, or by its field."""
+        """Return the intrinsics of a picture: as measured, as the camera says, or by its field."""
         if self._measured is None and found.lens is not None:
             return Intrinsics(*found.lens)
         width_px, height_px = found.width_px, found.height_px
@@ -180,7 +180,7 @@ class Perception:
 
 
 def _deviations(track: Track, p_camera: Vec3) -> tuple[float, float]:
-    """Give how well a face's place is known, across and along the view.
+    """Return how well a face's place is known, across and along the view.
 
     The filter knows of what changes from picture to picture; that this person's face is
     not of the usual size is the same in all of them.

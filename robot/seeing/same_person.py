@@ -31,7 +31,7 @@ def without_own_motion(
     before: Iterable[Known],
     p_camera: Vec3,
 ) -> tuple[list[Sighting], list[Sighting]]:
-    """Give the faces with the spin of their own motion, and the things that are not theirs.
+    """Return the faces with the spin of their own motion, and the things that are not theirs.
 
     before: tracked faces, where they are expected now; one that the detector has just missed
         still owns its body
@@ -54,7 +54,7 @@ def without_own_motion(
 
 
 def _velocity(face: Sighting, tracked: list[Known]) -> Vec3 | None:
-    """Give the velocity of the tracked face at a sighting's place, None where there is none."""
+    """Return the velocity of the tracked face at a sighting's place, None where there is none."""
     near = [(norm(sub(p, face.p_world_m)), v) for p, v in tracked]
     away, v = min(near, key=lambda pair: pair[0], default=(1.0, None))
     return v if away < _HEAD_M else None
@@ -73,19 +73,19 @@ def _owner(thing: Sighting, faces: list[Known], p_camera: Vec3) -> int | None:
 
 
 def _on_head(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> bool:
-    """Tell whether a patch's middle is on the head."""
+    """Return whether a patch's middle is on the head."""
     off = _off(thing, p_face, p_camera)
     return off is not None and hypot(*off) < _HEAD_M
 
 
 def _below(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> bool:
-    """Tell whether a patch's middle is where the body of a face is."""
+    """Return whether a patch's middle is where the body of a face is."""
     off = _off(thing, p_face, p_camera)
     return off is not None and off[0] < _HALF_WIDTH_M and -_BELOW_M < off[1] < _ABOVE_M
 
 
 def _off(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:
-    """Give how far aside of and above a face a patch is, None where it is nearer or farther.
+    """Return how far aside of and above a face a patch is, None where it is nearer or farther.
 
     A patch whose distance is only assumed is taken to be as far as the face.
     """
@@ -99,7 +99,7 @@ def _off(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] |
 
 
 def _goes_along(thing: Sighting, p_face: Vec3, v_face: Vec3 | None, p_camera: Vec3) -> bool:
-    """Tell whether a patch moves across the view as the face does; unknown counts as so."""
+    """Return whether a patch moves across the view as the face does; unknown counts as so."""
     if thing.v_world_m_s is None or v_face is None:
         return True
     way = sub(thing.p_world_m, p_camera)

@@ -83,7 +83,7 @@ def face_sighting(
 def _measured(
     face: DetectedFace, pose: FacePose, depth: DepthReader | None
 ) -> tuple[float, float] | None:
-    """Give the measured distance over that from the size, and its relative deviation.
+    """Return the measured distance over that from the size, and its relative deviation.
 
     None where the camera's depth does not tell the distance of this face.
     """
@@ -139,7 +139,7 @@ def reader_of(
     depth_m: NDArray[Any] | None,
     depth_at: Callable[[NDArray[Any], Box], Reading] | None,
 ) -> DepthReader | None:
-    """Give what reads one depth picture, None where there is none or nothing reads it."""
+    """Return what reads one depth picture, None where there is none or nothing reads it."""
     if depth_m is None or depth_at is None:
         return None
     return lambda box: depth_at(depth_m, box)

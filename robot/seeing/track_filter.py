@@ -47,7 +47,6 @@ class TrackFilter:
     """The filter of one track. Numbers given to it must be finite."""
 
     def __init__(self, p_m: Vec3, cov_m2: Floats, speed_sd_m_s: float, noise: Restlessness) -> None:
-        """Begin at a place, with a velocity of 0 give or take ``speed_sd_m_s`` a side."""
         self._noise = noise
         self._unseen_s = 0.0
         # OpenCV's filter: a prediction and a correction take 37 us, in numpy 170.
@@ -87,13 +86,13 @@ class TrackFilter:
 
     @property
     def state(self) -> Floats:
-        """Give place and velocity: (6,)."""
+        """Return place and velocity: (6,)."""
         state: Floats = self._state
         return state
 
     @property
     def cov(self) -> Floats:
-        """Give their covariance: (6, 6)."""
+        """Return their covariance: (6, 6)."""
         cov: Floats = self._cov
         return cov
 
@@ -114,7 +113,7 @@ class TrackFilter:
 
 
 def sight_cov(p_m: Vec3, p_eye_m: Vec3, across_sd: float, along_sd: float) -> Floats:
-    """Give the covariance (3, 3) of what is known otherwise across the line of view than along."""
+    """Return the covariance (3, 3) of what is known differently across and along the view."""
     view = np.array(unit(sub(p_m, p_eye_m)))
     more = along_sd**2 - across_sd**2
     cov: Floats = across_sd**2 * _I3 + more * (view[:, None] * view)
@@ -122,13 +121,13 @@ def sight_cov(p_m: Vec3, p_eye_m: Vec3, across_sd: float, along_sd: float) -> Fl
 
 
 def far_off(off_m: ArrayLike, cov_m2: Floats) -> float:
-    """Give the squared Mahalanobis length of a difference of places."""
+    """Return the squared Mahalanobis length of a difference of places."""
     off = np.asarray(off_m, dtype=np.float64)
     return float(off @ np.linalg.solve(cov_m2, off))
 
 
 def _wander(accel_m_s2: float, dt_s: float) -> Floats:
-    """Give the covariance (6, 6) that random acceleration adds in a time."""
+    """Return the covariance (6, 6) that random acceleration adds in a time."""
     power = accel_m_s2**2 * _ACCELERATION_LASTS_S
     cov: Floats = power * (
         dt_s**3 / 3.0 * _OF_PLACE + dt_s**2 / 2.0 * _OF_BOTH + dt_s * _OF_VELOCITY

@@ -184,19 +184,19 @@ class Track:
 
     @property
     def p_world_m(self) -> Vec3:
-        """Give the place at ``at_s``."""
+        """Return the place at ``at_s``."""
         x, y, z = self.filter.state[:3].tolist()
         return x, y, z
 
     @property
     def v_world_m_s(self) -> Vec3:
-        """Give the velocity."""
+        """Return the velocity."""
         x, y, z = self.filter.state[3:].tolist()
         return x, y, z
 
     @property
     def cov(self) -> Floats:
-        """Give the covariance (6, 6) of place and velocity."""
+        """Return the covariance (6, 6) of place and velocity."""
         return self.filter.cov
 
     @property
@@ -211,7 +211,6 @@ class Tracker:
     """Keeps identities and velocities of faces and moving things."""
 
     def __init__(self, params: TrackParams) -> None:
-        """Take what is believed of motions."""
         get_ready()
         self._tracks: list[Track] = []
         self._next_id = 1
@@ -252,7 +251,7 @@ class Tracker:
         return tuple(t for t in self._tracks if t_s - t.seen_s <= par.coast_ms / 1e3)
 
     def _cost(self, track: Track, sighting: Sighting, p_camera: Vec3) -> float:
-        """Give how unlikely it is that a track is seen so: minus twice the log likelihood.
+        """Return how unlikely it is that a track is seen so: minus twice the log likelihood.
 
         A track long unseen could be anywhere; without the logarithm that would make it
         the best match of everything.
@@ -278,7 +277,7 @@ class Tracker:
         return far + known + (0.0 if _same_mark(track, sighting) else _OTHER_MARK)
 
     def _gate_m(self, track: Track, sighting: Sighting, far_m: float) -> float:
-        """Give the farthest from its expected place that something is taken for the same.
+        """Return the farthest from its expected place that something is taken for the same.
 
         A detector that tells things apart in the picture has already judged; what it gave
         another number is the same only about where the track's own outline is.
@@ -348,20 +347,20 @@ class Tracker:
 
 
 def _same_mark(track: Track, sighting: Sighting) -> bool:
-    """Tell whether the detector takes both for the same, or does not tell things apart."""
+    """Return whether the detector takes both for the same, or does not tell things apart."""
     marks = track.sighting.mark, sighting.mark
     return None in marks or marks[0] == marks[1]
 
 
 def sized(track: Track, sighting: Sighting, p_camera: Vec3) -> Vec3:
-    """Give a sighting's place with the distance that the size learned of this face tells."""
+    """Return a sighting's place with the distance that the size learned of this face tells."""
     if sighting.depth_measured or track.depth_s is None:
         return sighting.p_world_m
     return add(p_camera, scale(sub(sighting.p_world_m, p_camera), track.face_size))
 
 
 def blended(A: Mat3, B: Mat3, share: float) -> Mat3:
-    """Give a rotation a share of the way from A to B (columns blended, made square again)."""
+    """Return a rotation a share of the way from A to B (columns blended, made square again)."""
     x = unit(_column(A, B, 0, share))
     z = _column(A, B, 2, share)
     y = unit(cross(z, x))

@@ -42,7 +42,6 @@ class Picture3d:
     def __init__(
         self, width_px: int, height_px: int, lens: Intrinsics, R_world_camera: Mat3, p_m: Vec3
     ) -> None:
-        """Begin with an empty picture."""
         self.picture: Bytes = np.zeros((height_px, width_px, 3), np.uint8)
         self.depth_m = np.full((height_px, width_px), np.inf, np.float32)
         self.lens = lens
@@ -130,7 +129,7 @@ class Picture3d:
         return pixels
 
     def _window(self, pixels: Floats) -> tuple[int, int, int, int] | None:
-        """Give x, y, width, height of the part of the picture that points span."""
+        """Return x, y, width, height of the part of the picture that points span."""
         height, width = self.depth_m.shape
         low = np.floor(np.clip(pixels.min(axis=0), -2.0, 1e6)).astype(int)
         high = np.ceil(np.clip(pixels.max(axis=0), -2.0, 1e6)).astype(int) + 1
@@ -141,7 +140,7 @@ class Picture3d:
         return left, top, right - left, bottom - top
 
     def _rays(self, window: tuple[int, int, int, int]) -> Floats:
-        """Give the directions of a window's pixels, z = 1: (h, w, 3)."""
+        """Return the directions of a window's pixels, z = 1: (h, w, 3)."""
         left, top, width, height = window
         i = self.lens
         x = (np.arange(left, left + width) - i.cx_px) / i.fx_px

@@ -50,7 +50,6 @@ class BoardCamera:
         board: CharucoBoard,
         rng: np.random.Generator,
     ) -> None:
-        """Take the lens as it truly is, the board, and the dice of the noise."""
         self.params, self.lens, self.board = params, lens, board
         self._rng = rng
         edge = round(_PAPER_EDGE_MM * _TEXTURE_PX_PER_MM)
@@ -96,7 +95,7 @@ class BoardCamera:
 
 
 def true_lens(width_px: int, height_px: int, horizontal_field_deg: float = 69.0) -> Intrinsics:
-    """Give a plausible lens that is not quite what its data sheet says."""
+    """Return a plausible lens that is not quite what its data sheet says."""
     focal = 0.5 * width_px / np.tan(radians(0.5 * horizontal_field_deg)) * 1.03
     return Intrinsics(
         float(focal),
@@ -109,7 +108,7 @@ def true_lens(width_px: int, height_px: int, horizontal_field_deg: float = 69.0)
 
 @lru_cache(maxsize=4)
 def _fine_rays(width_px: int, height_px: int, lens: Intrinsics) -> NDArray[np.float32]:
-    """Give where the looks of all pixels meet the plane z = 1: (looks * h, looks * w, 2)."""
+    """Return where the looks of all pixels meet the plane z = 1: (looks * h, looks * w, 2)."""
     steps = (np.arange(_LOOKS) + 0.5) / _LOOKS - 0.5
     x = (np.arange(width_px)[:, None] + steps).ravel()
     y = (np.arange(height_px)[:, None] + steps).ravel()

@@ -43,7 +43,6 @@ class BoardScene:
         rng: np.random.Generator,
         params: BoardCameraParams | None = None,
     ) -> None:
-        """Take the camera as the rig file has it, the head's build and the dice of the noise."""
         par = params if params is not None else BoardCameraParams()
         self.mount, self.lens = elsewhere(camera), _lens(camera, par)
         self.head_rad: Angles3 = (0.0, 0.0, 0.0)
@@ -72,7 +71,7 @@ class BoardScene:
         return Shot(now_s, self._number, self._camera.picture(*pose))
 
     def seen_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
-        """Give R_camera_board and p_camera_board_m of the hanging board for neck angles."""
+        """Return R_camera_board and p_camera_board_m of the hanging board for neck angles."""
         R, p = self._where.pose(*self._geometry.head_pose(head_rad))
         a, b, c = R
         back: Mat3 = ((a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2]))
@@ -80,7 +79,7 @@ class BoardScene:
 
 
 def elsewhere(camera: CameraParams) -> CameraParams:
-    """Give a mount a little off the one of the rig file."""
+    """Return a mount a little off the one of the rig file."""
     x, y, z = (mm + off for mm, off in zip(camera.position_mm, _OFF_MM, strict=True))
     return replace(
         camera,
@@ -94,7 +93,7 @@ def elsewhere(camera: CameraParams) -> CameraParams:
 def held_pose(
     number: int, params: BoardCameraParams, lens: Intrinsics, board: CharucoBoard
 ) -> tuple[Mat3, Vec3]:
-    """Give R_camera_board and p_camera_board_m of the number-th way to hold the board, from 0.
+    """Return R_camera_board and p_camera_board_m of the number-th way to hold the board, from 0.
 
     Everywhere in the picture, near and far, tilted to all sides; no two alike.
     """

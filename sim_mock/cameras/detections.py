@@ -52,7 +52,6 @@ class SceneCamera:
         head_pose: Callable[[float], tuple[Mat3, Vec3]],
         rng: np.random.Generator,
     ) -> None:
-        """Take the scene, where the camera sits, where the head really is, and the dice."""
         self._params = params
         self._scene = scene
         self._mount = mount
@@ -70,7 +69,7 @@ class SceneCamera:
         self._number = 0
 
     def latest(self, now_s: float) -> Detections | None:
-        """Give the newest detections that have arrived by ``now_s``."""
+        """Return the newest detections that have arrived by ``now_s``."""
         if self._start_s is None:
             self._start_s = now_s
         if now_s >= self._start_s + self._number / self._params.rate_hz - 1e-9:

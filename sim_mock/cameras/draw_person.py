@@ -106,7 +106,7 @@ def _hull(canvas: Picture3d, points_world_m: Floats, colour: Colour) -> None:
 
 
 def _ellipsoid(middle_m: Vec3, half_m: Vec3) -> Floats:
-    """Give points all over an ellipsoid."""
+    """Return points all over an ellipsoid."""
     up = np.linspace(-1.0, 1.0, 13)[:, None]
     level = np.sqrt(1.0 - up * up)
     x, y = level * np.cos(_AROUND), level * np.sin(_AROUND)
@@ -116,7 +116,7 @@ def _ellipsoid(middle_m: Vec3, half_m: Vec3) -> Floats:
 
 @lru_cache(maxsize=8)
 def _features(looks: Looks) -> tuple[tuple[Floats, Colour], ...]:
-    """Give the outlines of a face's features, in the order in which they are drawn."""
+    """Return the outlines of a face's features, in the order in which they are drawn."""
     skin = looks.skin
     shade, deep = _darker(skin, 0.86), _darker(skin, 0.68)
     drawn: list[tuple[Floats, Colour]] = [
@@ -155,13 +155,13 @@ def _features(looks: Looks) -> tuple[tuple[Floats, Colour], ...]:
 
 
 def _nose_side(side: float) -> Floats:
-    """Give the flank of the nose on the owner's left (1) or right (-1)."""
+    """Return the flank of the nose on the owner's left (1) or right (-1)."""
     root, wing = (-0.022, 0.006 * side, 0.028), (-0.004, 0.014 * side, -0.008)
     return np.array([root, wing, (0.0, 0.0, -0.010), (0.0, 0.0, 0.0)])
 
 
 def _mouth(above_m: float, below_m: float) -> Floats:
-    """Give lips between the corners of the mouth, so far above and below their line."""
+    """Return lips between the corners of the mouth, so far above and below their line."""
     a, b = _MOUTH_RIGHT, _MOUTH_LEFT
     share = np.linspace(0.0, 1.0, 13)[:, None]
     line = a + share * (b - a)
@@ -174,7 +174,7 @@ def _mouth(above_m: float, below_m: float) -> Floats:
 
 
 def _ellipse(middle: tuple[float, float, float], half_y: float, half_z: float) -> Floats:
-    """Give an upright ellipse at a place."""
+    """Return an upright ellipse at a place."""
     x, y, z = middle
     t = _AROUND[::2]
     return np.stack((np.full(len(t), x), y + half_y * np.cos(t), z + half_z * np.sin(t)), axis=1)
@@ -183,7 +183,7 @@ def _ellipse(middle: tuple[float, float, float], half_y: float, half_z: float) -
 def _arc(
     middle: tuple[float, float, float], half_y: float, rise_m: float, thick_m: float
 ) -> Floats:
-    """Give a band that bends down by ``rise_m`` to its ends, thinner there."""
+    """Return a band that bends down by ``rise_m`` to its ends, thinner there."""
     x, y, z = middle
     share = np.linspace(-1.0, 1.0, 9)
     base = z - rise_m * share * share
@@ -195,7 +195,7 @@ def _arc(
 
 
 def _on_head(y: Floats, z: Floats) -> Floats:
-    """Give points of the head's front above given places of the face's plane."""
+    """Return points of the head's front above given places of the face's plane."""
     cx, cy, cz = HEAD_MIDDLE_M
     a, b, c = HEAD_HALF_M
     inside = np.maximum(0.0, 1.0 - ((y - cy) / b) ** 2 - ((z - cz) / c) ** 2)
@@ -204,7 +204,7 @@ def _on_head(y: Floats, z: Floats) -> Floats:
 
 @lru_cache(maxsize=8)
 def _trunk(looks: Looks, number: int) -> Bytes:
-    """Give a neck, sloping shoulders and a checked shirt: (h, w, 4), opaque where they are."""
+    """Return a neck, sloping shoulders and a checked shirt: (h, w, 4), opaque where they are."""
     width, height = 138, 225
     shirt = np.zeros((height, width, 4), np.uint8)
     rng = np.random.default_rng(1000 + number)
@@ -227,7 +227,7 @@ def _trunk(looks: Looks, number: int) -> Bytes:
 
 @lru_cache(maxsize=32)
 def _ball(hand: bool, number: int) -> Bytes:
-    """Give a round patterned patch: (64, 64, 4)."""
+    """Return a round patterned patch: (64, 64, 4)."""
     rng = np.random.default_rng(2000 + number)
     spread = 25.0 if hand else 90.0
     colour = np.array(LOOKS[0].skin if hand else rng.uniform(60.0, 200.0, 3))

@@ -29,7 +29,7 @@ def draw_room(canvas: Picture3d, seed: int = 0) -> None:
 
 @lru_cache(maxsize=4)
 def _room(seed: int) -> tuple[Sheet, ...]:
-    """Give the six sides; textures are the same for the same seed."""
+    """Return the six sides; textures are the same for the same seed."""
     rng = np.random.default_rng(seed)
     (x0, y0, z0), (x1, y1, z1) = _LOW, _HIGH
     wide, long, tall = y1 - y0, x1 - x0, z1 - z0
@@ -48,7 +48,7 @@ def _room(seed: int) -> tuple[Sheet, ...]:
 
 
 def _texture(width_m: float, height_m: float, colour: Colour, rng: np.random.Generator) -> Bytes:
-    """Give soft patches of several sizes on a colour."""
+    """Return soft patches of several sizes on a colour."""
     width, height = round(width_m * _PX_PER_M), round(height_m * _PX_PER_M)
     grey = np.zeros((height, width))
     for size_m, contrast in zip(_PATCHES_M, _CONTRAST, strict=True):

@@ -111,7 +111,7 @@ class PixelCamera:
         self._before: tuple[float, Mat3] | None = None
 
     def latest(self, now_s: float) -> Detections | None:
-        """Give the newest detections that have arrived by ``now_s``."""
+        """Return the newest detections that have arrived by ``now_s``."""
         if self._start_s is None:
             self._start_s = now_s
         R, p = self._mount.pose(*self._head_pose(now_s))
@@ -177,7 +177,7 @@ class PixelCamera:
         return Exposure(t_s, self._number, picture, depth, R, p)
 
     def _smear_px(self, t_s: float, R: Mat3) -> tuple[float, float]:
-        """Give how far the picture's middle moves during the exposure."""
+        """Return how far the picture's middle moves during the exposure."""
         if self._before is None or t_s <= self._before[0]:
             return 0.0, 0.0
         before_s, R_before = self._before
@@ -198,7 +198,7 @@ class PixelCamera:
         return out
 
     def _stereo(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Give distances as stereo measures them: error with the square, blind beside edges."""
+        """Return distances as stereo measures them: error with the square, blind beside edges."""
         noise = self._piece(depth_m.size).reshape(depth_m.shape)
         noise = noise * (self._params.depth_noise_1_m / max(self._params.noise_grey, 1e-9))
         seen = depth_m * (1.0 + depth_m * noise)
@@ -209,7 +209,7 @@ class PixelCamera:
         return out
 
     def _piece(self, size: int) -> NDArray[np.float32]:
-        """Give a piece of the stock of noise, another each time."""
+        """Return a piece of the stock of noise, another each time."""
         start = int(self._rng.integers(0, _NOISE_STOCK))
         return np.take(self._noise, np.arange(start, start + size), mode="wrap")
 

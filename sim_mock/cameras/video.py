@@ -19,7 +19,7 @@ class Film(Protocol):
         ...
 
     def due_s(self, number: int) -> float:
-        """Give the film time at which a picture is due."""
+        """Return the film time at which a picture is due."""
         ...
 
     def shot(self, number: int) -> Shot:
@@ -81,7 +81,7 @@ class FilmCamera:
         self.pictures = self.pictures_with_face = 0
 
     def latest(self, now_s: float) -> Detections | None:
-        """Give the newest detections that have come through by ``now_s``.
+        """Return the newest detections that have come through by ``now_s``.
 
         Raises:
             CameraError: the film cannot be read any more.
@@ -117,7 +117,7 @@ class FilmCamera:
         self._video.close()
 
     def _captured_s(self, number: int) -> float:
-        """Give the simulated time of a picture's exposure."""
+        """Return the simulated time of a picture's exposure."""
         return self._start_s + self._video.due_s(number)
 
     def _look(self, number: int) -> None:

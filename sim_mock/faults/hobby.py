@@ -49,7 +49,7 @@ class HobbyFaults(LineFaults):
         self._hobby = board
 
     def power(self, on: bool = True) -> str:
-        """Give the servos their supply, or take it; what gives the pulses notices nothing."""
+        """Return the servos their supply, or take it; what gives the pulses notices nothing."""
         self._hobby.body.advance()
         self._hobby.body.servo_power = on
         return f"the servos have {'their' if on else 'no'} supply"

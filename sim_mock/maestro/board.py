@@ -86,7 +86,7 @@ class MaestroBoard:
     # --- what it is, and who is heard
 
     def hears(self, client_baud: int) -> bool:
-        """Tell whether a client at this baud rate is understood, once it has sent AA."""
+        """Return whether a client at this baud rate is understood, once it has sent AA."""
         mode = self.body.settings.mode
         if mode == "uart-fixed":
             return client_baud == self.body.settings.baud
@@ -127,7 +127,7 @@ class MaestroBoard:
         self._forget()
 
     def here(self, channel: int) -> HobbyServo:
-        """Give the servo of a channel, brought up to now.
+        """Return the servo of a channel, brought up to now.
 
         Raises:
             KeyError: the board has no such channel.
@@ -139,7 +139,7 @@ class MaestroBoard:
         return servos[channel]
 
     def positions_steps(self) -> tuple[float, ...]:
-        """Give where the shafts truly are now, in quarter microseconds, by channel."""
+        """Return where the shafts truly are now, in quarter microseconds, by channel."""
         self.body.advance()
         return tuple(servo.place_steps for servo in self.body.servos)
 
@@ -162,7 +162,7 @@ class MaestroBoard:
         return self.faults.around(replies, data) if self._wire.any else replies
 
     def _what_comes(self, data: bytes, client_baud: int | None) -> bytes:
-        """Give what the board understands of a client's bytes."""
+        """Return what the board understands of a client's bytes."""
         if not self.body.awake or self.body.settings.mode == "mute":
             return b""
         if self.heed_baud and client_baud is not None:
@@ -173,7 +173,7 @@ class MaestroBoard:
         return bytes(b for b in data if self._wire.take("lose_bytes", None, now_s) is None)
 
     def _through_pins(self, data: bytes, client_baud: int) -> bytes:
-        """Give what the serial pins understand: nothing before AA tells the rate, if it must."""
+        """Return what the serial pins understand: nothing before AA tells the rate, if it must."""
         if self.body.settings.mode == "uart-detect" and self._told_baud is None:
             sign = data.find(POLOLU)
             if sign < 0:
@@ -201,11 +201,11 @@ class MaestroBoard:
         return self._sent(Piece(asked, answer))
 
     def _lost(self) -> bool:
-        """Tell whether a command that answers nothing is lost on its way."""
+        """Return whether a command that answers nothing is lost on its way."""
         return self._wire.take("lose_writes", None, self.now_s()) is not None
 
     def _sent(self, piece: Piece) -> list[Piece]:
-        """Give an answer as it arrives; faults of one channel spoil only its position."""
+        """Return an answer as it arrives; faults of one channel spoil only its position."""
         if not self._wire.any:
             return [piece]
         now_s = self.now_s()

@@ -49,7 +49,7 @@ class Body:
 
     @property
     def awake(self) -> bool:
-        """Tell whether it does not just restart."""
+        """Return whether it does not just restart."""
         return self._period >= self._awake_from
 
     # --- what it is told
@@ -87,7 +87,7 @@ class Body:
         self.send_all(self.settings.on_error)
 
     def told_errors(self) -> int:
-        """Give the register of errors, which is empty after that."""
+        """Return the register of errors, which is empty after that."""
         told, self.errors = self.errors, 0
         return told
 
@@ -134,20 +134,20 @@ class Body:
             self._period += (until - self._period) // (2 * SWING) * (2 * SWING)
 
     def _next_period(self, now: int) -> int:
-        """Give the next period in which anything happens."""
+        """Return the next period in which anything happens."""
         if self.swung is not None or not self.awake or not self._at_rest():
             return self._period + 1
         due = self._due()
         return now if due is None else max(self._period + 1, min(now, due))
 
     def _due(self) -> int | None:
-        """Give the period in which patience with the host ends, None for never."""
+        """Return the period in which patience with the host ends, None for never."""
         if not self.settings.timeout_s or self._timed_out:
             return None
         return self._fed + round(self.settings.timeout_s * PERIODS_S)
 
     def _at_rest(self, but: int | None = None) -> bool:
-        """Tell whether every servo, ``but`` one, has heard its last pulse and done what it can."""
+        """Return whether every servo, ``but`` one, has heard its last pulse and obeyed."""
         return all(
             not channel.moving and servo.width_steps == self._pulse(channel) and servo.resting
             for k, (channel, servo) in enumerate(zip(self.channels, self.servos, strict=True))
@@ -155,7 +155,7 @@ class Body:
         )
 
     def _pulse(self, channel: Channel) -> int:
-        """Give the pulse that reaches a servo; 0: none."""
+        """Return the pulse that reaches a servo; 0: none."""
         return channel.position if self.servo_power else 0
 
     def _pass(self) -> None:
@@ -178,5 +178,5 @@ class Body:
 
 
 def whole_periods(now_s: float) -> int:
-    """Give the whole periods of a time; the margin keeps 0.03 s from being two of them."""
+    """Return the whole periods of a time; the margin keeps 0.03 s from being two of them."""
     return int(now_s * PERIODS_S + 1e-3)

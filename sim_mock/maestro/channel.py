@@ -29,22 +29,22 @@ class Channel:
 
     @property
     def position(self) -> int:
-        """Give the width that is sent now; 0: no pulses."""
+        """Return the width that is sent now; 0: no pulses."""
         return self._at8 // EIGHTHS
 
     @property
     def limited(self) -> bool:
-        """Tell whether it has a limit of speed or acceleration."""
+        """Return whether it has a limit of speed or acceleration."""
         return self.speed != 0 or self.acceleration != 0
 
     @property
     def moving(self) -> bool:
-        """Tell whether it is still being led to its target."""
+        """Return whether it is still being led to its target."""
         return self._at8 != self.target * EIGHTHS or self._velocity8 != 0
 
     @property
     def led(self) -> bool:
-        """Tell whether it is being led to its target under a limit: what a board calls moving."""
+        """Return whether it is being led to its target under a limit: what a board calls moving."""
         return self.limited and self.moving
 
     def limit_speed(self, speed: int) -> None:
@@ -94,7 +94,7 @@ class Channel:
         self._velocity8 = 0 if clipped or there or not self.acceleration else velocity8
 
     def _next_speed8(self, way8: int, speed8: int) -> int:
-        """Give the speed towards the target for the next 10 ms; below 0: still away from it."""
+        """Return the speed towards the target for the next 10 ms; below 0: still away from it."""
         most8 = self.speed * EIGHTHS or way8
         if not self.acceleration:
             return min(most8, way8)
@@ -106,7 +106,7 @@ class Channel:
 
 
 def brakes_within(way: int, acceleration: int) -> int:
-    """Give the largest first step of a motion that comes to rest within a way.
+    """Return the largest first step of a motion that comes to rest within a way.
 
     The steps after it are smaller by the acceleration each, the last one is the smallest.
     """

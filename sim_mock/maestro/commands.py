@@ -153,12 +153,12 @@ _PROTOCOL = Heard(0, 0, trouble="protocol")
 
 
 def word(low: int, high: int) -> int:
-    """Give the number in two data bytes."""
+    """Return the number in two data bytes."""
     return low | high << 7
 
 
 def crc7(data: bytes) -> int:
-    """Give the check of a command: CRC-7 with the polynomial 91 hex, lowest bit first."""
+    """Return the check of a command: CRC-7 with the polynomial 91 hex, lowest bit first."""
     rest = 0
     for byte in data:
         rest ^= byte

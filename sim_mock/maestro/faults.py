@@ -30,7 +30,7 @@ class Board(Protocol):
     body: Body
 
     def here(self, channel: int) -> HobbyServo:
-        """Give the servo of a channel, brought up to now."""
+        """Return the servo of a channel, brought up to now."""
         ...
 
     def restart(self) -> None:
@@ -90,7 +90,7 @@ class MaestroFaults(HobbyFaults):
     # --- all
 
     def reports(self) -> list[dict[str, object]]:
-        """Give what every channel sends and where its servo truly is."""
+        """Return what every channel sends and where its servo truly is."""
         self._board.body.advance()
         return [
             {
@@ -108,7 +108,7 @@ class MaestroFaults(HobbyFaults):
         ]
 
     def board(self) -> dict[str, object]:
-        """Give the errors found and not yet asked for, and whether a script runs."""
+        """Return the errors found and not yet asked for, and whether a script runs."""
         named = [name for bit, name in enumerate(ERRORS) if self._board.body.errors >> bit & 1]
         return {"errors": named, "script": self._board.body.script_running}
 

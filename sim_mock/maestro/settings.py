@@ -58,7 +58,7 @@ LIMITS = ("min-us", "max-us")
 
 
 def cases() -> dict[str, str]:
-    """Give the name of every case, as it is typed, and its possible values."""
+    """Return the name of every case, as it is typed, and its possible values."""
     named = {name: "|".join(values) for name, values in _WORDS.items()}
     return {
         "mode": named["mode"],
@@ -72,7 +72,7 @@ def cases() -> dict[str, str]:
 
 
 def chosen(settings: Settings, case: str, value: str) -> Settings:
-    """Give the settings with one case decided otherwise.
+    """Return the settings with one case decided otherwise.
 
     Raises:
         ValueError: there is no such case or value.

@@ -125,7 +125,6 @@ def run(settings: Settings, say: Callable[[str], None], heed_ctrl_c: bool) -> No
     Raises:
         ValueError, OSError: the settings cannot be met.
     """
-
     servers: list[Server] = []
 
     def stop(number: int, frame: FrameType | None) -> None:

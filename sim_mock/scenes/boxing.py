@@ -90,12 +90,12 @@ class Boxing:
     behaviours: tuple[str, ...] = ("wait", "guard", "attack")
 
     def people(self, t_s: float) -> tuple[Person, ...]:
-        """Give the opponent, whose hands are things of their own."""
+        """Return the opponent, whose hands are things of their own."""
         face, turn = _opponent(t_s)
         return (Person(face, turn, None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Give both fists, and the hand from aside and the planner's targets while they last."""
+        """Return both fists, and the hand from aside and the planner's targets while they last."""
         phase_s = t_s % _ROUND_S
         face, _ = _opponent(t_s)
         fists = (_fist(_RIGHT, face, phase_s), _fist(_LEFT, face, phase_s))
@@ -113,7 +113,7 @@ class Boxing:
         return tuple(things)
 
     def behaviour(self, t_s: float) -> str | None:
-        """Give what the robot's planner has chosen: attack, guard or wait."""
+        """Return what the robot's planner has chosen: attack, guard or wait."""
         phase_s = t_s % _ROUND_S
         if any(start_s <= phase_s < start_s + _ATTACK_S for start_s, _ in _ATTACKS):
             return "attack"
@@ -122,7 +122,7 @@ class Boxing:
         return "wait"
 
     def events(self) -> tuple[Event, ...]:
-        """Give the five behaviours, the steps and the feints; the rest is for the face."""
+        """Return the five behaviours, the steps and the feints; the rest is for the face."""
         chin = _plus(_CORNER, (-0.3, 0.0, -0.1))
         events = [
             *(_punch_event(punch) for punch in _PUNCHES),
@@ -145,14 +145,14 @@ class Boxing:
 
 
 def _opponent(t_s: float) -> tuple[Vec3, tuple[float, float]]:
-    """Give the opponent's face, which bobs a little, and where it points."""
+    """Return the opponent's face, which bobs a little, and where it points."""
     face, turn = between(_KEYS, t_s % _ROUND_S)
     bob = (0.008 * sin(2 * pi * 0.5 * t_s), 0.008 * sin(2 * pi * 0.75 * t_s + 1.0))
     return (face[0] + bob[0], face[1] + bob[1], face[2]), turn
 
 
 def _fist(side: float, face: Vec3, phase_s: float) -> Vec3:
-    """Give one fist: on guard before the chin, in a punch, waving or feinting."""
+    """Return one fist: on guard before the chin, in a punch, waving or feinting."""
     place = _plus(face, (-0.12, side * 0.12, -0.13))
     for punch in _PUNCHES:
         if punch.side == side:
@@ -174,7 +174,7 @@ def _fist(side: float, face: Vec3, phase_s: float) -> Vec3:
 
 
 def _punch_end(side: float) -> Vec3:
-    """Give where a punch ends: before the robot's face, a little to its side."""
+    """Return where a punch ends: before the robot's face, a little to its side."""
     return _plus(HEAD_M, (_PUNCH_ENDS_M, side * 0.03, -0.02))
 
 
@@ -184,7 +184,7 @@ def _guards(punch: _Move, phase_s: float) -> bool:
 
 
 def _reaching(reach: _Move, phase_s: float) -> Vec3:
-    """Give the hand that comes in from aside, beckons and goes."""
+    """Return the hand that comes in from aside, beckons and goes."""
     since_s = phase_s - reach.start_s
     into = there_and_back(since_s, _REACH_IN_S, _REACH_STAY_S, _REACH_OUT_S)
     beckon = 0.03 * sin(2 * pi * 2.0 * since_s) * into
@@ -215,7 +215,7 @@ def _reach_event(reach: _Move) -> Event:
 
 
 def _aside_rad(p_world_m: Vec3) -> float:
-    """Give how far to the side of straight ahead a place is, from the robot's eyes."""
+    """Return how far to the side of straight ahead a place is, from the robot's eyes."""
     return atan2(p_world_m[1] - HEAD_M[1], p_world_m[0] - HEAD_M[0])
 
 

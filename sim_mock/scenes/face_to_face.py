@@ -64,7 +64,7 @@ class FaceToFace:
     behaviours: tuple[str, ...] = ()
 
     def people(self, t_s: float) -> tuple[Person, ...]:
-        """Give the one person."""
+        """Return the one person."""
         (x, y, z), (yaw, nod) = between(_KEYS, t_s % _ROUND_S)
         face = (
             x + 0.006 * sin(2 * pi * 0.21 * t_s),
@@ -76,7 +76,7 @@ class FaceToFace:
         return (Person(face, (yaw, nod + down), None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Give nothing: person and robot are by themselves."""
+        """Return nothing: person and robot are by themselves."""
         return ()
 
     def behaviour(self, t_s: float) -> str | None:

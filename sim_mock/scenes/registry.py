@@ -10,7 +10,7 @@ from gazerig.sim_mock.scenes.walks_past import WalksPast
 
 
 def scenes() -> dict[str, Scene]:
-    """Give the scenes by name."""
+    """Return the scenes by name."""
     every: tuple[Scene, ...] = (
         Visitor(),
         Boxing(),

@@ -67,19 +67,19 @@ class Scene(Protocol):
     behaviours: tuple[str, ...]
 
     def people(self, t_s: float) -> tuple[Person, ...]:
-        """Give everybody present, who may be far outside every field of view."""
+        """Return everybody present, who may be far outside every field of view."""
         ...
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Give everything else that can be looked at."""
+        """Return everything else that can be looked at."""
         ...
 
     def behaviour(self, t_s: float) -> str | None:
-        """Give the behaviour that the robot's planner has in force, None: the rig's own."""
+        """Return the behaviour that the robot's planner has in force, None: the rig's own."""
         ...
 
     def events(self) -> tuple[Event, ...]:
-        """Give the events of one round, none of which outlasts the round."""
+        """Return the events of one round, none of which outlasts the round."""
         ...
 
 
@@ -92,12 +92,12 @@ class Key(NamedTuple):
 
 
 def min_jerk(s: float) -> float:
-    """Give the smoothest way from 0 to 1 at a share 0..1 of its time."""
+    """Return the smoothest way from 0 to 1 at a share 0..1 of its time."""
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 
 def there_and_back(since_s: float, out_s: float, hold_s: float, back_s: float) -> float:
-    """Give 0 before, smoothly up to 1 in ``out_s``, held, and smoothly down to 0 again."""
+    """Return 0 before, smoothly up to 1 in ``out_s``, held, and smoothly down to 0 again."""
     if since_s <= 0.0 or since_s >= out_s + hold_s + back_s:
         return 0.0
     if since_s < out_s:

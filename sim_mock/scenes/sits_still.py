@@ -23,12 +23,12 @@ class SitsStill:
     behaviours: tuple[str, ...] = ()
 
     def people(self, t_s: float) -> tuple[Person, ...]:
-        """Give the one person."""
+        """Return the one person."""
         x, y, z = (a - b for a, b in zip(HEAD_M, FACE_M, strict=True))
         return (Person(FACE_M, (atan2(y, x), atan2(z, hypot(x, y))), None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Give nothing."""
+        """Return nothing."""
         return ()
 
     def behaviour(self, t_s: float) -> str | None:

@@ -41,12 +41,12 @@ class StepsAside:
     behaviours: tuple[str, ...] = ()
 
     def people(self, t_s: float) -> tuple[Person, ...]:
-        """Give the one person."""
+        """Return the one person."""
         face, turn = between(_KEYS, t_s % _ROUND_S)
         return (Person(face, turn, None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Give nothing."""
+        """Return nothing."""
         return ()
 
     def behaviour(self, t_s: float) -> str | None:

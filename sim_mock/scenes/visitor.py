@@ -35,7 +35,7 @@ class Visitor:
     behaviours: tuple[str, ...] = ()
 
     def people(self, t_s: float) -> tuple[Person, ...]:
-        """Give the one visitor, who may be far outside every field of view."""
+        """Return the one visitor, who may be far outside every field of view."""
         phase = t_s % _ROUND_S
         face, turn = between(_KEYS, phase)
         sway = (
@@ -47,7 +47,7 @@ class Visitor:
         return (Person(face, turn, self._hand(phase, face)),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Give nothing: the visitor's own hand belongs to the visitor."""
+        """Return nothing: the visitor's own hand belongs to the visitor."""
         return ()
 
     def behaviour(self, t_s: float) -> str | None:
@@ -55,7 +55,7 @@ class Visitor:
         return None
 
     def events(self) -> tuple[Event, ...]:
-        """Give none: nothing in particular is asked of the gaze."""
+        """Return none: nothing in particular is asked of the gaze."""
         return ()
 
     def _hand(self, phase_s: float, face: Vec3) -> Vec3 | None:

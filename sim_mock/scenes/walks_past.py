@@ -20,7 +20,7 @@ _ROUND_S = 2.0 * (_WAY_S + _TURN_S)
 
 
 def _along(phase_s: float) -> float:
-    """Give how much of a way is done: constant speed between two short even accelerations."""
+    """Return how much of a way is done: constant speed between two short even accelerations."""
     speed = 1.0 / (_WAY_S - _SOON_S)
     if phase_s <= 0.0:
         return 0.0
@@ -41,14 +41,14 @@ class WalksPast:
     behaviours: tuple[str, ...] = ()
 
     def people(self, t_s: float) -> tuple[Person, ...]:
-        """Give the one person, who stands, walks to the left, stands and walks back."""
+        """Return the one person, who stands, walks to the left, stands and walks back."""
         phase = t_s % _ROUND_S
         there = _along(phase - _TURN_S) - _along(phase - 2.0 * _TURN_S - _WAY_S)
         x, y = _HEAD_AHEAD_M + FAR_M, HALF_WAY_M * (2.0 * there - 1.0)
         return (Person((x, y, _UP_M), (atan2(-y, -x), 0.0), None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Give nothing."""
+        """Return nothing."""
         return ()
 
     def behaviour(self, t_s: float) -> str | None:

@@ -49,7 +49,7 @@ START = "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.quick impor
 
 
 def commands(rig: str) -> dict[str, list[str]]:
-    """Give what is typed, by name; each holds the torque on until it is ended."""
+    """Return what is typed, by name; each holds the torque on until it is ended."""
     joint = "eyes_pan" if rig == "maker" else "left_eye_pan"
     by = [] if rig == "maker" else ["--by", "motion"]
     return {
@@ -73,7 +73,7 @@ class Bench(NamedTuple):
     port: str
 
     def servos(self) -> list[dict[str, Any]]:
-        """Give the servos as they are."""
+        """Return the servos as they are."""
         found: list[dict[str, Any]] = json.loads(self.buses.command("status"))["servos"]
         ids = {joint.id for joint in self.rig.joints.values()}
         return [servo for servo in found if servo["id"] in ids]
@@ -83,7 +83,7 @@ class Bench(NamedTuple):
         return sum(bool(servo.get("torque", servo.get("target"))) for servo in self.servos())
 
     def off_park_deg(self) -> float:
-        """Give how far the worst joint is from its parking pose."""
+        """Return how far the worst joint is from its parking pose."""
         at = {servo["id"]: servo.get("place", servo["position"]) for servo in self.servos()}
         park = park_rad(self.rig)
         return max(

@@ -80,7 +80,7 @@ class Spans(NamedTuple):
 
 
 def emulated(kind: str, ids: tuple[int, ...]) -> Emulated:
-    """Give the servos of one bus."""
+    """Return the servos of one bus."""
     if kind == "maestro":
         return MaestroLine(12, servos=tuple(HobbySpec(i) for i in ids))
     model = "sts3215" if kind == "feetech" else "xl330-m077"
@@ -236,7 +236,7 @@ def take_turns(
 
 
 def count_of(client: Client) -> int:
-    """Give how many servos it has."""
+    """Return how many servos it has."""
     return sum(map(len, client.kinds.values()))
 
 
@@ -296,7 +296,7 @@ def _set_up(kind: str, path: str, ids: tuple[int, ...]) -> None:
 
 
 def row(client: Client, here: list[Spans], there: list[Spans]) -> dict[str, object]:
-    """Give the figures of one client: least and median of the rounds."""
+    """Return the figures of one client: least and median of the rounds."""
     figures: dict[str, object] = {"client": client.name, "reads": client.reads}
     for where, rounds in (("here", here), ("pty", there)):
         for key in Spans._fields:

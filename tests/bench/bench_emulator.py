@@ -121,7 +121,7 @@ def simulated_seconds() -> Table:
 
 
 def ticker(chain: DynamixelChain, now: list[float], packets: list[bytes]) -> Callable[[], None]:
-    """Give one tick: the clock goes on by 5 ms, one packet is exchanged."""
+    """Return one tick: the clock goes on by 5 ms, one packet is exchanged."""
     count = [0]
 
     def tick() -> None:
@@ -158,7 +158,7 @@ def wire_time(cycles: int) -> Table:
 
 
 def per_call(work: Callable[[], object], times: int) -> float:
-    """Give seconds per call, the median of five batches."""
+    """Return seconds per call, the median of five batches."""
     batches = []
     for _ in range(5):
         began = time.perf_counter()

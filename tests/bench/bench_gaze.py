@@ -56,7 +56,7 @@ def percept(faces: int, bodies: int, t_s: float, rng: np.random.Generator) -> Pe
 
 
 def gaze_step(faces: int, bodies: int, pictures: int) -> tuple[float, float]:
-    """Give seconds a tick, and a tick with a new picture, at 30 pictures and 200 ticks a second."""
+    """Return seconds a tick, and a tick with a new picture, at 30 pictures, 200 ticks a second."""
     choice = Choice(mock=True, fast=True, seed=0, scene="visitor")
     robot = assemble(load_rig("desk"), choice).robot
     joints = JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ())
@@ -81,7 +81,7 @@ def gaze_step(faces: int, bodies: int, pictures: int) -> tuple[float, float]:
 
 
 def ruckig_step(times: int = 3000) -> float:
-    """Give seconds of one step of a six-axis jerk-limited plan to a changing target."""
+    """Return seconds of one step of a six-axis jerk-limited plan to a changing target."""
     axes = 6
     plan, wish, out = Ruckig(axes, TICK_S), InputParameter(axes), OutputParameter(axes)
     wish.max_velocity, wish.max_acceleration = [5.0] * axes, [50.0] * axes
@@ -98,7 +98,7 @@ def ruckig_step(times: int = 3000) -> float:
 
 
 def per_call(work: Callable[[int], None], times: int) -> float:
-    """Give seconds per call."""
+    """Return seconds per call."""
     began = time.perf_counter()
     for k in range(times):
         work(k)

@@ -77,7 +77,7 @@ def measured(film: Path, motion: bool) -> Stamps:
 
 
 def ended(seconds: float) -> str | None:
-    """Tell whether the run is over."""
+    """Return whether the run is over."""
     return "seconds" if seconds >= SECONDS else None
 
 

@@ -41,7 +41,7 @@ def main() -> None:
 
 
 def measured(width: int, height: int) -> dict[str, list[float]]:
-    """Give milliseconds of each step, picture by picture."""
+    """Return milliseconds of each step, picture by picture."""
     params = MotionParams()
     focal = 0.73 * width
     lens = SimpleNamespace(fx_px=focal, fy_px=focal, cx_px=(width - 1) / 2, cy_px=(height - 1) / 2)

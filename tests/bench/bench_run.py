@@ -205,7 +205,7 @@ def timed(work: Callable[..., Any], spent: dict[str, float], name: str) -> Calla
 
 
 def per_call(work: Callable[[], None], times: int) -> float:
-    """Give seconds per call."""
+    """Return seconds per call."""
     began = time.perf_counter()
     for _ in range(times):
         work()
@@ -213,7 +213,7 @@ def per_call(work: Callable[[], None], times: int) -> float:
 
 
 def resident_mib() -> float:
-    """Give the resident memory of this process."""
+    """Return the resident memory of this process."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 

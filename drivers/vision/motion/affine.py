@@ -56,7 +56,7 @@ def flow_map(places: Floats, flow: Floats, centre: Floats, area_px: float) -> tu
 
 
 def patch_motion(back: Back, rest_px: float) -> PatchMotion:
-    """Give slide, growth and spin of a map from now to before."""
+    """Return slide, growth and spin of a map from now to before."""
     (a, b), (c, d) = back.matrix.tolist()
     shrink = sqrt(max(abs(a * d - b * c), 1e-6))
     sd = back.slope_sd / sqrt(2.0)  # growth and spin are half the sum of two numbers each
@@ -65,7 +65,7 @@ def patch_motion(back: Back, rest_px: float) -> PatchMotion:
 
 
 def affine_rest(places: Floats, flow: Floats) -> float:
-    """Give what one affine motion leaves of a flow, root mean square of the lengths."""
+    """Return what one affine motion leaves of a flow, root mean square of the lengths."""
     if len(places) < _LEAST_POINTS:
         return 0.0
     rows = np.column_stack((places - places.mean(axis=0), np.ones(len(places))))
@@ -91,13 +91,13 @@ def _fit(rows: Floats, flow: Floats) -> tuple[Floats | None, Floats, float]:
 
 
 def _flat(normal: Floats) -> bool:
-    """Tell whether points lie in a row: no area of moments is left."""
+    """Return whether points lie in a row: no area of moments is left."""
     xx, xy, yy = normal[0, 0], normal[0, 1], normal[1, 1]
     return bool(xx * yy - xy * xy <= 1e-6 * max(xx, yy) ** 2 + 1e-12)
 
 
 def _spread(rows: Floats, weights: Floats, rest_px: float, area_px: float) -> float:
-    """Give the standard deviation of the map's slopes, root mean square."""
+    """Return the standard deviation of the map's slopes, root mean square."""
     inverse = np.linalg.inv(rows.T @ (rows * weights[:, None]) + 1e-9 * np.eye(3))
     points_a_patch = max(1.0, _PATCH_PX2 * len(rows) / max(area_px, 1.0))
     both = 0.5 * float(inverse[0, 0] + inverse[1, 1])

@@ -21,7 +21,7 @@ _KEPT = 0.5
 
 
 def anchor(group: Group, grey: Grey, middle: Floats, offset: Floats) -> Floats:
-    """Give a pixel of the thing, (2,), near its middle.
+    """Return a pixel of the thing, (2,), near its middle.
 
     grey: (h, w) picture
     middle: (2,) middle of the patch
@@ -37,7 +37,7 @@ def anchor(group: Group, grey: Grey, middle: Floats, offset: Floats) -> Floats:
 
 
 def _standing_out(group: Group, grey: Grey) -> Mask:
-    """Tell which pixels of a patch, (n,), are not as bright as the ground around it."""
+    """Return which pixels of a patch, (n,), are not as bright as the ground around it."""
     x, y, width, height = group.box
     left, top = max(0, x - _MARGIN_PX), max(0, y - _MARGIN_PX)
     crop = grey[top : y + height + _MARGIN_PX, left : x + width + _MARGIN_PX].astype(np.float32)

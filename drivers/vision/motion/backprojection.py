@@ -45,7 +45,7 @@ def small_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane |
 
 
 def distance(group: Group, depth: Plane | None, params: MotionParams) -> Distance:
-    """Give a thing's distance from the depth picture, else the assumed one."""
+    """Return a thing's distance from the depth picture, else the assumed one."""
     if depth is not None:
         values = depth[group.y, group.x]
         values = values[np.isfinite(values)]
@@ -58,13 +58,13 @@ def distance(group: Group, depth: Plane | None, params: MotionParams) -> Distanc
 
 
 def place(point_px: Floats, z_m: float, K: Floats) -> Vec3:
-    """Give the point at depth ``z_m`` that a pixel shows."""
+    """Return the point at depth ``z_m`` that a pixel shows."""
     x, y = ((point_px - K[:2, 2]) / K[[0, 1], [0, 1]]).tolist()
     return z_m * x, z_m * y, z_m
 
 
 def velocity(p_m: Vec3, flow_px_s: tuple[float, float], loom_1_s: float, K: Floats) -> Vec3:
-    """Give the velocity of a thing at ``p_m`` whose image moves and grows so."""
+    """Return the velocity of a thing at ``p_m`` whose image moves and grows so."""
     x, y, z = p_m
     return (
         z * flow_px_s[0] / float(K[0, 0]) - loom_1_s * x,
@@ -74,5 +74,5 @@ def velocity(p_m: Vec3, flow_px_s: tuple[float, float], loom_1_s: float, K: Floa
 
 
 def radius_m(area_px: float, z_m: float, K: Floats) -> float:
-    """Give the radius of the disc that covers as much of the picture."""
+    """Return the radius of the disc that covers as much of the picture."""
     return z_m * float(np.sqrt(area_px / (np.pi * K[0, 0] * K[1, 1])))

@@ -40,13 +40,13 @@ class Group(NamedTuple):
 
     @property
     def box(self) -> tuple[int, int, int, int]:
-        """Give x, y, width and height of the pixels' box."""
+        """Return x, y, width and height of the pixels' box."""
         x, y = int(self.x.min()), int(self.y.min())
         return x, y, int(self.x.max()) - x + 1, int(self.y.max()) - y + 1
 
 
 def gathered(things: Things, params: MotionParams) -> list[Group]:
-    """Give the things that move, the largest first."""
+    """Return the things that move, the largest first."""
     least = max(4, round(params.min_area_share * things.mask.size))
     pieces = [
         piece
@@ -58,7 +58,7 @@ def gathered(things: Things, params: MotionParams) -> list[Group]:
 
 
 def _connected(mask: Mask, flow: Flow, close_px: int, least: int) -> list[Group]:
-    """Give the pixels of the mask by neighbourhood, gaps up to ``close_px`` being bridged."""
+    """Return the pixels of the mask by neighbourhood, gaps up to ``close_px`` being bridged."""
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (close_px, close_px))
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
@@ -100,7 +100,7 @@ def _parted(group: Group, things: Things, least: int, splits: int) -> list[Group
 
 
 def _sides(group: Group, threshold_px: float) -> Mask | None:
-    """Tell which pixels of two things are the one's; None where there is but one."""
+    """Return which pixels of two things are the one's; None where there is but one."""
     step = max(1, len(group.x) // _SAMPLE)
     places = np.column_stack((group.x, group.y)).astype(np.float64)
     flow = group.flow

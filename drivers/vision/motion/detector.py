@@ -76,7 +76,6 @@ class MotionDetector:
     """Finds what moves from picture to picture; pure but for the memory of the last."""
 
     def __init__(self, params: MotionParams) -> None:
-        """Take how finely and carefully to look."""
         self._params = params
         self._search = FlowSearch(params.preset, params.finest_level)
         self._tracks = MotionTracks(params)
@@ -92,7 +91,7 @@ class MotionDetector:
 
     @property
     def before_s(self) -> float | None:
-        """Give the capture time of the picture that the next one will be compared with."""
+        """Return the capture time of the picture that the next one will be compared with."""
         return None if self._before is None else self._before.captured_s
 
     def find(
@@ -234,21 +233,21 @@ class MotionDetector:
 
 
 def turned_between(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> Floats:
-    """Give R_now_before of two orientations of the camera in the world, (3, 3) each."""
+    """Return R_now_before of two orientations of the camera in the world, (3, 3) each."""
     now, before = np.asarray(R_world_now, float), np.asarray(R_world_before, float)
     out: Floats = now.T @ before
     return out
 
 
 def _room(group: Group, pair: Compared, ego: Ego) -> Room:
-    """Give where a patch would be in the older picture if it stood still."""
+    """Return where a patch would be in the older picture if it stood still."""
     if pair.shift is None:
         return Room(ego.B, np.zeros(2))
     return Room(ego.B, np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64))
 
 
 def _measured(group: Group, pictures: Blurred, room: Room) -> tuple[Floats, PatchMotion]:
-    """Give a patch's middle, and the motion there."""
+    """Return a patch's middle, and the motion there."""
     places = np.column_stack((group.x, group.y)).astype(np.float64)
     middle = places.mean(axis=0)
     step = max(1, len(places) // _SAMPLE)

@@ -86,7 +86,7 @@ def own_motion(pair: Compared, K: Floats, predicted: bool) -> Ego:
 
 
 def _textured(pair: Compared) -> Floats:
-    """Give the points of a grid, (n, 2), at which the flow can be believed."""
+    """Return the points of a grid, (n, 2), at which the flow can be believed."""
     half = cv2.resize(pair.now, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     strength = cv2.cornerMinEigenVal(half, _CORNER_BLOCK)
     height, width = pair.now.shape
@@ -133,7 +133,7 @@ def _fitted(
 
 
 def _rows(a: Floats, b: Floats) -> Floats:
-    """Give the (2 n, 8) rows of b (h6 x + h7 y + 1) = (h0 x + h1 y + h2, h3 x + h4 y + h5)."""
+    """Return the (2 n, 8) rows of b (h6 x + h7 y + 1) = (h0 x + h1 y + h2, h3 x + h4 y + h5)."""
     n = len(a)
     rows = np.zeros((2, n, 8))
     for axis in (0, 1):
@@ -153,7 +153,7 @@ def _solved(rows: Floats, b: Floats, weights: Floats) -> Floats:
 
 
 def _image(h: Floats, a: Floats) -> Floats:
-    """Give where the homography takes points."""
+    """Return where the homography takes points."""
     x, y = a.T
     depth = np.maximum(h[6] * x + h[7] * y + 1.0, 1e-3)
     there = h[0] * x + h[1] * y + h[2], h[3] * x + h[4] * y + h[5]
@@ -162,12 +162,12 @@ def _image(h: Floats, a: Floats) -> Floats:
 
 
 def _noise(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
-    """Give the standard deviation along one axis: half of such lengths are below 1.18 of it."""
+    """Return the standard deviation along one axis: half of such lengths are below 1.18 of it."""
     return max(_LEAST_NOISE_PX, middle(errors[mask]) / 1.177)
 
 
 def _spread(points: Floats, shape: tuple[int, ...]) -> bool:
-    """Tell whether points lie all over a picture of (height, width)."""
+    """Return whether points lie all over a picture of (height, width)."""
     cells = np.floor(points / (shape[1], shape[0]) * _CELLS)
     return len(np.unique(cells[:, 0] * _CELLS[1] + cells[:, 1])) >= _LEAST_CELLS
 
@@ -177,12 +177,12 @@ def _inverse(H: Floats) -> Floats:
 
 
 def _way(H: Floats, points: Floats) -> float:
-    """Give how far a homography moves points, median."""
+    """Return how far a homography moves points, median."""
     return float(np.median(np.hypot(*(moved(H, points) - points).T)))
 
 
 def turn_rad(ego: Ego, grey: Grey, K: Floats) -> float:
-    """Give by how much the middle of the picture turned away, as an angle."""
+    """Return by how much the middle of the picture turned away, as an angle."""
     height, width = grey.shape
     middle = np.array([[0.5 * (width - 1), 0.5 * (height - 1)]])
     rays = (np.concatenate((middle, moved(ego.total, middle))) - K[:2, 2]) / K[[0, 1], [0, 1]]

@@ -21,13 +21,24 @@ class Lens(Protocol):
     """Focal lengths and the place of the optical axis, in pixels of the picture given."""
 
     @property
-    def fx_px(self) -> float: ...
+    def fx_px(self) -> float:
+        """Return the focal length across, px."""
+        ...
+
     @property
-    def fy_px(self) -> float: ...
+    def fy_px(self) -> float:
+        """Return the focal length down, px."""
+        ...
+
     @property
-    def cx_px(self) -> float: ...
+    def cx_px(self) -> float:
+        """Return the optical centre across, px."""
+        ...
+
     @property
-    def cy_px(self) -> float: ...
+    def cy_px(self) -> float:
+        """Return the optical centre down, px."""
+        ...
 
 
 class SmallPicture(NamedTuple):
@@ -62,7 +73,7 @@ def made_small(picture: NDArray[Any], work_px: int, lens: Lens, captured_s: floa
 
 
 def grey_of(picture: NDArray[Any]) -> Grey:
-    """Give a picture's brightness, (h, w), whether it is BGR, BGR with alpha, or grey."""
+    """Return a picture's brightness, (h, w), whether it is BGR, BGR with alpha, or grey."""
     channels = picture.shape[2] if picture.ndim == 3 else 1
     if channels == 3:
         return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
@@ -82,7 +93,7 @@ def _check(picture: NDArray[Any]) -> None:
 
 
 def camera_matrix(lens: Lens, scale: tuple[float, float]) -> Floats:
-    """Give the (3, 3) camera matrix of a picture scaled by ``scale``."""
+    """Return the (3, 3) camera matrix of a picture scaled by ``scale``."""
     sx, sy = scale
     return np.array(
         [
@@ -94,11 +105,11 @@ def camera_matrix(lens: Lens, scale: tuple[float, float]) -> Floats:
 
 
 def to_given(point_px: tuple[float, float], scale: tuple[float, float]) -> tuple[float, float]:
-    """Give where a point of the small picture lies in the picture given."""
+    """Return where a point of the small picture lies in the picture given."""
     return (point_px[0] + 0.5) / scale[0] - 0.5, (point_px[1] + 0.5) / scale[1] - 0.5
 
 
 def middle(values: Floats) -> float:
-    """Give the upper median of (n,) values, n > 0: five times the speed of numpy's own."""
+    """Return the upper median of (n,) values, n > 0: five times the speed of numpy's own."""
     half = len(values) // 2
     return float(np.partition(values, half)[half])

@@ -117,7 +117,7 @@ def _aligned(
 
 
 def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, Floats]:
-    """Give brightness (n,), and (n, 7) how it changes with the map's numbers and with light."""
+    """Return brightness (n,), and (n, 7) how it changes with the map's numbers and with light."""
     height, width = now.shape
     x, y = at.T
     right, left = np.minimum(x + 1, width - 1), np.maximum(x - 1, 0)
@@ -130,14 +130,14 @@ def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, F
 
 
 def _seen(before: Plane, room: Room, places: Floats) -> Floats:
-    """Give the older picture's brightness at places of the newer, (n,)."""
+    """Return the older picture's brightness at places of the newer, (n,)."""
     there = (moved(room.B, places) + room.shift).astype(np.float32)
     seen = cv2.remap(before, there[:, None], _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
     return np.asarray(seen, dtype=np.float64).ravel()
 
 
 def _weighed(errors: Floats) -> tuple[float, Floats]:
-    """Give the noise of errors, the mean apart, and Tukey's weights."""
+    """Return the noise of errors, the mean apart, and Tukey's weights."""
     apart = np.abs(errors - middle(errors))
     noise = max(_LEAST_NOISE, 1.4826 * middle(apart))
     return noise, np.maximum(1.0 - (apart / (_TUKEY * noise)) ** 2, 0.0) ** 2

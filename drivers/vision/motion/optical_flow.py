@@ -53,7 +53,6 @@ class FlowSearch:
     """DIS with its memory, for pictures of any size that it can bear."""
 
     def __init__(self, preset: str, finest_level: int) -> None:
-        """Take the preset ("ultrafast", "fast" or "medium") and the level the search ends at."""
         self._dis = cv2.DISOpticalFlow.create(_PRESETS[preset])
         self._dis.setFinestScale(finest_level)
 
@@ -67,13 +66,13 @@ class FlowSearch:
 
 
 def searchable(grey: Grey) -> bool:
-    """Tell whether a picture is large enough, and shaped so, that flow can be found in it."""
+    """Return whether a picture is large enough, and shaped so, that flow can be found in it."""
     short, long = sorted(grey.shape)
     return bool(short >= _LEAST_SIDE_PX and long <= _LARGEST_ASPECT * short)
 
 
 def turn_homography(R_now_before: Floats | None, now: SmallPicture, before: SmallPicture) -> Floats:
-    """Give how pixels move when the camera turns about its lens: K R K^-1.
+    """Return how pixels move when the camera turns about its lens: K R K^-1.
 
     R_now_before: (3, 3) turns directions from the older camera's axes into the newer's;
         None, or what is no number, counts as no turn
@@ -85,7 +84,7 @@ def turn_homography(R_now_before: Floats | None, now: SmallPicture, before: Smal
 
 
 def moved(H: Floats, points_px: Floats) -> Floats:
-    """Give where a homography takes (n, 2) points; infinite where it takes them behind us."""
+    """Return where a homography takes (n, 2) points; infinite where it takes them behind us."""
     homogeneous = points_px @ H[:, :2].T + H[:, 2]
     depth = homogeneous[:, 2:]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -94,7 +93,7 @@ def moved(H: Floats, points_px: Floats) -> Floats:
 
 
 def corners(shape: tuple[int, ...]) -> Floats:
-    """Give the middles of a picture's four corner pixels, (4, 2)."""
+    """Return the middles of a picture's four corner pixels, (4, 2)."""
     height, width = shape[:2]
     return np.array([(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)], float)
 
@@ -113,7 +112,7 @@ def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
 
 
 def _inside(flow: Flow) -> Mask:
-    """Tell which pixels the flow leads to a pixel of the other picture."""
+    """Return which pixels the flow leads to a pixel of the other picture."""
     height, width = flow.shape[:2]
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
     at_x: Plane = flow[..., 0] + x

@@ -17,7 +17,7 @@ _STILL_M = 1e-4
 
 
 def parallax(depth_m: Plane | None, K: Floats, t_now_before_m: Floats | None) -> Flow | None:
-    """Give how far still things are from their place now in the older picture, (h, w, 2).
+    """Return how far still things are from their place now in the older picture, (h, w, 2).
 
     depth_m: (h, w), NaN where unknown: there the picture's middle distance is taken
     t_now_before_m: (3,) where the lens was, seen from where it is, in its axes of now

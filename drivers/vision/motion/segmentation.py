@@ -59,7 +59,7 @@ def what_moves(pair: Compared, ego: Ego, params: MotionParams) -> Things:
 
 
 def _jumps(shift: Flow | None) -> Plane | float:
-    """Give by how much still neighbours part, (h, w): flow there may be the other's."""
+    """Return by how much still neighbours part, (h, w): flow there may be the other's."""
     if shift is None:
         return 0.0
     ends = cv2.morphologyEx(shift, cv2.MORPH_GRADIENT, np.ones((_SMEAR_PX, _SMEAR_PX), np.uint8))
@@ -67,7 +67,7 @@ def _jumps(shift: Flow | None) -> Plane | float:
 
 
 def _background(ego: Ego, shape: tuple[int, ...]) -> Flow:
-    """Give where the still room's pixels lie in the older picture, (h, w, 2)."""
+    """Return where the still room's pixels lie in the older picture, (h, w, 2)."""
     height, width = shape
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
     (a, b, c), (d, e, f), (g, h, i) = ego.B.astype(np.float32)
@@ -76,7 +76,7 @@ def _background(ego: Ego, shape: tuple[int, ...]) -> Flow:
 
 
 def _borne_out(pair: Compared, there: Flow, rest: Flow) -> Mask:
-    """Tell where the flow explains the newer picture and the camera's motion does not.
+    """Return where the flow explains the newer picture and the camera's motion does not.
 
     Ground that a thing has left changed too, and plain ground is explained by any flow; but
     it "came" from where nothing has changed, while a thing has left where it came from.
@@ -92,7 +92,7 @@ def _borne_out(pair: Compared, there: Flow, rest: Flow) -> Mask:
 
 
 def _added(flow: Flow, sign: float) -> Flow:
-    """Give each pixel's own place with its flow added, or taken away."""
+    """Return each pixel's own place with its flow added, or taken away."""
     out: Flow = np.float32(sign) * flow
     out[..., 0] += np.arange(out.shape[1], dtype=np.float32)
     out[..., 1] += np.arange(out.shape[0], dtype=np.float32)[:, None]
@@ -100,7 +100,7 @@ def _added(flow: Flow, sign: float) -> Flow:
 
 
 def _unlike(now: Plane, pair: Compared, there: Flow) -> Plane:
-    """Give how unlike the older picture is, seen through a map: a local mean of squares."""
+    """Return how unlike the older picture is, seen through a map: a local mean of squares."""
     seen = cv2.remap(pair.before, there, _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
     off = now - seen
     # Clipped, or a dark coat would darken all around it.

@@ -43,7 +43,6 @@ class MotionTracks:
     """Numbers for moving patches that last from picture to picture."""
 
     def __init__(self, params: MotionParams) -> None:
-        """Take the times."""
         self._params = params
         self._follows: list[Follow] = []
         self._next_id = 1
@@ -101,7 +100,7 @@ class MotionTracks:
         self._follows = []
 
     def told(self, follow: Follow) -> bool:
-        """Tell whether a patch has been seen often enough."""
+        """Return whether a patch has been seen often enough."""
         return follow.seen >= self._params.confirm_pictures
 
     def _begun(self, centre: Floats, t_s: float) -> Follow:

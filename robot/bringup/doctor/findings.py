@@ -51,5 +51,5 @@ class Finding:
 
 
 def worst(findings: Iterable[Finding]) -> Level:
-    """Give the worst level there is, "ok" where nothing was found."""
+    """Return the worst level there is, "ok" where nothing was found."""
     return max((finding.level for finding in findings), key=LEVELS.index, default="ok")

@@ -60,7 +60,7 @@ class Board:
 
     @property
     def size(self) -> int | None:
-        """Give its number of channels, None where nobody can tell."""
+        """Return its number of channels, None where nobody can tell."""
         return USB_CHANNELS.get(self.usb)
 
 
@@ -106,7 +106,7 @@ def take(port: BusPort, params: MaestroParams, setups: Sequence[ServoSetup], usb
 
 
 def _spoken(params: MaestroParams, found: MaestroFound) -> MaestroParams:
-    """Give how to speak to a board that was found, whatever the rig says."""
+    """Return how to speak to a board that was found, whatever the rig says."""
     form = params.protocol if params.protocol in found.forms else found.forms[0]
     return replace(params, protocol=form, crc=found.crc)
 
