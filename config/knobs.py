@@ -19,8 +19,8 @@ from gazerig.config.export import closest, shown
 from gazerig.config.load import ConfigError, Entry, Fault, weighed
 from gazerig.config.schema import RULES, Rig
 from gazerig.gaze.types import PARTS
-from gazerig.robot.orders import Value
-from gazerig.robot.types import in_order
+from gazerig.robot.model.commands import Value
+from gazerig.robot.model.types import in_order
 
 NEXT_TICK = "next tick"
 NEXT_START = "next start"

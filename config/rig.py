@@ -29,13 +29,13 @@ from gazerig.gaze.pursuit import PursuitParams
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import ScanpathParams
 from gazerig.gaze.top_down import TopDownParams
-from gazerig.robot.frames import CameraParams
-from gazerig.robot.joint import JointParams
-from gazerig.robot.kinematics import LIDS, GeometryParams
-from gazerig.robot.loop import LoopParams
+from gazerig.robot.control.loop import LoopParams
+from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import LIDS, GeometryParams
+from gazerig.robot.model.types import in_order
+from gazerig.robot.perception.tracker import TrackParams
 from gazerig.robot.safety.guard import GuardParams
-from gazerig.robot.seeing.tracks import TrackParams
-from gazerig.robot.types import in_order
 
 
 @dataclass(frozen=True)

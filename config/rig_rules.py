@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from gazerig.config.rig import Rig
 from gazerig.drivers.servo_models import SERVOS
 from gazerig.gaze.types import PARTS
-from gazerig.robot.kinematics import LIDS
+from gazerig.robot.model.kinematics import LIDS
+from gazerig.robot.model.types import JOINTS
 from gazerig.robot.safety.guard import Guard
-from gazerig.robot.types import JOINTS
 
 
 def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:

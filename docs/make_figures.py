@@ -27,9 +27,9 @@ from gazerig.gaze.lids import LidParams, Lids  # noqa: E402
 from gazerig.gaze.saccade import Saccade, SaccadeParams  # noqa: E402
 from gazerig.gaze.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
-from gazerig.robot.assemble import assemble, gaze_parts  # noqa: E402
-from gazerig.robot.choice import Choice  # noqa: E402
-from gazerig.robot.loop import Tick, run  # noqa: E402
+from gazerig.robot.app.assemble import assemble, gaze_parts  # noqa: E402
+from gazerig.robot.app.options import Choice  # noqa: E402
+from gazerig.robot.control.loop import Tick, run  # noqa: E402
 from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
 from gazerig.sim_mock.true_gaze import (  # noqa: E402
     angles_of_place,

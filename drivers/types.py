@@ -2,7 +2,7 @@
 
 A servo bus speaks its servos' own steps (Dynamixel, Feetech STS: 4096 a turn, 0.088 deg;
 a hobby servo on a Maestro: a quarter of a microsecond of pulse width); what a step means
-at a joint is known by gazerig.robot.body alone. Times are host monotonic seconds.
+at a joint is known by gazerig.robot.control.body alone. Times are host monotonic seconds.
 """
 
 from collections.abc import Mapping, Sequence

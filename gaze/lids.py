@@ -12,8 +12,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.lid_closing import Closing, closure
-from gazerig.gaze.lid_dice import depth, doubled, evokes, pause_s
+from gazerig.gaze.blink_profile import Closing, closure
+from gazerig.gaze.blink_statistics import depth, doubled, evokes, pause_s
 from gazerig.gaze.lid_params import LidParams as LidParams
 from gazerig.gaze.lid_rest import LidsAtRest, Pair
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.flight import Flight, scattered
 from gazerig.gaze.head import Head
 from gazerig.gaze.lids import Lids, Openings
 from gazerig.gaze.pursuit import Pursuit
 from gazerig.gaze.saccade import Saccade
-from gazerig.gaze.shift import ShiftParams, ShiftRule
+from gazerig.gaze.saccade_trajectory import Flight, scattered
+from gazerig.gaze.saccade_trigger import ShiftParams, ShiftRule
 from gazerig.gaze.types import (
     Angles2,
     Angles3,

@@ -220,7 +220,7 @@ class GazeCommand(NamedTuple):
 
 
 class HeadGeometry(Protocol):
-    """What the oculomotor models must know of a head's build (gazerig.robot.kinematics has it)."""
+    """What the oculomotor models must know of a head's build (robot/model/kinematics.py has it)."""
 
     def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
         """Return R_world_head and p_world_head_m for neck angles."""

@@ -12,7 +12,7 @@ import pytest
 import typer
 from typer.core import TyperGroup
 
-from gazerig.robot.cli.calibrations import DEFAULT, JointsUnlessNamed
+from gazerig.robot.cli.calibrate_group import DEFAULT, JointsUnlessNamed
 from gazerig.robot.cli.main import app, main
 
 _START = "import sys; from gazerig.robot.cli.main import main; sys.argv[0] = 'gazerig'; main()"

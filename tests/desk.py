@@ -1,7 +1,7 @@
 """The joints of the shipped desk rig, in the order of its joint angles."""
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.types import in_order
+from gazerig.robot.model.types import in_order
 
 JOINTS = in_order(load_rig("desk").joints)
 

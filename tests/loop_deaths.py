@@ -15,8 +15,8 @@ from typing import NamedTuple
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.robot.emulated_rig import emulated_lines
-from gazerig.robot.rig_bus import guarded_rig_bus, ports_of, rig_bus, rig_setups
+from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus, rig_setups
+from gazerig.robot.app.emulation import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
 RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker"}

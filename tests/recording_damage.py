@@ -16,16 +16,16 @@ from mcap.records import Chunk
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.cli.report import _recorded
-from gazerig.robot.loop import run
-from gazerig.robot.recording.frames import Frames
+from gazerig.robot.control.loop import run
 from gazerig.robot.recording.gaze_angles import trace_of
 from gazerig.robot.recording.read import RunRecording, used
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.rerun import rerun
 from gazerig.robot.recording.run_info import RunInfo
+from gazerig.robot.recording.snapshot_index import Frames
 
 HEAD = 9
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from math import radians
 
-from gazerig.robot.types import Servos, Snapshot, Trail
+from gazerig.robot.model.types import Servos, Snapshot, Trail
 
 SIX = (
     "eyes_pan", "eyes_tilt", "left_upper_lid", "right_upper_lid", "left_lower_lid",

@@ -12,11 +12,11 @@ from typing import NamedTuple
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.servo_models import HOBBY_KINDS, servo_label
-from gazerig.robot.body import Body
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.emulated_rig import emulated_lines, place_of
-from gazerig.robot.rig_angles import limits, park_rad
-from gazerig.robot.rig_bus import rig_bus, rig_setups
+from gazerig.robot.app.bus_wiring import rig_bus, rig_setups
+from gazerig.robot.app.emulation import emulated_lines, place_of
+from gazerig.robot.app.rig_limits import limits, park_rad
+from gazerig.robot.control.body import Body
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build

@@ -12,36 +12,36 @@ ROOMS = ("config", "drivers", "gaze", "robot", "sim_mock")
 
 # The pure parts of the machine that a second world may also stand on.
 PURE = {
-    "robot.calibrate.charuco_board",
-    "robot.clock",
-    "robot.seeing.face_pose",
-    "robot.frames",
-    "robot.seeing.intrinsics",
-    "robot.kinematics",
+    "robot.calibration.charuco_board",
+    "robot.model.clock",
+    "robot.perception.face_pose",
+    "robot.model.frames",
+    "robot.perception.intrinsics",
+    "robot.model.kinematics",
 }
 # Where config, the machine and the second world meet.
 TOP = {
-    "robot.assemble",
-    "robot.cameras",
+    "robot.app.assemble",
+    "robot.app.camera_factory",
     "robot.cli.record",
     "robot.cli.main",
-    "robot.cli.camera",
-    "robot.cli.camera_neck",
+    "robot.cli.calibrate_camera",
+    "robot.cli.neck_motion",
     "robot.cli.emulate",
-    "robot.cli.face",
+    "robot.cli.calibrate_face",
     "robot.cli.calibrate",
     "robot.cli.motion",
-    "robot.cli.wires",
-    "robot.emulated_rig",
-    "robot.rig_angles",
-    "robot.rig_bus",
+    "robot.cli.ports",
+    "robot.app.emulation",
+    "robot.app.rig_limits",
+    "robot.app.bus_wiring",
     "robot.cli.monitor",
-    "robot.cli.servos",
-    "robot.cli.steering",
+    "robot.cli.bringup_commands",
+    "robot.cli.jog_prompt",
     "robot.cli.setup_maestro",
-    "robot.cli.servo_words",
+    "robot.cli.messages",
     "robot.cli.calibrate_joint",
-    "robot.cli.opened",
+    "robot.cli.open_port",
     "robot.cli.reboot",
     "robot.cli.setup",
     "robot.cli.scan",
@@ -52,9 +52,9 @@ TOP = {
     "robot.cli.tune",
     "robot.cli.replay",
     "robot.cli.report",
-    "robot.retune",
-    "robot.tuning",
-    "robot.recording.rerun",
+    "robot.app.live_params",
+    "robot.app.param_store",
+    "robot.app.resimulate",
 }
 
 # Vendor packages, and the only modules that may see each.
@@ -72,23 +72,23 @@ OWNERS = {
     "orjson": ("robot.recording.",),
     "matplotlib": ("robot.report.",),
     "jinja2": ("robot.report.",),
-    "aiohttp": ("robot.page.",),
+    "aiohttp": ("robot.dashboard.",),
     "ruamel": ("config.entries", "config.save"),
     "pydantic": ("config.",),
     "pydantic_core": ("config.",),
     "typer": ("robot.cli.",),
-    "viser": ("robot.page.",),
-    "PIL": ("robot.calibrate.charuco_page",),
+    "viser": ("robot.dashboard.",),
+    "PIL": ("robot.calibration.charuco_page",),
     "cv2": (
         "drivers.",
-        "robot.calibrate.camera_calibration",
-        "robot.calibrate.charuco_",
-        "robot.seeing.face_pose",
-        "robot.calibrate.hand_eye",
-        "robot.heatmap",
-        "robot.seeing.intrinsics",
-        "robot.page.",
-        "robot.seeing.track_filter",
+        "robot.calibration.camera_calibration",
+        "robot.calibration.charuco_",
+        "robot.perception.face_pose",
+        "robot.calibration.hand_eye",
+        "robot.analysis.heatmap",
+        "robot.perception.intrinsics",
+        "robot.dashboard.",
+        "robot.perception.kalman",
         "sim_mock.",
     ),
 }
@@ -171,9 +171,9 @@ def test_package_files_hold_a_docstring_and_nothing_else() -> None:
 
 
 def test_it_would_catch_a_wrong_arrow() -> None:
-    assert not room_allowed("gaze.head", "robot.loop")
+    assert not room_allowed("gaze.head", "robot.control.loop")
     assert not room_allowed("drivers.camera.webcam", "gaze.types")
-    assert not room_allowed("robot.loop", "sim_mock.scenes.registry.visitor")
-    assert not room_allowed("robot.loop", "config.schema")
-    assert not room_allowed("sim_mock.scenes.registry.visitor", "robot.loop")
-    assert room_allowed("sim_mock.cameras.detections", "robot.frames")
+    assert not room_allowed("robot.control.loop", "sim_mock.scenes.registry.visitor")
+    assert not room_allowed("robot.control.loop", "config.schema")
+    assert not room_allowed("sim_mock.scenes.registry.visitor", "robot.control.loop")
+    assert room_allowed("sim_mock.cameras.detections", "robot.model.frames")

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gazerig.robot.seeing.assignment import FORBIDDEN, likeliest_pairs
+from gazerig.robot.perception.data_association import FORBIDDEN, likeliest_pairs
 
 PRICES = st.sampled_from([0.0, 1.0, 2.5, 7.0, FORBIDDEN])
 COSTS = st.tuples(st.integers(1, 4), st.integers(1, 4)).flatmap(

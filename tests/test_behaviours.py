@@ -10,9 +10,9 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.assemble import Assembly, Choice, assemble
-from gazerig.robot.behaviours import Behaviours
-from gazerig.robot.loop import Tick, run
+from gazerig.robot.analysis.behaviour_score import Behaviours
+from gazerig.robot.app.assemble import Assembly, Choice, assemble
+from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.registry import scenes
 from gazerig.sim_mock.scenes.scene import Event, Person, Scene, Thing, there_and_back

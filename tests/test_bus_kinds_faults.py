@@ -16,10 +16,10 @@ from copied import copied
 from mixed_rig import mixed_text
 from struck_rigs import CASES, RIGS, Case, Machine, pair_of, quick, rig_of
 
-import gazerig.robot.assemble as assemble_module
+import gazerig.robot.app.assemble as assemble_module
 from gazerig.config.schema import load_rig
-from gazerig.robot.choice import Choice
-from gazerig.robot.rig_angles import limits
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.rig_limits import limits
 
 LEFT = {
     "dynamixel": {

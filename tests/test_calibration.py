@@ -8,7 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.config.rig import LidJoints
-from gazerig.robot.calibrate.calibration import (
+from gazerig.robot.calibration.endstop_search import (
+    STEPS_PER_DEG,
+    Stop,
+    StopSearch,
+    StopSearchParams,
+    go,
+    search,
+)
+from gazerig.robot.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
     Marks,
@@ -21,16 +29,8 @@ from gazerig.robot.calibrate.calibration import (
     lid_keys,
     middle,
 )
-from gazerig.robot.calibrate.stop_search import (
-    STEPS_PER_DEG,
-    Stop,
-    StopSearch,
-    StopSearchParams,
-    go,
-    search,
-)
-from gazerig.robot.joint import JointParams
-from gazerig.robot.types import JOINTS as EVERY
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.types import JOINTS as EVERY
 
 JOINT = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 TURN = 4096

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gazerig.robot.calibrate.board_views import Held, ViewParams, coverage, held
-from gazerig.robot.calibrate.camera_calibration import (
+from gazerig.robot.calibration.board_coverage import Held, ViewParams, coverage, held
+from gazerig.robot.calibration.camera_calibration import (
     CameraCalibrationRefused,
     LensCalibration,
     LensCalibrationParams,
     calibrate_lens,
 )
-from gazerig.robot.calibrate.charuco_board import CharucoBoard, SeenBoard
-from gazerig.robot.seeing.intrinsics import Intrinsics, intrinsics_of_view, project
+from gazerig.robot.calibration.charuco_board import CharucoBoard, SeenBoard
+from gazerig.robot.perception.intrinsics import Intrinsics, intrinsics_of_view, project
 from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
 from gazerig.sim_mock.cameras.charuco_scene import held_pose
 

@@ -10,17 +10,22 @@ from desk import JOINTS, LIDS
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.gaze.types import Angles3
-from gazerig.robot.calibrate.board_views import ViewParams
-from gazerig.robot.calibrate.camera_calibration import (
+from gazerig.robot.calibration.board_coverage import ViewParams
+from gazerig.robot.calibration.camera_calibration import (
     CameraCalibrationRefused,
     LensCalibrationParams,
 )
-from gazerig.robot.calibrate.camera_steps import LensSteps, NeckStepParams, neck_angles, neck_steps
-from gazerig.robot.calibrate.charuco_board import CharucoBoard
-from gazerig.robot.calibrate.hand_eye import camera_on_head
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.frames import CameraParams
-from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.calibration.camera_procedure import (
+    LensSteps,
+    NeckStepParams,
+    neck_angles,
+    neck_steps,
+)
+from gazerig.robot.calibration.charuco_board import CharucoBoard
+from gazerig.robot.calibration.hand_eye import camera_on_head
+from gazerig.robot.model.clock import SimulatedClock
+from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 BOARD = CharucoBoard()

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from gazerig.robot.cli.calibrations import app
+from gazerig.robot.cli.calibrate_group import app
 from gazerig.robot.cli.main import app as whole
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from gazerig.robot.cli.camera import app
+from gazerig.robot.cli.calibrate_camera import app
 
 run = CliRunner().invoke
 

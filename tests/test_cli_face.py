@@ -23,12 +23,12 @@ from typer.testing import CliRunner
 from gazerig.config.save import save_rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.audience import only_stops
-from gazerig.robot.cli import face as cli_face
-from gazerig.robot.cli.calibrations import app
-from gazerig.robot.cli.keys import BUTTONS, PageKeys, key_and_count, keys_of
-from gazerig.robot.orders import Ask, Jog, LookAt, Order, Resume, Stop
-from gazerig.robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.robot.app.run_observers import only_stops
+from gazerig.robot.cli import calibrate_face as cli_face
+from gazerig.robot.cli.calibrate_group import app
+from gazerig.robot.cli.key_input import BUTTONS, PageKeys, key_and_count, keys_of
+from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Resume, Stop
+from gazerig.robot.perception.face_pose import PARTS_FACE_M
 
 ROOT = Path(__file__).parents[1]
 DESK = ROOT / "config" / "rigs" / "desk.yaml"

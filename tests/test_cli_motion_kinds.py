@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
+from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.cli.messages import holding, left_alone
 from gazerig.robot.cli.motion import app
-from gazerig.robot.cli.servo_words import holding, left_alone
-from gazerig.robot.emulated_rig import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
 

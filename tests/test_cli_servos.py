@@ -12,8 +12,8 @@ from gazerig.config.save import copy_shipped, save_rig
 from gazerig.drivers.dynamixel.registers import Registers
 from gazerig.drivers.serial.list_ports import Host, SerialPort
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.robot.cli import bench
-from gazerig.robot.cli import servos as cli_servos
+from gazerig.robot.cli import bringup_commands as cli_servos
+from gazerig.robot.cli import progress as bench
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 

@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.list_ports import Host, SerialPort
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.robot.cli import bench
-from gazerig.robot.cli import servos as cli_servos
-from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.cli import bringup_commands as cli_servos
+from gazerig.robot.cli import progress as bench
 from gazerig.sim_mock.devices import FeetechLine, MaestroLine
 from gazerig.sim_mock.pty.client import PtyBus, PtyBuses
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -93,7 +93,7 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
         path = bus.start_device(MaestroLine(crc=True))
         board = SerialPort(path, "Pololu Mini Maestro", "1ffb:008a", None)
         monkeypatch.setattr(bench, "serial_ports", lambda host: (board,))
-        monkeypatch.setattr("gazerig.robot.cli.wires.serial_ports", lambda: (board,))
+        monkeypatch.setattr("gazerig.robot.cli.ports.serial_ports", lambda: (board,))
         for words in (
             ("scan", "--port", path, "--kind", "feetech"),
             ("scan", "--port", path, "--kind", "dynamixel"),

@@ -16,8 +16,8 @@ from typer.core import TyperGroup
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.cli.main import app
-from gazerig.robot.cli.start import next_steps
 from gazerig.robot.cli.terminal import DEBUG_LOGGER
+from gazerig.robot.cli.welcome import next_steps
 
 ADAPTER = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-U2D2")
 ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)

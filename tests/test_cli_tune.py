@@ -26,21 +26,23 @@ from gazerig.config.load import ConfigError
 from gazerig.config.save import copy_shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot import stop_latch
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.cli.entry_point import QUICK, is_quick
+from gazerig.robot.cli.entry_point import main as quick_main
 from gazerig.robot.cli.lead import app as lead_app
 from gazerig.robot.cli.lead import read_point
-from gazerig.robot.cli.quick import QUICK, is_quick
-from gazerig.robot.cli.quick import main as quick_main
 from gazerig.robot.cli.tune import app, read_pairs, read_value, state_lines
-from gazerig.robot.loop import Tick
-from gazerig.robot.loop import run as run_loop
-from gazerig.robot.remote.live_control import LiveControl
-from gazerig.robot.remote.running_rig import RunningRig, running
-from gazerig.robot.tuning import Tuning
+from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.loop import run as run_loop
+from gazerig.robot.model import stop_latch
+from gazerig.robot.remote.client import RunningRig, running
+from gazerig.robot.remote.live_server import LiveControl
 
-GAZERIG = "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.quick import main; main()"
+GAZERIG = (
+    "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.entry_point import main; main()"
+)
 SPEED = "gaze.saccade.max_speed_deg_s"
 RATE = "loop.rate_hz"
 PACE_S = 0.02  # real seconds a tick

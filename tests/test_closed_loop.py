@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.assemble import assemble, gaze_parts
-from gazerig.robot.choice import Choice
-from gazerig.robot.frames import NewestPose, PoseHistory
-from gazerig.robot.loop import Tick, run
+from gazerig.robot.app.assemble import assemble, gaze_parts
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.frames import NewestPose, PoseHistory
 from gazerig.sim_mock.cameras.rendered import PixelCameraParams
 from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S
 from gazerig.sim_mock.scenes.walks_past import HALF_WAY_M, WALK_M_S

@@ -10,18 +10,18 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
 from gazerig.robot.cli.report import app
-from gazerig.robot.loop import run
+from gazerig.robot.control.loop import run
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
-from gazerig.robot.report import build
-from gazerig.robot.report.about import About
-from gazerig.robot.report.bands import BY_KEY
+from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import chance, compare, corrected, differences_of
-from gazerig.robot.report.measured import Measured, mean, median
+from gazerig.robot.report.norm_bands import BY_KEY
+from gazerig.robot.report.run_header import About
+from gazerig.robot.report.statistics import Measured, mean, median
 
 SECONDS = 16.0
 DICE = np.random.default_rng(11)

@@ -8,10 +8,10 @@ import pytest
 from gazerig.config.confined import Confined
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.page.hear import PageHear
-from gazerig.robot.tuning import Tuning
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.dashboard.request_handler import PageHear
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_models import SERVOS
 from gazerig.robot.cli.examples import EXAMPLES
-from gazerig.robot.joint import JointParams
+from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.scenes.registry import scenes
 
 FOLDERS = ("config", "drivers", "gaze", "robot", "sim_mock")

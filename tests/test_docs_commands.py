@@ -15,8 +15,8 @@ import pytest
 from command_line import options, parse, typed
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, each_of_papers, spans
 
-from gazerig.robot.loop import Robot
-from gazerig.robot.remote.running_rig import RunningRig
+from gazerig.robot.control.loop import Robot
+from gazerig.robot.remote.client import RunningRig
 from gazerig.sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
 from gazerig.sim_mock.feetech.chain import COMMANDS as STS
 from gazerig.sim_mock.maestro.faults import COMMANDS as MAESTRO

@@ -7,6 +7,7 @@ from gazerig.drivers.errors import PortError
 from gazerig.drivers.feetech.memory_table import REGISTERS, TABLE_END
 from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
 from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.bus_search import Looked
 from gazerig.robot.bringup.doctor.checks import CHECKS, apply_fix, examine, take
 from gazerig.robot.bringup.doctor.dynamixel import READ
 from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
@@ -14,9 +15,8 @@ from gazerig.robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_late
 from gazerig.robot.bringup.doctor.run import apply_fixes, check, check_all, fix_latency, look
 from gazerig.robot.bringup.doctor.subject import ServoState
 from gazerig.robot.bringup.scan_report import remarks
-from gazerig.robot.bringup.searching import Looked
+from gazerig.robot.bringup.scan_text import grouped, summed_up, together
 from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH
-from gazerig.robot.bringup.servo_report import grouped, summed_up, together
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort

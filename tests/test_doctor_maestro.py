@@ -8,6 +8,7 @@ from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.maestro.line import Line
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.channel_test import sent_home
 from gazerig.robot.bringup.doctor.findings import worst
 from gazerig.robot.bringup.doctor.maestro import apply_fix, visit
 from gazerig.robot.bringup.doctor.run import apply_fixes
@@ -19,7 +20,6 @@ from gazerig.robot.bringup.maestro_settings import (
     start_limits,
     wide_range,
 )
-from gazerig.robot.bringup.maestro_sweep import sent_home
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
 

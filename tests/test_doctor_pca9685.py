@@ -19,7 +19,7 @@ from gazerig.drivers.pca9685.registers import (
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.doctor.findings import worst
 from gazerig.robot.bringup.doctor.pca9685 import visit
-from gazerig.robot.cli import servos as cli_servos
+from gazerig.robot.cli import bringup_commands as cli_servos
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pca9685.bridge import build_bridge
 

@@ -18,17 +18,17 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.gaze_recording import FixationTable, read_recording
-from gazerig.robot.kinematics import GeometryParams, Kinematics
-from gazerig.robot.loop import Tick, run
-from gazerig.robot.orders import Jog, Stop
+from gazerig.robot.analysis.eye_tracker_csv import FixationTable, read_recording
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.commands import Jog, Stop
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.export_bids import About, label_of, write_bids
 from gazerig.robot.recording.export_csv import EVENTS, columns, write_csv
 from gazerig.robot.recording.gaze_angles import Trace, in_space, trace_of
 from gazerig.robot.recording.gaze_labels import Labels, Stretch, labels_of, lag_of, stretches_of
-from gazerig.robot.types import JointState
 
 RATE_HZ = 200.0
 SETTLED_S = 3.0  # at the start the guard lets the eyes follow the plan only slowly

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gazerig.gaze.angles import add, compose, rotate, rotation
 from gazerig.gaze.types import PARTS, Angles3, Vec3
-from gazerig.robot.calibrate.face_calibration import (
+from gazerig.robot.calibration.face_calibration import (
     FARTHEST_MM,
     ORDER,
     PART_WORDS,
@@ -22,7 +22,7 @@ from gazerig.robot.calibrate.face_calibration import (
     point_world_m,
     pressed,
 )
-from gazerig.robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.robot.perception.face_pose import PARTS_FACE_M
 
 ANGLE = st.floats(-3.1, 3.1)
 TURN = st.tuples(ANGLE, st.floats(-1.5, 1.5), ANGLE)

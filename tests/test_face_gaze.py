@@ -5,8 +5,8 @@ from math import cos, radians, sin
 import pytest
 
 from gazerig.gaze.angles import rotation, sub, unit
-from gazerig.robot.face_gaze import on_face
-from gazerig.robot.planner import Planner
+from gazerig.robot.analysis.gaze_on_face import on_face
+from gazerig.robot.app.scripted_behaviour import Planner
 
 NOSE = (1.0, 0.2, 0.25)
 TOWARDS = rotation((radians(180.0), 0.0, 0.0))

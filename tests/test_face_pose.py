@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.gaze.types import PARTS
-from gazerig.robot.seeing.face_pose import (
+from gazerig.robot.perception.face_pose import (
     LANDMARKS_FACE_M,
     PARTS_FACE_M,
     FacePose,

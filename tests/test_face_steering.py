@@ -10,11 +10,11 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Bodies, Face, Percept, Target
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.calibrate.face_calibration import begun, point_world_m
-from gazerig.robot.calibrate.face_steering import AIMED_DEG, STALE_S, WAIT_S, FaceSteering
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.calibration.face_calibration import begun, point_world_m
+from gazerig.robot.calibration.face_steering import AIMED_DEG, STALE_S, WAIT_S, FaceSteering
+from gazerig.robot.control.loop import Tick
 from gazerig.sim_mock.scenes.sits_still import SitsStill
 
 RIG = load_rig("desk")

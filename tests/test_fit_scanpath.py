@@ -17,9 +17,9 @@ from gazerig.gaze.scanpath import (
     row_sums_note,
 )
 from gazerig.gaze.types import PARTS
-from gazerig.robot.fit_scanpath import fit
-from gazerig.robot.fixations import FixationParams, PartBoxes, fixations_of
-from gazerig.robot.gaze_recording import Samples, read_recording
+from gazerig.robot.analysis.eye_tracker_csv import Samples, read_recording
+from gazerig.robot.analysis.fit_scanpath import fit
+from gazerig.robot.analysis.fixations import FixationParams, PartBoxes, fixations_of
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import rotate
-from gazerig.robot.frames import (
+from gazerig.robot.model.frames import (
     CameraMount,
     CameraParams,
     LensParams,
@@ -19,8 +19,8 @@ from gazerig.robot.frames import (
     mounted_at,
     standing_still,
 )
-from gazerig.robot.joint import JointParams
-from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 
 KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
 

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, angle_between, norm, scale, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
-from gazerig.robot.seeing.intrinsics import intrinsics_of_lens, project
-from gazerig.robot.summary import cyclopean
+from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.perception.intrinsics import intrinsics_of_lens, project
 
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
 SECONDS, BEGIN_S, RATE_HZ = 24.0, 1.0, 10.0

@@ -10,19 +10,19 @@ import pytest
 from desk import JOINTS, LIDS
 
 from gazerig.gaze.types import Angles3
-from gazerig.robot.calibrate.camera_calibration import CameraCalibrationRefused
-from gazerig.robot.calibrate.camera_steps import neck_angles
-from gazerig.robot.calibrate.charuco_board import CharucoBoard, SeenBoard
-from gazerig.robot.calibrate.hand_eye import (
+from gazerig.robot.calibration.camera_calibration import CameraCalibrationRefused
+from gazerig.robot.calibration.camera_procedure import neck_angles
+from gazerig.robot.calibration.charuco_board import CharucoBoard, SeenBoard
+from gazerig.robot.calibration.hand_eye import (
     HandEye,
     HandEyeParams,
     NeckView,
     camera_on_head,
     turns_deg,
 )
-from gazerig.robot.frames import CameraParams
-from gazerig.robot.kinematics import GeometryParams, Kinematics
-from gazerig.robot.seeing.intrinsics import project
+from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.perception.intrinsics import project
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 BOARD = CharucoBoard()

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from gazerig.gaze.angles import angle_between, angles_of, norm, rotate, rotate_back, rotation, sub
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import GazeCommand
-from gazerig.robot.kinematics import GeometryParams, Kinematics
-from gazerig.robot.types import JointState
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.model.types import JointState
 
 GEOMETRY = GeometryParams(62.0, 38.0, 51.0)
 KINEMATICS = Kinematics(

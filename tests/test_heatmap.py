@@ -8,14 +8,14 @@ import pytest
 
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import PARTS
-from gazerig.robot.heatmap import (
+from gazerig.robot.analysis.heatmap import (
     density_s_m2,
     face_from,
     heatmap,
     share_per_part,
 )
-from gazerig.robot.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
-from gazerig.robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.perception.face_pose import PARTS_FACE_M
 
 MEDIA = Path(__file__).parents[2] / "shared" / "media"
 CENTRES = np.array([PARTS_FACE_M[part][1:] for part in PARTS])

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.drivers.types import DetectedFace, Detections
-from gazerig.robot.frames import CameraMount, CameraParams, LensParams, PoseHistory
-from gazerig.robot.kinematics import GeometryParams, Kinematics
-from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M
-from gazerig.robot.seeing.intrinsics import (
+from gazerig.robot.model.frames import CameraMount, CameraParams, LensParams, PoseHistory
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M
+from gazerig.robot.perception.intrinsics import (
     Intrinsics,
     fits,
     intrinsics_of_lens,
@@ -23,8 +23,8 @@ from gazerig.robot.seeing.intrinsics import (
     rays,
     undistorted,
 )
-from gazerig.robot.seeing.perception import Perception
-from gazerig.robot.seeing.tracks import Tracker, TrackParams
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker, TrackParams
 
 BENT = Intrinsics(480.0, 482.0, 327.0, 190.0, (-0.25, 0.09, 0.002, -0.001, -0.01))
 LENS = LensParams(640, 400, 480.0, 482.0, 327.0, 190.0, BENT.distortion)

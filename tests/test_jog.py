@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.dynamixel.bus import DynamixelBus
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.assemble import gaze_parts
-from gazerig.robot.body import Body
-from gazerig.robot.bringup.applied import Step
-from gazerig.robot.bringup.jog import JogParams, ManualControl, duration_s
+from gazerig.robot.app.assemble import gaze_parts
 from gazerig.robot.bringup.look_at import ends_reached, look_at
-from gazerig.robot.clock import SimulatedClock
+from gazerig.robot.bringup.manual_control import JogParams, ManualControl, duration_s
+from gazerig.robot.bringup.move_result import Step
+from gazerig.robot.control.body import Body
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort

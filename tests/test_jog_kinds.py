@@ -8,14 +8,14 @@ import pytest
 from mixed_rig import mixed_text
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.assemble import gaze_parts
-from gazerig.robot.body import Body
-from gazerig.robot.bringup.jog import JogParams, ManualControl
+from gazerig.robot.app.assemble import gaze_parts
+from gazerig.robot.app.bus_wiring import rig_bus
+from gazerig.robot.app.emulation import emulated_lines, place_of
+from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.bringup.look_at import ends_reached, look_at, met
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.emulated_rig import emulated_lines, place_of
-from gazerig.robot.rig_angles import limits, park_rad
-from gazerig.robot.rig_bus import rig_bus
+from gazerig.robot.bringup.manual_control import JogParams, ManualControl
+from gazerig.robot.control.body import Body
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort

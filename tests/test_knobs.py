@@ -20,8 +20,8 @@ from gazerig.config.knobs import (
 )
 from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.joint import JointParams
-from gazerig.robot.orders import Value
+from gazerig.robot.model.commands import Value
+from gazerig.robot.model.joint import JointParams
 
 RIG = load_rig("desk")
 KNOBS = knobs(RIG, RIG)

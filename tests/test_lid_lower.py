@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gazerig.gaze.lids import LidParams, Lids, Openings, Side
 from gazerig.gaze.types import GazeCommand
-from gazerig.robot.kinematics import GeometryParams, Kinematics
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 
 DT = 0.005
 AWAKE = 0.8

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from gazerig.gaze.lid_closing import closure
+from gazerig.gaze.blink_profile import closure
 from gazerig.gaze.lids import LidParams, Lids
 
 DT = 0.005

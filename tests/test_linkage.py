@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.joint import JointParams
-from gazerig.robot.linkage import Curve, Straight
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.transmission import Curve, Straight
 
 ROD = [[-30.0, 1900.0], [-10.0, 1640.0], [0.0, 1500.0], [15.0, 1350.0], [30.0, 1100.0]]
 MAKER = load_rig("maker")

@@ -9,10 +9,10 @@ import pytest
 
 from gazerig.config.load import ConfigError, Fault
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.orders import Order
-from gazerig.robot.remote.live_control import LiveControl
-from gazerig.robot.remote.running_rig import running
+from gazerig.robot.model.clock import SimulatedClock
+from gazerig.robot.model.commands import Order
+from gazerig.robot.remote.client import running
+from gazerig.robot.remote.live_server import LiveControl
 
 
 class Robot:

@@ -15,8 +15,8 @@ import pytest
 from gazerig.config.save import copy_shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.remote.running_rig import NoRig, Refused, RunningRig, running
-from gazerig.robot.remote.sockets import folder, sockets
+from gazerig.robot.remote.client import NoRig, Refused, RunningRig, running
+from gazerig.robot.remote.socket_io import folder, sockets
 
 RATE = "loop.rate_hz"
 ROOT = Path(__file__).parents[1]

@@ -11,6 +11,8 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.dynamixel.registers import Registers
 from gazerig.drivers.feetech.registers import StsRegisters
 from gazerig.drivers.maestro.commands import Speech
+from gazerig.robot.app.bus_wiring import bus_names
+from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.bringup.monitor import Monitor, as_json
 from gazerig.robot.bringup.telemetry import (
     DynamixelLooks,
@@ -19,9 +21,7 @@ from gazerig.robot.bringup.telemetry import (
     MaestroLooks,
     look_at_pulse,
 )
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.emulated_rig import emulated_lines
-from gazerig.robot.rig_bus import bus_names
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
 

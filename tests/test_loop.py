@@ -14,15 +14,15 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import PARTS
-from gazerig.robot.assemble import Assembly, Choice, assemble
-from gazerig.robot.clock import RealClock, SimulatedClock
-from gazerig.robot.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.kinematics import GeometryParams, Kinematics
-from gazerig.robot.loop import LoopParams, Tick, run
-from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
-from gazerig.robot.seeing.perception import Perception
-from gazerig.robot.seeing.tracks import Sighting, Tracker, TrackParams
-from gazerig.robot.types import Verdict
+from gazerig.robot.app.assemble import Assembly, Choice, assemble
+from gazerig.robot.control.loop import LoopParams, Tick, run
+from gazerig.robot.model.clock import RealClock, SimulatedClock
+from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.model.types import Verdict
+from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Sighting, Tracker, TrackParams
 from gazerig.sim_mock.scenes.visitor import Visitor
 
 

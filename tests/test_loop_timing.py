@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gazerig.robot.page.loop_timing import OVER_S, LoopTiming
-from gazerig.robot.types import Timing
+from gazerig.robot.dashboard.loop_timing import OVER_S, LoopTiming
+from gazerig.robot.model.types import Timing
 
 
 def timed(times_s: list[float], rate_hz: float = 200.0) -> Timing:

@@ -6,7 +6,7 @@ from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.maestro.line import Line
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.maestro_sweep import SLOW_STEPS_S, Place, walk
+from gazerig.robot.bringup.channel_test import SLOW_STEPS_S, Place, walk
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board

@@ -10,8 +10,8 @@ from gazerig.drivers.dynamixel.registers import Registers
 from gazerig.robot.bringup.monitor import Monitor, as_json
 from gazerig.robot.bringup.servo_families import DYNAMIXEL
 from gazerig.robot.bringup.telemetry import DynamixelLooks, look
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.joint import JointParams
+from gazerig.robot.model.clock import SimulatedClock
+from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec

@@ -34,8 +34,8 @@ from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
 from gazerig.gaze.pursuit import Pursuit, PursuitParams
 from gazerig.gaze.saccade import Saccade, SaccadeParams
 from gazerig.gaze.types import Angles2, GazeCommand, GazeState, Target, Vec3
-from gazerig.robot.kinematics import GeometryParams, Kinematics
-from gazerig.robot.types import JointState
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.model.types import JointState
 
 DT = 0.005
 CENTRED = GeometryParams(0.0, 0.0, 0.0)

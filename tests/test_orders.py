@@ -11,10 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
-from gazerig.robot.orders import (
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.session import leave
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.commands import (
     Ask,
     Jog,
     LookAt,
@@ -27,7 +28,6 @@ from gazerig.robot.orders import (
     check,
     from_json,
 )
-from gazerig.robot.session import leave
 
 YAW = JOINTS.index("neck_yaw")
 

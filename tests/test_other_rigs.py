@@ -8,9 +8,9 @@ import pytest
 from mixed_rig import mixed_text
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
 
 
 def ran(rig: Rig, seconds: float, seed: int = 0) -> tuple[Assembly, list[Tick], tuple[str, ...]]:
@@ -110,7 +110,7 @@ def test_true_servos_keep_to_their_joints_ranges(tmp_path: Path) -> None:
     """What the emulated shafts do, not what anybody believes of them."""
     rig = rig_of("mixed", tmp_path)
     made = assemble(rig, Choice(mock=True, fast=True, seed=1, scene="boxing"))
-    from gazerig.robot.emulated_rig import place_of
+    from gazerig.robot.app.emulation import place_of
 
     ports = [share.bus._port for share in made.robot.body.bus._shares]  # type: ignore[attr-defined]
     devices = dict(zip(("", "neck", "tilt"), (port.chain for port in ports), strict=True))

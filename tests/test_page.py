@@ -32,9 +32,9 @@ from six_joints import of_six
 from websockets.sync.client import connect
 
 from gazerig.gaze.types import PART_NAMES, PARTS
-from gazerig.robot.page.link import Page, pack, unpack
-from gazerig.robot.page.picture import encode
-from gazerig.robot.types import SeenBody, SeenFace, Snapshot
+from gazerig.robot.dashboard.camera_overlay import encode
+from gazerig.robot.dashboard.page_process import Page, pack, unpack
+from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 T = TypeVar("T")
 PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes

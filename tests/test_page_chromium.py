@@ -24,15 +24,15 @@ from gazerig.config.confined import Confined
 from gazerig.config.load import ConfigError, shipped
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
-from gazerig.robot.assemble import assemble
-from gazerig.robot.audience import Audience, Told, Wished
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import LoopCount, Tick
-from gazerig.robot.orders import Ask, LookAt, Renew, Stop
-from gazerig.robot.page.view import _HALF_WIDTH as HALF_WIDTH
-from gazerig.robot.page.view import VIEWS
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.app.run_observers import Audience, Told, Wished
+from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.dashboard.page_main import _HALF_WIDTH as HALF_WIDTH
+from gazerig.robot.dashboard.page_main import VIEWS
+from gazerig.robot.model.commands import Ask, LookAt, Renew, Stop
 from gazerig.robot.recording.run_info import RunInfo
-from gazerig.robot.tuning import Tuning
 
 
 def load_browser() -> ModuleType:

@@ -20,13 +20,13 @@ from six_joints import SIX, of_six
 from gazerig.config.knobs import knobs, values
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
-from gazerig.robot.orders import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_json
-from gazerig.robot.page.controls import LeadView
-from gazerig.robot.page.ear import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
-from gazerig.robot.page.feed import TuningFeed
-from gazerig.robot.page.hear import PAGE, PageHear
-from gazerig.robot.page.jog import MEASURED, RECKONED, JogView, measured_table
-from gazerig.robot.page.knob import (
+from gazerig.robot.dashboard.control_tabs import LeadView
+from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
+from gazerig.robot.dashboard.jog_panel import MEASURED, RECKONED, JogView, measured_table
+from gazerig.robot.dashboard.outbox import Teller
+from gazerig.robot.dashboard.page_main import News, drain
+from gazerig.robot.dashboard.page_process import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
+from gazerig.robot.dashboard.param_control import (
     KnobControl,
     PageKnob,
     hint,
@@ -37,12 +37,12 @@ from gazerig.robot.page.knob import (
     step_of,
     written,
 )
-from gazerig.robot.page.link import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
-from gazerig.robot.page.tell import Teller
-from gazerig.robot.page.tuning import found, group_of
-from gazerig.robot.page.view import News, drain
-from gazerig.robot.remote.requests import plain
-from gazerig.robot.types import Snapshot
+from gazerig.robot.dashboard.param_feed import TuningFeed
+from gazerig.robot.dashboard.param_panel import found, group_of
+from gazerig.robot.dashboard.request_handler import PAGE, PageHear
+from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_json
+from gazerig.robot.model.types import Snapshot
+from gazerig.robot.remote.request_handler import plain
 
 PATIENCE_S = 20.0
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

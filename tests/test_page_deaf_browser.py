@@ -18,10 +18,10 @@ from page_visitor import LOOKING, Visitor
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from gazerig.robot.orders import Stop, as_json
-from gazerig.robot.page.link import Page
-from gazerig.robot.page.picture import encode
-from gazerig.robot.types import Snapshot
+from gazerig.robot.dashboard.camera_overlay import encode
+from gazerig.robot.dashboard.page_process import Page
+from gazerig.robot.model.commands import Stop, as_json
+from gazerig.robot.model.types import Snapshot
 
 PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -21,13 +21,13 @@ from page_visitor import LOOKING
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from gazerig.robot.page.asked import from_browser
-from gazerig.robot.page.browsers import Places
-from gazerig.robot.page.connections import MOST as MOST_CONNECTIONS
-from gazerig.robot.page.door import MOST_LINES, Door
-from gazerig.robot.page.rate import Rate
-from gazerig.robot.page.server import FROM_BROWSER_BYTES, browser_of, open_server
-from gazerig.robot.page.stop_line import StopListener, StopSender
+from gazerig.robot.dashboard.auth_proxy import MOST_LINES, Door
+from gazerig.robot.dashboard.browser_requests import from_browser
+from gazerig.robot.dashboard.browsers import Places
+from gazerig.robot.dashboard.connection_limits import MOST as MOST_CONNECTIONS
+from gazerig.robot.dashboard.stop_channel import StopListener, StopSender
+from gazerig.robot.dashboard.token_bucket import Rate
+from gazerig.robot.dashboard.viser_server import FROM_BROWSER_BYTES, browser_of, open_server
 
 PATIENCE_S = 20.0
 VISER = [f"viser-v{viser.__version__}"]

@@ -8,14 +8,14 @@ import pytest
 from desk import JOINTS
 
 from gazerig.gaze.types import PARTS
-from gazerig.robot.heatmap_face import on_canvas
-from gazerig.robot.page.dwell import BIN_S, BINS, Dwell
-from gazerig.robot.page.face_map import HIGH_PX, SHRINK, WIDE_PX, FaceMap, gaze_on_face
-from gazerig.robot.page.fields import field_edge
-from gazerig.robot.page.saccades import KEPT, MainSequence
-from gazerig.robot.page.timeline import STRIP_S, Timeline
-from gazerig.robot.report.human import fastest_peak, slowest_peak
-from gazerig.robot.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
+from gazerig.robot.analysis.heatmap_face import on_canvas
+from gazerig.robot.dashboard.dwell_chart import BIN_S, BINS, Dwell
+from gazerig.robot.dashboard.event_timeline import STRIP_S, Timeline
+from gazerig.robot.dashboard.gaze_map import HIGH_PX, SHRINK, WIDE_PX, FaceMap, gaze_on_face
+from gazerig.robot.dashboard.main_sequence_chart import KEPT, MainSequence
+from gazerig.robot.dashboard.view_frusta import field_edge
+from gazerig.robot.model.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
+from gazerig.robot.report.human_norms import fastest_peak, slowest_peak
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 FACING = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))

@@ -11,9 +11,16 @@ from desk import JOINTS
 from six_joints import SIX, TELLS_NOTHING, of_six
 
 from gazerig.gaze.types import Pull
-from gazerig.robot.page.ghost import GhostView
-from gazerig.robot.page.head import HeadView
-from gazerig.robot.page.health import (
+from gazerig.robot.dashboard.attention_panel import pulls, winner
+from gazerig.robot.dashboard.commanded_pose import GhostView
+from gazerig.robot.dashboard.head_model import HeadView
+from gazerig.robot.dashboard.html import AMBER, RED
+from gazerig.robot.dashboard.joint_charts import Traces, TracesView
+from gazerig.robot.dashboard.outbox import Teller
+from gazerig.robot.dashboard.overlays import Layers, LayersView
+from gazerig.robot.dashboard.page_main import News, View
+from gazerig.robot.dashboard.panel import PanelView
+from gazerig.robot.dashboard.servo_health import (
     NO_FEEDBACK,
     health,
     servo_table,
@@ -21,14 +28,7 @@ from gazerig.robot.page.health import (
     strain_of_load,
     strain_of_voltage,
 )
-from gazerig.robot.page.layers import Layers, LayersView
-from gazerig.robot.page.panel import PanelView
-from gazerig.robot.page.style import AMBER, RED
-from gazerig.robot.page.tell import Teller
-from gazerig.robot.page.traces import Traces, TracesView
-from gazerig.robot.page.view import News, View
-from gazerig.robot.page.why import pulls, winner
-from gazerig.robot.types import (
+from gazerig.robot.model.types import (
     Ghost,
     SeenCamera,
     SeenFixation,

@@ -11,10 +11,7 @@ from six_joints import RECKONED_RAD, SIX, WISH_RAD, of_six
 
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
-from gazerig.robot.page.link import MESSAGE_BYTES
-from gazerig.robot.page.mesh import Mesh, cap, ellipsoid, lid, ring, turned
-from gazerig.robot.page.people import fixated_part
-from gazerig.robot.page.picture import (
+from gazerig.robot.dashboard.camera_overlay import (
     FARTHEST_M,
     NEAREST_M,
     PICTURE_WIDTH_PX,
@@ -23,11 +20,21 @@ from gazerig.robot.page.picture import (
     encode,
     ground,
 )
-from gazerig.robot.page.place import along, quaternion, turned_up, upright_along
-from gazerig.robot.page.status import drawn_together, status
-from gazerig.robot.page.traces import GROUPS, MOST_POINTS, Group, Traces, groups_of, mean_deg
-from gazerig.robot.types import JOINTS as EVERY_JOINT
-from gazerig.robot.types import SeenFace, Snapshot, Trail
+from gazerig.robot.dashboard.joint_charts import (
+    GROUPS,
+    MOST_POINTS,
+    Group,
+    Traces,
+    groups_of,
+    mean_deg,
+)
+from gazerig.robot.dashboard.mesh import Mesh, cap, ellipsoid, lid, ring, turned
+from gazerig.robot.dashboard.page_process import MESSAGE_BYTES
+from gazerig.robot.dashboard.people import fixated_part
+from gazerig.robot.dashboard.scene_node import along, quaternion, turned_up, upright_along
+from gazerig.robot.dashboard.status import drawn_together, status
+from gazerig.robot.model.types import JOINTS as EVERY_JOINT
+from gazerig.robot.model.types import SeenFace, Snapshot, Trail
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

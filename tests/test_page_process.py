@@ -19,9 +19,9 @@ import pytest
 from desk import JOINTS
 from page_visitor import LOOKING, Visitor, said
 
-from gazerig.robot.page.link import Page
-from gazerig.robot.page.view import free_port as first_free_port
-from gazerig.robot.types import SeenFace, Snapshot
+from gazerig.robot.dashboard.page_main import free_port as first_free_port
+from gazerig.robot.dashboard.page_process import Page
+from gazerig.robot.model.types import SeenFace, Snapshot
 
 T = TypeVar("T")
 REPOSITORY = Path(__file__).parents[1]
@@ -99,8 +99,10 @@ def page_process(parent: int) -> int | None:
             state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
         except OSError:  # it has ended meanwhile
             continue
-        if b"gazerig.robot.page.view" in words and state != "Z":
-            _fd, _stop_fd, its_parent, *_ = words[words.index(b"gazerig.robot.page.view") + 1 :]
+        if b"gazerig.robot.dashboard.page_main" in words and state != "Z":
+            _fd, _stop_fd, its_parent, *_ = words[
+                words.index(b"gazerig.robot.dashboard.page_main") + 1 :
+            ]
             if int(its_parent) == parent:
                 return int(entry.name)
     return None
@@ -115,9 +117,10 @@ def in_time(work: Callable[[], None]) -> bool:
 
 def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
     check = (
-        "import gazerig.robot.page.link, sys; sys.exit(bool({'viser', 'cv2'} & set(sys.modules)))"
+        "import gazerig.robot.dashboard.page_process, sys;"
+        "sys.exit(bool({'viser', 'cv2'} & set(sys.modules)))"
     )
-    assert subprocess.run([sys.executable, "-c", check], cwd=REPOSITORY).returncode == 0
+    assert subprocess.run([sys.executable, "-c", check]).returncode == 0
 
 
 def test_unopened_page_drops() -> None:
@@ -261,7 +264,7 @@ def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
 
 PARENT = """
 import os, sys, time
-from gazerig.robot.page.link import Page
+from gazerig.robot.dashboard.page_process import Page
 page = Page("127.0.0.1", int(sys.argv[1]))
 page.open()
 while page.url() is None:

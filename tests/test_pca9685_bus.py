@@ -19,8 +19,8 @@ from gazerig.drivers.pca9685.release import stop_pulses
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.serial.port_owner import refuse_owner
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pca9685.bridge import build_bridge

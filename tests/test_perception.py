@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Angles3, Mat3, Percept, Vec3
-from gazerig.robot.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
-from gazerig.robot.seeing.head_turn_residual import HeadTurnResidual, Seen, turning_rad_s
-from gazerig.robot.seeing.intrinsics import intrinsics_of_view, project
-from gazerig.robot.seeing.perception import Perception
-from gazerig.robot.seeing.sightings import Box, Reading
-from gazerig.robot.seeing.tracks import Tracker, TrackParams
+from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.perception.egomotion_residual import HeadTurnResidual, Seen, turning_rad_s
+from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
+from gazerig.robot.perception.intrinsics import intrinsics_of_view, project
+from gazerig.robot.perception.localisation import Box, Reading
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker, TrackParams
 
 WIDTH, HEIGHT = 640, 400
 LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)

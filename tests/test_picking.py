@@ -10,11 +10,11 @@ from desk import JOINTS
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Bodies, Face, Percept, Vec3
-from gazerig.robot.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.kinematics import GeometryParams, Kinematics
-from gazerig.robot.loop import Tick
-from gazerig.robot.page.picking import USUAL_M, Picking, distance_m
-from gazerig.robot.seeing.intrinsics import intrinsics_of_view, project
+from gazerig.robot.control.loop import Tick
+from gazerig.robot.dashboard.click_to_look import USUAL_M, Picking, distance_m
+from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.perception.intrinsics import intrinsics_of_view, project
 
 CAMERA = CameraParams(position_mm=(20.0, 0.0, 45.0), horizontal_field_deg=70.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -11,11 +11,11 @@ from gazerig.drivers.vision.face_mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face_params import FaceDetectorParams
 from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.types import Angles3, Mat3, Vec3
-from gazerig.robot.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M, face_pose
-from gazerig.robot.seeing.intrinsics import intrinsics_of_view, project
-from gazerig.robot.seeing.perception import Perception
-from gazerig.robot.seeing.tracks import Tracker, TrackParams
+from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M, face_pose
+from gazerig.robot.perception.intrinsics import intrinsics_of_view, project
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker, TrackParams
 from gazerig.sim_mock.cameras.canvas import Picture3d, Sheet
 from gazerig.sim_mock.cameras.draw_person import (
     LOOKS,

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.calibrate.calibration import CalibrationRefused, changes
-from gazerig.robot.calibrate.places import angle_now, between, likely_angle, places
-from gazerig.robot.joint import JointParams
+from gazerig.robot.calibration.joint_calibration import CalibrationRefused, changes
+from gazerig.robot.calibration.linkage_calibration import angle_now, between, likely_angle, places
+from gazerig.robot.model.joint import JointParams
 
 MAKER = load_rig("maker")
 PAN, LID = MAKER.joints["eyes_pan"], MAKER.joints["left_lower_lid"]

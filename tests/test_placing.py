@@ -8,12 +8,12 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.maestro.commands import Speech
-from gazerig.robot.bringup.hobby_servo import SPEED_US_S, OneHobby
-from gazerig.robot.bringup.single_joint import Stopped
-from gazerig.robot.calibrate.calibration import CalibrationRefused
-from gazerig.robot.calibrate.placing import LEAD_US, HobbyPlacer, Steered, by_places
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.emulated_rig import emulated_lines
+from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.calibration.hobby_access import SPEED_US_S, OneHobby
+from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.calibration.joint_calibration import CalibrationRefused
+from gazerig.robot.calibration.linkage_procedure import LEAD_US, HobbyPlacer, Steered, by_places
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
 
@@ -59,7 +59,7 @@ class Bench:
         finally:
             self.hobby.let_go()
 
-    # gazerig.robot.calibrate.placing.Steerer
+    # gazerig.robot.calibration.linkage_procedure.Steerer
 
     def tell(self, line: str) -> None:
         self.said.append(line)

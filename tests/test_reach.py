@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.assemble import assemble, gaze_parts
-from gazerig.robot.choice import Choice
-from gazerig.robot.gaze_error import gaze_error
-from gazerig.robot.loop import run
-from gazerig.robot.orders import Jog, LookAt
-from gazerig.robot.reach import look_reply
-from gazerig.robot.reply import Reply
-from gazerig.robot.rig_angles import limits
-from gazerig.robot.types import JointAngles, JointState
+from gazerig.robot.app.assemble import assemble, gaze_parts
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.rig_limits import limits
+from gazerig.robot.control.loop import run
+from gazerig.robot.control.reachability import look_reply
+from gazerig.robot.model.commands import Jog, LookAt
+from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.reply import Reply
+from gazerig.robot.model.types import JointAngles, JointState
 
 RIGS = ("desk", "feetech", "maker")
 DT_S = 0.01

@@ -21,19 +21,19 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot import lead, stop_latch
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.clock import RealClock
-from gazerig.robot.loop import Robot, Tick
-from gazerig.robot.orders import Tune, Value
-from gazerig.robot.remote import server as server_module
-from gazerig.robot.remote import sockets as remote_socket
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Robot, Tick
+from gazerig.robot.model import lead, stop_latch
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.commands import Tune, Value
+from gazerig.robot.remote import socket_io as remote_socket
+from gazerig.robot.remote import socket_server as server_module
 from gazerig.robot.remote.budget import Budget, Rate
-from gazerig.robot.remote.requests import Pulse, Requests
-from gazerig.robot.remote.running_rig import NoRig, Refused, RigGone, RunningRig, running
-from gazerig.robot.remote.server import RemoteServer
-from gazerig.robot.remote.sockets import REQUEST_BYTES
+from gazerig.robot.remote.client import NoRig, Refused, RigGone, RunningRig, running
+from gazerig.robot.remote.request_handler import Pulse, Requests
+from gazerig.robot.remote.socket_io import REQUEST_BYTES
+from gazerig.robot.remote.socket_server import RemoteServer
 
 RATE = "loop.rate_hz"
 BLINKS = "gaze.lids.blinks_per_min"
@@ -418,7 +418,7 @@ def test_a_huge_request_is_refused_and_hung_up_on(rig: RunningRig, folder: Path)
 def test_an_endless_request_is_refused_and_hung_up_on(
     rig: RunningRig, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gazerig.robot.remote.server._REST_S", 0.2)
+    monkeypatch.setattr("gazerig.robot.remote.socket_server._REST_S", 0.2)
     with raw(folder) as end:
         end.sendall(b'{"do": "characters"}\n')
         assert "ok" in line_of(end)
@@ -449,7 +449,7 @@ def test_two_requests_in_one_piece_get_two_answers(rig: RunningRig, folder: Path
 def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
     rig: RunningRig, folder: Path, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gazerig.robot.remote.server._TAKES_S", 0.2)
+    monkeypatch.setattr("gazerig.robot.remote.socket_server._TAKES_S", 0.2)
     with raw(folder) as end:
         ticks = len(beat.ticks)
         with contextlib.suppress(OSError):
@@ -615,9 +615,9 @@ def test_without_a_runtime_folder_it_is_one_of_the_user_in_tmp(tmp_path: Path) -
 
 LISTENS = """
 import os, sys
-from gazerig.robot.clock import RealClock
-from gazerig.robot.remote.requests import Pulse, Requests
-from gazerig.robot.remote.server import RemoteServer
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.remote.request_handler import Pulse, Requests
+from gazerig.robot.remote.socket_server import RemoteServer
 server = RemoteServer(Requests(None, None, Pulse(RealClock()), {}), print)
 server.open()
 print("open", flush=True)
@@ -699,7 +699,7 @@ def test_a_rig_that_ends_while_asked_is_gone_in_words(folder: Path) -> None:
 def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gazerig.robot.remote.running_rig._ANSWER_S", 0.1)
+    monkeypatch.setattr("gazerig.robot.remote.client._ANSWER_S", 0.1)
     folder.mkdir(mode=0o700)
     with remote_socket.listen(folder / "77.sock"), RunningRig.connect() as rig:
         for _ in range(2):

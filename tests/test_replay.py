@@ -16,22 +16,22 @@ from typer.testing import CliRunner
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
 from gazerig.robot.cli import replay as cli_replay
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.loop import Tick, run
-from gazerig.robot.orders import Ask
-from gazerig.robot.page.ear import MESSAGE_BYTES
-from gazerig.robot.page.link import PICTURE, REPLAY, SNAPSHOT, unpack
-from gazerig.robot.page.replay import ReplayView, clock, event_list, strip
-from gazerig.robot.recording.frames import Frames
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.dashboard.inbox import MESSAGE_BYTES
+from gazerig.robot.dashboard.page_process import PICTURE, REPLAY, SNAPSHOT, unpack
+from gazerig.robot.dashboard.replay import ReplayView, clock, event_list, strip
+from gazerig.robot.model.clock import SimulatedClock
+from gazerig.robot.model.commands import Ask
 from gazerig.robot.recording.gaze_angles import trace_of
-from gazerig.robot.recording.player import State
+from gazerig.robot.recording.playback_clock import State
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.replay import Replay, introduction
 from gazerig.robot.recording.run_info import RunInfo, versions
+from gazerig.robot.recording.snapshot_index import Frames
 
 SECONDS = 6.0
 RATE_HZ = 200.0

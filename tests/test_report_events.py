@@ -11,12 +11,12 @@ from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.saccade import Saccade as Jumps
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.types import Vec3
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.report.blink_finder import BlinkFinder
-from gazerig.robot.report.gathered import Gathered, Gathering
-from gazerig.robot.report.gaze_events import Blink, Fixation, GazeEvents, Saccade
+from gazerig.robot.report.event_detector import Blink, Fixation, GazeEvents, Saccade
+from gazerig.robot.report.gaze_trace import Gathered, Gathering
 from gazerig.robot.report.saccade_finder import Jump, SaccadeFinder
 
 SECONDS = 40.0

@@ -14,18 +14,18 @@ from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import BusHealth
 from gazerig.gaze.types import Percept
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
-from gazerig.robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune
-from gazerig.robot.recording.moment import Engaged, Measured, Moment, Refused
-from gazerig.robot.recording.played_back import PlayedBody
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.resimulate import Rerun, recorded_rig, rerun
+from gazerig.robot.app.session import leave
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Resume, Stop, Tune
+from gazerig.robot.recording.playback_devices import PlayedBody
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.rerun import Rerun, recorded_rig, rerun
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text
 from gazerig.robot.recording.run_writer import RunWriter
-from gazerig.robot.session import leave
+from gazerig.robot.recording.tick_record import Engaged, Measured, Moment, Refused
 
 NECK_YAW = 6
 Asked = dict[int, tuple[Order, ...]]

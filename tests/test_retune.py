@@ -16,10 +16,10 @@ from desk import JOINTS
 from gazerig.config.knobs import NEXT_START, Knob, changed, knobs, value_of
 from gazerig.config.load import ConfigError, shipped, shipped_names
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
-from gazerig.robot.orders import Jog, Resume, Stop, Tune, Value, as_json, from_json
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.commands import Jog, Resume, Stop, Tune, Value, as_json, from_json
 
 RIG = load_rig("desk")
 DT_S = 1.0 / 200.0

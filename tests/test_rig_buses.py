@@ -10,8 +10,8 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.multi_bus import MixedBus
-from gazerig.robot.choice import Choice
-from gazerig.robot.rig_bus import bus_names, joints_on, ports_of, rig_setups
+from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
+from gazerig.robot.app.options import Choice
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
 
 
 def test_one_bus_is_itself_and_several_are_one(mixed: Rig) -> None:
-    from gazerig.robot.assemble import assemble
+    from gazerig.robot.app.assemble import assemble
 
     made = assemble(mixed, Choice(mock=True, fast=True, seed=0, scene="visitor"))
     assert isinstance(made.robot.body.bus, MixedBus)

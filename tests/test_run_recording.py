@@ -25,16 +25,16 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import BusHealth, Detections
 from gazerig.gaze.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
-from gazerig.robot import stop_latch
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
 from gazerig.robot.cli.main import app
 from gazerig.robot.cli.terminal import BAD_INPUT, FAULT, _writer
-from gazerig.robot.loop import Tick, run
-from gazerig.robot.orders import Ask, Jog, LookAt, Order, Resume, Stop, Tune
-from gazerig.robot.page.picture import encode
-from gazerig.robot.recording import moment as moments
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.dashboard.camera_overlay import encode
+from gazerig.robot.model import stop_latch
+from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Resume, Stop, Tune
 from gazerig.robot.recording import run_format as fmt
+from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.picture_encoder import PictureEncoder
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
@@ -535,7 +535,7 @@ def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) ->
 def test_what_the_queue_cannot_hold_is_lost_and_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gazerig.robot.recording.writer_link.QUEUE_BYTES", 150_000)
+    monkeypatch.setattr("gazerig.robot.recording.writer_client.QUEUE_BYTES", 150_000)
     made = assembly()
     path = tmp_path / "lost.mcap"
     recorder = Recorder(path, info_for(made), lambda: BusHealth(0, 0, {}))

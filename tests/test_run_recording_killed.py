@@ -17,9 +17,9 @@ RIG = """
 import sys
 from pathlib import Path
 from gazerig.config.schema import load_rig
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.clock import RealClock
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
 

@@ -10,8 +10,8 @@ from desk import JOINTS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gazerig.robot.model.types import JointState, Verdict
 from gazerig.robot.safety.guard import Guard, GuardParams, JointLimit
-from gazerig.robot.types import JointState, Verdict
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
+from gazerig.robot.model.types import JointState
 from gazerig.robot.safety.collisions import CollisionParams
-from gazerig.robot.types import JointState
 
 ROOM = Path(__file__).parents[1] / "robot" / "safety"
 PARTS = ("motion", "stuck", "health", "collisions", "late_ticks", "guard")

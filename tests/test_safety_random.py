@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from gazerig.robot.model.types import JointState
 from gazerig.robot.safety.collisions import CollisionParams
 from gazerig.robot.safety.guard import Guard, GuardParams, JointLimit
-from gazerig.robot.types import JointState
 
 Array = NDArray[np.float64]
 Row = tuple[float, ...]

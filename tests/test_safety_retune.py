@@ -10,9 +10,9 @@ import pytest
 from desk import JOINTS
 from numpy.typing import NDArray
 
+from gazerig.robot.model.types import JointState
 from gazerig.robot.safety.collisions import CollisionParams
 from gazerig.robot.safety.guard import Guard, GuardParams, JointLimit
-from gazerig.robot.types import JointState
 
 DT_S = 0.005
 GENTLE = GuardParams(gentle_ms=50.0)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
+from gazerig.robot.model.types import JointState, Verdict
 from gazerig.robot.safety.guard import Guard, GuardParams, JointLimit
-from gazerig.robot.safety.stuck import StuckParams
-from gazerig.robot.types import JointState, Verdict
+from gazerig.robot.safety.stall_detector import StuckParams
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))

@@ -5,7 +5,7 @@ import pytest
 
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Vec3
-from gazerig.robot.frames import CameraMount, CameraParams
+from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 

@@ -3,7 +3,7 @@
 import pytest
 
 from gazerig.drivers.dynamixel.discovery import COMMON_FIRST
-from gazerig.robot.bringup.searching import (
+from gazerig.robot.bringup.bus_search import (
     BOARD_RATES,
     Looked,
     found_of,

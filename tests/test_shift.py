@@ -5,7 +5,7 @@ from math import radians
 import pytest
 
 from gazerig.gaze.pursuit import Slip
-from gazerig.gaze.shift import ShiftParams, ShiftRule
+from gazerig.gaze.saccade_trigger import ShiftParams, ShiftRule
 
 
 def slip(error_deg: float, slip_deg_s: float = 0.0) -> Slip:

@@ -7,14 +7,14 @@ import pytest
 
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing, SetupError
 from gazerig.robot.bringup.servo_families import kind_of
-from gazerig.robot.bringup.single_joint import SingleJoint, Stopped
-from gazerig.robot.bringup.smart_servo import SmartServo
-from gazerig.robot.calibrate.calibrating import by_hand, by_motion
-from gazerig.robot.calibrate.calibration import CalibrationRefused
-from gazerig.robot.calibrate.placing import HandPlacer, Steered, by_places
-from gazerig.robot.calibrate.stop_search import STEPS_PER_DEG, StopSearchParams
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.joint import JointParams
+from gazerig.robot.calibration.endstop_search import STEPS_PER_DEG, StopSearchParams
+from gazerig.robot.calibration.joint_access import SingleJoint, Stopped
+from gazerig.robot.calibration.joint_calibration import CalibrationRefused
+from gazerig.robot.calibration.joint_procedure import by_hand, by_motion
+from gazerig.robot.calibration.linkage_procedure import HandPlacer, Steered, by_places
+from gazerig.robot.calibration.smart_servo_access import SmartServo
+from gazerig.robot.model.clock import SimulatedClock
+from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -73,7 +73,7 @@ class Bench:
         self.port.faults.command(text.format(id=self.id))
         self.clock.sleep_until(self.clock.now_s() + 0.1)
 
-    # gazerig.robot.calibrate.calibrating.Person
+    # gazerig.robot.calibration.joint_procedure.Person
 
     def tell(self, line: str) -> None:
         self.said.append(line)

@@ -18,31 +18,31 @@ from six_joints import SIX
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
-from gazerig.robot.page.link import unpack
+from gazerig.robot.analysis.summary import Summary
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.app.session import leave
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.dashboard.page_process import unpack
 from gazerig.robot.recording.export_bids import About as Subject
 from gazerig.robot.recording.export_bids import write_bids
 from gazerig.robot.recording.export_csv import columns, write_csv
-from gazerig.robot.recording.frames import Frames
 from gazerig.robot.recording.gaze_angles import trace_of
 from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
-from gazerig.robot.recording.moment import as_json, flat, from_json
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.rerun import rerun
 from gazerig.robot.recording.run_format import HEALTH, PERCEPT, TICK, Message
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text
 from gazerig.robot.recording.run_writer import RunWriter
-from gazerig.robot.remote.requests import Pulse
-from gazerig.robot.report import build
-from gazerig.robot.report.about import About
+from gazerig.robot.recording.snapshot_index import Frames
+from gazerig.robot.recording.tick_record import as_json, flat, from_json
+from gazerig.robot.remote.request_handler import Pulse
+from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import compare
-from gazerig.robot.report.gathered import Gathered, Gathering
-from gazerig.robot.report.run_joints import UPPER, RunJoints, openings
-from gazerig.robot.session import leave
-from gazerig.robot.summary import Summary
+from gazerig.robot.report.gaze_trace import Gathered, Gathering
+from gazerig.robot.report.joint_basis import UPPER, RunJoints, openings
+from gazerig.robot.report.run_header import About
 
 STARTED = "2026-01-31T12:00:00+00:00"
 NO_MORE = {

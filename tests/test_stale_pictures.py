@@ -12,10 +12,10 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.types import Camera, Detections
 from gazerig.gaze.angles import angle_between, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot import assemble as assembling
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
+from gazerig.robot.app import assemble as assembling
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
 GONE_S, BACK_S, END_S = 2.0, 9.0, 12.0

@@ -15,9 +15,9 @@ import pytest
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.bringup.single_joint import Stopped
-from gazerig.robot.cli.person import Lines
-from gazerig.robot.cli.steering import SteeringPerson
+from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.cli.jog_prompt import SteeringPerson
+from gazerig.robot.cli.prompts import Lines
 
 ROOT = Path(__file__).parents[1]
 

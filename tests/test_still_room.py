@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.robot import assemble as assembling
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
+from gazerig.robot.app import assemble as assembling
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
 SECONDS = 3.0

@@ -8,7 +8,7 @@ import pytest
 from test_cli_face import DESK, PATIENCE_S, Sitting
 
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.remote.running_rig import Refused, RunningRig
+from gazerig.robot.remote.client import Refused, RunningRig
 
 
 def goes_on(running: RunningRig) -> None:

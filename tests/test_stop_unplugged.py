@@ -9,13 +9,13 @@ import pytest
 from bus_kinds import KINDS, Twin, in_process
 from mixed_rig import mixed_text
 
-import gazerig.robot.assemble as assemble_module
+import gazerig.robot.app.assemble as assemble_module
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import BusLost
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
-from gazerig.robot.orders import Resume, Stop
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.commands import Resume, Stop
 from gazerig.sim_mock.device import Device
 
 RIGS = ("desk", "feetech", "maker", "mixed")

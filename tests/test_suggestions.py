@@ -11,10 +11,10 @@ from test_cli_servos import SMALL
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
+from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.cli.main import app
 from gazerig.robot.cli.suggestions import completed, speaking_of
 from gazerig.robot.cli.terminal import _writer
-from gazerig.robot.emulated_rig import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBus
 
 DESK = Path(__file__).parents[1] / "config/rigs/desk.yaml"

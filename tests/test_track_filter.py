@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gazerig.robot.seeing.track_filter import Restlessness, TrackFilter
+from gazerig.robot.perception.kalman import Restlessness, TrackFilter
 
 FINE = 0.002**2 * np.eye(3)
 DT_S = 1.0 / 30.0

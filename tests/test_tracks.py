@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.robot.seeing.track_filter import far_off
-from gazerig.robot.seeing.tracks import Sighting, Track, Tracker, TrackParams, blended
+from gazerig.robot.perception.kalman import far_off
+from gazerig.robot.perception.tracker import Sighting, Track, Tracker, TrackParams, blended
 
 CAMERA = (0.0, 0.0, 0.2)
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

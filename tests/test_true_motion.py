@@ -15,7 +15,7 @@ from mixed_rig import mixed_text
 from true_shafts import Bench, Judge, restless
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.rig_angles import limits
+from gazerig.robot.app.rig_limits import limits
 
 NAMES = ("desk", "feetech", "maker", "mixed")
 BEYOND_DEG = 0.5

@@ -11,10 +11,10 @@ import pytest
 from gazerig.config.knobs import values
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.orders import Order, Tune
-from gazerig.robot.tuning import Tuning
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.model.commands import Order, Tune
 
 DESK = Path("config/rigs/desk.yaml")
 NOW = datetime(2026, 1, 31, 23, 59, 59)

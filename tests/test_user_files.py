@@ -15,10 +15,10 @@ from gazerig.config.schema import load_rig, load_rules, load_walk
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
 from gazerig.drivers.file_output import output_file, output_text, refuse_existing, write_file
-from gazerig.robot.gaze_recording import read_recording
-from gazerig.robot.heatmap import face_from
+from gazerig.robot.analysis.eye_tracker_csv import read_recording
+from gazerig.robot.analysis.heatmap import face_from
 from gazerig.robot.remote.file_watch import look
-from gazerig.robot.report.written import write_all
+from gazerig.robot.report.files import write_all
 
 SECRET = "root:$6$abcdefgh:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n"
 

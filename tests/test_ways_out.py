@@ -13,17 +13,17 @@ from typing import Any
 import pytest
 from attack.ways_out import START, attack, bench
 
-import gazerig.robot.assemble as assemble_module
+import gazerig.robot.app.assemble as assemble_module
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, SetupError
-from gazerig.robot import session
-from gazerig.robot.assemble import Assembly, assemble
+from gazerig.robot.analysis.summary import Summary
+from gazerig.robot.app import session
+from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.cli.line_writer import LineWriter
 from gazerig.robot.cli.run import had_faults
-from gazerig.robot.interrupts import SAME_REQUEST_S, Interrupts
-from gazerig.robot.loop import Robot
-from gazerig.robot.power_down import PowerDown
-from gazerig.robot.summary import Summary
+from gazerig.robot.control.interrupts import SAME_REQUEST_S, Interrupts
+from gazerig.robot.control.loop import Robot
+from gazerig.robot.control.power_down import PowerDown
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
 

@@ -13,17 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import gazerig.robot.assemble as assemble_module
+import gazerig.robot.app.assemble as assemble_module
 from gazerig.config.schema import Rig
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.body import Body
-from gazerig.robot.choice import Choice
-from gazerig.robot.clock import SimulatedClock
-from gazerig.robot.emulated_rig import emulated_lines, place_of
-from gazerig.robot.rig_angles import limits, park_rad
-from gazerig.robot.rig_bus import rig_bus
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.bus_wiring import rig_bus
+from gazerig.robot.app.emulation import emulated_lines, place_of
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.rig_limits import limits, park_rad
+from gazerig.robot.control.body import Body
+from gazerig.robot.model.clock import SimulatedClock
+from gazerig.robot.model.types import JointAngles
 from gazerig.robot.safety.guard import Guard
-from gazerig.robot.types import JointAngles
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -33,7 +33,7 @@ SPEED_MS, ACCEL_MS = 5, 10
 PULSE_MS = 20
 GROUPS = {"eye": "eyes", "lid": "lids", "neck": "neck"}
 STOP_DEG = 4.0
-"""Emulated mechanical stops lie so far beyond a joint's range (robot/emulated_rig.py)."""
+"""Emulated mechanical stops lie so far beyond a joint's range (robot/app/emulation.py)."""
 
 
 def group_of(joint: str) -> str:

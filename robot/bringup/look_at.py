@@ -9,12 +9,12 @@ from gazerig.gaze.angles import angle_between, norm, sub
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.types import GazeState, Target, Vec3
-from gazerig.robot.bringup.applied import Moved, Step
-from gazerig.robot.bringup.jog import ManualControl
-from gazerig.robot.gaze_error import gaze_error
-from gazerig.robot.joint import JointParams
-from gazerig.robot.kinematics import Kinematics
-from gazerig.robot.types import JointAngles, JointState
+from gazerig.robot.bringup.manual_control import ManualControl
+from gazerig.robot.bringup.move_result import Moved, Step
+from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.types import JointAngles, JointState
 
 AT_END_DEG = 1.0
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from gazerig.robot.bringup.telemetry import Look, Looks
-from gazerig.robot.joint import JointParams
+from gazerig.robot.model.joint import JointParams
 
 _DIGITS = {"goal_deg": 2, "position_deg": 2, "velocity_deg_s": 1, "load": 3}
 

@@ -15,7 +15,7 @@ from gazerig.drivers.feetech.protocol import REBOOT, instruction
 from gazerig.drivers.feetech.registers import StsRegisters
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import SERVOS
-from gazerig.robot.bringup.servo_kind import Driving, Scanned, ServoKind, Setting
+from gazerig.robot.bringup.servo_family import Driving, Scanned, ServoKind, Setting
 
 XL430_LOAD_FULL = 1000.0
 """Models without current measurement give their load in 0.1 % of the stall torque there."""

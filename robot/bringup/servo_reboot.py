@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
-from gazerig.robot.bringup.servo_kind import TRIES, Found, ServoKind
+from gazerig.robot.bringup.servo_family import TRIES, Found, ServoKind
 
 BACK_S = 3.0
 """A servo that is not back after so long will not come; they take about 0.4 to 0.8 s."""

@@ -15,7 +15,7 @@ from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.servo_kind import TRIES, Found, ServoKind, Tell
+from gazerig.robot.bringup.servo_family import TRIES, Found, ServoKind, Tell
 
 SHARED, ANSWERS = 2, 6
 """So many of so many answers in pieces are no accident."""

@@ -26,7 +26,7 @@ from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.robot.bringup.servo_families import DYNAMIXEL
-from gazerig.robot.joint import JointParams
+from gazerig.robot.model.joint import JointParams
 
 # 116 goal position | 120 tick, 122 moving, 123 status, 124 pwm | 126 current, 128 velocity,
 # 132 position | 136, 140 trajectory | 144 voltage, 146 temperature: no gap between them

@@ -12,9 +12,9 @@ from rich.table import Table
 from gazerig.config.save import copy_shipped, propose, rig_file, save_rig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.bringup.single_joint import Stopped
-from gazerig.robot.calibrate.calibration import Value, changes
-from gazerig.robot.calibrate.stop_search import StopSearchParams
+from gazerig.robot.calibration.endstop_search import StopSearchParams
+from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.calibration.joint_calibration import Value, changes
 from gazerig.robot.cli.calibrate_joint import (
     Bench,
     By,
@@ -24,10 +24,10 @@ from gazerig.robot.cli.calibrate_joint import (
     measure,
     refuse_impossible,
 )
-from gazerig.robot.cli.person import Lines
-from gazerig.robot.cli.steering import SteeringPerson
+from gazerig.robot.cli.jog_prompt import SteeringPerson
+from gazerig.robot.cli.ports import MockOption, PortOption, wires
+from gazerig.robot.cli.prompts import Lines
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
-from gazerig.robot.cli.wires import MockOption, PortOption, wires
 
 
 def calibrate_joints(

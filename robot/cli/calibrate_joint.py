@@ -8,24 +8,24 @@ from typing import NamedTuple
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.i2c.port import port_of
-from gazerig.robot.bringup.hobby_servo import OneHobby
-from gazerig.robot.bringup.servo_access import OneServo
-from gazerig.robot.bringup.single_joint import SingleJoint
-from gazerig.robot.bringup.smart_servo import SmartServo
-from gazerig.robot.calibrate.calibrating import by_hand, by_motion
-from gazerig.robot.calibrate.calibration import Calibration, CalibrationRefused, Places
-from gazerig.robot.calibrate.placing import HandPlacer, HobbyPlacer, by_places
-from gazerig.robot.calibrate.stop_search import StopSearchParams
-from gazerig.robot.cli.opened import opened
-from gazerig.robot.cli.steering import SteeringPerson
+from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
+from gazerig.robot.calibration.endstop_search import StopSearchParams
+from gazerig.robot.calibration.hobby_access import OneHobby
+from gazerig.robot.calibration.joint_access import SingleJoint
+from gazerig.robot.calibration.joint_calibration import Calibration, CalibrationRefused, Places
+from gazerig.robot.calibration.joint_procedure import by_hand, by_motion
+from gazerig.robot.calibration.linkage_procedure import HandPlacer, HobbyPlacer, by_places
+from gazerig.robot.calibration.servo_access import OneServo
+from gazerig.robot.calibration.smart_servo_access import SmartServo
+from gazerig.robot.cli.jog_prompt import SteeringPerson
+from gazerig.robot.cli.open_port import opened
+from gazerig.robot.cli.ports import Wires
 from gazerig.robot.cli.terminal import say
-from gazerig.robot.cli.wires import Wires
-from gazerig.robot.clock import RealClock
+from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.power_down import PowerDown
 from gazerig.robot.guardian.guarded_servo import GuardedServo
 from gazerig.robot.guardian.guardian import Guardian
-from gazerig.robot.interrupts import Interrupts
-from gazerig.robot.power_down import PowerDown
-from gazerig.robot.rig_bus import bus_names, joints_on, release_plan
+from gazerig.robot.model.clock import RealClock
 
 Made = Calibration | Places
 
@@ -83,7 +83,7 @@ def measure(bench: Bench, names: Sequence[str]) -> Measured:
 
     Raises:
         SetupError: a port cannot be opened, or there are no answers left.
-        gazerig.robot.bringup.single_joint.Stopped: somebody wants it to end.
+        gazerig.robot.calibration.joint_access.Stopped: somebody wants it to end.
     """
     found: dict[str, Made] = {}
     refused: list[str] = []
@@ -229,7 +229,7 @@ def _warn_of_neck(name: str, person: SteeringPerson) -> None:
     """Ask before something as heavy as a head moves by itself.
 
     Raises:
-        gazerig.robot.calibrate.calibration.CalibrationRefused: the answer was no.
+        gazerig.robot.calibration.joint_calibration.CalibrationRefused: the answer was no.
     """
     if not name.startswith("neck"):
         return

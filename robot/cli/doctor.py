@@ -8,6 +8,7 @@ import typer
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.serial.port import BusPort
+from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
 from gazerig.robot.bringup.doctor import maestro as doctor_maestro
 from gazerig.robot.bringup.doctor import pca9685 as doctor_pca9685
 from gazerig.robot.bringup.doctor import run as checkup
@@ -15,14 +16,13 @@ from gazerig.robot.bringup.doctor.checks import apply_fix
 from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
 from gazerig.robot.bringup.doctor.guardian import examine_guardian
 from gazerig.robot.bringup.doctor.run import Done
+from gazerig.robot.bringup.scan_text import as_plain, grouped, summed_up
 from gazerig.robot.bringup.servo_families import KINDS
-from gazerig.robot.bringup.servo_report import as_plain, grouped, summed_up
-from gazerig.robot.cli import bench as bench
-from gazerig.robot.cli.bench import JsonOption, console, progress, wipe
+from gazerig.robot.cli import progress as bench
+from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, setups_on, wires
+from gazerig.robot.cli.progress import JsonOption, console, progress, wipe
 from gazerig.robot.cli.suggestions import completed
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors
-from gazerig.robot.cli.wires import MockOption, PortOption, bus_label, setups_on, wires
-from gazerig.robot.rig_bus import has_watchdog, release_plan
 
 app = typer.Typer()
 

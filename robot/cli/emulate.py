@@ -12,8 +12,8 @@ import typer
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.servo_models import BusKind
+from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.cli.terminal import clear_errors
-from gazerig.robot.emulated_rig import emulated_lines
 from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
 from gazerig.sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.line import BusSettings

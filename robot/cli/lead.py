@@ -9,8 +9,8 @@ import typer
 
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli.terminal import FAULT, clear_errors, say
-from gazerig.robot.clock import RealClock
-from gazerig.robot.remote.running_rig import RunningRig, running
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.remote.client import RunningRig, running
 
 app = typer.Typer()
 _LEADS_EVERY_S = 0.2

@@ -13,16 +13,15 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.file_input import read_limited
 from gazerig.drivers.file_output import write_file
 from gazerig.drivers.serial.list_ports import serial_ports
+from gazerig.robot.cli import bringup_commands as cli_servos
 from gazerig.robot.cli import emulate as cli_emulate
 from gazerig.robot.cli import motion as cli_motion
 from gazerig.robot.cli import record as cli_record
 from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.cli import report as cli_report
 from gazerig.robot.cli import run as cli_run
-from gazerig.robot.cli import servos as cli_servos
 from gazerig.robot.cli import tune as cli_tune
 from gazerig.robot.cli.examples import add_examples
-from gazerig.robot.cli.start import next_steps
 from gazerig.robot.cli.terminal import (
     DEBUG_LOGGER,
     ForceOption,
@@ -31,7 +30,8 @@ from gazerig.robot.cli.terminal import (
     run_app,
     say,
 )
-from gazerig.robot.remote.running_rig import running
+from gazerig.robot.cli.welcome import next_steps
+from gazerig.robot.remote.client import running
 
 app = typer.Typer(
     invoke_without_command=True,
@@ -75,8 +75,8 @@ def fit_scanpath(
 ) -> None:
     """Fit a walk over the face to an eye-tracker recording, as YAML that run takes."""
     with clear_errors():
-        from gazerig.robot import fit_scanpath as fitting
-        from gazerig.robot.fixations import PartBoxes
+        from gazerig.robot.analysis import fit_scanpath as fitting
+        from gazerig.robot.analysis.fixations import PartBoxes
 
         boxes = load(parts, PartBoxes) if parts is not None else None
         say(fitting.fit(recording, boxes, out, smoothing, seed, force))

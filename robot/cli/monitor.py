@@ -15,6 +15,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.dynamixel.registers import Registers
 from gazerig.drivers.feetech.registers import StsRegisters
 from gazerig.drivers.serial.port import BusPort
+from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.bringup.monitor import Monitor, Sample, as_json
 from gazerig.robot.bringup.telemetry import (
     DynamixelLooks,
@@ -24,12 +25,11 @@ from gazerig.robot.bringup.telemetry import (
     MaestroLooks,
     Pca9685Looks,
 )
-from gazerig.robot.cli.opened import opened
+from gazerig.robot.cli.open_port import opened
+from gazerig.robot.cli.ports import MockOption, PortOption, Wires, wires
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, signals
-from gazerig.robot.cli.wires import MockOption, PortOption, Wires, wires
-from gazerig.robot.clock import RealClock
-from gazerig.robot.joint import JointParams
-from gazerig.robot.rig_bus import bus_names
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.joint import JointParams
 
 app = typer.Typer()
 

@@ -11,20 +11,20 @@ import typer
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.body import Body
-from gazerig.robot.bringup.applied import PASSING, Moved, Step
-from gazerig.robot.bringup.jog import JogParams, ManualControl, parked, refuse_beyond
+from gazerig.robot.app.bus_wiring import guarded_rig_bus
+from gazerig.robot.app.rig_limits import lid_ends, limits, park_rad
 from gazerig.robot.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
-from gazerig.robot.bus_events import drawn_together
-from gazerig.robot.cli import calibrations as cli_calibrations
+from gazerig.robot.bringup.manual_control import JogParams, ManualControl, parked, refuse_beyond
+from gazerig.robot.bringup.move_result import PASSING, Moved, Step
+from gazerig.robot.cli import calibrate_group as cli_calibrations
 from gazerig.robot.cli import monitor as cli_monitor
-from gazerig.robot.cli.servo_words import holding, left_alone
+from gazerig.robot.cli.messages import holding, left_alone
+from gazerig.robot.cli.ports import MockOption, PortOption, RigOption, Wires, wires
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
-from gazerig.robot.cli.wires import MockOption, PortOption, RigOption, Wires, wires
-from gazerig.robot.clock import RealClock
-from gazerig.robot.power_down import PowerDown
-from gazerig.robot.rig_angles import lid_ends, limits, park_rad
-from gazerig.robot.rig_bus import guarded_rig_bus
+from gazerig.robot.control.body import Body
+from gazerig.robot.control.event_text import drawn_together
+from gazerig.robot.control.power_down import PowerDown
+from gazerig.robot.model.clock import RealClock
 from gazerig.robot.safety.guard import Guard
 
 app = typer.Typer()
@@ -113,7 +113,7 @@ def look_at_command(
         loaded = load_rig(rig)
         # Imports vision as well, so only this command does, and before the torque is on: in
         # that time the servos' watchdog would trip.
-        from gazerig.robot.assemble import gaze_parts
+        from gazerig.robot.app.assemble import gaze_parts
 
         kinematics, oculomotor = gaze_parts(loaded, seed)
     with _commanded(loaded, _Way(mock, port, yes, rig), 20.0, hold, not no_park) as control:

@@ -9,15 +9,15 @@ from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.maestro.line import Line
 from gazerig.drivers.pca9685.release import stop_pulses
 from gazerig.drivers.serial.port import BusPort
+from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.bringup import servo_reboot as servo_reboot
-from gazerig.robot.bringup.maestro_sweep import sent_home
+from gazerig.robot.bringup.channel_test import sent_home
 from gazerig.robot.bringup.servo_families import KINDS
-from gazerig.robot.bringup.servo_kind import ServoKind
-from gazerig.robot.cli.bench import YesOption, to_open
+from gazerig.robot.bringup.servo_family import ServoKind
+from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, wires
+from gazerig.robot.cli.progress import YesOption, to_open
 from gazerig.robot.cli.terminal import FAULT, clear_errors, say
-from gazerig.robot.cli.wires import MockOption, PortOption, bus_label, wires
-from gazerig.robot.clock import RealClock
-from gazerig.robot.rig_bus import bus_names, joints_on
+from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer()
 

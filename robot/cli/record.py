@@ -12,7 +12,7 @@ from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.source import PictureSource
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.cli.terminal import clear_errors, say, signals, status
-from gazerig.robot.clock import RealClock
+from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer(add_completion=False)
 

@@ -17,11 +17,11 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing
 from gazerig.robot.cli.run import host_port
 from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, say, signals
-from gazerig.robot.loop import Tick
+from gazerig.robot.control.loop import Tick
 
 if TYPE_CHECKING:
-    from gazerig.robot.page.snapshot import ShownRig
-    from gazerig.robot.recording.rerun import Rerun
+    from gazerig.robot.app.resimulate import Rerun
+    from gazerig.robot.dashboard.snapshot import ShownRig
 
 app = typer.Typer(add_completion=False)
 
@@ -96,7 +96,7 @@ def _export(
     file: Path, bids: bool, out: Path | None, subject: str | None, task: str | None, force: bool
 ) -> None:
     """Write one kind of export and say what was written."""
-    from gazerig.robot.reckoned import RECKONED
+    from gazerig.robot.control.feedback_basis import RECKONED
     from gazerig.robot.recording.export_bids import About, write_bids
     from gazerig.robot.recording.export_csv import csv_files, write_csv
     from gazerig.robot.recording.gaze_angles import trace_of
@@ -149,12 +149,12 @@ def _show(
     stopped: Callable[[], str | None],
 ) -> bool:
     """Serve the page until told to stop; False where it cannot be had."""
-    from gazerig.robot.clock import RealClock
-    from gazerig.robot.page.link import Page
-    from gazerig.robot.recording.frames import Frames
-    from gazerig.robot.recording.player import State
+    from gazerig.robot.dashboard.page_process import Page
+    from gazerig.robot.model.clock import RealClock
+    from gazerig.robot.recording.playback_clock import State
     from gazerig.robot.recording.read import RunRecording, used
     from gazerig.robot.recording.replay import Replay
+    from gazerig.robot.recording.snapshot_index import Frames
 
     recording, clock = RunRecording(file), RealClock()
     _warn(recording.note)
@@ -199,9 +199,9 @@ def _built(config_yaml: str) -> "ShownRig | None":
     """Return how the recorded rig was built; None, with a word why, where nobody can tell."""
     from gazerig.config.load import ConfigError, load
     from gazerig.config.schema import Rig
-    from gazerig.robot.assemble import gaze_parts
-    from gazerig.robot.frames import CameraMount
-    from gazerig.robot.page.snapshot import ShownRig
+    from gazerig.robot.app.assemble import gaze_parts
+    from gazerig.robot.dashboard.snapshot import ShownRig
+    from gazerig.robot.model.frames import CameraMount
 
     with TemporaryDirectory() as folder:
         file = Path(folder) / "recorded.yaml"
@@ -227,8 +227,8 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
 
     Only joints as recorded can come out the same; nothing else was then to change.
     """
+    from gazerig.robot.app.resimulate import rerun
     from gazerig.robot.recording.read import RunRecording, used
-    from gazerig.robot.recording.rerun import rerun
 
     recording = RunRecording(file)
     with used(file), _progress("running again", recording.duration_s) as read:

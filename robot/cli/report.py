@@ -21,12 +21,12 @@ from gazerig.robot.cli.terminal import ForceOption, clear_errors, say, signals
 if TYPE_CHECKING:
     from gazerig.config.schema import Rig
     from gazerig.gaze.scanpath import Walk
-    from gazerig.robot.assemble import Assembly
-    from gazerig.robot.choice import Choice
+    from gazerig.robot.app.assemble import Assembly
+    from gazerig.robot.app.options import Choice
     from gazerig.robot.recording.read import RunRecording
-    from gazerig.robot.report.about import About
-    from gazerig.robot.report.gathered import Gathered, Gathering
-    from gazerig.robot.report.measured import Finding
+    from gazerig.robot.report.gaze_trace import Gathered, Gathering
+    from gazerig.robot.report.run_header import About
+    from gazerig.robot.report.statistics import Finding
 
 app = typer.Typer(add_completion=False)
 
@@ -69,9 +69,9 @@ def report(
         if (file is None) == (scene is None):
             raise SetupError("report takes a recording, or --scene NAME: one of them")
         # Drawing and models are heavy; `--help` does without them.
-        from gazerig.robot.report.build import report_of
+        from gazerig.robot.report.files import numbers_file
         from gazerig.robot.report.page import banner
-        from gazerig.robot.report.written import numbers_file
+        from gazerig.robot.report.report import report_of
 
         target = page_file(out or _beside(file, scene))
         refuse_existing(target, numbers_file(target), force=force)
@@ -79,7 +79,7 @@ def report(
             if file is not None:
                 about, run = _recorded(file, file.stem, tell)
             else:
-                from gazerig.robot.choice import Choice
+                from gazerig.robot.app.options import Choice
 
                 choice = Choice(True, True, seed, scene, scanpath=scanpath, saccade=saccade)
                 layers = _Layers(rig, character, profile)
@@ -105,7 +105,7 @@ def compare(
         from gazerig.robot.recording.read import RunRecording, used
         from gazerig.robot.report.compare import LEVEL
         from gazerig.robot.report.compare import compare as comparing
-        from gazerig.robot.report.written import numbers_file
+        from gazerig.robot.report.files import numbers_file
 
         target = page_file(out)
         refuse_existing(target, numbers_file(target), force=force)
@@ -131,7 +131,7 @@ def compare(
 def _recorded(file: Path, name: str, tell: _Tell) -> "tuple[About, Gathered]":
     """Read a recorded run."""
     from gazerig.robot.recording.read import RunRecording, used
-    from gazerig.robot.report.build import read
+    from gazerig.robot.report.report import read
 
     recording = RunRecording(file)
     about = _about(recording, name)
@@ -148,8 +148,8 @@ def _simulated(
 ) -> "tuple[About, Gathered]":
     """Run a scene in simulated time."""
     from gazerig.config.schema import load_rig, load_walk
-    from gazerig.robot.assemble import assemble, chosen
-    from gazerig.robot.report.gathered import Gathering
+    from gazerig.robot.app.assemble import assemble, chosen
+    from gazerig.robot.report.gaze_trace import Gathering
 
     rig = load_rig(*layers)
     made, gathering = assemble(rig, choice), Gathering()
@@ -174,8 +174,8 @@ def _run(
     made: "Assembly", gathering: "Gathering", seconds: float, conversation: str | None, tell: _Tell
 ) -> None:
     """Let the head look for so long; Ctrl-C ends the run early."""
-    from gazerig.robot.loop import Tick, run
-    from gazerig.robot.planner import Planner
+    from gazerig.robot.app.scripted_behaviour import Planner
+    from gazerig.robot.control.loop import Tick, run
 
     words, scene = f"simulating {seconds:.0f} s", made.scene
     planner = Planner(scene.behaviour, made.robot.ask) if scene is not None else None
@@ -207,7 +207,7 @@ def _run(
 
 def _about(recording: "RunRecording", name: str) -> "About":
     """Describe a recorded run."""
-    from gazerig.robot.report.about import About
+    from gazerig.robot.report.run_header import About
 
     info = recording.info
     known = (
@@ -260,8 +260,8 @@ def _described(
     walk: "Walk",
 ) -> "About":
     """Add to a run's description the style of its gaze."""
-    from gazerig.robot.report.about import About
-    from gazerig.robot.report.model import own
+    from gazerig.robot.report.reference_walk import own
+    from gazerig.robot.report.run_header import About
 
     gaze = rig.gaze
     styles = (

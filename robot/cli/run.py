@@ -17,12 +17,12 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing, write_file
 from gazerig.robot.cli.examples import complete_scene, complete_shipped
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
-from gazerig.robot.joint_faults import JointFault
+from gazerig.robot.control.joint_faults import JointFault
 
 if TYPE_CHECKING:
-    from gazerig.robot.assemble import Assembly
-    from gazerig.robot.audience import Told
-    from gazerig.robot.choice import Choice
+    from gazerig.robot.app.assemble import Assembly
+    from gazerig.robot.app.options import Choice
+    from gazerig.robot.app.run_observers import Told
 
 app = typer.Typer()
 
@@ -118,9 +118,9 @@ def run(
     """Run the head: gazerig run --mock, then open the page it names."""
     with clear_errors(rig, port, mock):
         # Vision and emulator are heavy; `check` and `--help` do without them.
-        from gazerig.robot import session
-        from gazerig.robot.assemble import assemble
-        from gazerig.robot.audience import Wished
+        from gazerig.robot.app import session
+        from gazerig.robot.app.assemble import assemble
+        from gazerig.robot.app.run_observers import Wished
 
         address = host_port(page)
         refuse_existing(*_written_at_the_end(heatmap, summary), force=force)
@@ -172,9 +172,9 @@ def _told(
     pictures_hz: float,
 ) -> "Told":
     """Gather what tuning and recording must know of the command line."""
-    from gazerig.robot.audience import Told
+    from gazerig.robot.app.param_store import Tuning
+    from gazerig.robot.app.run_observers import Told
     from gazerig.robot.recording.run_info import RunInfo, versions
-    from gazerig.robot.tuning import Tuning
 
     def info() -> RunInfo:
         whole = made.retuner.rig

@@ -20,15 +20,15 @@ from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU, is_i2c
 from gazerig.drivers.servo_models import BusKind
+from gazerig.robot.bringup.bus_search import RATES, Looked, found_of, known_kinds, plan, search
 from gazerig.robot.bringup.doctor.port import name_ports
 from gazerig.robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
-from gazerig.robot.bringup.searching import RATES, Looked, found_of, known_kinds, plan, search
 from gazerig.robot.bringup.servo_families import KINDS
-from gazerig.robot.cli import bench as bench
-from gazerig.robot.cli.bench import JsonOption, console
+from gazerig.robot.cli import progress as bench
+from gazerig.robot.cli.ports import MockOption, wires
+from gazerig.robot.cli.progress import JsonOption, console
 from gazerig.robot.cli.suggestions import completed
 from gazerig.robot.cli.terminal import FAULT, clear_errors, say
-from gazerig.robot.cli.wires import MockOption, wires
 
 app = typer.Typer()
 

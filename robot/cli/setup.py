@@ -10,14 +10,14 @@ from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
+from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.bringup import servo_setup as servo_setup
 from gazerig.robot.bringup.servo_families import KINDS
-from gazerig.robot.bringup.servo_kind import ServoKind
-from gazerig.robot.cli.bench import YesOption, progress, to_open, wipe
+from gazerig.robot.bringup.servo_family import ServoKind
+from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, setups_on, wires
+from gazerig.robot.cli.progress import YesOption, progress, to_open, wipe
 from gazerig.robot.cli.setup_maestro import set_up_board, write_settings
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
-from gazerig.robot.cli.wires import MockOption, PortOption, bus_label, setups_on, wires
-from gazerig.robot.rig_bus import bus_names
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 

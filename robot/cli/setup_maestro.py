@@ -21,12 +21,12 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.channel_test import FINE_STEPS, Place, walk
 from gazerig.robot.bringup.maestro_settings import clipped, instructions, settings_file
-from gazerig.robot.bringup.maestro_sweep import FINE_STEPS, Place, walk
-from gazerig.robot.cli import bench as bench
+from gazerig.robot.cli import progress as bench
 from gazerig.robot.cli.terminal import say, signals
-from gazerig.robot.clock import RealClock
-from gazerig.robot.joint import JointParams
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.joint import JointParams
 
 WIGGLE_DEG = 5.0
 QUICK_STEPS_S = 90.0 / 360.0 * 16_000.0

@@ -19,7 +19,7 @@ from gazerig.config.load import ConfigError, shipped_names
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from gazerig.robot.cli.line_writer import LineWriter
 from gazerig.robot.cli.suggestions import completed, speaking_of, with_doctor
-from gazerig.robot.interrupts import Interrupts
+from gazerig.robot.control.interrupts import Interrupts
 
 BAD_INPUT = 2
 """Exit code: something asked for or configured is wrong."""

@@ -13,7 +13,7 @@ from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli import lead as cli_lead
 from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
-from gazerig.robot.remote.running_rig import JsonValue, KnobInfo, RunningRig
+from gazerig.robot.remote.client import JsonValue, KnobInfo, RunningRig
 
 app = typer.Typer()
 app.add_typer(cli_lead.app)

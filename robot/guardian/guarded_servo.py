@@ -1,12 +1,12 @@
 """One servo without a watchdog, driven for calibrating under a guardian's eyes."""
 
 from gazerig.drivers.errors import ServoFault
-from gazerig.robot.bringup.servo_access import Found, OneServo
+from gazerig.robot.calibration.servo_access import Found, OneServo
 from gazerig.robot.guardian.guardian import Guardian
 
 
 class GuardedServo:
-    """Adds a guardian to a servo by itself; implements gazerig.robot.bringup.servo_access.OneServo.
+    """Adds a guardian to a servo by itself; implements ``servo_access.OneServo``.
 
     Signs of life are the bytes that its port sends and waits for.
 

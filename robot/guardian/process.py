@@ -21,10 +21,10 @@ import sys
 
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.i2c.port import port_of
-from gazerig.robot.clock import RealClock
 from gazerig.robot.guardian.hang_detector import HangDetector
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, Heartbeat
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, releaser
+from gazerig.robot.model.clock import RealClock
 
 LOOK_S = 0.02
 """Time between two looks at the heartbeat."""

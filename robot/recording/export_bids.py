@@ -21,7 +21,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_input import read_limited
 from gazerig.drivers.file_output import make_folder, output_file, write_file
 from gazerig.gaze.types import PART_NAMES, Floats
-from gazerig.robot.reckoned import PARTLY, RECKONED, Basis
+from gazerig.robot.control.feedback_basis import PARTLY, RECKONED, Basis
 from gazerig.robot.recording.gaze_angles import Trace
 from gazerig.robot.recording.gaze_labels import Labels, Stretch
 

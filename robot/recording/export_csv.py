@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.drivers.file_output import output_text, refuse_existing, write_file
-from gazerig.robot.reckoned import RECKONED
+from gazerig.robot.control.feedback_basis import RECKONED
 from gazerig.robot.recording.gaze_angles import MOVEMENTS, Trace
 from gazerig.robot.recording.gaze_labels import Labels, Stretch
 

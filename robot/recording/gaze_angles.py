@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3
-from gazerig.robot.orders import Jog, Order, Renew, Stop
-from gazerig.robot.reckoned import Basis, basis_of, reckoned_joints
-from gazerig.robot.tick import Tick
+from gazerig.robot.control.feedback_basis import Basis, basis_of, reckoned_joints
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import Jog, Order, Renew, Stop
 
 Ints = NDArray[np.int64]
 

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from math import inf
 
 from gazerig.drivers.types import Picture
-from gazerig.robot.page.picture import encode
-from gazerig.robot.tick import Tick
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.dashboard.camera_overlay import encode
 
 
 class PictureEncoder:

@@ -19,11 +19,11 @@ from zstandard import ZstdError
 
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.gaze.types import Percept
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.chunk_reader import LARGEST_BYTES, unpacked
-from gazerig.robot.recording.moment import Moment, from_json, percept_from_json
 from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
-from gazerig.robot.tick import Tick
+from gazerig.robot.recording.tick_record import Moment, from_json, percept_from_json
 
 _MAGIC = b"\x89MCAP0\r\n"
 _CAMERA = "gazerig-camera-"

@@ -15,14 +15,14 @@ from pathlib import Path
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import BusHealth
 from gazerig.gaze.types import Percept
-from gazerig.robot.body import Body
+from gazerig.robot.control.body import Body
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording import writer_process as writer
-from gazerig.robot.recording.body_tap import BodyTap
-from gazerig.robot.recording.moment import Heard, Measured, flat, flat_percept
+from gazerig.robot.recording.joint_recorder import BodyTap
 from gazerig.robot.recording.picture_encoder import PictureEncoder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
-from gazerig.robot.recording.writer_link import WriterLink
-from gazerig.robot.tick import Tick
+from gazerig.robot.recording.tick_record import Heard, Measured, flat, flat_percept
+from gazerig.robot.recording.writer_client import WriterLink
 
 _HEALTH_S = 1.0
 _SEND_S = 0.05

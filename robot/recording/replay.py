@@ -5,10 +5,10 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from gazerig.robot.clock import Clock
-from gazerig.robot.page.link import PICTURE, REPLAY
-from gazerig.robot.recording.frames import Frames
-from gazerig.robot.recording.player import KINDS, Mark, Player, State
+from gazerig.robot.dashboard.page_process import PICTURE, REPLAY
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.recording.playback_clock import KINDS, Mark, Player, State
+from gazerig.robot.recording.snapshot_index import Frames
 
 ROUND_S = 0.04
 _SLIDE_S = 0.1  # how often the slider moves by itself
@@ -23,7 +23,7 @@ _MOST_WORDS = 150
 
 
 class Screen(Protocol):
-    """What shows the messages, as gazerig.robot.page.link.Page does."""
+    """What shows the messages, as gazerig.robot.dashboard.page_process.Page does."""
 
     def send(self, message: bytes) -> bool:
         """Hand over a message; False where it is not taken now."""

@@ -11,8 +11,8 @@ from typing import Any
 
 from gazerig.gaze.angles import add, compose, norm, rotate, rotation, sub
 from gazerig.gaze.types import Angles2, GazeState, Mat3, Vec3
+from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.run_format import UNUSED
-from gazerig.robot.types import JointState
 
 Json = dict[str, Any]
 

@@ -1,7 +1,7 @@
 """The process that writes a recording: fed through a socket, it outlives the program it serves.
 
 Run as ``python -m gazerig.robot.recording.writer_process SOCKET FILE``, two open file descriptors,
-by gazerig.robot.recording.writer_link. A message is a letter, MORE or LAST, and a piece of some
+by gazerig.robot.recording.writer_client. A message is a letter, MORE or LAST, and a piece of some
 pickled (kind, values); the first of all is the run's beginning. When the other side is
 gone, however it ended, the file is closed as it should be.
 """
@@ -17,10 +17,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from gazerig.drivers.types import BusHealth
-from gazerig.robot.clock import Clock, RealClock
+from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.robot.recording.record_router import Scribe
 from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
-from gazerig.robot.recording.scribe import Scribe
 
 MORE, LAST = b"+", b"."
 BEGIN, TICK, PERCEPT, PICTURE, HEALTH, END = "begin", "tick", "percept", "picture", "health", "end"

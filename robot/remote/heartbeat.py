@@ -6,9 +6,9 @@ A program that dies, hangs as a whole or is stopped sends none, and the gaze lea
 import threading
 from collections.abc import Callable
 
-from gazerig.robot.lead import HEARTBEAT_S
-from gazerig.robot.orders import Renew, as_json
-from gazerig.robot.remote.sockets import Garbled, Wire
+from gazerig.robot.model.commands import Renew, as_json
+from gazerig.robot.model.lead import HEARTBEAT_S
+from gazerig.robot.remote.socket_io import Garbled, Wire
 
 _EVERY_S = 0.25 * HEARTBEAT_S
 

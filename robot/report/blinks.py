@@ -7,8 +7,8 @@ import numpy as np
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.report.blink_finder import Blink
-from gazerig.robot.report.gathered import Gathered
-from gazerig.robot.report.measured import Measured, figure, mean, median, spread_over_mean
+from gazerig.robot.report.gaze_trace import Gathered
+from gazerig.robot.report.statistics import Measured, figure, mean, median, spread_over_mean
 
 _DOUBLE_S = 0.6
 _EVOKING_DEG = 33.0

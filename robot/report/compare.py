@@ -17,16 +17,16 @@ import numpy as np
 from scipy import stats
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report.about import About
-from gazerig.robot.report.bands import BY_KEY
-from gazerig.robot.report.build import Progress, drawn, measured, read
-from gazerig.robot.report.canvas import COLOURS, Shown
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.report.compare_page import Difference, Word, compare_page, mixed
-from gazerig.robot.report.gathered import Gathered
-from gazerig.robot.report.measured import Measured, figure, judged
-from gazerig.robot.report.measured import drawn as resampled
-from gazerig.robot.report.written import write_all
-from gazerig.robot.tick import Tick
+from gazerig.robot.report.files import write_all
+from gazerig.robot.report.gaze_trace import Gathered
+from gazerig.robot.report.norm_bands import BY_KEY
+from gazerig.robot.report.plotting import COLOURS, Shown
+from gazerig.robot.report.report import Progress, drawn, measured, read
+from gazerig.robot.report.run_header import About
+from gazerig.robot.report.statistics import Measured, figure, judged
+from gazerig.robot.report.statistics import drawn as resampled
 
 LEVEL = 0.05
 _DRAWS = 2000

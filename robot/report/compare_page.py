@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Literal, NamedTuple
 
-from gazerig.robot.reckoned import Basis
-from gazerig.robot.report.about import About
-from gazerig.robot.report.bands import GROUPS
-from gazerig.robot.report.gathered import Gathered
-from gazerig.robot.report.measured import Finding
+from gazerig.robot.control.feedback_basis import Basis
+from gazerig.robot.report.gaze_trace import Gathered
+from gazerig.robot.report.norm_bands import GROUPS
 from gazerig.robot.report.page import (
     Picture,
     banner,
@@ -18,6 +16,8 @@ from gazerig.robot.report.page import (
     rendered,
     with_unit,
 )
+from gazerig.robot.report.run_header import About
+from gazerig.robot.report.statistics import Finding
 
 Word = Literal["more than chance", "may be chance", "too few events"]
 

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report import human
-from gazerig.robot.report.gathered import Gathered
-from gazerig.robot.report.measured import Measured, median
+from gazerig.robot.report import human_norms as human
+from gazerig.robot.report.gaze_trace import Gathered
 from gazerig.robot.report.saccade_finder import THRESHOLD_DEG_S
+from gazerig.robot.report.statistics import Measured, median
 
 LEAST_DEG = 5.0
 _AFTER_S, _BEFORE_S, _LEAST_AFTER_S = 0.9, 0.15, 0.45

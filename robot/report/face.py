@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import PARTS, Floats
-from gazerig.robot.report import human
-from gazerig.robot.report.gathered import Gathered
-from gazerig.robot.report.measured import Measured, mean, median
-from gazerig.robot.seeing.face_pose import PARTS_FACE_M
+from gazerig.robot.perception.face_pose import PARTS_FACE_M
+from gazerig.robot.report import human_norms as human
+from gazerig.robot.report.gaze_trace import Gathered
+from gazerig.robot.report.statistics import Measured, mean, median
 
 N = len(PARTS)
 _EYES = (PARTS.index("LE"), PARTS.index("RE"))

@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Ellipse
 
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
-from gazerig.robot.heatmap_face import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
-from gazerig.robot.report import face, human
-from gazerig.robot.report.bands import FACE
-from gazerig.robot.report.canvas import (
+from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.report import face
+from gazerig.robot.report import human_norms as human
+from gazerig.robot.report.norm_bands import FACE
+from gazerig.robot.report.plotting import (
     HUMAN,
     HUMAN_FILL,
     INK,
@@ -21,7 +22,7 @@ from gazerig.robot.report.canvas import (
     legend,
     nothing,
 )
-from gazerig.robot.report.model import published
+from gazerig.robot.report.reference_walk import published
 
 _NAMES = [PART_NAMES[part] for part in PARTS]
 _NONE = "no fixation on a face part"

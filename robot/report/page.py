@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import jinja2
 
-from gazerig.robot.reckoned import RECKONED, Basis
-from gazerig.robot.report.about import About
-from gazerig.robot.report.bands import BANDS, GROUPS, Band
-from gazerig.robot.report.canvas import Drawing
-from gazerig.robot.report.gathered import Gathered
-from gazerig.robot.report.measured import Finding
-from gazerig.robot.report.run_joints import RunJoints
+from gazerig.robot.control.feedback_basis import RECKONED, Basis
+from gazerig.robot.report.gaze_trace import Gathered
+from gazerig.robot.report.joint_basis import RunJoints
+from gazerig.robot.report.norm_bands import BANDS, GROUPS, Band
+from gazerig.robot.report.plotting import Drawing
+from gazerig.robot.report.run_header import About
+from gazerig.robot.report.statistics import Finding
 
 _CLASSES = {"pass": "pass", "outside": "outside", "too few events": "few"}
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report import human
-from gazerig.robot.report.gathered import Gathered
-from gazerig.robot.report.measured import Measured, figure, mean, median, one_over_mean
+from gazerig.robot.report import human_norms as human
+from gazerig.robot.report.gaze_trace import Gathered
+from gazerig.robot.report.statistics import Measured, figure, mean, median, one_over_mean
 
 LEAST_DEG = 1.0
 """Below, threshold and encoder steps shape what is measured."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from math import degrees, isfinite, radians
 from typing import NamedTuple
 
-from gazerig.robot.safety.motion import JointLimit, Motion
-from gazerig.robot.types import JOINTS, JointAngles
+from gazerig.robot.model.types import JOINTS, JointAngles
+from gazerig.robot.safety.motion_limiter import JointLimit, Motion
 
 _ROUNDING_RAD = 1e-9
 

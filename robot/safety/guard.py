@@ -10,14 +10,14 @@ from collections.abc import Callable
 from math import isfinite, radians
 from typing import Literal, NamedTuple
 
+from gazerig.robot.model.types import JointAngles, JointState, Level, Verdict
 from gazerig.robot.safety.collisions import Collisions
 from gazerig.robot.safety.guard_params import GuardParams as GuardParams
 from gazerig.robot.safety.health import Health
 from gazerig.robot.safety.late_ticks import LateTicks
-from gazerig.robot.safety.motion import JointLimit as JointLimit
-from gazerig.robot.safety.motion import Motion
-from gazerig.robot.safety.stuck import Stuck
-from gazerig.robot.types import JointAngles, JointState, Level, Verdict
+from gazerig.robot.safety.motion_limiter import JointLimit as JointLimit
+from gazerig.robot.safety.motion_limiter import Motion
+from gazerig.robot.safety.stall_detector import Stuck
 
 _NEAR_RAD = radians(1.0)
 _ROUNDING_RAD = 1e-9

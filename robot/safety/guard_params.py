@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from gazerig.robot.safety.collisions import CollisionParams
 from gazerig.robot.safety.health import HealthParams
-from gazerig.robot.safety.stuck import StuckParams
+from gazerig.robot.safety.stall_detector import StuckParams
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Literal
 
-from gazerig.robot.safety.motion import JointLimit
-from gazerig.robot.types import JointState
+from gazerig.robot.model.types import JointState
+from gazerig.robot.safety.motion_limiter import JointLimit
 
 Strain = Literal["", "hot", "overloaded", "voltage"]
 _Column = tuple[float | None, ...]

@@ -1,6 +1,6 @@
 """A person as a camera sees one: a drawn face of true size and pose, and a body below it.
 
-The face is that of gazerig.robot.seeing.face_pose: its eyes, nose and mouth lie where the
+The face is that of gazerig.robot.perception.face_pose: its eyes, nose and mouth lie where the
 landmarks are, in three dimensions, so that a face detector that was made for people finds them
 there. Not
 drawn: arms, expression, blinks; the eyes look straight ahead.
@@ -15,7 +15,7 @@ import numpy as np
 
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Vec3
-from gazerig.robot.seeing.face_pose import LANDMARKS_FACE_M
+from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M
 from gazerig.sim_mock.cameras.canvas import Bytes, Colour, Floats, Picture3d, Sheet
 from gazerig.sim_mock.scenes.scene import Person, Thing
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from gazerig.drivers.types import Detections, FaceDetector, MovingBlob, Picture
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.frames import CameraMount
-from gazerig.robot.seeing.intrinsics import Intrinsics, intrinsics_of_view
+from gazerig.robot.model.frames import CameraMount
+from gazerig.robot.perception.intrinsics import Intrinsics, intrinsics_of_view
 from gazerig.sim_mock.cameras.canvas import Picture3d
 from gazerig.sim_mock.cameras.draw_person import draw_person, draw_thing
 from gazerig.sim_mock.cameras.draw_room import draw_room

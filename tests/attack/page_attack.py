@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 from page_visitor import LOOKING, Visitor
 from websockets.sync.client import ClientConnection
 
-from gazerig.robot.remote.running_rig import RunningRig
+from gazerig.robot.remote.client import RunningRig
 
 CLIENTS = 8
 PRESSES = 20
@@ -235,7 +235,10 @@ class Rig:
         for entry in Path("/proc").iterdir():
             with contextlib.suppress(OSError):
                 words = (entry / "cmdline").read_bytes().split(b"\0")
-                if b"gazerig.robot.page.view" in words and str(self._process.pid).encode() in words:
+                if (
+                    b"gazerig.robot.dashboard.page_main" in words
+                    and str(self._process.pid).encode() in words
+                ):
                     return int(entry.name), self._process.pid
         return None, self._process.pid
 

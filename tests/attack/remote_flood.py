@@ -11,14 +11,14 @@ import tempfile
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
-from gazerig.robot.assemble import assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.clock import RealClock
-from gazerig.robot.loop import run
-from gazerig.robot.remote import server
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.control.loop import run
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.remote import socket_server as server
 from gazerig.robot.remote.budget import ALL, EACH, Rate
-from gazerig.robot.remote.live_control import LiveControl
-from gazerig.robot.tuning import Tuning
+from gazerig.robot.remote.live_server import LiveControl
 
 FLOODS = {
     "nothing": "",
@@ -32,7 +32,7 @@ FLOODS = {
 FLOOD = """
 import sys, time
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.remote.running_rig import RunningRig
+from gazerig.robot.remote.client import RunningRig
 rig, n = RunningRig.connect(), 0
 while True:
     n += 1
@@ -78,7 +78,7 @@ def flooded(what: str, seconds: float, programs: int) -> tuple[float, int, float
 
 _STOP = """
 import time
-from gazerig.robot.remote.running_rig import RunningRig
+from gazerig.robot.remote.client import RunningRig
 rig = RunningRig.connect()
 began = time.monotonic()
 rig.stop("a test")

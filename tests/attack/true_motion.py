@@ -31,9 +31,9 @@ from true_shafts import Judge, Late, looked_at, on_time, run, sometimes_late
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.assemble import Assembly
-from gazerig.robot.choice import Choice
-from gazerig.robot.orders import LookAt
+from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.app.options import Choice
+from gazerig.robot.model.commands import LookAt
 from gazerig.sim_mock.scenes.registry import scenes
 
 RIGS = ("desk", "feetech", "maker", "mixed")

@@ -30,8 +30,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.emulated_rig import emulated_lines
-from gazerig.robot.rig_angles import park_rad
+from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.rig_limits import park_rad
 from gazerig.sim_mock.pty.client import PtyBuses
 
 ROOT = Path(__file__).parents[2]
@@ -39,13 +39,17 @@ RIGS = {"desk": "dynamixel", "feetech": "feetech", "maker": "maestro"}
 LONGEST_S = 20.0
 # Broken on purpose, from outside: what a plug-in, a small machine or a bug of ours would do.
 BROKEN = {
-    "observer raises": "import gazerig.robot.summary as m\n"
+    "observer raises": "import gazerig.robot.analysis.summary as m\n"
     "def note(self, tick):\n    raise RuntimeError('plug-in')\nm.Summary.note = note\n",
-    "MemoryError in the loop": "import gazerig.robot.loop as m\ntick, n = m.Robot.tick, []\n"
-    "def note(self, *words):\n    n.append(0)\n    if len(n) > 200:\n        raise MemoryError\n"
+    "MemoryError in the loop": "import gazerig.robot.control.loop as m\n"
+    "tick, n = m.Robot.tick, []\n"
+    "def note(self, *words):\n    n.append(0)\n"
+    "    if len(n) > 200:\n        raise MemoryError\n"
     "    return tick(self, *words)\nm.Robot.tick = note\n",
 }
-START = "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.quick import main; main()"
+START = (
+    "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.entry_point import main; main()"
+)
 
 
 def commands(rig: str) -> dict[str, list[str]]:
@@ -202,7 +206,7 @@ def stop_tty(run: Started) -> None:
 
 def kill_page(run: Started) -> None:
     for child in children(run.pid):
-        if b"gazerig.robot.page.view" in Path(f"/proc/{child}/cmdline").read_bytes():
+        if b"gazerig.robot.dashboard.page_main" in Path(f"/proc/{child}/cmdline").read_bytes():
             os.kill(child, signal.SIGKILL)
     time.sleep(1.0)
     run.process.send_signal(signal.SIGTERM)

@@ -31,7 +31,7 @@ from gazerig.drivers.types import FaceDetector
 from gazerig.drivers.vision.face_detector import face_detector
 from gazerig.drivers.vision.face_params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.robot.seeing.motion_finder import motion_finder
+from gazerig.robot.perception.motion_source import motion_finder
 
 RATE_HZ, ROUNDS, SECONDS = 200.0, 12, 1.0
 STOP = threading.Event()

@@ -14,8 +14,8 @@ from ruckig import InputParameter, OutputParameter, Ruckig
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Bodies, Face, Percept
-from gazerig.robot.assemble import Choice, assemble
-from gazerig.robot.types import JointState
+from gazerig.robot.app.assemble import Choice, assemble
+from gazerig.robot.model.types import JointState
 
 TICK_S = 0.005
 

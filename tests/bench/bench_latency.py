@@ -19,9 +19,9 @@ import numpy as np
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Detections
 from gazerig.drivers.vision.face_detector import face_detector
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.control.loop import Tick, run
 
 MEDIA = Path(__file__).resolve().parents[3] / "shared" / "media"
 SECONDS, SKIP_S, BARE = 20.0, 2.0, 60

@@ -31,12 +31,12 @@ from websockets.sync.connection import Connection
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
-from gazerig.robot.assemble import assemble
-from gazerig.robot.audience import Audience, Told, Wished
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import LoopCount, Tick, run
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.app.run_observers import Audience, Told, Wished
+from gazerig.robot.control.loop import LoopCount, Tick, run
 from gazerig.robot.recording.run_info import RunInfo
-from gazerig.robot.tuning import Tuning
 
 TESTS = Path(__file__).parents[1]
 sys.path.insert(0, str(TESTS))
@@ -190,7 +190,7 @@ for n in itertools.count():
 """,
     "remote set": """
 import itertools, time
-from gazerig.robot.remote.running_rig import RunningRig
+from gazerig.robot.remote.client import RunningRig
 rig = RunningRig.connect({pid})
 for n in itertools.count():
     time.sleep(0.1)
@@ -198,7 +198,7 @@ for n in itertools.count():
 """,
     "remote get": """
 import time
-from gazerig.robot.remote.running_rig import RunningRig
+from gazerig.robot.remote.client import RunningRig
 rig = RunningRig.connect({pid})
 while True:
     time.sleep(0.1)

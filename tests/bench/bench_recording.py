@@ -16,14 +16,14 @@ import numpy as np
 
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
-from gazerig.robot.assemble import Assembly, assemble
-from gazerig.robot.choice import Choice
-from gazerig.robot.loop import Tick, run
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.app.session import leave
+from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.rerun import rerun
 from gazerig.robot.recording.run_info import RunInfo, versions
-from gazerig.robot.session import leave
 
 
 def made(fast: bool) -> Assembly:

@@ -20,10 +20,10 @@ from fastcrc import crc16
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.dynamixel.bus import DynamixelBus
-from gazerig.robot.assemble import Assembly, Choice, assemble
-from gazerig.robot.loop import run
-from gazerig.robot.summary import Summary
-from gazerig.robot.types import in_order
+from gazerig.robot.analysis.summary import Summary
+from gazerig.robot.app.assemble import Assembly, Choice, assemble
+from gazerig.robot.control.loop import run
+from gazerig.robot.model.types import in_order
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 

@@ -18,7 +18,7 @@ RIGS = ("desk", "feetech", "maker")
 SCENES = ("visitor", "boxing")
 SEEDS = (0, 1)
 SECONDS = 60
-_MAIN = "from gazerig.robot.cli.quick import main; main()"
+_MAIN = "from gazerig.robot.cli.entry_point import main; main()"
 
 
 def digest(rig: str, scene: str, seed: int) -> str:

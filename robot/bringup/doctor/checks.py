@@ -13,7 +13,7 @@ from gazerig.robot.bringup.doctor.findings import Finding, Fix
 from gazerig.robot.bringup.doctor.settings import SETTINGS
 from gazerig.robot.bringup.doctor.state import STATE
 from gazerig.robot.bringup.doctor.subject import FIX, ServoChecks, ServoState, Verdict
-from gazerig.robot.bringup.servo_kind import TRIES, Found, Registers, ServoKind
+from gazerig.robot.bringup.servo_family import TRIES, Found, Registers, ServoKind
 
 CHECKS: dict[str, ServoChecks] = {checks.kind.name: checks for checks in (DYNAMIXEL, FEETECH)}
 """By the name of the kind."""

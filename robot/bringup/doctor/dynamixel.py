@@ -20,7 +20,7 @@ from gazerig.robot.bringup.doctor.subject import (
     WantedSetting,
 )
 from gazerig.robot.bringup.servo_families import DYNAMIXEL as KIND
-from gazerig.robot.bringup.servo_kind import Registers
+from gazerig.robot.bringup.servo_family import Registers
 
 GUARDING = (2, 4, 5)
 """Bits of Shutdown that protect motor and gears: overheating, electrical shock, overload."""

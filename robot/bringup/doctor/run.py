@@ -23,7 +23,7 @@ from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.doctor.checks import visit
 from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
 from gazerig.robot.bringup.doctor.port import examine_latency, examine_port, port_facts
-from gazerig.robot.bringup.servo_kind import Found, ServoKind, Tell
+from gazerig.robot.bringup.servo_family import Found, ServoKind, Tell
 
 
 class Presence(NamedTuple):

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from gazerig.robot.bringup.doctor.findings import Level
 from gazerig.robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
-from gazerig.robot.bringup.servo_kind import ServoModel
+from gazerig.robot.bringup.servo_family import ServoModel
 
 TRIPPED = 255
 WARM_C = 10

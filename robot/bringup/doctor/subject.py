@@ -7,7 +7,7 @@ from typing import NamedTuple
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.doctor.findings import Level
-from gazerig.robot.bringup.servo_kind import Found, Registers, ServoKind, ServoModel
+from gazerig.robot.bringup.servo_family import Found, Registers, ServoKind, ServoModel
 
 FIX = "gazerig doctor --fix"
 

@@ -1,0 +1,1 @@
+"""What a run or an eye tracker's recording says about gaze."""

@@ -1,0 +1,167 @@
+"""Which of a scene's events the gaze answered, and how fast (Mitake et al. 1 and 4).
+
+Judged by what was chosen to be looked at, tick by tick; so the latency of the camera, of
+perception and of the choice are in it, the flight of the eyes (50 ms and more) is not.
+An event counts when it is over. World frame, metres, seconds.
+
+The time of a hand that reaches in from outside the field of view begins where the scene
+says so: when the hand comes nearer to straight ahead than half the camera's field. A
+head that is turned a little towards it may see it earlier, one turned away later, by
+about 0.1 s for every 8 degrees.
+"""
+
+from collections.abc import Iterable
+from math import dist
+from statistics import median
+from typing import Literal, NamedTuple, Protocol
+
+from gazerig.gaze.types import Vec3
+from gazerig.robot.control.loop import Tick
+
+
+class Happening(Protocol):
+    """Something that happens in every round of a scene, and what is asked of the gaze.
+
+    asks: "look": be on a thing of this kind between start and end; "return": be on it
+        again by the end
+    start_s, end_s: from the beginning of a round
+    place_world_m, within_m: where that thing is: looking at another of its kind elsewhere
+        is no answer
+    """
+
+    @property
+    def name(self) -> str:
+        """Return the behaviour that is tested."""
+        ...
+
+    @property
+    def asks(self) -> Literal["look", "return"]:
+        """Return how it is judged."""
+        ...
+
+    @property
+    def kind(self) -> str:
+        """Return the kind of thing."""
+        ...
+
+    @property
+    def start_s(self) -> float:
+        """Return its beginning."""
+        ...
+
+    @property
+    def end_s(self) -> float:
+        """Return its end."""
+        ...
+
+    @property
+    def place_world_m(self) -> Vec3:
+        """Return where it happens."""
+        ...
+
+    @property
+    def within_m(self) -> float:
+        """Return how far around."""
+        ...
+
+
+class _Answer(NamedTuple):
+    """How one event went.
+
+    latency_s: "look": from its start to the first look, None without one;
+        "return": time spent elsewhere, None where the gaze was never drawn away
+    """
+
+    seen: bool
+    latency_s: float | None
+    on_s: float
+    lasted_s: float
+
+
+class _Watch:
+    """One event while it lasts."""
+
+    def __init__(self) -> None:
+        self._first_s: float | None = None
+        self._on = False
+        self._on_s = 0.0
+        self._off_s = 0.0
+
+    def note(self, on: bool, since_s: float, dt_s: float) -> None:
+        """Count one tick, ``since_s`` after the event's start."""
+        self._on = on
+        if not on:
+            self._off_s += dt_s
+            return
+        self._on_s += dt_s
+        if self._first_s is None:
+            self._first_s = since_s
+
+    def answer(self, asks: Literal["look", "return"]) -> _Answer:
+        lasted_s = self._on_s + self._off_s
+        if asks == "return":
+            away_s = self._off_s if self._off_s > 0.0 else None
+            return _Answer(self._on, away_s, self._on_s, lasted_s)
+        return _Answer(self._first_s is not None, self._first_s, self._on_s, lasted_s)
+
+
+class Behaviours:
+    """Scores a run, tick by tick."""
+
+    def __init__(self, events: Iterable[Happening], round_s: float) -> None:
+        self._events = tuple(events)
+        self._round_s = round_s
+        self._watches: dict[int, _Watch] = {}
+        self._answers: dict[str, list[_Answer]] = {event.name: [] for event in self._events}
+        self._first_s: float | None = None
+        self._last_s = 0.0
+        self._round = 0
+
+    def note(self, tick: Tick) -> None:
+        """Count one tick; the first one is the scene's beginning."""
+        if self._first_s is None:
+            self._first_s = self._last_s = tick.t_s
+        dt_s, self._last_s = tick.t_s - self._last_s, tick.t_s
+        number, phase_s = divmod(tick.t_s - self._first_s, self._round_s)
+        if number != self._round:
+            self._round = int(number)
+            for i in tuple(self._watches):
+                self._over(i)
+        for i, event in enumerate(self._events):
+            if event.start_s <= phase_s < event.end_s:
+                watch = self._watches.setdefault(i, _Watch())
+                watch.note(_looks_at(tick, event), phase_s - event.start_s, dt_s)
+            elif i in self._watches:
+                self._over(i)
+
+    def _over(self, i: int) -> None:
+        """Write down how an event went."""
+        event = self._events[i]
+        self._answers[event.name].append(self._watches.pop(i).answer(event.asks))
+
+    def figures(self) -> dict[str, dict[str, float | int | None]]:
+        """Return for each name: how many were seen, of how many, and how.
+
+        latency_s: median over the events seen (away: over those that drew the gaze off)
+        share: of the events' time, the part in which what was asked for was looked at
+        """
+        return {name: _figure(answers) for name, answers in self._answers.items()}
+
+
+def _looks_at(tick: Tick, event: Happening) -> bool:
+    """Return whether the target in force is what the event asks for."""
+    target = tick.target
+    if target.kind != event.kind:
+        return False
+    return dist(target.p_world_m, event.place_world_m) <= event.within_m
+
+
+def _figure(answers: list[_Answer]) -> dict[str, float | int | None]:
+    latencies = [answer.latency_s for answer in answers if answer.latency_s is not None]
+    lasted_s = sum(answer.lasted_s for answer in answers)
+    return {
+        "seen": sum(answer.seen for answer in answers),
+        "of": len(answers),
+        "latency_s": round(median(latencies), 4) if latencies else None,
+        "share": round(sum(a.on_s for a in answers) / lasted_s, 4) if lasted_s > 0.0 else None,
+    }

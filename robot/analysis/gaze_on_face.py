@@ -1,0 +1,57 @@
+"""Where on the face the gaze goes, as measured: points in the face's own frame."""
+
+from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.control.loop import Tick
+
+_PLANE_M = -0.028
+"""The plane between the nose tip and the eyes and mouth, along the face's own x axis."""
+
+
+class FaceGaze:
+    """Gathers gaze points on the plane of the face that is looked at.
+
+    points_face_m: (y, z) to the owner's left and up from the nose; seconds: time at each
+    """
+
+    def __init__(self) -> None:
+        self.points_face_m: list[tuple[float, float]] = []
+        self.seconds: list[float] = []
+        self._last_s: float | None = None
+
+    def note(self, tick: Tick) -> None:
+        """Add the tick's point where a face is the target and the eyes are not jumping."""
+        before, self._last_s = self._last_s, tick.t_s
+        if before is None or tick.target.kind != "face" or tick.gaze.phase == "saccade":
+            return
+        faces = tick.percept.faces if tick.percept is not None else ()
+        face = next((face for face in faces if face.id == tick.target.id), None)
+        if face is None:
+            return
+        elapsed = max(0.0, tick.t_s - tick.target.at_s)
+        centre = add(face.p_world_m, scale(face.v_world_m_s, elapsed))
+        out = rotate(face.R_world_face, (_PLANE_M, 0.0, 0.0))
+        point = on_face(
+            tick.pose.p_world_head_m, cyclopean(tick), add(centre, out), face.R_world_face
+        )
+        if point is not None:
+            self.points_face_m.append(point)
+            self.seconds.append(tick.t_s - before)
+
+
+def on_face(
+    p_world_eye_m: Vec3, way_world: Vec3, p_world_face_m: Vec3, R_world_face: Mat3
+) -> tuple[float, float] | None:
+    """Return where a line of sight meets the plane of a face: (y, z) in the face's frame.
+
+    None where the line runs along the plane or away from it.
+    """
+    out = (R_world_face[0][0], R_world_face[1][0], R_world_face[2][0])
+    towards = dot(way_world, out)
+    if towards > -0.05:
+        return None
+    distance = dot(sub(p_world_face_m, p_world_eye_m), out) / towards
+    meets = add(p_world_eye_m, scale(way_world, distance))
+    _, y, z = rotate_back(R_world_face, sub(meets, p_world_face_m))
+    return (y, z)

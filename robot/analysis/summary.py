@@ -1,0 +1,112 @@
+"""Figures of a run, gathered tick by tick and given as one JSON object at the end."""
+
+from collections import Counter, defaultdict, deque
+from collections.abc import Mapping
+from math import degrees, radians
+
+import numpy as np
+
+from gazerig.gaze.angles import add, angle_between, scale, sub, unit
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import Vec3
+from gazerig.robot.control.feedback_basis import reckoned_joints
+from gazerig.robot.control.loop import Tick
+
+_FIXATION_RAD_S = radians(40.0)
+"""Slower is fixating; 30 is usual, and one servo step in a 5 ms tick is already 18 deg/s."""
+
+_EVENTS_KEPT = 100
+"""The newest; a rig that runs for weeks must not fill the memory."""
+
+
+class Summary:
+    """Counts and shares over a run."""
+
+    def __init__(self) -> None:
+        self._target_s: defaultdict[str, float] = defaultdict(float)
+        self._part_s: defaultdict[str, float] = defaultdict(float)
+        self._limited: Counter[str] = Counter()
+        self._events: deque[tuple[float, str]] = deque(maxlen=_EVENTS_KEPT)
+        # Counted by thousandths of a degree: a list would grow for as long as the rig runs.
+        self._errors_mdeg: Counter[int] = Counter()
+        self._first_s: float | None = None
+        self._last: Tick | None = None
+        self._gaze: Vec3 | None = None
+
+    def note(self, tick: Tick) -> None:
+        """Count one tick."""
+        if self._first_s is None or self._last is None:
+            self._first_s = tick.t_s
+            dt_s = 0.0
+        else:
+            dt_s = tick.t_s - self._last.t_s
+        self._last = tick
+        self._target_s[tick.target.kind] += dt_s
+        if tick.target.part is not None:
+            self._part_s[tick.target.part] += dt_s
+        if self._fixates(tick, dt_s):
+            self._errors_mdeg[round(1000.0 * degrees(gaze_error_rad(tick)))] += 1
+        self._events.extend((tick.t_s - self._first_s, event) for event in tick.events)
+        for reason in tick.verdict.reasons:
+            self._limited[reason.partition(": ")[2]] += 1
+
+    def _fixates(self, tick: Tick, dt_s: float) -> bool:
+        """Tell a fixation as an eye tracker does: by the speed of the gaze."""
+        before, self._gaze = self._gaze, cyclopean(tick)
+        if before is None or dt_s <= 0.0 or tick.gaze.phase == "saccade":
+            return False
+        return angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s
+
+    def figures(self) -> dict[str, object]:
+        """Return what the ticks themselves tell; the caller adds bus, loop and pictures."""
+        last = self._last
+        return {
+            "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,
+            "fixations": last.gaze.fixations if last else 0,
+            "saccades": last.gaze.saccades if last else 0,
+            "blinks": last.gaze.blinks if last else 0,
+            "target_share": _shares(self._target_s),
+            "part_share": _shares(self._part_s),
+            "gaze_error_deg": {
+                "median": _percentile_deg(self._errors_mdeg, 50.0),
+                "p95": _percentile_deg(self._errors_mdeg, 95.0),
+            },
+            "reckoned": list(reckoned_joints(last)) if last else [],
+            "limited": dict(sorted(self._limited.items())),
+            "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
+        }
+
+
+def cyclopean(tick: Tick) -> Vec3:
+    """Return the mean of both measured lines of sight: a unit vector in the world."""
+    return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
+
+
+def gaze_error_rad(tick: Tick) -> float:
+    """Return the mean angle of both measured lines of sight off the intended point.
+
+    Eyes that one linkage turns sideways stay parallel: what that leaves counts too.
+    """
+    target, pose = tick.target, tick.pose
+    point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, tick.t_s - target.at_s)))
+    left = angle_between(line_of_sight(pose, True), sub(point, pose.p_world_eye_left_m))
+    right = angle_between(line_of_sight(pose, False), sub(point, pose.p_world_eye_right_m))
+    return 0.5 * (left + right)
+
+
+def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
+    """Return a percentile of counted thousandths of a degree, None of nothing."""
+    if not counts_mdeg:
+        return None
+    values = sorted(counts_mdeg)
+    reached = np.cumsum([counts_mdeg[value] for value in values])
+    return values[int(np.searchsorted(reached, percent / 100.0 * reached[-1]))] / 1000.0
+
+
+def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
+    """Return shares of the total, largest first."""
+    total = sum(seconds.values())
+    if total <= 0.0:
+        return {}
+    by_time = sorted(seconds.items(), key=lambda item: -item[1])
+    return {name: round(time / total, 4) for name, time in by_time}

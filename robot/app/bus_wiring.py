@@ -1,0 +1,153 @@
+"""The buses of a rig: which joints are on which, and one bus made of them all."""
+
+from collections.abc import Mapping
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.dynamixel.bus import DynamixelBus
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.feetech.bus import FeetechBus
+from gazerig.drivers.i2c.port import port_of
+from gazerig.drivers.maestro.bus import MaestroBus
+from gazerig.drivers.multi_bus import MixedBus, Share
+from gazerig.drivers.pca9685.bus import Pca9685Bus
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_models import BUS_KINDS
+from gazerig.drivers.types import ServoBus, ServoSetup
+from gazerig.robot.app.rig_limits import park_rad
+from gazerig.robot.control.body import setups
+from gazerig.robot.guardian.guarded_bus import GuardedBus
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.guardian.release_plan import ReleasePlan
+
+
+def bus_names(rig: Rig) -> tuple[str, ...]:
+    """Return the names of the buses that joints are on, "" for the one without a name first."""
+    used = {joint.bus for joint in rig.joints.values()}
+    return tuple(name for name in ("", *rig.buses) if name in used)
+
+
+def joints_on(rig: Rig, name: str) -> tuple[str, ...]:
+    """Return the joints of one bus, in the order of all joints."""
+    return tuple(joint for joint in rig.names if rig.joints[joint].bus == name)
+
+
+def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
+    """Return the serial port of every bus: the rig's, or that given instead.
+
+    given: a port for the bus without a name, or for the only one; NAME=PORT for another, and
+        several with commas between
+
+    Raises:
+        SetupError: it names a bus that is not there.
+    """
+    ports = {name: rig.bus_named(name).port for name in bus_names(rig)}
+    for one in given.split(",") if given is not None else ():
+        name, equals, port = one.rpartition("=")
+        if not equals and "" not in ports and len(ports) == 1:
+            (name,) = ports
+        if name not in ports or not port:
+            named = ", ".join(f"{name}=PORT" if name else "PORT" for name in ports)
+            raise SetupError(f"--port {given}: no such bus in this rig; it can be {named}")
+        ports[name] = port
+    return ports
+
+
+def rig_setups(rig: Rig) -> tuple[ServoSetup, ...]:
+    """Return what buses must know of a rig's servos, in the order of its joints."""
+    return setups(rig.joints, park_rad(rig), rig.guard.gentle_speed_deg_s)
+
+
+def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
+    """Make the bus of a rig; nothing is opened.
+
+    ports: by the name of the bus
+    """
+    return _joined([_share(rig, name, ports[name]) for name in bus_names(rig)])
+
+
+def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
+    """Return the bus of a rig on serial ports, guarded where servos have no watchdog.
+
+    A program that switches torque on through it may die: a guardian process, started as the
+    bus is opened, then lets go. Nothing is opened here.
+
+    Args:
+        rig: the rig.
+        paths: of the serial ports, by the name of the bus.
+    """
+    plans = release_plans(rig, paths)
+    guarded = list(plans)
+    guardian = Guardian(tuple(plans.values())) if plans else None
+    beat = guardian.beat if guardian is not None else None
+    shares = []
+    for name in bus_names(rig):
+        share = _share(rig, name, port_of(paths[name], on_traffic=beat))
+        if guardian is not None and name in plans:
+            bus = GuardedBus(share.bus, len(share.places), guardian, guarded.index(name))
+            share = share._replace(bus=bus)
+        shares.append(share)
+    return _joined(shares)
+
+
+def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
+    """Return how to let go of the servos that have no watchdog, by the name of their bus.
+
+    Args:
+        rig: the rig.
+        paths: of the serial ports, by the name of the bus.
+    """
+    return {
+        name: release_plan(rig, name, paths[name])
+        for name in bus_names(rig)
+        if not has_watchdog(rig, name)
+    }
+
+
+def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
+    """Return how to let go of the servos of one bus.
+
+    Args:
+        rig: the rig.
+        name: of the bus.
+        path: of its serial port.
+    """
+    config, board = rig.bus_named(name), rig.bus_named(name).maestro
+    (kind,) = (kind for kind in BUS_KINDS if kind == config.kind)
+    ids = tuple(rig.joints[joint].id for joint in joints_on(rig, name))
+    return ReleasePlan(
+        kind,
+        path,
+        config.baud,
+        ids,
+        board.protocol,
+        board.device,
+        board.crc,
+        board.channels,
+        config.pca9685.addresses,
+    )
+
+
+def has_watchdog(rig: Rig, name: str) -> bool:
+    """Return whether the servos of one bus stop by themselves when their program dies."""
+    config = rig.bus_named(name)
+    return config.kind == "dynamixel" and config.dynamixel.watchdog_ms > 0
+
+
+def _joined(shares: list[Share]) -> ServoBus:
+    """Return several buses as one; one stays as it is."""
+    return shares[0].bus if len(shares) == 1 else MixedBus(shares)
+
+
+def _share(rig: Rig, name: str, port: BusPort) -> Share:
+    every = dict(zip(rig.names, rig_setups(rig), strict=True))
+    mine = joints_on(rig, name)
+    own = [every[joint] for joint in mine]
+    places = tuple(rig.names.index(joint) for joint in mine)
+    config = rig.bus_named(name)
+    if config.kind == "feetech":
+        return Share(name, FeetechBus(port, own, config.feetech), places)
+    if config.kind == "pca9685":
+        return Share(name, Pca9685Bus(port, own, config.pca9685), places)
+    if config.kind == "maestro":
+        return Share(name, MaestroBus(port, own, config.maestro), places)
+    return Share(name, DynamixelBus(port, own, config.dynamixel), places)

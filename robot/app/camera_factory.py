@@ -1,0 +1,156 @@
+"""The camera that was asked for: a scene, a film, a recording, a webcam or an OAK-D."""
+
+from collections.abc import Callable
+from functools import partial
+from math import radians
+
+import numpy as np
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.camera.oak import OakSource
+from gazerig.drivers.camera.playback import CameraReplay
+from gazerig.drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.source import PictureSource
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.camera.webcam import Webcam
+from gazerig.drivers.camera.worker import CameraParts
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import Camera, MovingBlob
+from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.app.options import Choice
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.frames import CameraMount, CameraParams
+from gazerig.robot.perception.intrinsics import Intrinsics
+from gazerig.robot.perception.motion_source import motion_finder, retuned
+from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams
+from gazerig.sim_mock.cameras.video import FilmCamera
+from gazerig.sim_mock.scenes.scene import Scene
+
+HeadPose = Callable[[float], tuple[Mat3, Vec3]]
+"""Gives R_world_head and p_world_head_m at a time."""
+
+
+def scene_camera(
+    rig: Rig,
+    choice: Choice,
+    scene: Scene,
+    mount: CameraMount,
+    where: HeadPose,
+    rng: np.random.Generator,
+) -> Camera:
+    """Make a camera on a simulated scene: drawn and looked at, or what a detector would find."""
+    field_deg = rig.camera.horizontal_field_deg
+    if not choice.pixels:
+        params = SceneCameraParams(horizontal_field_deg=field_deg)
+        return SceneCamera(params, scene, mount, where, rng)
+    drawn = PixelCameraParams(horizontal_field_deg=field_deg)
+    motion = _MotionOfDrawn(rig.motion)
+    return PixelCamera(drawn, scene, mount, where, face_detector(rig.detector), rng, motion)
+
+
+def real_camera(
+    rig: Rig, choice: Choice, clock: Clock, placed: CameraParams, turns: PoseRing | None
+) -> Camera:
+    """Make the camera of a film, a recording, a webcam or an OAK-D.
+
+    placed: where it sits, which may be standing still though the rig's does not
+    turns: how the camera was turned when; None where it stands still
+
+    Raises:
+        SetupError: a film, recording or model file cannot be used.
+    """
+    detector = partial(face_detector, rig.detector)
+    field_rad = radians(placed.horizontal_field_deg)
+    motion = partial(motion_finder, rig.motion, placed.lens, field_rad, turns)
+    if choice.fast:
+        return FilmCamera(_film(choice), detector(), choice.film_delay_s, motion=motion())
+    parts = CameraParts(_source(rig, choice), detector, motion)
+    return CameraProcess(parts, clock.now_s, rig.camera_care)
+
+
+def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams) -> str:
+    """Let the camera of a running rig look otherwise; say what of it cannot be done.
+
+    placed: where it sits, with the lens that is to be believed
+    """
+    detector = partial(face_detector, after.detector) if after.detector != before.detector else None
+    seen_through = after.camera.lens, after.camera.horizontal_field_deg
+    before_through = before.camera.lens, before.camera.horizontal_field_deg
+    moves = after.motion != before.motion or seen_through != before_through
+    if detector is None and not moves:
+        return ""
+    field_rad = radians(placed.horizontal_field_deg)
+    try:
+        match camera:
+            case CameraProcess() | FilmCamera():
+                motion = partial(retuned, after.motion, placed.lens, field_rad)
+                done = camera.retune(detector, motion if moves else None)
+            case PixelCamera():
+                drawn = partial(_retuned_drawn, after.motion)
+                done = camera.retune(detector, drawn if moves else None)
+            case _:
+                return ""  # it makes up what a detector would find
+    except SetupError as error:
+        return f"the detector stays as it was: {error}"
+    return "" if done else "the camera's process is busy and looks as before: set it once more"
+
+
+def _film(choice: Choice) -> VideoFile | CameraReplay:
+    return CameraReplay(choice.replay) if choice.replay is not None else VideoFile(_path(choice))
+
+
+def _source(rig: Rig, choice: Choice) -> Callable[[], PictureSource]:
+    """Return how to make the source, for the process that will use it."""
+    if choice.replay is not None:
+        return partial(CameraReplay, choice.replay)
+    if choice.video is not None:
+        return partial(VideoFile, choice.video)
+    if choice.oak:
+        return partial(OakSource, rig.oak)
+    return partial(Webcam.of, choice.camera or 0, rig.webcam)
+
+
+def _path(choice: Choice) -> str:
+    return str(choice.video)
+
+
+class _MotionOfDrawn:
+    """Finds what moves in drawn pictures, which know how the camera was turned."""
+
+    def __init__(self, params: MotionParams) -> None:
+        self._enabled = params.enabled
+        self._detector = MotionDetector(params)
+        self._before: Mat3 | None = None
+
+    def retune(self, params: MotionParams) -> None:
+        """Look otherwise from the next picture on; what is followed stays."""
+        self._enabled = params.enabled
+        self._detector.retune(params)
+        if not params.enabled:
+            self._detector.forget()
+
+    def __call__(self, shot: Exposure, lens: Intrinsics) -> tuple[MovingBlob, ...]:
+        """Find what has moved since the picture before; nothing while not enabled."""
+        before, self._before = self._before, shot.R_world_camera
+        if not self._enabled:
+            return ()
+        turned = (
+            turned_between(np.array(shot.R_world_camera), np.array(before))
+            if before is not None and self._detector.before_s is not None
+            else None
+        )
+        return self._detector.find(shot.picture, shot.captured_s, lens, turned, shot.depth_m)
+
+
+FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
+
+
+def _retuned_drawn(params: MotionParams, find: FindMotion | None) -> FindMotion | None:
+    if isinstance(find, _MotionOfDrawn):
+        find.retune(params)
+    return find

@@ -1,0 +1,89 @@
+"""The emulated servos of a rig: built into joints as the rig's YAML says."""
+
+from math import pi, radians
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.servo_models import HOBBY_KINDS
+from gazerig.robot.app.bus_wiring import bus_names, joints_on
+from gazerig.robot.model.joint import JointParams
+from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
+
+_CROOKED_DEG = {"left_eye_pan": 6.0, "right_eye_pan": -4.0, "neck_yaw": -12.0, "neck_pitch": -8.0}
+"""Emulated joints start a little crooked, as a head that somebody has moved by hand does."""
+
+_STOP_BEYOND_DEG = 4.0
+"""Emulated joints have mechanical stops so far beyond their configured range."""
+
+_LOAD_KG_M2 = {"neck_yaw": 2.0e-3, "neck_pitch": 3.0e-3, "neck_roll": 3.0e-3}
+"""Inertia of a balanced head of 0.6 kg about its axes; eyes and lids weigh next to nothing."""
+
+
+def emulated_lines(rig: Rig) -> dict[str, Emulated]:
+    """Return what is on each bus of a rig, by the bus's name; servos in the order of joints."""
+    return {name: _line(rig, name) for name in bus_names(rig)}
+
+
+def emulated_servo(rig: Rig, name: str) -> ServoSpec:
+    """Return the smart servo of one joint."""
+    joint = rig.joints[name]
+    start, (low, high) = _start(joint, name), _stops(joint)
+    load = _LOAD_KG_M2.get(name, 0.0) * (_steps_per_rad(joint) / joint.made().steepest) ** 2
+    physics = Physics(load_kg_m2=load, stop_low_steps=low, stop_high_steps=high)
+    return ServoSpec(joint.id, joint.model, start, physics=physics)
+
+
+def place_of(rig: Rig, joint: str) -> int:
+    """Return the place of a joint's servo among the true positions of what it is emulated on."""
+    bus, servo_id = rig.joints[joint].bus, rig.joints[joint].id
+    # A board tells all its channels, a chain the servos that it was made of.
+    return servo_id if rig.bus_of(joint).kind in HOBBY_KINDS else joints_on(rig, bus).index(joint)
+
+
+def _line(rig: Rig, name: str) -> Emulated:
+    config, joints = rig.bus_named(name), joints_on(rig, name)
+    if config.kind == "maestro":
+        board = config.maestro
+        servos = tuple(_hobby(rig.joints[joint], joint) for joint in joints)
+        return MaestroLine(board.channels, board.device, board.crc, servos)
+    if config.kind == "pca9685":
+        boards = config.pca9685
+        servos = tuple(_hobby(rig.joints[joint], joint) for joint in joints)
+        return Pca9685Line(boards.addresses, boards.oscillator_hz, servos)
+    specs = tuple(emulated_servo(rig, joint) for joint in joints)
+    return (
+        FeetechLine(specs, config.baud)
+        if config.kind == "feetech"
+        else DynamixelLine(specs, config.baud)
+    )
+
+
+def _hobby(joint: JointParams, name: str) -> HobbySpec:
+    low, high = _stops(joint)
+    facts, spec = joint.facts, HobbySpec(joint.id)
+    if joint.servo_deg_s is not None:
+        spec = spec._replace(speed_steps_s=joint.servo_deg_s * facts.steps_per_turn / 360.0)
+    # The board's own range of the channel is set as wide as such servos go.
+    return spec._replace(
+        start_steps=_start(joint, name),
+        stop_low_steps=low,
+        stop_high_steps=high,
+        min_steps=facts.lowest,
+        max_steps=facts.highest,
+    )
+
+
+def _start(joint: JointParams, name: str) -> int:
+    return round(joint.steps(radians(_CROOKED_DEG.get(name, 0.0))))
+
+
+def _stops(joint: JointParams) -> tuple[float, float]:
+    """Return the first and last step of the servo that its mechanics allow."""
+    ends = (joint.min_deg - _STOP_BEYOND_DEG, joint.max_deg + _STOP_BEYOND_DEG)
+    low, high = sorted(joint.steps(radians(end)) for end in ends)
+    return low, high
+
+
+def _steps_per_rad(joint: JointParams) -> float:
+    return joint.facts.steps_per_turn / (2.0 * pi)

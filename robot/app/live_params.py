@@ -1,0 +1,271 @@
+"""A rig's parameters put into the running parts, between two ticks and without a jump.
+
+Each part has a ``retune`` that takes its parameters and keeps what it knows. Only parts
+whose parameters differ are touched. What cannot change while the rig runs (see
+gazerig.config.knobs) keeps the value it started with until the next start.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from gazerig.config.knobs import NEXT_START, changed, differences, live
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import Rig, load_walk
+from gazerig.drivers.types import Camera
+from gazerig.gaze.attention import Attention
+from gazerig.gaze.aversion import Aversion
+from gazerig.gaze.bottom_up import BottomUp
+from gazerig.gaze.breathing import Breathing
+from gazerig.gaze.field_of_view import FieldOfView
+from gazerig.gaze.head import Head
+from gazerig.gaze.idle import Idle
+from gazerig.gaze.lids import Lids
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.pursuit import Pursuit
+from gazerig.gaze.saccade import Saccade
+from gazerig.gaze.scanpath import Scanpath, Walk
+from gazerig.gaze.top_down import TopDown
+from gazerig.robot.app.camera_factory import retune_camera
+from gazerig.robot.app.rig_limits import (
+    eye_limits,
+    head_limits,
+    lid_ends,
+    limits,
+    own_parts,
+    park_pose,
+)
+from gazerig.robot.control.body import Body
+from gazerig.robot.control.loop import LoopParams
+from gazerig.robot.model.commands import Tune, Value
+from gazerig.robot.model.frames import CameraMount, CameraParams
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.types import JointAngles
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker
+from gazerig.robot.safety.guard import Guard, JointLimit
+
+
+class Parts(NamedTuple):
+    """The parts of a running robot that have parameters."""
+
+    body: Body
+    guard: Guard
+    kinematics: Kinematics
+    camera: Camera
+    mount: CameraMount
+    perception: Perception
+    tracker: Tracker
+    attention: Attention
+    field_of_view: FieldOfView
+    bottom_up: BottomUp
+    top_down: TopDown
+    idle: Idle
+    scanpath: Scanpath
+    aversion: Aversion
+    oculomotor: Oculomotor
+    saccade: Saccade
+    pursuit: Pursuit
+    head: Head
+    breathing: Breathing
+    lids: Lids
+
+
+class Placed(NamedTuple):
+    """Where the camera is taken to sit, which may be standing still though the rig's does not."""
+
+    camera: Callable[[Rig], CameraParams]
+    mount: str
+
+
+class _Ready(NamedTuple):
+    """A rig that was checked before its turn.
+
+    changes: what makes it of ``base``; walk: what its scanpath names, None if as before
+    """
+
+    changes: tuple[tuple[str, Value], ...]
+    base: Rig
+    rig: Rig
+    walk: Walk | None
+
+
+_ALIKE = (
+    "field_of_view", "bottom_up", "top_down", "attention", "idle", "aversion", "saccade", "pursuit",
+    "breathing", "lids",
+)  # fmt: skip
+"""Sections of the gaze whose part of the same name needs nothing but its own parameters."""
+
+
+class Retuner:
+    """Puts changes into the parts of a robot; a gazerig.robot.control.loop.Robot's ``tune``.
+
+    rig: in force
+    """
+
+    def __init__(self, parts: Parts, rig: Rig, placed: Placed) -> None:
+        self.rig = rig
+        self.parts = parts
+        self._placed = placed
+        self._started = rig
+        self._walk = load_walk(rig.gaze.scanpath.walk)
+        self._ready: dict[int, _Ready] = {}
+
+    @property
+    def loop(self) -> LoopParams:
+        """Return the rate and the time for parking in force."""
+        return self.rig.loop
+
+    @property
+    def park_rad(self) -> JointAngles:
+        """Return the pose before torque goes off."""
+        return park_pose(self.rig)
+
+    @property
+    def camera(self) -> CameraParams:
+        """Return lens and place of the camera as they are believed."""
+        return self._placed.camera(self.rig)
+
+    @property
+    def horizontal_field_deg(self) -> float:
+        """Return the camera's field of view as it is believed."""
+        return self.camera.horizontal_field_deg
+
+    def prepare(self, base: Rig, rig: Rig) -> Tune:
+        """Make the order that turns one rig into another that was checked; from any thread.
+
+        Its tick then need not check it. base: in force when the order comes
+
+        Raises:
+            gazerig.config.load.ConfigError: the walk that the rig names is at fault.
+        """
+        order = Tune(tuple(differences(base, rig).items()))
+        self._ready[id(order.changes)] = _ready(order, base, rig)
+        return order
+
+    def __call__(self, order: Tune, t_s: float) -> tuple[str, ...]:
+        """Put a change in force, from this tick on; say what was done.
+
+        A change that nobody has prepared is checked here; a wrong one changes nothing.
+        """
+        ready = self._ready.pop(id(order.changes), None)
+        if ready is None or ready.changes is not order.changes or ready.base is not self.rig:
+            try:
+                ready = _ready(order, self.rig, changed(self.rig, dict(order.changes)))
+            except ConfigError as error:
+                return tuple(f"not tuned: {line}" for line in str(error).splitlines())
+        said = self._put(ready.rig, ready.walk or self._walk)
+        return (*(_told(key, value) for key, value in order.changes), *said)
+
+    def _put(self, rig: Rig, walk: Walk) -> tuple[str, ...]:
+        """Hand the parameters that differ to their parts."""
+        before, self.rig = self.rig, rig
+        self._put_gaze(before, rig, walk)
+        self._walk = walk
+        return self._put_machine(before, rig)
+
+    def _put_gaze(self, old: Rig, new: Rig, walk: Walk) -> None:
+        parts, was, now = self.parts, old.gaze, new.gaze
+        for name in _ALIKE:
+            if getattr(now, name) != getattr(was, name):
+                getattr(parts, name).retune(getattr(now, name))
+        if now.scanpath != was.scanpath or walk != self._walk:
+            parts.scanpath.retune(now.scanpath, walk)
+        bounds = (new.joints, new.ranges) != (old.joints, old.ranges)
+        if now.oculomotor != was.oculomotor or (bounds and eye_limits(new) != eye_limits(old)):
+            parts.oculomotor.retune(now.oculomotor, eye_limits(new))
+        if now.head != was.head or (bounds and head_limits(new) != head_limits(old)):
+            parts.head.retune(now.head, *head_limits(new))
+
+    def _put_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
+        parts = self.parts
+        bends = (new.geometry, new.lid_joints) != (old.geometry, old.lid_joints)
+        if bends:
+            parts.kinematics.retune(new.geometry, lid_ends(new))
+        said = self._put_joints(old, new)
+        if bends or new.ranges != old.ranges:
+            parts.guard.go_gently()  # wishes are elsewhere all at once
+        if new.loop.rate_hz != old.loop.rate_hz:
+            parts.guard.pace(1.0 / new.loop.rate_hz)
+        if new.tracks != old.tracks:
+            parts.tracker.retune(new.tracks)
+        placed, was_placed = self._placed.camera(new), self._placed.camera(old)
+        if placed != was_placed:
+            parts.mount.retune(replace(placed, mount=self._placed.mount))
+        sees = placed.horizontal_field_deg, placed.lens, new.face_parts_mm
+        if sees != (was_placed.horizontal_field_deg, was_placed.lens, old.face_parts_mm):
+            parts.perception.retune(placed.horizontal_field_deg, own_parts(new), placed.lens)
+        camera = retune_camera(parts.camera, old, new, placed)
+        return (*said, camera) if camera else said
+
+    def _put_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
+        """Tell body and guard of joints; the guard where each joint is in angles of now.
+
+        Gives what has to wait for the servos to be set up anew.
+        """
+        if (new.joints, new.guard) == (old.joints, old.guard):
+            return ()
+        parts, joints, before = self.parts, self._lasting(new), self._lasting(old)
+        gentle_deg_s = new.guard.gentle_speed_deg_s
+        others = (joints, gentle_deg_s) != (before, old.guard.gentle_speed_deg_s)
+        if others:
+            for i, (factor, offset_rad) in parts.body.retune(joints, gentle_deg_s).items():
+                parts.guard.recount(i, factor, offset_rad)
+        if new.guard != old.guard or limits(joints) != limits(before):
+            parts.guard.retune(new.guard, limits(joints))
+        if not others:
+            return ()
+        return _beyond(parts.body.names, limits(joints), parts.body.reach())
+
+    def _lasting(self, rig: Rig) -> dict[str, JointParams]:
+        """Return the joints with the servos that the bus was opened with."""
+        return {
+            name: _with_servo(rig.joints[name], first)
+            for name, first in self._started.joints.items()
+        }
+
+
+_OF_THE_SERVO = ("id", "model", "firmware_min", "bus", "linkage", "servo_deg_s")
+"""What of a joint stays as it was when the bus was opened."""
+
+
+def _with_servo(joint: JointParams, first: JointParams) -> JointParams:
+    """Return a joint with the servo of another; the same one where it has that already."""
+    kept = {key: getattr(first, key) for key in _OF_THE_SERVO}
+    if all(getattr(joint, key) == value for key, value in kept.items()):
+        return joint
+    return replace(joint, **kept)
+
+
+def _ready(order: Tune, base: Rig, rig: Rig) -> _Ready:
+    """Put a checked change together, with the face walk where it is another one.
+
+    Raises:
+        gazerig.config.load.ConfigError: the walk that the rig names is at fault.
+    """
+    name = rig.gaze.scanpath.walk
+    walk = load_walk(name) if name != base.gaze.scanpath.walk else None
+    return _Ready(order.changes, base, rig, walk)
+
+
+def _beyond(
+    joints: tuple[str, ...], wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]
+) -> tuple[str, ...]:
+    """Say which joints may go farther or faster than their servos were set up to."""
+    more = [
+        name
+        for name, wish, most in zip(joints, wanted, reach, strict=True)
+        if wish.low_rad < most.low_rad - 1e-6
+        or wish.high_rad > most.high_rad + 1e-6
+        or wish.speed_rad_s > most.speed_rad_s + 1e-6
+    ]
+    if not more:
+        return ()
+    return (f"{', '.join(more)}: all of the range and speed come with a stop and a resume",)
+
+
+def _told(key: str, value: Value) -> str:
+    when = live(key)
+    note = f" ({when})" if when.startswith(NEXT_START) else ""
+    return f"tuned: {key} = {value}{note}"

@@ -1,0 +1,321 @@
+"""The parameters of a running rig: what they are, what they are to be, and the file they are in.
+
+Three rigs matter: the one that its files make (with the options of the command line), the
+one in force, and the one of defaults. What a person changes lies over the files until it is
+saved, whichever character is chosen and however often the files are edited meanwhile.
+
+Everything may be called from any thread. Changes reach the running parts as one order,
+checked as a whole beforehand.
+"""
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from gazerig.config.apart import apart
+from gazerig.config.confined import Confined
+from gazerig.config.knobs import (
+    NEXT_START,
+    Knob,
+    changed,
+    differences,
+    flattened,
+    live,
+    value_of,
+    values,
+    values_after,
+)
+from gazerig.config.knobs import knobs as knobs_of
+from gazerig.config.load import ConfigError, Fault, shipped_names
+from gazerig.config.rig_files import Layers, RigFiles, read_all, save_copy, save_over
+from gazerig.config.save import Change, Saved, rig_file
+from gazerig.config.save_text import Unchangeable, written
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.app.live_params import Retuner
+from gazerig.robot.model.commands import Value
+from gazerig.robot.model.reply import OrderTaker
+
+NO_CHARACTER = "none"
+_DEFAULTS = "desk"
+
+
+class _State(NamedTuple):
+    """Everything at one moment; a new one takes its place as a whole.
+
+    saved: what the files make, with the options; rig: in force
+    name: of the rig as it was asked for, a shipped name or a path
+    files: in use, with what they held when they were last read without a fault
+    was, values: of ``saved`` and of ``rig``, by key
+    """
+
+    saved: Rig
+    rig: Rig
+    name: str
+    character: str | None
+    files: RigFiles
+    was: Mapping[str, Value]
+    values: Mapping[str, Value]
+    version: int
+
+
+class Tuning:
+    """Gives and changes the parameters of one running rig.
+
+    version: goes up at each change
+    confined: says which files a person at a browser may name
+    """
+
+    def __init__(
+        self,
+        retuner: Retuner,
+        order: OrderTaker,
+        rig: str,
+        character: str | None = None,
+        profile: str | None = None,
+        now: Callable[[], datetime] = datetime.now,
+        elsewhere: Callable[..., Any] = apart,
+    ) -> None:
+        """Take a rig as it was assembled, and the names of the files it was made of.
+
+        order: takes orders for the next tick, as gazerig.robot.control.loop.Robot.order
+        now: the time in the name of a backup
+        elsewhere: calls a function that reads or writes rig files, so that the control loop
+            does not feel it
+
+        Raises:
+            gazerig.config.load.ConfigError: the files have changed since, and are at fault now.
+        """
+        self._retuner, self._order = retuner, order
+        self._profile, self._now, self._elsewhere = profile, now, elsewhere
+        self._changing = threading.Lock()
+        self._defaults = _defaults(retuner.rig)
+        # What the command line says otherwise stays in force whatever the files say.
+        read, files = read_all(Layers(rig, character, profile))
+        whole, found = retuner.rig, values(retuner.rig)
+        self._options = differences(read, whole)
+        self._state = _State(whole, whole, rig, character, files, found, found, 0)
+        self._knobs = knobs_of(whole, self._defaults)
+        # A shipped rig's own folder is the package's, where nobody has files.
+        at_home = rig in shipped_names("rigs")
+        self.confined = Confined(Path.cwd() if at_home else self.path.parent)
+
+    @property
+    def version(self) -> int:
+        """Count the changes."""
+        return self._state.version
+
+    @property
+    def name(self) -> str:
+        """Return the rig's name or path."""
+        return self._state.name
+
+    @property
+    def path(self) -> Path:
+        """Return the rig's file."""
+        return rig_file(self._state.name)
+
+    @property
+    def character_name(self) -> str:
+        """Return the character in force, "none" without one."""
+        return self._state.character or NO_CHARACTER
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the files in use: the rig's, and those laid over it."""
+        return self._state.files.paths
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Return all parameters in the order of the file."""
+        state, made = self._state, self._knobs
+        # All but which entries there are stays as it is.
+        if [knob.key for knob in made] != list(state.values):
+            made = self._knobs = knobs_of(state.rig, self._defaults)
+        return made
+
+    def values(self) -> dict[str, Value]:
+        """Return key -> value in force of every knob."""
+        return dict(self._state.values)
+
+    def get(self, prefix: str = "") -> dict[str, Value]:
+        """Return the values in force whose keys begin so.
+
+        Raises:
+            gazerig.config.load.ConfigError: there is none; the message says what is near.
+        """
+        state = self._state
+        found = {key: value for key, value in state.values.items() if key.startswith(prefix)}
+        return found or {prefix: value_of(state.rig, prefix)}
+
+    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
+        """Put values at dotted keys in force from the next tick on, all of them or none.
+
+        Gives a line for each value that is another one now.
+
+        Raises:
+            gazerig.config.load.ConfigError: with every fault; what was in force stays.
+        """
+        with self._changing:
+            return self._put(self._state, changed(self._state.rig, changes))
+
+    def unsaved(self) -> tuple[Change, ...]:
+        """Return what is in force and not in the files."""
+        state = self._state
+        return _changes(state.saved, state.rig, state.was)
+
+    def differs(self) -> tuple[Change, ...]:
+        """Return what differs from the defaults, those of the shipped rig."""
+        return _changes(self._defaults, self._state.rig, values(self._defaults))
+
+    def revert(self) -> tuple[str, ...]:
+        """Put in force what the files say."""
+        with self._changing:
+            return self._put(self._state, self._state.saved)
+
+    def save(self, path: Path | str | None = None) -> Saved:
+        """Write what is in force into the rig's file, or into a copy of it at a new path.
+
+        From then on the copy is this rig's file. A file that was spoilt by hand meanwhile is
+        kept as a backup.
+
+        Raises:
+            gazerig.config.load.ConfigError: the rig is a shipped one and no path is given, the path
+                exists or cannot be written, or another layer overrides a value.
+        """
+        with self._changing:
+            if self._state.files.changed():
+                # An edit that nobody has heard of yet counts; one with faults does not.
+                with contextlib.suppress(ConfigError):
+                    self._reload()
+            state = self._state
+            wanted = flattened(state.rig, differences(state.saved, state.rig))
+            _refuse_lists(wanted)
+            layers, good = self._layers(state), state.files.own
+            target = rig_file(state.name)
+            if path is not None and os.path.realpath(path) != os.path.realpath(target):
+                done = self._elsewhere(save_copy, layers, good, str(path), wanted, self._now())
+                state = state._replace(name=str(path))
+            else:
+                layers = layers._replace(name=str(target))
+                done = self._elsewhere(save_over, layers, good, wanted, self._now())
+            saved: Saved
+            saved, files = done
+            self._state = state._replace(
+                saved=state.rig, was=state.values, files=files, version=state.version + 1
+            )
+            return saved
+
+    def characters(self) -> tuple[str, ...]:
+        """Return the characters there are, the one in force first; "none" is the rig itself."""
+        now = self.character_name
+        return (now, *(n for n in (NO_CHARACTER, *shipped_names("characters")) if n != now))
+
+    def character(self, name: str) -> tuple[str, ...]:
+        """Lay another character over the rig; what is unsaved stays over both.
+
+        name: of a shipped one, a path, or "none"
+
+        Raises:
+            gazerig.config.load.ConfigError: there is no such character, or it does not fit the rig.
+        """
+        with self._changing:
+            state = self._state
+            wanted = None if name in (NO_CHARACTER, "") else name
+            state = self._read(state._replace(character=wanted))
+            rig = changed(state.saved, differences(self._state.saved, self._state.rig))
+            return self._put(state, rig)
+
+    def reload(self, path: Path | str | None = None) -> tuple[str, ...]:
+        """Put in force what the files say now; what is unsaved stays, unless they changed it.
+
+        path: the one of the files that was edited
+
+        Raises:
+            gazerig.config.load.ConfigError: with every fault; what was in force stays.
+        """
+        with self._changing:
+            return self._reload()
+
+    def _reload(self) -> tuple[str, ...]:
+        before, state = self._state, self._read(self._state)
+        edited = differences(before.saved, state.saved)
+        kept = {
+            key: value
+            for key, value in differences(before.saved, before.rig).items()
+            if not any(_overlap(key, other) for other in edited)
+        }
+        return self._put(state, changed(state.saved, kept))
+
+    def _layers(self, state: _State) -> Layers:
+        return Layers(state.name, state.character, self._profile)
+
+    def _read(self, state: _State) -> _State:
+        """Read the files, with the options over them; what is in force stays."""
+        rig, files = self._elsewhere(read_all, self._layers(state))
+        saved = changed(rig, self._options)
+        return state._replace(saved=saved, was=values(saved), files=files)
+
+    def _put(self, state: _State, rig: Rig) -> tuple[str, ...]:
+        """Put a rig in force that was checked, and say what is other than before."""
+        before = self._state
+        found = differences(before.rig, rig)
+        if found:
+            self._order(self._retuner.prepare(before.rig, rig))
+        elif state == before:
+            return ()
+        self._state = state._replace(
+            rig=rig if found else before.rig,
+            values=values_after(before.values, before.rig, rig) if found else before.values,
+            version=before.version + 1,
+        )
+        return tuple(_told(key, value) for key, value in found.items())
+
+
+def _defaults(rig: Rig) -> Rig:
+    """Return the shipped rig of the same name, else the one that all others are made of."""
+    return load_rig(rig.name if rig.name in shipped_names("rigs") else _DEFAULTS)
+
+
+def _refuse_lists(wanted: Mapping[str, Value]) -> None:
+    """Refuse what no single line can hold."""
+    faults = [
+        Fault("", None, key, "", "holds mappings: change it in the file, which is read again")
+        for key, value in wanted.items()
+        if isinstance(value, tuple) and any(isinstance(item, Mapping) for item in value)
+    ]
+    if faults:
+        raise ConfigError(faults)
+
+
+def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[Change, ...]:
+    """Return each value that differs, as YAML; was: those before."""
+    found = flattened(after, differences(before, after))
+    return tuple(
+        Change(key, _text(was[key]) if key in was else None, _text(value))
+        for key, value in found.items()
+    )
+
+
+def _text(value: Value) -> str:
+    """Write a value as YAML on one line."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {_text(item)}' for key, item in value.items())}}}"
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_text, value))}]"
+    try:
+        return written(value)
+    except Unchangeable:
+        return str(value)
+
+
+def _overlap(one: str, other: str) -> bool:
+    """Return whether two keys are the same or one is above the other."""
+    return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
+
+
+def _told(key: str, value: Value) -> str:
+    when = live(key)
+    note = f" ({when})" if when.startswith(NEXT_START) else ""
+    return f"{key} = {_text(value)}{note}"

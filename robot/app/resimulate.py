@@ -1,0 +1,333 @@
+"""A recorded run done again: the same percepts, times, orders and dice, the models of now.
+
+With the configuration and code of then every command comes out the same to the bit; the
+joints are then fed as recorded. With anything changed the recorded joints would belong to
+other commands, so the emulated servos follow instead.
+"""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from gazerig.config.load import ConfigError, load, shipped
+from gazerig.config.schema import Rig, load_rig
+from gazerig.config.text import rig_text
+from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.robot.analysis.summary import Summary
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import Choice
+from gazerig.robot.app.session import leave
+from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.recording.playback_devices import NoCamera, PlayedBody, PlayedPerception
+from gazerig.robot.recording.read import BadRecording, RunRecording
+from gazerig.robot.recording.tick_record import Measured, Moment
+
+Joints = Literal["recorded", "emulated"]
+
+_LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
+
+
+class Rerun(NamedTuple):
+    """What came out of doing a run again.
+
+    joints: where the joints' angles came from
+    ticks: compared; agreeing: whose target, gaze and commands are the same to the bit
+    first_difference_s: from the first tick, None where all agree; differs: what does there
+    tx_same: the bytes on the emulated bus are the same too, None where nobody can know
+    recorded, again: the figures of both (gazerig.robot.analysis.summary)
+    notes: what else a person should know
+    """
+
+    joints: Joints
+    ticks: int
+    agreeing: int
+    first_difference_s: float | None
+    differs: str
+    tx_same: bool | None
+    recorded: dict[str, object]
+    again: dict[str, object]
+    notes: tuple[str, ...]
+
+    @property
+    def same(self) -> bool:
+        """Return whether every tick came out the same."""
+        return self.agreeing == self.ticks
+
+
+def rerun(
+    recording: RunRecording,
+    rig: Rig | str | None = None,
+    character: str | None = None,
+    joints: str | None = None,
+    note: Callable[[Tick], None] | None = None,
+) -> Rerun:
+    """Do a recorded run again.
+
+    rig: another rig, by name or path or as it is; None: as recorded
+    character: laid over it, by name or path
+    joints: "recorded" (the default where nothing is changed) or "emulated"
+    note: gets every tick of the new run, to be recorded or reported on
+
+    Raises:
+        gazerig.config.load.ConfigError: the rig or character is at fault.
+        SetupError: the recording cannot be read or holds no tick.
+    """
+    changed = rig is not None or character is not None
+    fed = _joints(joints, changed)
+    with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
+        with_rig = _rig(recording, rig, character, Path(folder))
+        # The scene is not looked at: what it showed is in the recording.
+        choice = Choice(mock=True, fast=True, seed=recording.info.seed, scene="visitor")
+        made = assemble(with_rig, choice)
+        try:
+            return _Again(made, fed, note).whole(recording)
+        finally:
+            made.close()
+
+
+class _Again:
+    """One run being done again."""
+
+    def __init__(self, made: Assembly, joints: Joints, note: Callable[[Tick], None] | None) -> None:
+        self._made = made
+        self._joints = joints
+        self._note = note
+        self._compared = _Compared()
+        self._notes: list[str] = []
+        self._body = PlayedBody(made.robot.body) if joints == "recorded" else None
+        self._perception = PlayedPerception(made.mount, made.horizontal_field_deg)
+        robot = made.robot
+        robot.perception, robot.camera = self._perception, NoCamera()
+        if self._body is not None:
+            robot.body = self._body
+
+    def whole(self, recording: RunRecording) -> Rerun:
+        """Do all of it and compare."""
+        moments = recording.moments()
+        first = next(moments, None)
+        if first is None:
+            raise SetupError(f"{recording.path} holds no tick: there is nothing to run again")
+        self._see_joints(first.tick.verdict.joints)
+        if recording.note:
+            self._notes.append(recording.note)
+        began_s = self._start(first)
+        ended = self._run(chain((first,), moments))
+        end = recording.end
+        if ended is None and end.ran_s is not None:
+            self._made.clock.sleep_until(began_s + end.ran_s)
+        if self._body is not None:
+            self._body.leave_off()
+        count = LoopCount(self._compared.ticks, 0, ended or end.stopped_by or "seconds")
+        leave(self._made, count, lambda line: None)
+        if ended is not None:
+            self._notes.append(f"the new run ended early by {ended}")
+        now = self._made.sent_digest()
+        same = now == end.tx_sha256 if end.tx_sha256 else None
+        return self._compared.result(self._joints, same, tuple(self._notes))
+
+    def _see_joints(self, recorded: tuple[str, ...]) -> None:
+        """See that recorded joints are the rig's own; say where the rig has others.
+
+        Raises:
+            SetupError: they are to be fed to a rig that has others.
+        """
+        names = self._made.robot.body.names
+        if names == recorded:
+            return
+        apart = f"the rig has the joints {', '.join(names)}, the recording {', '.join(recorded)}"
+        if self._body is not None:
+            raise SetupError(f"{apart}: let the servos be emulated")
+        self._notes.append(apart)
+
+    def _start(self, first: Moment) -> float:
+        """Begin where the recorded run began; give when."""
+        began_s = first.tick.t_s - first.dt_s
+        starts = [one.t_s for one in first.before if isinstance(one, Measured)]
+        if not starts:
+            self._notes.append("the start of the run is not in the recording: it begins a little")
+        self._made.clock.sleep_until(starts[0] if starts else began_s)
+        if self._body is not None:
+            self._body.play(first)
+        self._made.robot.start(self._made.clock)
+        return began_s
+
+    def _run(self, moments: Iterator[Moment]) -> str | None:
+        """Do tick after tick; give what ended them before their time."""
+        made = self._made
+        for moment in moments:
+            made.clock.sleep_until(moment.tick.t_s)
+            try:
+                tick = self._tick(moment)
+            except DriverError as error:
+                return f"fault: {error}"
+            self._compared.note(moment.tick, tick)
+            if self._note is not None:
+                self._note(tick)
+            if tick.verdict.level == "limp" and not tick.stopped and self._body is None:
+                return f"fault: {'; '.join(tick.verdict.gravest)}"
+        return None
+
+    def _tick(self, moment: Moment) -> Tick:
+        """Do one tick."""
+        was = moment.tick
+        if self._body is not None:
+            self._body.play(moment)
+        self._perception.percept = was.percept
+        for order in was.orders:
+            try:
+                self._made.robot.order_again(order)
+            except ValueError as error:
+                self._notes.append(f"an order could not be given again: {error}")
+        tick = self._made.robot.tick(was.t_s, moment.dt_s)
+        # What happened on the bus and to the camera happened to the machine of then.
+        return tick if self._body is None else tick._replace(events=was.events)
+
+
+class _Compared:
+    """Two runs, tick by tick."""
+
+    def __init__(self) -> None:
+        self.ticks = 0
+        self._agreeing = 0
+        self._began_s = 0.0
+        self._first_s: float | None = None
+        self._differs = ""
+        self._was, self._is = Summary(), Summary()
+
+    def note(self, was: Tick, now: Tick) -> None:
+        """Compare a tick with its likeness."""
+        if self.ticks == 0:
+            self._began_s = was.t_s
+        self.ticks += 1
+        self._was.note(was)
+        self._is.note(now)
+        differs = _difference(was, now)
+        if not differs:
+            self._agreeing += 1
+        elif self._first_s is None:
+            self._first_s = was.t_s - self._began_s
+            self._differs = differs
+
+    def result(self, joints: Joints, tx_same: bool | None, notes: tuple[str, ...]) -> Rerun:
+        """Return what came out."""
+        return Rerun(
+            joints, self.ticks, self._agreeing, self._first_s, self._differs, tx_same,
+            self._was.figures(), self._is.figures(), notes,
+        )  # fmt: skip
+
+
+class _Decided(NamedTuple):
+    """What a tick decided, as text that is the same only where every bit is."""
+
+    target: str
+    gaze: str
+    wish: str
+    command: str
+    level: str
+
+
+def _decided(tick: Tick) -> _Decided:
+    gaze = tick.gaze._replace(limited=())  # told since later versions
+    if _LOWER_LIDS.isdisjoint(tick.verdict.joints):  # what is asked of absent lids moves nothing
+        gaze = gaze._replace(lower_left=1.0, lower_right=1.0)
+    # The reason's words may be put better one day; what they stand for is in the pulls.
+    return _Decided(
+        repr(tick.target._replace(why="")),
+        repr(gaze),
+        repr(tick.wish_rad),
+        repr(tick.verdict.command_rad),
+        tick.verdict.level,
+    )
+
+
+def _difference(was: Tick, now: Tick) -> str:
+    """Say what differs first in a tick, "" where nothing does."""
+    pairs = zip(_Decided._fields, _decided(was), _decided(now), strict=True)
+    name = next((name for name, then, again in pairs if then != again), None)
+    return f"{name}: {_short(was, now, name)}" if name is not None else ""
+
+
+def _short(was: Tick, now: Tick, name: str) -> str:
+    """Say in a few words what one part of a tick became of what it was."""
+    if name == "target":
+        return f"{now.target.why}, was {was.target.why}"
+    if name == "gaze":
+        return f"{now.gaze.phase}, was {was.gaze.phase}"
+    if name == "level":
+        return f"{now.verdict.level}, was {was.verdict.level}"
+    if was.verdict.joints != now.verdict.joints:
+        return f"joints {', '.join(now.verdict.joints)}, was {', '.join(was.verdict.joints)}"
+    then, again = was.wish_rad, now.wish_rad
+    if name == "command":
+        then, again = was.verdict.command_rad, now.verdict.command_rad
+    rows = zip(now.verdict.joints, then, again, strict=True)
+    joint, old, new = next(row for row in rows if repr(row[1]) != repr(row[2]))
+    return f"{joint} {new:.6f} rad, was {old:.6f}"
+
+
+def _joints(joints: str | None, changed: bool) -> Joints:
+    """Choose where the joints' angles come from."""
+    match joints:
+        case None:
+            return "emulated" if changed else "recorded"
+        case "recorded" | "emulated":
+            return "recorded" if joints == "recorded" else "emulated"
+    raise SetupError(f"joints {joints}: unknown; there is recorded, emulated")
+
+
+def recorded_rig(recording: RunRecording) -> Rig:
+    """Return the rig with everything that was in force when the run began.
+
+    Raises:
+        BadRecording: this version does not know what the recorded one was made of.
+    """
+    with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
+        return _read(recording, _kept(recording.info.config_yaml, Path(folder) / "recorded.yaml"))
+
+
+def _rig(
+    recording: RunRecording, rig: Rig | str | None, character: str | None, folder: Path
+) -> Rig:
+    """Return the rig to run with: the recorded one, unless another was asked for."""
+    if isinstance(rig, str):
+        return load_rig(rig, character)
+    text = rig_text(rig) if rig is not None else recording.info.config_yaml
+    whole = _kept(text, folder / "recorded.yaml")
+    base = rig if rig is not None else _read(recording, whole)
+    found = base
+    if character is not None:
+        found = load(_character(character), Rig, defaults=(whole,))
+    scanpath = found.gaze.scanpath
+    same_walk = rig is None and scanpath.walk == base.gaze.scanpath.walk
+    if not same_walk or not recording.info.walk_yaml:
+        return found
+    # The walk's own file may have changed since, or be on another machine.
+    walk = str(_kept(recording.info.walk_yaml, folder / "walk.yaml"))
+    return replace(found, gaze=replace(found.gaze, scanpath=replace(scanpath, walk=walk)))
+
+
+def _read(recording: RunRecording, whole: Path) -> Rig:
+    """Read the recorded configuration."""
+    try:
+        return load(whole, Rig)
+    except ConfigError as error:
+        first = error.faults[0]
+        raise BadRecording(
+            f"{recording.path} was made with a configuration that this version does not know "
+            f"({first.key}: {first.rule}): give another rig"
+        ) from None
+
+
+def _kept(text: str, file: Path) -> Path:
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def _character(name_or_path: str) -> Path:
+    """Find a character as gazerig.config.schema.load_rig does."""
+    if "/" in name_or_path or name_or_path.endswith((".yaml", ".yml")):
+        return Path(name_or_path)
+    return shipped("characters", name_or_path)

@@ -1,0 +1,80 @@
+"""What a rig's file comes to in radians and metres, for the parts that are made of it."""
+
+from collections.abc import Mapping
+from math import radians
+
+from gazerig.config.schema import Rig
+from gazerig.gaze.types import Angles2, Vec3
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import LIDS, LidEnds
+from gazerig.robot.model.types import JointAngles, in_order
+from gazerig.robot.safety.motion_limiter import JointLimit
+
+EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
+"""Of the left and the right eye: ((yaw low, high), (pitch low, high)), radians."""
+
+
+def limits(joints: Mapping[str, JointParams]) -> tuple[JointLimit, ...]:
+    """Return the joints' limits, in the order of ``in_order``."""
+    return tuple(joints[name].limit() for name in in_order(joints))
+
+
+def park_pose(rig: Rig) -> JointAngles:
+    """Return the pose before torque goes off."""
+    return tuple(radians(rig.park_deg.get(name, 0.0)) for name in in_order(rig.joints))
+
+
+def own_parts(rig: Rig) -> dict[str, Vec3]:
+    """Return the rig's own places of face parts in metres."""
+    return {code: (x / 1e3, y / 1e3, z / 1e3) for code, (x, y, z) in rig.face_parts_mm.items()}
+
+
+def lid_ends(rig: Rig) -> dict[str, LidEnds]:
+    """Return the joint angles of the rig's lids shut, and open."""
+    ends = {}
+    for name in LIDS:
+        shut, wide = rig.lid_joints.ends_deg(name)
+        if name in rig.joints and shut is not None and wide is not None:
+            ends[name] = (radians(shut), radians(wide))
+    return ends
+
+
+def eye_limits(rig: Rig) -> EyeLimits:
+    """Return the eyes' ranges: the narrower of the joints' and the profile's."""
+    return (_eye(rig, "left"), _eye(rig, "right"))
+
+
+def head_limits(rig: Rig) -> tuple[float, tuple[Angles2, Angles2]]:
+    """Return the smallest eye limit and the neck's ((yaw low, high), (pitch low, high))."""
+    smallest = min(abs(end) for eye in eye_limits(rig) for span in eye for end in span)
+    neck = _span(rig, "neck_yaw", rig.ranges.neck_yaw_deg), _span(rig, "neck_pitch", 180.0)
+    return smallest, neck
+
+
+def neck_span(rig: Rig, name: str) -> Angles2:
+    """Return the range of an axis of the neck; none where it is not there."""
+    return _span(rig, name, 180.0)
+
+
+def _eye(rig: Rig, side: str) -> tuple[Angles2, Angles2]:
+    yaw = _span(rig, _turned_by(rig, side, "pan"), rig.ranges.eye_yaw_deg)
+    return yaw, _span(rig, _turned_by(rig, side, "tilt"), rig.ranges.eye_pitch_deg)
+
+
+def _turned_by(rig: Rig, side: str, way: str) -> str:
+    """Name the joint that turns an eye: its own, or that of both."""
+    own = f"{side}_eye_{way}"
+    return own if own in rig.joints else f"eyes_{way}"
+
+
+def _span(rig: Rig, name: str, most_deg: float) -> Angles2:
+    """Return a joint's range within +-most_deg, in radians; none where it is not there."""
+    joint = rig.joints.get(name)
+    if joint is None:
+        return (0.0, 0.0)
+    return radians(max(joint.min_deg, -most_deg)), radians(min(joint.max_deg, most_deg))
+
+
+def park_rad(rig: Rig) -> dict[str, float]:
+    """Return the parking pose by joint; joints left out go to 0."""
+    return {name: radians(angle) for name, angle in rig.park_deg.items()}

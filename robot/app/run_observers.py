@@ -1,0 +1,280 @@
+"""Everything that watches a run, or reaches into it, beside the control loop.
+
+The page, the status line, other programs, the rig's files and the recording: each is optional,
+has its own thread or process, and is told of a tick in next to no time.
+"""
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.control.observers import Observers, left_out
+from gazerig.robot.dashboard.click_to_look import Picking
+from gazerig.robot.dashboard.page_process import Page
+from gazerig.robot.dashboard.param_feed import Fed, TuningFeed
+from gazerig.robot.dashboard.publisher import InForce, Onlooker
+from gazerig.robot.dashboard.request_handler import Confined, PageHear
+from gazerig.robot.dashboard.snapshot import Snapshots
+from gazerig.robot.model.commands import Order, Resume, Stop, Tune
+from gazerig.robot.model.reply import OrderTaker, Ticket
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunInfo
+from gazerig.robot.remote.live_server import FileTuning, LiveControl
+
+_SWITCH_S = 0.0003
+
+STEER = "steer"
+"""The menu of this name is the page's steps of a calibration (dashboard/control_tabs.py)."""
+
+
+class LiveTuning(FileTuning, Fed, Protocol):
+    """The parameters of the running rig, as gazerig.robot.app.param_store.Tuning has them."""
+
+    @property
+    def confined(self) -> Confined:
+        """Return what says which files a person at a browser may name."""
+        ...
+
+
+class Wished(NamedTuple):
+    """What shall watch, None or False where nothing shall.
+
+    page: host and port; status_line: on the terminal; record: a file to write; over: also
+    where it exists
+    """
+
+    page: tuple[str, int] | None = None
+    status_line: bool = False
+    record: Path | None = None
+    over: bool = False
+
+
+class Told(NamedTuple):
+    """What only the command line knows.
+
+    tuning: the parameters; refusals: what it raises where a value breaks a rule
+    about: what does not change, for other programs; info: for the recording
+    """
+
+    tuning: LiveTuning
+    refusals: tuple[type[Exception], ...]
+    about: dict[str, object]
+    info: Callable[[], RunInfo]
+
+
+class Steer(NamedTuple):
+    """Buttons of the page that lead a calibration in the place of all that leads the robot.
+
+    keys: what stands on them; press: takes one, in a thread of the page's, and gives what there
+    is to say about it; shown: gives how far things are, in words
+    """
+
+    keys: tuple[str, ...]
+    press: Callable[[str], str | None]
+    shown: Callable[[], str]
+
+
+class Audience:
+    """All of them, opened and closed together."""
+
+    def __init__(
+        self,
+        made: Assembly,
+        wished: Wished,
+        told: Told | None,
+        fast: bool,
+        say: Callable[[str], None],
+        status: Callable[[str], None],
+        steer: Steer | None = None,
+    ) -> None:
+        """Take the robot before it starts.
+
+        told: None where parameters cannot be changed from outside and nothing is recorded
+        fast: simulated time, in which nobody can watch
+        steer: who leads the head by buttons; then the page can otherwise only stop and resume
+        """
+        self._steer = steer
+        self._made, self._fast, self._say = made, fast, say
+        self._tuning = told.tuning if told is not None else None
+        self._live = (
+            LiveControl(made.robot, told.tuning, told.refusals, made.clock, told.about, say)
+            if told is not None and not fast
+            else None
+        )
+        self._picking = Picking(made.mount, made.poses, made.camera)
+        self._page = self._made_page(wished.page, told) if wished.page is not None else None
+        self._snapshots = Snapshots(made.loop.rate_hz, made.shown())
+        self._onlooker = self._made_onlooker(status if wished.status_line else None)
+        self._recorder = self._made_recorder(wished, told)
+        self._looking = False
+        self._observers = Observers(say)
+        self.join(self._observers)
+
+    def _made_page(self, address: tuple[str, int], told: Told | None) -> Page:
+        order, steer = self._made.robot.order, self._steer
+        hear = PageHear(
+            order if steer is None else only_stops(order),
+            tuning=self._tuning,
+            point=self._picking.point,
+            steer=steer.press if steer is not None else None,
+            refusals=told.refusals if told is not None else (),
+            saved=self._live.saved if self._live is not None else None,
+            depth=self._show_depth,
+            confined=self._tuning.confined if self._tuning is not None else None,
+        )
+        return Page(*address, hear)
+
+    def _made_onlooker(self, status: Callable[[str], None] | None) -> Onlooker:
+        page, made, tuning = self._page, self._made, self._tuning
+        return Onlooker(
+            page,
+            status,
+            self._snapshots,
+            made.robot.body.bus.health,
+            self._in_force,
+            made.robot.perception.residual,
+            made.mount,
+            made.poses,
+            lambda: made.horizontal_field_deg,
+            TuningFeed(page.send, tuning) if page is not None and tuning is not None else None,
+            self._say,
+        )
+
+    def _made_recorder(self, wished: Wished, told: Told | None) -> Recorder | None:
+        if wished.record is None or told is None:
+            return None
+        robot = self._made.robot
+        recorder = Recorder(
+            wished.record, told.info(), robot.body.bus.health, wished.over, patient=self._fast
+        )
+        robot.body = recorder.tapped(robot.body)
+        return recorder
+
+    def join(self, observers: Observers) -> None:
+        """Have all of them told of ticks; each is left out by itself where it fails."""
+        if not self._fast:
+            observers.add("page and status line", self._onlooker.note)
+        if self._page is not None:
+            observers.add("picking a point on the page", self._picking.note)
+            observers.add("the page's limits", self._keep_shown)
+        if self._live is not None:
+            observers.add("the remote control", self._live.note)
+        if self._recorder is not None:
+            observers.add("the recording", self._recorder.note)
+
+    def note(self, tick: Tick) -> None:
+        """Tell all of a tick; called by the loop where they have not joined others."""
+        self._observers.note(tick)
+
+    def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
+        """Return the loop's ``stop`` as the recording needs it."""
+        return self._recorder.timed(stop) if self._recorder is not None else stop
+
+    def open_files(self) -> None:
+        """Create what is written, before anything moves.
+
+        Raises:
+            SetupError: it exists already or cannot be made.
+        """
+        if self._recorder is not None:
+            self._recorder.open()
+
+    def open(self) -> None:
+        """Open the doors, once the robot has started; the robot goes on without what fails."""
+        if not self._fast:
+            # Who computes in another thread gives the interpreter back after so long, not the
+            # usual 5 ms, which is a whole slot of the loop.
+            sys.setswitchinterval(_SWITCH_S)
+        with self._spared("the recording"):
+            if self._recorder is not None:
+                self._recorder.begin()
+        with self._spared("the page"):
+            if self._page is not None:
+                self._page.open()
+                self._page.offer(self._menus())
+        with self._spared("the remote control"):
+            if self._live is not None:
+                self._live.open()
+        with self._spared("page and status line"):
+            if not self._fast:
+                self._onlooker.start()
+                self._looking = True
+
+    @contextlib.contextmanager
+    def _spared(self, name: str) -> Iterator[None]:
+        """Go on whatever the block raises, and say so."""
+        try:
+            yield
+        except Exception as error:
+            self._say(left_out(name, error))
+
+    def tell(self, words: str) -> None:
+        """Say something to everybody who looks at the page."""
+        if self._page is not None:
+            self._page.say(words)
+
+    def give_up(self) -> None:
+        """Leave no file behind of a robot that could not start."""
+        if self._recorder is not None:
+            self._recorder.close("it could not start")
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened to those who watch."""
+        return self._recorder.events() if self._recorder is not None else ()
+
+    def unwritten(self) -> Path | None:
+        """Return the file that was asked for and is not whole, None where there is none."""
+        return self._recorder.unwritten if self._recorder is not None else None
+
+    def close(self, count: LoopCount) -> None:
+        """Close all, when the torque is off."""
+        with self._spared("the remote control"):
+            if self._live is not None:
+                self._live.close()
+        with self._spared("page and status line"):
+            if self._looking:
+                self._onlooker.stop()
+        with self._spared("the page"):
+            if self._page is not None:
+                self._page.close()
+        with self._spared("the recording"):
+            if self._recorder is not None:
+                self._say(self._recorder.close(count.stopped_by, self._made.sent_digest()))
+
+    def _menus(self) -> dict[str, tuple[str, ...]]:
+        if self._steer is not None:
+            return {STEER: self._steer.keys}
+        return self._made.robot.menus()
+
+    def _in_force(self) -> InForce:
+        if self._steer is not None:
+            return InForce(self._steer.shown(), "", "")
+        robot = self._made.robot
+        menus = robot.menus()
+        character = self._tuning.character_name if self._tuning is not None else ""
+        return InForce(menus["behaviour"][0], menus["conversation"][0], character)
+
+    def _show_depth(self, on: bool) -> None:
+        self._onlooker.depth = on
+
+    def _keep_shown(self, tick: Tick) -> None:
+        """Show the rig as it is built now: limits and the field of view can be tuned."""
+        if any(isinstance(order, Tune) for order in tick.orders):
+            self._snapshots.rig = self._made.shown()
+
+
+def only_stops(order: OrderTaker) -> OrderTaker:
+    """Return what takes stop and resume alone; of the rest, it raises ValueError."""
+
+    def take(asked: Order) -> Ticket | None:
+        if not isinstance(asked, Stop | Resume):
+            raise ValueError(
+                f"the buttons of {STEER!r} lead the head now; besides them only stop and resume go"
+            )
+        return order(asked)
+
+    return take

@@ -1,0 +1,293 @@
+"""Least squares of hand-eye calibration: camera on the head and board in the world. Pure.
+
+Two rotations and two places are moved by Levenberg-Marquardt steps until
+the corners are reprojected best. Corners far off count less (Huber). Joints are never
+quite where they say (steps of 0.088 deg, play of the gears), and a head that is 0.1 deg
+off shifts a board 0.7 m away by more than all errors of its corners; so each view has a
+small turn of the head as well, held near zero by how far joints are usually off. Nor is
+the lens known exactly: 1 % of its focal length is 7 mm of the camera's place, but a head
+that turns by known angles measures the lens too, so focal length and centre may move as
+far as a calibration is usually off. How sure the result is comes from leaving out one view
+at a time (jackknife), and from how the place follows the lens.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.calibration.charuco_board import SeenBoard
+from gazerig.robot.perception.intrinsics import Intrinsics, project
+
+Floats = NDArray[np.float64]
+
+# Steps for slopes by differences: radians, metres.
+_SMALL = 1e-6
+_MOST_STEPS = 60
+# A last step of 1 um, or 0.00006 deg.
+_SETTLED = 1e-6
+# Numbers that all views share: camera, board, and focal length and centre of the lens.
+_SHARED = 15
+# Usual error of a corner; only its ratio to the joints' error matters.
+_CORNER_PX = 0.3
+# Huber's bound over the spread of the errors: 95 % as good as plain squares on normal noise.
+_HUBER = 1.345
+
+
+class Pose(NamedTuple):
+    """A frame in its parent: rotation (3, 3) and place (3,) in metres."""
+
+    R: Floats
+    p: Floats
+
+    def then(self, child: "Pose") -> "Pose":
+        """Return the child's frame in this one's parent."""
+        return Pose(self.R @ child.R, self.R @ child.p + self.p)
+
+    def moved(self, step: Floats) -> "Pose":
+        """Turn it about its own axes and shift it along its parent's."""
+        return Pose(self.R @ np.asarray(cv2.Rodrigues(step[:3])[0]), self.p + step[3:])
+
+
+class Guess(NamedTuple):
+    """What is looked for.
+
+    camera: in the head; board: in the world
+    lens_off: (3,) share by which the focal length is longer, pixels by which the centre is
+        farther right and lower, than calibrated
+    turns_rad: (views, 3) by how much each head is turned beyond what its joints say
+    """
+
+    camera: Pose
+    board: Pose
+    lens_off: Floats
+    turns_rad: Floats
+
+    def moved(self, step: Floats) -> "Guess":
+        """Move it by (15 + 3 views,) numbers."""
+        return Guess(
+            self.camera.moved(step[:6]),
+            self.board.moved(step[6:12]),
+            self.lens_off + step[12:_SHARED],
+            self.turns_rad + step[_SHARED:].reshape(-1, 3),
+        )
+
+    def lens(self, calibrated: Intrinsics) -> Intrinsics:
+        """Return the lens as it seems from here."""
+        zoom, right, down = self.lens_off.tolist()
+        return Intrinsics(
+            calibrated.fx_px * (1.0 + zoom),
+            calibrated.fy_px * (1.0 + zoom),
+            calibrated.cx_px + right,
+            calibrated.cy_px + down,
+            calibrated.distortion,
+        )
+
+
+class Sights(NamedTuple):
+    """All corners of all views: n corners.
+
+    R_world_head: (n, 3, 3); p_world_head_m, corners_board_m: (n, 3); corners_px: (n, 2)
+    view: (n,) number of the view each belongs to; views: how many
+    lens_error: (3,) how far focal length (as a share) and centre (pixels) are usually off
+    joint_error_rad: how far joints are usually off
+    """
+
+    R_world_head: Floats
+    p_world_head_m: Floats
+    corners_board_m: Floats
+    corners_px: Floats
+    view: NDArray[np.int64]
+    views: int
+    lens: Intrinsics
+    lens_error: Floats
+    joint_error_rad: float
+
+    @staticmethod
+    def of(
+        views: Sequence[tuple[Mat3, Vec3, SeenBoard]],
+        lens: Intrinsics,
+        lens_error: Floats,
+        joint_error_rad: float,
+    ) -> "Sights":
+        """Line up the corners of views."""
+        counts = [len(seen.ids) for _, _, seen in views]
+        return Sights(
+            np.repeat(np.array([R for R, _, _ in views]), counts, axis=0),
+            np.repeat(np.array([p for _, p, _ in views]), counts, axis=0),
+            np.concatenate([seen.corners_board_m for _, _, seen in views]),
+            np.concatenate([seen.corners_px for _, _, seen in views]),
+            np.repeat(np.arange(len(views)), counts),
+            len(views),
+            lens,
+            lens_error,
+            joint_error_rad,
+        )
+
+    def errors(self, guess: Guess) -> Floats:
+        """Return by how much each corner is seen off: (2 n,) pixels, nan behind the camera."""
+        world = self.corners_board_m @ guess.board.R.T + guess.board.p
+        head = np.einsum("nji,nj->ni", self.R_world_head, world - self.p_world_head_m)
+        # The turns are so small that their squares do not count.
+        head -= np.cross(guess.turns_rad[self.view], head)
+        shown = project((head - guess.camera.p) @ guess.camera.R, guess.lens(self.lens))
+        return np.asarray((shown - self.corners_px).ravel(), dtype=np.float64)
+
+    def slopes(self, guess: Guess) -> tuple[Floats, Floats]:
+        """Return the slopes of errors by shared numbers (2 n, 15) and head turns (2 n, 3)."""
+        columns = []
+        for k in range(_SHARED + 3):
+            step = np.zeros(_SHARED + 3 * self.views)
+            step[[k] if k < _SHARED else slice(k, None, 3)] = _SMALL
+            more, less = (self.errors(guess.moved(sign * step)) for sign in (1.0, -1.0))
+            columns.append((more - less) / (2.0 * _SMALL))
+        return np.stack(columns[:_SHARED], axis=1), np.stack(columns[_SHARED:], axis=1)
+
+    def system(self, guess: Guess, errors: Floats) -> tuple[Floats, Floats]:
+        """Return the normal equations (m, m) and (m,) of all m = 15 + 3 views numbers."""
+        shared, own = self.slopes(guess)
+        weight = _weights(errors)[:, None]
+        inner = np.zeros((_SHARED + 3 * self.views,) * 2)
+        inner[:_SHARED, :_SHARED] = shared.T @ (shared * weight)
+        pull = np.concatenate((shared.T @ (errors * weight[:, 0]), np.zeros(3 * self.views)))
+        of_row = np.repeat(self.view, 2)
+        for k in range(self.views):
+            mine, at = of_row == k, slice(_SHARED + 3 * k, _SHARED + 3 * k + 3)
+            heavy = own[mine] * weight[mine]
+            inner[:_SHARED, at] = shared[mine].T @ heavy
+            inner[at, :_SHARED] = inner[:_SHARED, at].T
+            inner[at, at] = own[mine].T @ heavy
+            pull[at] = errors[mine] @ heavy
+        held = np.arange(12, len(pull))
+        trust = 1.0 / self._usual(guess) ** 2
+        inner[held, held] += trust
+        pull[held] += np.concatenate((guess.lens_off, guess.turns_rad.ravel())) * trust
+        return inner, pull
+
+    def cost(self, guess: Guess, errors: Floats, bound: float) -> float:
+        """Return Huber's cost of the errors and that of the turns."""
+        if not np.isfinite(errors).all():
+            return float("inf")
+        size = np.abs(errors)
+        costs = np.where(size <= bound, 0.5 * size * size, bound * (size - 0.5 * bound))
+        off = np.concatenate((guess.lens_off, guess.turns_rad.ravel())) / self._usual(guess)
+        return float(costs.sum()) / _CORNER_PX**2 + 0.5 * float((off * off).sum())
+
+    def _usual(self, guess: Guess) -> Floats:
+        """Return how far lens and joints are usually off: (3 + 3 views,)."""
+        turns = np.full(guess.turns_rad.size, self.joint_error_rad)
+        return np.concatenate((self.lens_error, turns))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What the search ended with.
+
+    cost: what it made small
+    rms_px, view_rms_px: reprojection errors with the joints as they say they are
+    corner_px: what is left of them when each head may be turned a little
+    joint_error_deg: root mean square of those turns, a joint
+    """
+
+    sights: Sights
+    guess: Guess
+    cost: float
+    rms_px: float
+    view_rms_px: Floats
+    corner_px: float
+    joint_error_deg: float
+
+    def spread(self) -> Floats:
+        """Return standard deviations (6,) of the camera's turn (rad) and place (m)."""
+        sights, errors = self.sights, self.sights.errors(self.guess)
+        shared, own = sights.slopes(self.guess)
+        weight, of_row = _weights(errors), np.repeat(sights.view, 2)
+        inner = np.zeros((sights.views, _SHARED, _SHARED))
+        pull = np.zeros((sights.views, _SHARED))
+        for k in range(sights.views):
+            mine = of_row == k
+            a, b, w = shared[mine], own[mine], weight[mine, None]
+            free = b.T @ (b * w) + np.eye(3) / sights.joint_error_rad**2
+            across = a.T @ (b * w)
+            inner[k] = a.T @ (a * w) - across @ np.linalg.solve(free, across.T)
+            pull[k] = a.T @ (errors[mine] * weight[mine])
+        try:
+            # Without view k the best place lies this far from the best with all of them.
+            whole = inner.sum(axis=0)
+            whole[12:, 12:] += np.diag(1.0 / sights.lens_error**2)
+            off = np.linalg.solve(whole - inner, pull[:, :, None])[:, :6, 0]
+        except np.linalg.LinAlgError:
+            return np.full(6, np.inf)
+        off -= off.mean(axis=0)
+        views = (sights.views - 1) / sights.views * (off * off).sum(axis=0)
+        # What the lens was calibrated wrong by is the same in all views.
+        by_lens = np.linalg.inv(whole)[:6, 12:] / sights.lens_error
+        found: Floats = np.sqrt(views + (by_lens * by_lens).sum(axis=1))
+        return found
+
+
+def start(sights: Sights, camera: Pose, board: Pose) -> Guess:
+    """Return a guess with the lens as calibrated and the heads where the joints say."""
+    return Guess(camera, board, np.zeros(3), np.zeros((sights.views, 3)))
+
+
+def refined(sights: Sights, guess: Guess) -> Fit:
+    """Move camera and board until the corners fit best."""
+    errors, damping = sights.errors(guess), 1e-3
+    for _ in range(_MOST_STEPS):
+        if not np.isfinite(errors).all():
+            break
+        bound = _bound(errors)
+        step = _solved(*sights.system(guess, errors), damping)
+        if step is None or damping > 1e9:
+            break
+        moved = guess.moved(step)
+        found = sights.errors(moved)
+        if not sights.cost(moved, found, bound) < sights.cost(guess, errors, bound):
+            damping *= 10.0
+            continue
+        guess, errors, damping = moved, found, max(damping / 10.0, 1e-12)
+        if float(np.abs(step[:12]).max()) < _SETTLED:
+            break
+    return _ended(sights, guess, errors)
+
+
+def _ended(sights: Sights, guess: Guess, errors: Floats) -> Fit:
+    """Sum up how well it fits."""
+    plain = sights.errors(guess._replace(turns_rad=np.zeros_like(guess.turns_rad)))
+    squares = (plain * plain).reshape(-1, 2).sum(axis=1)
+    by_view = [np.sqrt(squares[sights.view == k].mean()) for k in range(sights.views)]
+    bound = _bound(errors) if np.isfinite(errors).all() else 1.0
+    return Fit(
+        sights,
+        guess,
+        sights.cost(guess, errors, bound),
+        float(np.sqrt(squares.mean())),
+        np.array(by_view),
+        float(np.sqrt((errors * errors).reshape(-1, 2).sum(axis=1).mean())),
+        float(np.degrees(np.sqrt((guess.turns_rad**2).mean()))),
+    )
+
+
+def _solved(inner: Floats, pull: Floats, damping: float) -> Floats | None:
+    """Return the damped step, None where there is none."""
+    try:
+        step = np.linalg.solve(inner + damping * np.diag(np.diag(inner)), -pull)
+    except np.linalg.LinAlgError:
+        return None
+    return np.asarray(step, dtype=np.float64) if np.isfinite(step).all() else None
+
+
+def _bound(errors: Floats) -> float:
+    """Return the size beyond which errors count less, in pixels."""
+    return max(_HUBER * 1.4826 * float(np.median(np.abs(errors))), 1e-3)
+
+
+def _weights(errors: Floats) -> Floats:
+    """Return the weight of each error, 1/px^2."""
+    weight = np.minimum(1.0, _bound(errors) / np.maximum(np.abs(errors), 1e-12))
+    return np.asarray(weight / _CORNER_PX**2, dtype=np.float64)

@@ -1,0 +1,364 @@
+"""The commands that calibrate a camera: the board to print, then lens and place on the head."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import datetime
+from enum import StrEnum
+from math import degrees, radians
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.thread import CameraThread
+from gazerig.drivers.camera.webcam import Webcam
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.robot.app.rig_limits import lid_ends, neck_span
+from gazerig.robot.calibration.camera_calibration import LensCalibration
+from gazerig.robot.calibration.camera_procedure import (
+    LensSteps,
+    Neck,
+    NeckStep,
+    neck_angles,
+    neck_steps,
+)
+from gazerig.robot.calibration.charuco_board import BoardParams, CharucoBoard
+from gazerig.robot.calibration.charuco_page import RULER_MM, write_page
+from gazerig.robot.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
+from gazerig.robot.cli.neck_motion import agrees, go_on, moving_neck
+from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.kinematics import NECK, Kinematics
+from gazerig.robot.perception.intrinsics import intrinsics_of_lens
+from gazerig.sim_mock.cameras.charuco_scene import BoardScene
+
+app = typer.Typer()
+
+
+class Paper(StrEnum):
+    """Paper to print on; the keys of gazerig.robot.calibration.charuco_page.PAPERS_MM."""
+
+    a4 = "a4"
+    letter = "letter"
+
+
+class What(StrEnum):
+    """What to calibrate."""
+
+    all = "all"
+    lens = "lens"
+    mount = "mount"
+
+
+ColumnsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from left to right.")]
+RowsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from top to bottom.")]
+SquareOption = Annotated[float, typer.Option(metavar="MM", help="Side of a square.")]
+_BOARD = BoardParams()
+
+
+@app.command("calibrate-board")
+def calibrate_board(
+    out: Annotated[Path, typer.Argument(help="File to write, .pdf or .png.")] = Path("board.pdf"),
+    paper: Annotated[Paper, typer.Option(help="Paper, laid crosswise.")] = Paper.a4,
+    columns: ColumnsOption = _BOARD.columns,
+    rows: RowsOption = _BOARD.rows,
+    square: SquareOption = _BOARD.square_mm,
+    force: ForceOption = False,
+) -> None:
+    """Write the ChArUco board as a page to print in true size: gazerig calibrate board."""
+    with clear_errors():
+        write_page(CharucoBoard(_board(columns, rows, square, RULER_MM)), paper.value, out, force)
+        say(f"{out}: print it at 100 % on {paper.value}, glue it on something flat and stiff,")
+        say(f"and measure the ruler: if it is not {RULER_MM} mm, give --ruler when calibrating")
+
+
+@app.command("calibrate-camera")
+def calibrate_camera(
+    rig: RigArgument = "desk",
+    what: Annotated[
+        What, typer.Option(help="The lens, its mount on the head, or all of it.")
+    ] = What.all,
+    camera: Annotated[int, typer.Option(min=0, help="Webcam N.")] = 0,
+    ruler: Annotated[
+        float, typer.Option(metavar="MM", help="Length of the printed 100 mm ruler as measured.")
+    ] = float(RULER_MM),
+    columns: ColumnsOption = _BOARD.columns,
+    rows: RowsOption = _BOARD.rows,
+    square: SquareOption = _BOARD.square_mm,
+    out: Annotated[
+        Path | None, typer.Option(help="Copy a shipped rig to this file and write there.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show what would change, write nothing.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Answer every yes or no with yes.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="With --mock: seed of the noise.")] = 0,
+    mock: Annotated[
+        bool, typer.Option("--mock", help="Emulated servos, and a simulated board to look at.")
+    ] = False,
+    port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
+) -> None:
+    """Measure the lens and where the camera sits, with the printed board."""
+    with clear_errors(rig, port, mock), signals() as stopped:
+        loaded = load_rig(rig)
+        board = CharucoBoard(_board(columns, rows, square, ruler))
+        if loaded.camera.mount != "head" and what is not What.lens:
+            raise SetupError(
+                "camera.mount is base: the camera does not turn with the head, so looking from "
+                "several neck angles tells nothing; use --what lens"
+            )
+        if not dry_run:
+            _writable(rig, out)
+        job = _Job(loaded, board, stopped, _kinematics(loaded))
+        with _eye(job, camera, mock, seed) as eye:
+            found, changes, good = loaded.camera, dict[str, Any](), HandEyeParams()
+            if what is not What.mount:
+                lens = _lens(job, eye)
+                changes |= lens_changes(lens)
+                found, good = replace(found, lens=lens.params()), sure_as(lens)
+            if what is not What.lens:
+                with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
+                    changes |= mount_changes(_mount(job, eye, neck, found, good), found)
+        Console().print(_table(rig, loaded.camera, changes))
+        if not dry_run:
+            _write(job, rig, changes, out, yes)
+
+
+def lens_changes(lens: LensCalibration) -> dict[str, Any]:
+    """Return a measured lens as dotted keys of a rig file and values."""
+    params = lens.params()
+    return {
+        "camera.horizontal_field_deg": round(lens.horizontal_field_deg, 2),
+        "camera.lens.width_px": params.width_px,
+        "camera.lens.height_px": params.height_px,
+        "camera.lens.fx_px": params.fx_px,
+        "camera.lens.fy_px": params.fy_px,
+        "camera.lens.cx_px": params.cx_px,
+        "camera.lens.cy_px": params.cy_px,
+        "camera.lens.distortion": params.distortion,
+    }
+
+
+def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
+    """Return a camera found on the head as dotted keys of a rig file and values.
+
+    With it goes the lens that belongs to this place, at the size it was measured on.
+    """
+    params, lens = found.mounted(camera), found.lens
+    return {
+        "camera.position_mm": params.position_mm,
+        "camera.yaw_deg": params.yaw_deg,
+        "camera.pitch_deg": params.pitch_deg,
+        "camera.roll_deg": params.roll_deg,
+        "camera.lens.fx_px": round(lens.fx_px, 2),
+        "camera.lens.fy_px": round(lens.fy_px, 2),
+        "camera.lens.cx_px": round(lens.cx_px, 2),
+        "camera.lens.cy_px": round(lens.cy_px, 2),
+    }
+
+
+def sure_as(lens: LensCalibration) -> HandEyeParams:
+    """Return what hand-eye calibration may assume of a lens that was just measured."""
+    focal = max(lens.focal_std_px) / lens.intrinsics.fx_px * 100.0
+    centre = max(lens.centre_std_px) * 640.0 / lens.width_px
+    return HandEyeParams(lens_error_percent=max(focal, 0.02), centre_error_px=max(centre, 0.1))
+
+
+class _Job(NamedTuple):
+    """What all steps need."""
+
+    rig: Rig
+    board: CharucoBoard
+    stopped: Callable[[], str | None]
+    kinematics: Kinematics
+
+
+class _Eye(NamedTuple):
+    """Where pictures come from, and the simulated camera behind it where there is one."""
+
+    look: Callable[[], Shot | None]
+    now_s: Callable[[], float]
+    rest: Callable[[float], None]
+    mock: BoardScene | None
+
+
+class _NoFaces:
+    """Stands where faces are looked for: a board has none."""
+
+    def find(self, _: Picture) -> tuple[DetectedFace, ...]:
+        """Find nothing."""
+        return ()
+
+
+@contextlib.contextmanager
+def _eye(job: _Job, number: int, mock: bool, seed: int) -> Iterator[_Eye]:
+    """Open the camera, or a simulated one."""
+    clock = RealClock()
+    if mock:
+        dice = np.random.default_rng(seed)
+        simulated = BoardScene(job.rig.camera, job.board, job.kinematics, dice)
+        yield _Eye(lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated)
+        return
+    thread = CameraThread(Webcam(number), _NoFaces(), clock.now_s)
+
+    def look() -> Shot | None:
+        found = thread.latest(clock.now_s())
+        if found is None or found.picture is None:
+            return None
+        return Shot(found.captured_s, found.number, found.picture)
+
+    thread.open()
+    try:
+        yield _Eye(look, clock.now_s, lambda s: clock.sleep_until(clock.now_s() + s), None)
+    finally:
+        thread.close()
+
+
+def _lens(job: _Job, eye: _Eye) -> LensCalibration:
+    """Let a person show the board until the lens is known."""
+    steps, number = LensSteps(job.board, radians(job.rig.camera.horizontal_field_deg)), 0
+    say("hold the board before the camera and do what the line below says; Ctrl-C gives up")
+    while True:
+        go_on(job.stopped)
+        shot = eye.look()
+        if shot is None or shot.number == number:
+            eye.rest(0.01)
+            continue
+        number = shot.number
+        step = steps.take(shot)
+        lens, wish = None, step.coverage.missing[0] if step.coverage.missing else "enough"
+        if step.coverage.enough and step.kept:
+            lens, why = steps.tried()
+            wish = why or wish
+        note = "kept" if step.kept else step.why
+        status(f"{step.coverage.views} views, {step.corners} corners ({note}): {wish}")
+        if lens is not None:
+            break
+    i = lens.intrinsics
+    say(
+        f"lens: {len(lens.kept)} views, {len(lens.dropped)} dropped, reprojection error "
+        f"{lens.rms_px:.2f} px (worst view {max(lens.view_rms_px):.2f})"
+    )
+    say(
+        f"focal length {i.fx_px:.1f} +-{lens.focal_std_px[0]:.1f}, "
+        f"{i.fy_px:.1f} +-{lens.focal_std_px[1]:.1f} px; axis at {i.cx_px:.1f} "
+        f"+-{lens.centre_std_px[0]:.1f}, {i.cy_px:.1f} +-{lens.centre_std_px[1]:.1f} px"
+    )
+    if eye.mock is not None:
+        t = eye.mock.lens
+        say(f"true: {t.fx_px:.1f}, {t.fy_px:.1f} px; axis at {t.cx_px:.1f}, {t.cy_px:.1f} px")
+    return lens
+
+
+def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEyeParams) -> HandEye:
+    """Look at the hanging board from several neck angles."""
+    if camera.lens is None:
+        raise SetupError("the lens is not measured yet: calibrate it first (--what lens or all)")
+    shot = _first(job, eye)
+    height, width = shot.picture.shape[:2]
+    if (camera.lens.width_px, camera.lens.height_px) != (width, height):
+        raise SetupError(
+            f"pictures are {width} x {height}, the lens was measured on {camera.lens.width_px} x "
+            f"{camera.lens.height_px}: calibrate it anew (--what all)"
+        )
+    lens = intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), width, height)
+    yaw, pitch, roll = (neck_span(job.rig, name) for name in NECK)
+    planned = neck_angles((yaw, pitch, roll), lens, width, height)
+    views = []
+    for step in neck_steps(neck, eye.look, eye.now_s, job.board, job.kinematics, planned):
+        _tell_step(step)
+        if step.view is not None:
+            views.append(step.view)
+    found = camera_on_head(views, lens, width, good)
+    say(
+        f"mount: {len(found.kept)} views, {len(found.dropped)} dropped, reprojection error "
+        f"{found.rms_px:.2f} px, {found.corner_px:.2f} px with neck joints off by "
+        f"{found.joint_error_deg:.2f} deg"
+    )
+    mm, deg = found.position_std_mm, found.angle_std_deg
+    say(f"sure to {mm[0]:.1f}, {mm[1]:.1f}, {mm[2]:.1f} mm and {max(deg):.2f} deg")
+    if eye.mock is not None:
+        t = eye.mock.mount
+        at = ", ".join(f"{mm:.1f}" for mm in t.position_mm)
+        say(f"true: {at} mm, yaw {t.yaw_deg:.2f}, pitch {t.pitch_deg:.2f}, roll {t.roll_deg:.2f}")
+    return found
+
+
+def _tell_step(step: NeckStep) -> None:
+    yaw, pitch, roll = map(degrees, step.asked_rad)
+    what = f"{step.corners} corners" if step.view is not None else step.why
+    say(f"{step.number}/{step.of}: yaw {yaw:+.0f}, pitch {pitch:+.0f}, roll {roll:+.0f}: {what}")
+
+
+def _first(job: _Job, eye: _Eye) -> Shot:
+    """Wait for a picture."""
+    give_up_s = eye.now_s() + 5.0
+    while eye.now_s() < give_up_s:
+        go_on(job.stopped)
+        shot = eye.look()
+        if shot is not None:
+            return shot
+        eye.rest(0.02)
+    raise SetupError("the camera gives no pictures: check its cable, or name another (--camera N)")
+
+
+def _kinematics(rig: Rig) -> Kinematics:
+    return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
+
+
+def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardParams:
+    """Return the board as asked for and as printed."""
+    marker_mm = square_mm * _BOARD.marker_mm / _BOARD.square_mm
+    try:
+        return BoardParams(columns, rows, square_mm, marker_mm).scaled(ruler_mm / RULER_MM)
+    except ValueError as error:
+        raise SetupError(f"this board cannot be: {error}") from error
+
+
+def _table(rig: str, camera: CameraParams, changes: dict[str, Any]) -> Table:
+    """Show what was found beside what the rig file says."""
+    table = Table(caption=f"what was found, against {rig}")
+    for name in ("key", "old", "new"):
+        table.add_column(name, justify="left" if name == "key" else "right", no_wrap=True)
+    for key, new in changes.items():
+        old: Any = camera
+        for step in key.split(".")[1:]:
+            old = getattr(old, step, "-")
+        table.add_row(key, _number(old), _number(new))
+    return table
+
+
+def _number(value: Any) -> str:
+    return " ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else f"{value}"
+
+
+def _writable(rig: str, out: Path | None) -> None:
+    """Find out before anybody holds a board that nothing could be written."""
+    from gazerig.config.save import save_rig  # type: ignore[import-not-found, unused-ignore]
+
+    if out is None:
+        save_rig(rig, {}, datetime.now())
+    elif out.exists():
+        raise SetupError(f"--out {out}: there is such a file: give it as RIG instead")
+
+
+def _write(job: _Job, rig: str, changes: dict[str, Any], out: Path | None, yes: bool) -> None:
+    """Write what was found after a yes, and say where the old file is."""
+    from gazerig.config.save import copy_shipped, save_rig
+
+    if not agrees(job.stopped, yes, f"write these {len(changes)} values into {out or rig}?"):
+        say("nothing written")
+        return
+    target = copy_shipped(rig, out) if out is not None else rig
+    saved = save_rig(target, changes, datetime.now())
+    for change in saved.changes:
+        say(str(change))
+    say(f"written into {saved.path}; as it was: {saved.backup}")

@@ -1,0 +1,305 @@
+"""The command calibrate face: where one person's eyes, mouth and all else are on their face."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from gazerig.config.save import copy_shipped, rig_file, save_rig
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.types import Vec3
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.run_observers import Audience, Steer, Wished
+from gazerig.robot.app.session import Wanted, way_out
+from gazerig.robot.calibration.face_calibration import PART_WORDS, FaceCalibration, begun, changes
+from gazerig.robot.calibration.face_steering import FaceSteering
+from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.cli.calibrate import refuse_unwritable
+from gazerig.robot.cli.key_input import BUTTONS, HELP, Keys, LineKeys, PageKeys, TerminalKeys
+from gazerig.robot.cli.ports import MockOption, PortOption
+from gazerig.robot.cli.prompts import Lines, TerminalPerson
+from gazerig.robot.cli.run import host_port
+from gazerig.robot.cli.terminal import (
+    FAULT,
+    RigArgument,
+    clear_errors,
+    say,
+    signals,
+    status,
+)
+from gazerig.robot.control.event_text import drawn_together
+from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.control.loop import run as run_loop
+from gazerig.robot.remote.stop_only_server import StopDoor
+
+STILL_SCENE = "sits-still"
+
+# A script cannot come nearer or turn to the robot, so it does not wait for ever.
+_SCRIPT_WAITS_S = 20.0
+_SHOW_S = 0.1
+# A detector that blinks is not worth a word.
+_UNSEEN_S = 1.0
+
+
+def calibrate_face(
+    rig: RigArgument = "desk",
+    scene: Annotated[
+        str | None, typer.Option(help=f"Look at a simulated scene (with --mock: {STILL_SCENE}).")
+    ] = None,
+    video: Annotated[Path | None, typer.Option(help="Look at a photo or film, looped.")] = None,
+    camera: Annotated[int | None, typer.Option(min=0, help="Look through webcam N.")] = None,
+    oak: Annotated[bool, typer.Option("--oak", help="Look through an OAK-D camera.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Copy a shipped rig to this file and write there.")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Answer every yes or no with yes.")] = False,
+    answers: Annotated[
+        Path | None, typer.Option(help="File with one key a line, e.g. left 3; empty is Enter.")
+    ] = None,
+    page: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Where a page with the same keys is served. Other machines reach it at "
+            "0.0.0.0:8080. It opens with the token in the address that is printed at start.",
+        ),
+    ] = "127.0.0.1:8080",
+    no_page: Annotated[
+        bool, typer.Option("--no-page", help="Without the page; with --answers there is none.")
+    ] = False,
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Steer the gaze over your face to each of its parts, and write down where they are."""
+    with clear_errors(rig, port, mock), signals() as stopped:
+        loaded = load_rig(rig)
+        refuse_unwritable(rig, out)
+        lines = Lines(answers)
+        address = host_port(page)
+        shows = None if no_page or answers is not None else address
+        nothing = scene is None and video is None and camera is None and not oak
+        wanted = Wanted(
+            mock=mock,
+            # Nobody watches a script on an emulated rig: simulated time will do.
+            fast=mock and answers is not None and camera is None and not oak,
+            seconds=0.0,  # that much a film in simulated time asks for; keys end it
+            scene=STILL_SCENE if mock and nothing else scene,
+            video=video,
+            camera=camera,
+            oak=oak,
+            port=port,
+        )
+        made = assemble(loaded, wanted.choice())
+        try:
+            found = _steered(made, loaded, lines, answers is not None, stopped, shows)
+            _write(rig, loaded, found, out, TerminalPerson(lines, stopped, yes))
+        except Stopped as why:
+            say(f"stopped by {why}: nothing written")
+            raise typer.Exit(FAULT) from None
+
+
+def _steered(
+    made: Assembly,
+    rig: Rig,
+    lines: Lines,
+    scripted: bool,
+    stopped: Callable[[], str | None],
+    page: tuple[str, int] | None,
+) -> FaceCalibration:
+    """Let a person steer the gaze from part to part; the rig ends parked, torque off.
+
+    page: where one is served, None where there is none
+    Raises:
+        gazerig.robot.calibration.joint_access.Stopped: a signal or a fault ended it.
+        DriverError: port, servos or camera are not as configured.
+    """
+    idle = rig.gaze.idle
+    steering = FaceSteering(
+        begun(rig.face_parts_mm),
+        made.robot.attention.top_down,
+        (idle.rest_distance_m, 0.0, idle.rest_height_m),
+        "eyes_pan" not in rig.joints,
+    )
+    made.robot.attention = steering
+    # What comes through a pipe is a script, too: nobody is there to give up.
+    scripted = scripted or not sys.stdin.isatty()
+    keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
+    steer = Steer(BUTTONS, keys.press, lambda: shown(steering))
+    audience = Audience(made, Wished(page=page), None, page is None, say, status, steer)
+    door = StopDoor(
+        made.robot.order,
+        made.clock,
+        {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"},
+        say,
+    )
+    sitting = _Sitting(steering, keys, made.clock.now_s, stopped, scripted, audience, door)
+    say("the head turns to you now, as it always does: keep your fingers out of it;")
+    say(f"{HELP}; Ctrl-C writes nothing")
+    try:
+        count = _run(made, sitting, keys, audience, door, Interrupts.of(stopped))
+    finally:
+        made.close()
+    if stopped() is not None or count.stopped_by.startswith("fault"):
+        raise Stopped(count.stopped_by)
+    return steering.state
+
+
+def _run(
+    made: Assembly,
+    sitting: "_Sitting",
+    keys: Keys,
+    audience: Audience,
+    door: StopDoor,
+    interrupts: Interrupts,
+) -> LoopCount:
+    """Run the robot until the sitting is over."""
+    count = LoopCount(0, 0, "fault: unexpected error")
+    with contextlib.ExitStack() as closed_last, way_out(made, say, interrupts) as leaving:
+        leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.refuse))
+        for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
+            say(note)
+        closed_last.callback(lambda: audience.close(count))
+        audience.open()
+        closed_last.callback(door.close)
+        door.open()
+        with keys:
+            count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.note)
+        leaving.cause = count.stopped_by
+        audience.tell("over: the head parks; whether to write it is asked at the terminal")
+    return count
+
+
+class _Sitting:
+    """Keys in, words out on the terminal and the page, between the ticks."""
+
+    def __init__(
+        self,
+        steering: FaceSteering,
+        keys: Keys,
+        now_s: Callable[[], float],
+        stopped: Callable[[], str | None],
+        scripted: bool,
+        audience: Audience,
+        door: StopDoor,
+    ) -> None:
+        self._steering, self._keys, self._now_s = steering, keys, now_s
+        self._stopped, self._scripted = stopped, scripted
+        self._audience, self._door = audience, door
+        self._live_line = not scripted and sys.stderr.isatty()
+        self._said: tuple[str | None, bool] | None = None
+        self._ready_s = self._shown_s = self._seen_s = now_s()
+
+    def over(self, _: float) -> str | None:
+        """Take a key; give why it ended, None while it goes on."""
+        steering, now_s = self._steering, self._now_s()
+        if (why := self._stopped()) is not None:
+            return why
+        if steering.state.part is None:
+            return "you" if steering.state.at < len(PART_WORDS) else "the last part"
+        self._refuse_hopeless(now_s)
+        key = self._keys.next(steering.aimed)
+        if key is not None:
+            self._tell(steering.press(key, now_s))
+        return None
+
+    def note(self, tick: Tick) -> None:
+        """See what the tick did, and say what a person should know."""
+        self._audience.note(tick)
+        self._door.note(tick)
+        self._tell(self._steering.note(tick))
+        for event in drawn_together(tick.events):
+            say(event)
+        self._say_what_is_due(tick.t_s)
+        if self._live_line and tick.t_s - self._shown_s >= _SHOW_S:
+            self._shown_s = tick.t_s
+            status(shown(self._steering))
+
+    def _say_what_is_due(self, t_s: float) -> None:
+        """Name the part once, and say when nobody has been seen for a while."""
+        part, seen = self._steering.state.part, self._steering.face is not None
+        if seen:
+            self._seen_s = t_s
+        if part is None or self._said == (part, seen):
+            return
+        if seen:
+            self._tell(f"{PART_WORDS[part]}: steer until the gaze meets it, then Enter")
+        elif t_s - self._seen_s < _UNSEEN_S:
+            return
+        else:
+            self._tell("no face is seen: sit before the camera, 0.5 to 1.5 m away, and look at it")
+        self._said = part, seen
+
+    def _refuse_hopeless(self, now_s: float) -> None:
+        """End a script that nothing can happen to any more."""
+        if self._steering.aimed:
+            self._ready_s = now_s
+        if self._scripted and now_s - self._ready_s > _SCRIPT_WAITS_S:
+            what = "no face is seen" if self._steering.face is None else "the eyes cannot reach it"
+            raise SetupError(f"{what} for {_SCRIPT_WAITS_S:g} s: keys from a file or pipe end here")
+
+    def _tell(self, what: str | None) -> None:
+        if what is not None:
+            say(what)
+            self._audience.tell(what)
+
+
+def shown(steering: FaceSteering) -> str:
+    """Return the line that shows where a person is: part, how far moved, step."""
+    state = steering.state
+    if state.part is None or steering.face is None:
+        return "no face is seen"
+    left, up = state.moved_mm(state.part)
+    across = f"{abs(left):g} mm {'left' if left > 0.0 else 'right'}" if left else "0 mm across"
+    upright = f"{abs(up):g} mm {'up' if up > 0.0 else 'down'}" if up else "0 mm up"
+    return (
+        f"{state.at + 1}/{len(PART_WORDS)} {PART_WORDS[state.part]}: {across}, {upright}; "
+        f"step {state.step_mm:g} mm"
+    )
+
+
+def _write(
+    rig: str, loaded: Rig, found: FaceCalibration, out: Path | None, person: TerminalPerson
+) -> None:
+    """Show what was chosen, write it after a yes, and say where the old file is."""
+    wanted = changes(found)
+    if not wanted:
+        say("no part was chosen: nothing to write")
+        return
+    Console().print(_table(rig, loaded, found))
+    where = rig_file(rig) if out is None else out
+    if not person.agrees(f"write these {len(wanted)} places into {where}?"):
+        say("nothing written")
+        return
+    if out is not None:
+        copy_shipped(rig, out)
+    saved = save_rig(where, dict(wanted), datetime.now())
+    for change in saved.changes:
+        say(str(change))
+    if saved.backup is None:
+        say(f"everything is as {saved.path} says: nothing to write")
+    else:
+        say(f"written into {saved.path}; as it was: {saved.backup}")
+
+
+def _table(rig: str, loaded: Rig, found: FaceCalibration) -> Table:
+    table = Table(caption=f"places in mm out of the face, to its owner's left, up; against {rig}")
+    for name in ("part", "old", "new"):
+        table.add_column(name, justify="left" if name == "part" else "right", no_wrap=True)
+    for key, new in changes(found).items():
+        part = key.rpartition(".")[2]
+        old = loaded.face_parts_mm.get(part)
+        table.add_row(part, _numbers(old) if old is not None else "an adult's", _numbers(new))
+    return table
+
+
+def _numbers(place_mm: Vec3) -> str:
+    return " ".join(f"{v:g}" for v in place_mm)

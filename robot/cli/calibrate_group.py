@@ -1,0 +1,39 @@
+"""The commands under calibrate: joints, camera, board and face; joints where none is named."""
+
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from gazerig.robot.cli.calibrate import calibrate_joints
+from gazerig.robot.cli.calibrate_camera import calibrate_board, calibrate_camera
+from gazerig.robot.cli.calibrate_face import calibrate_face
+
+DEFAULT = "joints"
+_HELP = ("--help", "-h")
+
+
+class JointsUnlessNamed(TyperGroup):
+    """Takes what begins with none of its commands as arguments of the default one.
+
+    So ``gazerig calibrate my_rig.yaml`` stays what it was before there was anything else to
+    calibrate. A rig file that is called like a command is named ``./face``.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the default command before words that name none."""
+        if not args or (args[0] not in self.commands and args[0] not in _HELP):
+            args = [DEFAULT, *args]
+        return list(super().parse_args(ctx, args))
+
+
+app = typer.Typer(
+    name="calibrate",
+    cls=JointsUnlessNamed,
+    help="Find out and write into the rig's YAML: joints (the default), camera, face.",
+    subcommand_metavar="[joints|camera|board|face] [RIG] ...",
+)
+app.command("joints")(calibrate_joints)
+app.command("camera")(calibrate_camera)
+app.command("board")(calibrate_board)
+app.command("face")(calibrate_face)

@@ -1,0 +1,90 @@
+"""The way to the servos that commands share: a rig, its ports, other ports, or emulated buses."""
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from typing import Annotated, NamedTuple
+
+import typer
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.i2c.port import port_of
+from gazerig.drivers.serial.list_ports import serial_ports
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_owner import refuse_owner
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
+from gazerig.robot.app.emulation import emulated_lines
+from gazerig.sim_mock.devices import Emulated
+from gazerig.sim_mock.pty.client import PtyBuses
+
+MockOption = Annotated[
+    bool, typer.Option("--mock", help="Emulated servo bus instead of the rig's.")
+]
+PortOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PORT", help="Serial port instead of the rig's; NAME=PORT for a further bus."
+    ),
+]
+RigOption = Annotated[
+    str, typer.Option(metavar="RIG", help="A rig's YAML file, or the name of a shipped rig.")
+]
+
+
+class Wires(NamedTuple):
+    """Serial ports by the names of their buses, and what is emulated behind them, if it is."""
+
+    paths: Mapping[str, str]
+    buses: PtyBuses | None
+
+    def opened_by(self) -> dict[str, BusPort]:
+        """Return the ports, not opened yet."""
+        return {name: port_of(path) for name, path in self.paths.items()}
+
+    def command(self, text: str, bus: str) -> None:
+        """Let something happen to what is emulated on a bus; does nothing on real wires.
+
+        Raises:
+            ValueError: names the word that is wrong and what would be right.
+        """
+        if self.buses is not None:
+            self.buses.command(text, bus)
+
+
+@contextlib.contextmanager
+def wires(
+    rig: Rig, mock: bool, port: str | None, devices: Mapping[str, Emulated] | None = None
+) -> Iterator[Wires]:
+    """Return the ports to open; emulated buses end with the block.
+
+    devices: what is emulated on some buses instead of the rig's servos
+
+    Raises:
+        SetupError: the options exclude each other, or name no bus of the rig.
+        PortError: a port's owner would take servo packets for commands.
+    """
+    if mock and port is not None:
+        raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
+    if not mock:
+        paths, here = ports_of(rig, port), serial_ports()
+        for name, path in paths.items():
+            refuse_owner(path, rig.bus_named(name).kind, here)
+        yield Wires(paths, None)
+        return
+    with PtyBuses() as buses:
+        lines = {**emulated_lines(rig), **(devices or {})}
+        yield Wires(buses.start(lines), buses)
+
+
+def bus_label(rig: Rig, name: str) -> str:
+    """Call a bus by its name where a rig has several: "the bus", "bus lids"."""
+    if len(bus_names(rig)) == 1:
+        return "the bus"
+    return f"bus {name}" if name else "the main bus"
+
+
+def setups_on(rig: Rig, name: str) -> tuple[ServoSetup, ...]:
+    """Return what a bus must know of its servos, in the order of the joints."""
+    every = dict(zip(rig.names, rig_setups(rig), strict=True))
+    return tuple(every[joint] for joint in joints_on(rig, name))

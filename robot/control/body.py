@@ -1,0 +1,207 @@
+"""Joints to servos and back: the only place that knows what a step means at a joint."""
+
+from collections.abc import Mapping, Sequence
+from math import inf
+
+from gazerig.drivers.errors import BusLost, DriverError
+from gazerig.drivers.slow_entry import ENTRY_DEG_S
+from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.types import JointAngles, JointState, in_order
+from gazerig.robot.safety.motion_limiter import JointLimit
+
+
+def setups(
+    joints: Mapping[str, JointParams],
+    park_rad: Mapping[str, float],
+    gentle_deg_s: float = ENTRY_DEG_S,
+) -> tuple[ServoSetup, ...]:
+    """Return what a bus must know of all servos.
+
+    park_rad: parking pose of joints, 0 where not given: where servos that do not tell their
+        place are taken to be
+    gentle_deg_s: joints are led into their ranges no faster
+    """
+    return tuple(
+        joints[name].setup(name, park_rad.get(name, 0.0), gentle_deg_s) for name in in_order(joints)
+    )
+
+
+class Body:
+    """All joints of one rig on its bus, or its buses as one.
+
+    names: of the joints, in the order of every sequence of them
+    """
+
+    def __init__(
+        self,
+        bus: ServoBus,
+        joints: Mapping[str, JointParams],
+        park_rad: Mapping[str, float] | None = None,
+        gentle_deg_s: float = ENTRY_DEG_S,
+    ) -> None:
+        """Take the bus, made with ``setups`` of the same joints, and the joints.
+
+        park_rad: as in ``setups``
+        """
+        self.bus = bus
+        self.names = in_order(joints)
+        self._park_rad = dict(park_rad or {})
+        self._let_go = False
+        self._gentle_deg_s = gentle_deg_s
+        self._set_up = tuple(joints[name] for name in self.names)
+        self._take(self._set_up)
+        # Before the first answer: the centre, of an age that says so.
+        self._last = [
+            ServoReading(round(linkage.steps(0.0)), 0.0, 0.0, -inf, False, measured=f.measured)
+            for linkage, f in zip(self._linkages, (j.facts for j in self._joints), strict=True)
+        ]
+
+    def _take(self, joints: tuple[JointParams, ...]) -> None:
+        self._joints = joints
+        self._linkages = tuple(joint.made() for joint in joints)
+        self._to_steps = tuple(linkage.steps for linkage in self._linkages)
+        self._to_rad = tuple(linkage.angle_rad for linkage in self._linkages)
+        self._to_rate = tuple(linkage.rate_rad for linkage in self._linkages)
+
+    def retune(
+        self, joints: Mapping[str, JointParams], gentle_deg_s: float
+    ) -> dict[int, tuple[float, float]]:
+        """Count angles otherwise from now on; the servos are set up anew when torque comes on.
+
+        Gives, for each joint whose angles are other ones now, (factor, offset in radians):
+        what was x is factor x + offset.
+        """
+        before, self._gentle_deg_s = self._joints, gentle_deg_s
+        self._take(tuple(joints[name] for name in self.names))
+        self.bus.retune(setups(joints, self._park_rad, self._gentle_deg_s))
+        return {
+            i: (
+                now.angle_rad(old.steps(1.0)) - now.angle_rad(old.steps(0.0)),
+                now.angle_rad(old.steps(0.0)),
+            )
+            for i, (old, now) in enumerate(zip(before, self._joints, strict=True))
+            if not _counts_alike(old, now)
+        }
+
+    def reach(self) -> tuple[JointLimit, ...]:
+        """Return the ranges and speeds that servos were set up to keep, as angles of now."""
+        return tuple(map(_as_set_up, self._set_up, self._joints))
+
+    def start(self) -> JointAngles:
+        """Open the bus and switch torque on where the joints are; give the goals in force.
+
+        Raises:
+            SetupError: port or servos are not as configured.
+        """
+        self.bus.open()
+        try:
+            return self.take_hold()
+        except BaseException:
+            self.stop()
+            raise
+
+    def read(self, t_s: float) -> JointState:
+        """Read all joints; one that does not answer keeps its last value and its age.
+
+        Raises:
+            BusLost: nobody has answered for too long, and torque was not let
+                go of; after that the bus may stay away for as long as it likes.
+        """
+        try:
+            readings = self.bus.read(t_s)
+        except BusLost:
+            if not self._let_go:
+                raise
+            readings = (None,) * len(self.names)
+        missing: tuple[str, ...] = ()
+        for i, reading in enumerate(readings):
+            if reading is None:
+                missing = (*missing, self.names[i])
+            else:
+                self._last[i] = reading
+        columns = zip(*self._last, strict=True)
+        steps, speeds, _, at_s, _, torque, fault, load, warm, volts, _, measured = columns
+        return JointState(
+            tuple([angle(s) for angle, s in zip(self._to_rad, steps, strict=True)]),
+            tuple([v * k(s) for v, k, s in zip(speeds, self._to_rate, steps, strict=True)]),
+            at_s,
+            missing,
+            torque,
+            fault,
+            load,
+            warm,
+            volts,
+            tuple([reading is not None and reading.rearmed for reading in readings]),
+            measured,
+        )
+
+    def write(self, command_rad: JointAngles) -> None:
+        """Send one goal to every servo."""
+        self.bus.write(
+            [round(steps(angle)) for steps, angle in zip(self._to_steps, command_rad, strict=True)]
+        )
+
+    def angles(self, steps: Sequence[float]) -> JointAngles:
+        """Return the joint angles of servo positions."""
+        return tuple([angle(step) for angle, step in zip(self._to_rad, steps, strict=True)])
+
+    def let_go(self) -> None:
+        """Torque off at once; the bus stays open and readings go on.
+
+        Raises:
+            BusLost: the port is gone; the torque is taken off when it is back.
+        """
+        self._let_go = True
+        self.bus.release()
+
+    def take_hold(self) -> JointAngles:
+        """Torque on again where the joints are; give the goals in force.
+
+        Raises:
+            SetupError: a servo does not answer, refuses or has latched a fault.
+            BusLost: the port is gone.
+        """
+        goals = self.bus.engage()
+        self._let_go = False
+        self._set_up = self._joints
+        return self.angles(goals)
+
+    def stop(self) -> None:
+        """Torque off and close the bus."""
+        try:
+            self._release()
+        finally:
+            self.bus.close()
+
+    def _release(self) -> None:
+        try:
+            self.bus.release()
+        except DriverError:
+            raise
+        except Exception:  # no fault of the bus, such as no memory: it is tried once more
+            self.bus.release()
+        except BaseException:
+            self.bus.release()
+            raise
+
+
+def _counts_alike(one: JointParams, other: JointParams) -> bool:
+    """Return whether both make the same angle of the same step."""
+    return (one.sign, one.ratio, one.zero, one.linkage) == (
+        other.sign,
+        other.ratio,
+        other.zero,
+        other.linkage,
+    )
+
+
+def _as_set_up(set_up: JointParams, now: JointParams) -> JointLimit:
+    """Return the limits of a servo that was set up with other parameters than are in force."""
+    limit = set_up.limit()
+    if _counts_alike(set_up, now):
+        return limit
+    was, made = set_up.made(), now.made()
+    ends = sorted(made.angle_rad(was.steps(end)) for end in (limit.low_rad, limit.high_rad))
+    speed = limit.speed_rad_s * was.steepest / made.steepest
+    return limit._replace(low_rad=ends[0], high_rad=ends[1], speed_rad_s=speed)

@@ -1,0 +1,96 @@
+"""What can be chosen from menus while the robot runs, and orders refused as they come in."""
+
+from collections.abc import Callable, Mapping, Sequence
+from math import degrees, radians
+
+from gazerig.gaze.aversion import MODES, Aversion
+from gazerig.gaze.lids import Lids
+from gazerig.gaze.top_down import TopDown
+from gazerig.robot.model.commands import Ask, Jog
+from gazerig.robot.safety.motion_limiter import JointLimit
+
+_NEAR_END_RAD = radians(0.05)
+"""A slider at the end of a joint's range is rounded to a tenth of a degree."""
+
+LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
+    "awake": lambda lids, t_s: lids.sleepy(0.0),
+    "sleepy": lambda lids, t_s: lids.sleepy(0.7),
+    "wink left": lambda lids, t_s: lids.wink("left", t_s),
+    "wink right": lambda lids, t_s: lids.wink("right", t_s),
+}
+"""What can be asked of the lids."""
+
+
+class Menus:
+    """The models that a person can choose from: behaviours, modes of conversation, lids."""
+
+    def __init__(self, aversion: Aversion, lids: Lids) -> None:
+        self._aversion = aversion
+        self._lids = lids
+
+    def offered(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
+        """Return menu -> choices, the present one first."""
+        return {
+            "behaviour": _first(top_down.behaviour, top_down.behaviours),
+            "conversation": _first(self._aversion.mode, MODES),
+            "lids": tuple(LID_COMMANDS),
+        }
+
+    def choose(self, order: Ask, top_down: TopDown, t_s: float) -> None:
+        """Put a choice in force that ``refuse_unknown`` let through."""
+        if order.menu == "behaviour":
+            top_down.behave(order.choice)
+        elif order.menu == "conversation":
+            mode = next(mode for mode in MODES if mode == order.choice)
+            self._aversion.converse(mode, t_s)
+            self._lids.mode("rest" if mode == "none" else "conversation")
+        else:
+            LID_COMMANDS[order.choice](self._lids, t_s)
+
+
+def refuse_unknown(order: Ask, menus: Mapping[str, Sequence[str]]) -> None:
+    """Refuse what is on no menu.
+
+    Raises:
+        ValueError: with what there is.
+    """
+    if order.menu not in menus:
+        raise ValueError(f"nothing called {order.menu!r} to choose; there is {', '.join(menus)}")
+    if order.choice not in menus[order.menu]:
+        there = ", ".join(menus[order.menu])
+        raise ValueError(f"no {order.menu} {order.choice!r}; there is {there}")
+
+
+def refuse_absent(order: Jog, joints: Sequence[str]) -> None:
+    """Refuse joints that the rig does not have.
+
+    Raises:
+        ValueError: with those there are.
+    """
+    for name, _ in order.angles_rad:
+        if name not in joints:
+            raise ValueError(f"this rig has no joint {name!r}; there is {', '.join(joints)}")
+
+
+def refuse_out_of_range(order: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:
+    """Refuse angles outside the joints' ranges in force.
+
+    Raises:
+        ValueError: with each such joint and its range.
+    """
+    ranges = dict(zip(joints, limits, strict=True))
+    outside = []
+    for name, angle in order.angles_rad:
+        low, high = ranges[name][:2] if name in ranges else (angle, angle)
+        if not low - _NEAR_END_RAD <= angle <= high + _NEAR_END_RAD:
+            outside.append(
+                f"{name} {degrees(angle):.1f} deg is outside its range, "
+                f"{degrees(low):g}..{degrees(high):g} deg"
+            )
+    if outside:
+        raise ValueError("; ".join(outside))
+
+
+def _first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the present choice before the others."""
+    return (present, *(name for name in names if name != present))

@@ -1,0 +1,81 @@
+"""Orders on their way from any thread to the tick: bounded, and a stop before all else."""
+
+from collections import deque
+from contextlib import suppress
+from typing import NamedTuple
+
+from gazerig.robot.model.commands import Jog, LookAt, Order, Resume, Stop, Tune
+from gazerig.robot.model.reply import Reply, Ticket
+
+MAX_WAITING = 64
+MAX_PER_TICK = 8
+"""Orders obeyed in one tick, stops not counted; among them one change of parameters at most,
+as that takes longest."""
+
+
+class Waiting(NamedTuple):
+    """An order, and where its reply goes."""
+
+    order: Order
+    ticket: Ticket
+
+
+class OrderQueue:
+    """What was asked for since the last tick."""
+
+    def __init__(self) -> None:
+        self._orders: deque[Waiting] = deque()
+        self._stops: deque[Waiting] = deque()
+
+    def __len__(self) -> int:
+        """Return how many orders wait."""
+        return len(self._orders) + len(self._stops)
+
+    def add(self, order: Order) -> Ticket:
+        """Queue an order; may be called from any thread.
+
+        Raises:
+            ValueError: too many wait already. A stop is never refused.
+        """
+        waiting = Waiting(order, Ticket())
+        if isinstance(order, Stop):
+            if len(self._stops) >= MAX_WAITING:
+                with suppress(IndexError):  # taken up in this moment
+                    return self._stops[-1].ticket  # as good as one more
+            self._stops.append(waiting)
+            return waiting.ticket
+        if len(self._orders) >= MAX_WAITING:
+            raise ValueError(f"too many requests: {MAX_WAITING} orders wait already, ask again")
+        self._orders.append(waiting)
+        return waiting.ticket
+
+    def stops(self) -> list[Waiting]:
+        """Take all stops, and with them refuse what would move the head after all."""
+        taken: list[Waiting] = []
+        while self._stops:
+            taken.append(self._stops.popleft())
+        if taken:
+            self._drop_leads()
+        return taken
+
+    def take(self) -> list[Waiting]:
+        """Take what is to be obeyed in this tick, stops first."""
+        if not self._orders and not self._stops:
+            return []
+        taken = self.stops()
+        tunes, most = 0, len(taken) + MAX_PER_TICK
+        while self._orders and len(taken) < most:
+            tunes += isinstance(self._orders[0].order, Tune)
+            if tunes > 1:
+                break
+            taken.append(self._orders.popleft())
+        return taken
+
+    def _drop_leads(self) -> None:
+        """Refuse what was asked for before a stop and would move the head; keep the rest."""
+        for _ in range(len(self._orders)):
+            waiting = self._orders.popleft()
+            if isinstance(waiting.order, LookAt | Jog | Resume):
+                waiting.ticket.answer(Reply("it has been stopped since"))
+            else:
+                self._orders.append(waiting)

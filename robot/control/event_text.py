@@ -1,0 +1,26 @@
+"""What a bus has done, told shortly: the same done to several servos is one line."""
+
+import re
+from collections.abc import Iterable
+
+from gazerig.robot.bringup.scan_text import runs
+
+_SERVO = re.compile(r"servo (\d+)")
+
+
+def drawn_together(events: Iterable[str]) -> list[str]:
+    """Return "servos 1-9: Return Delay Time 250 -> 0" for nine events that differ in their servo.
+
+    An event is "neck_yaw (servo 7): what" or "servo 7: what"; anything else stays as it is.
+    """
+    whose: dict[str, list[str]] = {}
+    for event in events:
+        who, colon, what = event.partition(": ")
+        whose.setdefault(what if colon else event, []).append(who if colon else "")
+    lines = []
+    for what, names in whose.items():
+        ids = [int(found[1]) for name in names if (found := _SERVO.search(name))]
+        several = len(names) > 1 and len(ids) == len(names)
+        who = f"servos {runs(ids)}" if several else ", ".join(filter(None, names))
+        lines.append(f"{who}: {what}" if who else what)
+    return lines

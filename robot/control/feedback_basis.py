@@ -1,0 +1,37 @@
+"""What is measured and what is only reckoned: joints whose servos tell nothing.
+
+A hobby servo takes a place and gives none back. What stands for its place is its goal, moved
+by the speed that it is known to have: nobody sees it stick, slip or swing.
+"""
+
+from collections.abc import Callable, Collection
+from typing import Literal
+
+from gazerig.robot.control.tick import Tick
+
+Basis = Literal["measured", "partly reckoned", "reckoned"]
+
+RECKONED = "reckoned from commands and known servo speeds, not measured"
+PARTLY = "in part reckoned from commands and known servo speeds, not measured"
+
+
+def reckoned_joints(tick: Tick) -> tuple[str, ...]:
+    """Return the joints whose servos tell nothing."""
+    told = tick.joints.measured
+    if not told:
+        return ()
+    return tuple([n for n, tells in zip(tick.verdict.joints, told, strict=True) if not tells])
+
+
+def basis_of(
+    joints: Collection[str], reckoned: Collection[str], counts: Callable[[str], bool]
+) -> Basis:
+    """Return what a figure rests on.
+
+    joints: the rig's; counts: whether the figure rests on a joint of this name
+    """
+    hidden = [counts(name) for name in reckoned]
+    if not any(hidden):
+        return "measured"
+    whole = sum(hidden) == sum(counts(name) for name in joints)
+    return "reckoned" if whole else "partly reckoned"

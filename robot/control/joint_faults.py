@@ -1,0 +1,118 @@
+"""Joints that the guard had to hold back for a fault: said when it begins and ends, and counted."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from gazerig.robot.control.tick import Tick
+
+FAULTS = frozenset(
+    {"not moving", "overloaded", "hot", "voltage", "stale joints", "torque off", "not finite"}
+)
+"""Reasons of the guard to hold a joint that something is wrong with; latched errors besides."""
+
+_PASSING_S = {"stale joints": 0.5, "torque off": 0.5}
+"""A lost answer or a restart that is over sooner is none."""
+_OVER_S = 1.0
+"""A joint that tries again is not well yet: it is when it has not been held for so long."""
+
+
+class JointFault(NamedTuple):
+    """What befell one joint in a run.
+
+    times: how often it began; seconds: how long it lasted in all
+    """
+
+    joint: str
+    reason: str
+    times: int
+    seconds: float
+
+    def __str__(self) -> str:
+        """Write it for a line."""
+        often = "" if self.times == 1 else f", {self.times} times"
+        return f"{self.joint} {self.reason} ({self.seconds:.1f} s{often})"
+
+
+class _Running:
+    """A fault that lasts."""
+
+    def __init__(self, t_s: float) -> None:
+        self.from_s = self.last_s = t_s
+        self.said = False
+
+
+class JointFaults:
+    """Observes ticks for joints that are held by a fault.
+
+    Args:
+        say: gets a line, with the time since the first tick, when a fault begins and ends.
+    """
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._running: dict[tuple[str, str], _Running] = {}
+        self._counted: dict[tuple[str, str], tuple[int, float]] = {}
+        self._first_s: float | None = None
+
+    def note(self, tick: Tick) -> None:
+        """Look at one tick."""
+        if self._first_s is None:
+            self._first_s = tick.t_s
+        verdict = tick.verdict
+        held = verdict.level in ("hold", "limp") and not tick.stopped
+        if not held and not self._running:
+            return
+        for joint, reason in _held(tick) if held else ():
+            running = self._running.setdefault((joint, reason), _Running(tick.t_s))
+            running.last_s = tick.t_s
+            if not running.said and tick.t_s - running.from_s >= _PASSING_S.get(reason, 0.0):
+                running.said = True
+                self._tell(running.from_s, f"{joint}: {reason}: held")
+        for key, running in tuple(self._running.items()):
+            if tick.t_s - running.last_s > _OVER_S:
+                self._end(key, running)
+
+    def close(self) -> None:
+        """Count what still lasts, at the end of a run."""
+        for key, running in tuple(self._running.items()):
+            self._end(key, running, lasts=True)
+
+    def counted(self) -> tuple[JointFault, ...]:
+        """Return all faults that are over, by joint and reason."""
+        found = sorted(self._counted.items())
+        return tuple(JointFault(*key, times, seconds) for key, (times, seconds) in found)
+
+    def figures(self) -> dict[str, dict[str, dict[str, float]]]:
+        """Return the same as plain values: joint -> reason -> times and seconds."""
+        figures: dict[str, dict[str, dict[str, float]]] = {}
+        for fault in self.counted():
+            entry = {"times": fault.times, "seconds": round(fault.seconds, 3)}
+            figures.setdefault(fault.joint, {})[fault.reason] = entry
+        return figures
+
+    def _end(self, key: tuple[str, str], running: _Running, lasts: bool = False) -> None:
+        del self._running[key]
+        if not running.said:
+            return
+        seconds = running.last_s - running.from_s
+        times, before_s = self._counted.get(key, (0, 0.0))
+        self._counted[key] = times + 1, before_s + seconds
+        if not lasts:
+            joint, reason = key
+            self._tell(running.last_s, f"{joint}: {reason}: over after {seconds:.1f} s")
+
+    def _tell(self, t_s: float, what: str) -> None:
+        self._say(f"{t_s - (self._first_s or 0.0):.2f} s: {what}")
+
+
+def _held(tick: Tick) -> list[tuple[str, str]]:
+    """Return joint and reason of all joints that a fault holds in this tick."""
+    found = []
+    faults = tick.joints.fault
+    grave = set(tick.verdict.gravest)
+    for i, (joint, why) in enumerate(zip(tick.verdict.joints, tick.verdict.why, strict=False)):
+        if not why or f"{joint}: {why}" not in grave:
+            continue
+        if why in FAULTS or (faults and why == faults[i]):
+            found.append((joint, why))
+    return found

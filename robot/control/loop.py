@@ -1,0 +1,389 @@
+"""The tick, and the loop that keeps its time."""
+
+import contextlib
+import gc
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import inf, radians
+from typing import NamedTuple
+
+from gazerig.drivers.errors import DriverError
+from gazerig.drivers.types import Camera
+from gazerig.gaze.aversion import Aversion
+from gazerig.gaze.lids import Lids
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.scanpath import Scanpath
+from gazerig.robot.control.body import Body
+from gazerig.robot.control.chooser import Chooser
+from gazerig.robot.control.command_choices import (
+    Menus,
+    refuse_absent,
+    refuse_out_of_range,
+    refuse_unknown,
+)
+from gazerig.robot.control.command_queue import OrderQueue
+from gazerig.robot.control.reachability import jog_reply, look_reply
+from gazerig.robot.control.stop_control import StopControl
+from gazerig.robot.control.tick import Tick as Tick
+from gazerig.robot.control.tick import at_rest
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Renew, Resume, Stop, Tune, check
+from gazerig.robot.model.frames import PoseHistory
+from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.lead import Lead
+from gazerig.robot.model.reply import Reply, Ticket
+from gazerig.robot.model.types import JointAngles
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.safety.guard import Guard
+
+
+@dataclass(frozen=True)
+class LoopParams:
+    """The control rate."""
+
+    rate_hz: float = field(
+        default=200.0,
+        metadata={"low": 20.0, "high": 1000.0, "unit": "Hz", "says": "control rate"},
+    )
+    park_s: float = field(
+        default=4.0,
+        metadata={
+            "low": 0.0,
+            "high": 30.0,
+            "unit": "s",
+            "says": "longest time for parking before torque goes off",
+        },
+    )
+
+
+class LoopCount(NamedTuple):
+    """How the loop kept its time."""
+
+    ticks: int
+    overruns: int
+    stopped_by: str
+
+
+class Robot:
+    """All rooms of one head, wired."""
+
+    def __init__(
+        self,
+        body: Body,
+        kinematics: Kinematics,
+        camera: Camera,
+        perception: Perception,
+        poses: PoseHistory,
+        attention: Chooser,
+        scanpath: Scanpath,
+        aversion: Aversion,
+        oculomotor: Oculomotor,
+        lids: Lids,
+        guard: Guard,
+    ) -> None:
+        self.body = body
+        self.camera = camera
+        self.perception = perception
+        self.attention: Chooser = attention
+        self._kinematics = kinematics
+        self._poses = poses
+        self._scanpath = scanpath
+        self._aversion = aversion
+        self._oculomotor = oculomotor
+        self._menus = Menus(aversion, lids)
+        self._guard = guard
+        self._settled = True
+        self._orders = OrderQueue()
+        self._lead = Lead()
+        self._last: JointAngles = ()
+        # The models lead again: they begin where this tick finds head and eyes.
+        self._takes_over = False
+        self.tune: Callable[[Tune, float], tuple[str, ...]] = _not_tunable
+        self._told: list[str] = []
+        self._stop = StopControl(self._told)
+
+    @property
+    def stopped(self) -> str:
+        """Return why somebody stopped the robot, "" while it moves."""
+        return self._stop.why
+
+    def order(self, order: Order) -> Ticket:
+        """Ask for something, from the next tick on; may be called from any thread.
+
+        Returns:
+            Where the reply comes, once the loop has taken the order up.
+
+        Raises:
+            ValueError: it cannot be done, or too many orders wait; the message says which,
+                and what there is.
+        """
+        check(order)
+        if isinstance(order, Jog):
+            refuse_out_of_range(order, self.body.names, self._guard.limits)
+        return self.order_again(order)
+
+    def order_again(self, order: Order) -> Ticket:
+        """Ask for what was accepted in a recorded run, whatever the ranges are now.
+
+        Raises:
+            ValueError: as ``order``.
+        """
+        check(order)
+        if isinstance(order, Ask):
+            refuse_unknown(order, self.menus())
+        if isinstance(order, Jog):
+            refuse_absent(order, self.body.names)
+        return self._orders.add(order)
+
+    def ask(self, menu: str, choice: str) -> None:
+        """Ask for a behaviour, a mode of conversation or a wink, from the next tick on.
+
+        May be called from any thread.
+
+        Raises:
+            ValueError: there is no such menu or choice; the message lists what there is.
+        """
+        self.order(Ask(menu, choice))
+
+    def menus(self) -> dict[str, tuple[str, ...]]:
+        """Return what ``ask`` takes: menu -> choices, the present one first."""
+        return self._menus.offered(self.attention.top_down)
+
+    def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
+        """Open camera and bus, switch torque on where the joints are, begin from there.
+
+        ready: called last before the torque comes on; what it raises ends the start
+
+        Raises:
+            SetupError: something is absent or not as configured.
+        """
+        # A full pass of the garbage collector over all that start-up made takes 20 ms, four
+        # slots; what is there now stays, so later passes need not look at it. Before torque
+        # is on, as nothing may keep the servos waiting after.
+        gc.collect()
+        gc.freeze()
+        self.camera.open()
+        try:
+            if ready is not None:
+                ready()
+            goals = self.body.start()
+        except BaseException:
+            self.camera.close()
+            raise
+        try:
+            self._begin(clock.now_s(), goals)
+        except BaseException:
+            with contextlib.suppress(DriverError):
+                self.stop()
+            raise
+
+    def _begin(self, t_s: float, goals: JointAngles) -> None:
+        """Let every part begin where the joints are."""
+        self._guard.reset(t_s, goals)
+        joints = self.body.read(t_s)
+        pose = self._kinematics.forward(joints)
+        self._poses.remember(t_s, pose.head_rad)
+        self.attention.reset(t_s)
+        self._scanpath.reset(t_s)
+        self._aversion.reset(t_s)
+        self._oculomotor.reset(t_s, pose)
+        self._last = goals
+
+    def tick(self, t_s: float, dt_s: float) -> Tick:
+        """Read, see, choose, plan, guard, write.
+
+        Raises:
+            DriverError: bus or camera are gone.
+        """
+        orders = self._obey(t_s)
+        joints = self.body.read(t_s)
+        pose = self._kinematics.forward(joints)
+        self._poses.remember(t_s, pose.head_rad)
+        if self._takes_over:
+            self._takes_over = False
+            self._oculomotor.reset(t_s, pose)
+        detections = self.camera.latest(t_s)
+        percept = self.perception.see(detections, self._poses)
+        target = self._lead.target(self.attention.choose(percept, pose, t_s), t_s)
+        target = self._scanpath.wander(target, percept, t_s, self._settled, pose.p_world_head_m)
+        target = self._aversion.step(target, pose.p_world_head_m, t_s)
+        gaze = self._oculomotor.step(target, pose, t_s, dt_s)
+        self._settled = gaze.phase != "saccade"
+        wish = self._lead.pose_rad or self._kinematics.inverse(gaze)
+        if self.stopped:
+            self._stop.keep_released(self.body, joints, t_s)
+            verdict = at_rest(joints, wish, self.stopped, self.body.names)
+        else:
+            # What a person chose to look at is there whatever the camera shows.
+            age_s = 0.0 if self._lead.active else percept.age_s(t_s) if percept is not None else inf
+            verdict = self._guard.check(wish, joints, age_s, t_s)
+            self.body.write(verdict.command_rad)
+        self._last = verdict.command_rad
+        events = (*self._told, *self.body.bus.events(), *self.camera.events())
+        self._told.clear()
+        return Tick(
+            t_s, joints, pose, detections, percept, target, gaze, wish, verdict, events, orders,
+            self.stopped, self._lead.words,
+        )  # fmt: skip
+
+    def park(
+        self,
+        pose_rad: JointAngles,
+        clock: Clock,
+        params: LoopParams,
+        again: Callable[[], bool] | None = None,
+    ) -> bool:
+        """Move slowly to the parking pose; tell whether it was reached in time.
+
+        Somebody's stop ends it: the torque is off then. Other orders wait for nothing any more.
+
+        again: asked at every step, tells whether the rest is to be skipped
+        """
+        self._guard.go_gently()
+        start_s = clock.now_s()
+        end_s = start_s + params.park_s + 0.5 / params.rate_hz
+        for slot in range(1, int(params.park_s * params.rate_hz) + 1):
+            clock.sleep_until(start_s + slot / params.rate_hz)
+            t_s = clock.now_s()
+            # A bus that is slow to answer must not make it longer.
+            if t_s > end_s or (again is not None and again()):
+                return False
+            if stops := self._orders.stops():
+                for stop in stops:
+                    stop.ticket.answer(self._obey_one(stop.order, t_s))
+                return False
+            joints = self.body.read(t_s)
+            # Parking goes home whatever the camera shows.
+            self.body.write(self._guard.check(pose_rad, joints, 0.0, t_s).command_rad)
+            errors = zip(pose_rad, joints.position_rad, strict=True)
+            if max(abs(wish - now) for wish, now in errors) < radians(2.0):
+                return True
+        return False
+
+    def stop(self) -> None:
+        """Torque off, close the bus and the camera."""
+        try:
+            self.body.stop()
+        finally:
+            self.camera.close()
+
+    def _obey(self, t_s: float) -> tuple[Order, ...]:
+        """Put in force what was asked for, and end a lead that nobody renews."""
+        taken = self._orders.take()
+        for order, ticket in taken:
+            ticket.answer(self._obey_one(order, t_s))
+        if self._lead.lapsed(t_s):
+            self._told.append(f"{self._lead.words}: not renewed, so the gaze leads again")
+            self._let_lead(self._lead.end)
+        return tuple([order for order, _ in taken])
+
+    def _obey_one(self, order: Order, t_s: float) -> Reply:
+        """Put one order in force; return what became of it."""
+        match order:
+            case Ask():
+                self._menus.choose(order, self.attention.top_down, t_s)
+            case LookAt() | Jog() if self.stopped:
+                return Reply(f"stopped ({self.stopped}): resume first")
+            case LookAt():
+                return self._look(order, t_s)
+            case Jog():
+                return self._jog(order, t_s)
+            case Renew():
+                if not self._lead.renew(order, t_s):
+                    return Reply(f"{order.who or 'you'} lead nothing now")
+            case Stop():
+                self._lead.end()
+                self._stop.halt(order, self.body, t_s)
+            case Resume():
+                return self._resume(order, t_s)
+            case Tune():
+                self._told += self.tune(order, t_s)
+        return Reply()
+
+    def _look(self, order: LookAt, t_s: float) -> Reply:
+        """Look at a point that a person chose, or freely again."""
+        self._let_lead(lambda: self._lead.look(order, t_s))
+        target = self._lead.puppet(t_s)
+        if target is None:
+            return Reply()
+        return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
+
+    def _jog(self, order: Jog, t_s: float) -> Reply:
+        """Hold all joints but those given; without any, let the models lead again."""
+        self._let_lead(lambda: self._lead.jog(order, self.body.names, self._last, t_s))
+        if order.angles_rad:
+            # A slider can be torn from end to end in no time.
+            self._guard.go_gently()
+        return jog_reply(order, self.body.names, self._guard.limits)
+
+    def _let_lead(self, change: Callable[[], None]) -> None:
+        """Change who leads; the models begin gently where they take joints over."""
+        held, words = bool(self._lead.pose_rad), self._lead.words
+        change()
+        if held and not self._lead.pose_rad:
+            self._takes_over = True
+            self._guard.go_gently()
+        if self._lead.words and not words:
+            self._told.append(f"led by {self._lead.words}")
+
+    def _resume(self, order: Resume, t_s: float) -> Reply:
+        """Put the torque on where the joints are; a servo that refuses leaves it off."""
+        if not self.stopped:
+            return Reply()
+        resumed = self._stop.resume(order, self.body, t_s)
+        if isinstance(resumed, Reply):
+            return resumed
+        self._guard.reset(t_s, resumed)
+        self._takes_over = True
+        return Reply()
+
+
+def _not_tunable(order: Tune, t_s: float) -> tuple[str, ...]:
+    """Refuse: nobody has said how."""
+    return ("this robot's parameters cannot be changed while it runs",)
+
+
+def run(
+    robot: Robot,
+    clock: Clock,
+    params: LoopParams | Callable[[], LoopParams],
+    stop: Callable[[float], str | None],
+    watch: Callable[[Tick], None],
+) -> LoopCount:
+    """Tick at absolute slots until ``stop(seconds)`` gives a reason or something fails.
+
+    A tick that takes too long costs the slots it overran: they are counted and
+    skipped, never caught up in a burst.
+
+    params: a function where the rate may change while running; slots of another rate begin
+        at the last tick's
+    """
+    now = params if callable(params) else lambda: params
+    start_s = slots_s = last_s = clock.now_s()
+    rate_hz = now().rate_hz
+    period = 1.0 / rate_hz
+    slot, ticks, overruns = 0, 0, 0
+    while True:
+        if now().rate_hz != rate_hz:
+            slots_s += slot * period
+            rate_hz, slot = now().rate_hz, 0
+            period = 1.0 / rate_hz
+        slot += 1
+        clock.sleep_until(slots_s + slot * period)
+        t_s = clock.now_s()
+        reason = stop(t_s - start_s)
+        if reason is not None:
+            return LoopCount(ticks, overruns, reason)
+        try:
+            tick = robot.tick(t_s, t_s - last_s)
+        except DriverError as error:
+            return LoopCount(ticks, overruns, f"fault: {error}")
+        watch(tick)
+        if tick.verdict.level == "limp" and not tick.stopped:
+            return LoopCount(ticks, overruns, f"fault: {'; '.join(tick.verdict.gravest)}")
+        last_s = t_s
+        ticks += 1
+        late = int((clock.now_s() - slots_s) / period) - slot
+        if late > 0:
+            overruns += late
+            slot += late

@@ -1,0 +1,47 @@
+"""Those who are told of every tick, none of whom can end the run."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from gazerig.robot.control.tick import Tick
+
+
+class _Observer(NamedTuple):
+    name: str
+    note: Callable[[Tick], object]
+
+
+class Observers:
+    """Functions called with every tick; one that raises is left out from then on.
+
+    Args:
+        say: gets one line about each that is left out.
+    """
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._observers: tuple[_Observer, ...] = ()
+
+    def add(self, name: str, note: Callable[[Tick], object]) -> None:
+        """Call one more with every tick, under a name that people know it by."""
+        self._observers = (*self._observers, _Observer(name, note))
+
+    def note(self, tick: Tick) -> None:
+        """Tell all of a tick; called by the loop."""
+        for observer in self._observers:
+            try:
+                observer.note(tick)
+            except Exception as error:
+                self._observers = tuple([one for one in self._observers if one is not observer])
+                self._say(left_out(observer.name, error))
+
+
+def left_out(name: str, error: Exception) -> str:
+    """Say that something goes on without somebody who only watches."""
+    what = " ".join(str(error).split())
+    kind = type(error).__name__
+    return (
+        f"{name} failed ({kind}: {what}); the rig runs on without"
+        if what
+        else (f"{name} failed ({kind}); the rig runs on without")
+    )

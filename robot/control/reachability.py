@@ -1,0 +1,103 @@
+"""What a rig can do of what a person asks: joint by joint, before it has moved."""
+
+from collections.abc import Sequence
+from math import pi, radians
+
+from gazerig.gaze.angles import add, norm, scale, sub, unit
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.types import Angles2, Angles3, GazeCommand, Target
+from gazerig.robot.model.commands import Jog
+from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.kinematics import NECK, Kinematics
+from gazerig.robot.model.reply import JointReply, Reply
+from gazerig.robot.model.types import JointAngles, JointState
+from gazerig.robot.safety.motion_limiter import JointLimit
+
+_SAME_RAD = radians(0.1)
+_BESIDE_RAD = radians(0.5)
+"""A gaze that rests nearer to its point is on it: eyes that converge differ by rounding."""
+_AT_END = "at the end of its range"
+_TOO_NEAR = "the eyes converge on no nearer point"
+_ABSENT = "this rig has none"
+
+
+def look_reply(
+    target: Target, oculomotor: Oculomotor, kinematics: Kinematics, limits: Sequence[JointLimit]
+) -> Reply:
+    """Return how well eyes and head will meet a point that stands still.
+
+    limits: of the joints, in the order of ``kinematics.names``
+    """
+    reach = oculomotor.reach(target)
+    wished = kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad))
+    done = _within(wished, limits)
+    at_rest = (0.0,) * len(done)
+    pose = kinematics.forward(JointState(done, at_rest, at_rest, ()))
+    error = gaze_error(target.p_world_m, pose, not kinematics.one_pan)
+    # A head that stops short because the eyes do the rest is not kept from anything.
+    head = reach.facing_rad if error.whole > _BESIDE_RAD else reach.head_rad
+    asked = kinematics.inverse(_command(head, *reach.asked_eyes_rad))
+    left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
+    far_m = norm(sub(target.p_world_m, pose.p_world_head_m))
+    met = add(pose.p_world_head_m, scale(unit(add(left, right)), far_m))
+    ranges = _ranges(oculomotor, kinematics, limits)
+    joints = []
+    for name, wanted, got, (low, high) in zip(kinematics.names, asked, done, ranges, strict=True):
+        if name.endswith("lid") or abs(wanted - got) <= _SAME_RAD:
+            continue
+        if not low + _SAME_RAD < got < high - _SAME_RAD:
+            joints.append(JointReply(name, wanted, got, low, high, _AT_END))
+        elif reach.too_near:
+            joints.append(JointReply(name, wanted, got, low, high, _TOO_NEAR))
+    joints += [
+        JointReply(name, angle, 0.0, 0.0, 0.0, _ABSENT)
+        for name, angle in zip(NECK, head, strict=True)
+        if name not in kinematics.names and abs(angle) > _SAME_RAD
+    ]
+    return Reply("", target.p_world_m, met, tuple(joints), error.whole)
+
+
+def jog_reply(order: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> Reply:
+    """Return how far joints that are put at angles will go."""
+    spans = {name: limit[:2] for name, limit in zip(joints, limits, strict=True)}
+    found = []
+    for name, asked in order.angles_rad:
+        low, high = spans[name]
+        done = min(max(asked, low), high)
+        reason = _AT_END if abs(done - asked) > _SAME_RAD else ""
+        found.append(JointReply(name, asked, done, low, high, reason))
+    return Reply(joints=tuple(found))
+
+
+def _command(head: Angles3, left: Angles2, right: Angles2) -> GazeCommand:
+    return GazeCommand(head, left, right, 1.0, 1.0, "fixate", False, (0.0, 0.0, 0.0), 0, 0, 0)
+
+
+def _within(angles_rad: JointAngles, limits: Sequence[JointLimit]) -> JointAngles:
+    pairs = zip(angles_rad, limits, strict=True)
+    return tuple(min(max(angle, limit.low_rad), limit.high_rad) for angle, limit in pairs)
+
+
+def _ranges(
+    oculomotor: Oculomotor, kinematics: Kinematics, limits: Sequence[JointLimit]
+) -> list[Angles2]:
+    """Return the narrower of the gaze's and the guard's range of each joint."""
+    left, right, head = oculomotor.ranges_rad
+    lows, highs = (
+        kinematics.inverse(
+            _command(
+                (head[0][end], head[1][end], (-pi, pi)[end]),
+                (left[0][end], left[1][end]),
+                (right[0][end], right[1][end]),
+            )
+        )
+        for end in (0, 1)
+    )
+    rows = zip(kinematics.names, lows, highs, limits, strict=True)
+    return [
+        (limit.low_rad, limit.high_rad)
+        if name.endswith("lid")
+        else (max(low, limit.low_rad), min(high, limit.high_rad))
+        for name, low, high, limit in rows
+    ]

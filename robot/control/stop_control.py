@@ -1,0 +1,73 @@
+"""Carries out stops and their ends on the body; a stop that a lost bus refuses is remembered."""
+
+from gazerig.drivers.errors import BusLost, DriverError, ServoFault, SetupError
+from gazerig.robot.control.body import Body
+from gazerig.robot.model.commands import Resume, Stop
+from gazerig.robot.model.reply import Reply
+from gazerig.robot.model.stop_latch import StopLatch
+from gazerig.robot.model.types import JointAngles, JointState
+
+_RELEASE_AGAIN_S = 0.5
+"""After a stop, servos that still report torque are told again so often."""
+
+
+class StopControl:
+    """Takes the torque off and puts it on again.
+
+    Args:
+        told: takes a line for people of whatever happens.
+    """
+
+    def __init__(self, told: list[str]) -> None:
+        self._told = told
+        self._latch = StopLatch()
+        self._refused = ""
+        self._released_s = 0.0
+
+    @property
+    def why(self) -> str:
+        """Return why somebody stopped the robot, "" while it moves."""
+        return self._latch.why
+
+    def halt(self, order: Stop, body: Body, t_s: float) -> None:
+        """Take the torque off at once."""
+        if self._latch.stop(order, t_s):
+            by = f" by {order.who}" if order.who else ""
+            self._told.append(f"stopped{by}: {order.why}; torque off")
+        self._release(body, t_s)
+
+    def keep_released(self, body: Body, joints: JointState, t_s: float) -> None:
+        """Take the torque off again where a servo that answers still reports it after a stop."""
+        if True not in joints.torque or t_s - self._released_s < _RELEASE_AGAIN_S:
+            return
+        names = zip(body.names, joints.torque, strict=True)
+        holding = [name for name, on in names if on and name not in joints.missing]
+        if holding:
+            self._told.append(f"stopped, but {', '.join(holding)} still held: torque off again")
+            self._release(body, t_s)
+
+    def resume(self, order: Resume, body: Body, t_s: float) -> JointAngles | Reply:
+        """Put the torque on where the joints are; return the goals in force, or why not."""
+        by = f" by {order.who}" if order.who else ""
+        if refusal := self._latch.refusal(order, t_s):
+            if refusal != self._refused:  # a flood of them is one line
+                self._told.append(f"resume{by} refused: {refusal}")
+            self._refused = refusal
+            return Reply(refusal)
+        try:
+            goals = body.take_hold()
+        except (SetupError, ServoFault, BusLost) as error:
+            self._told.append(f"still stopped: {error}")
+            return Reply(self._told[-1])
+        self._latch.lift()
+        self._refused = ""
+        self._told.append(f"torque on again{by}: going on slowly")
+        return goals
+
+    def _release(self, body: Body, t_s: float) -> None:
+        """Take the torque off; where the bus is gone it does so itself when it is back."""
+        self._released_s = t_s
+        try:
+            body.let_go()
+        except DriverError as error:
+            self._told.append(f"the stop is remembered, torque is NOT YET off: {error}")

@@ -1,0 +1,378 @@
+"""The page's door: the only way in, at the asked address, for those who may come in.
+
+A reverse proxy before viser, which itself listens where nobody else can reach it
+(``gazerig.robot.dashboard.viser_server``). Whoever comes in shows a token, once, in the query of
+the first address; a cookie takes its place. That holds on this machine as well, which may have
+other users. The Origin of every websocket and of everything that is sent must be the address of
+this page, and on the loopback that address must be a name of the loopback, or a foreign name
+made to point here would do (DNS rebinding).
+
+It also serves what must work whatever viser does: the stop button, written into the page,
+and what the button talks to.
+"""
+
+import asyncio
+import hmac
+import json
+import secrets
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import aiohttp
+from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
+from yarl import URL
+
+from gazerig.robot.dashboard.browser_requests import ASKED_BYTES, compact, from_browser, leads
+from gazerig.robot.dashboard.browsers import Browsers, Places
+from gazerig.robot.dashboard.connection_limits import Connections
+from gazerig.robot.dashboard.stop_channel import StopSender
+from gazerig.robot.dashboard.token_bucket import Rate
+from gazerig.robot.dashboard.viser_server import (
+    BROWSER_HEADER,
+    FROM_BROWSER_BYTES,
+    TO_BROWSER_BYTES,
+)
+from gazerig.robot.dashboard.websocket_relay import TAKES_S, carry_in, carry_out, until_one_ends
+
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+MOST_TABS = 16
+"""Tabs that show the page at a time."""
+MOST_LINES = 32
+"""Tabs whose stop button is told the state of the rig."""
+
+_SCRIPT = Path(__file__).with_name("stop.js")
+_SCRIPT_TAG = b'<script src="/rig/stop.js"></script>'
+_HEAD = b"<head>"
+_ASKED_PER_S, _ASKED_BURST = 20.0, 40.0  # clicks of all people together
+_TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each is told all there is, which takes a moment
+_READ_S = 5.0
+_BEAT_S = 1.0
+_RENEWED_EVERY_S = 0.25
+_OPEN_PATIENCE_S = 20.0
+_CLOSE_PATIENCE_S = 3.0
+_DAY_S = 86400
+# What a proxy must not hand on: it is about one leg of the way (RFC 9110, 7.6.1).
+_ONE_LEG = {"connection", "transfer-encoding", "content-encoding", "content-length", "keep-alive"}
+_HEADERS = {
+    "X-Frame-Options": "DENY",  # nobody may lay a page of theirs over the buttons
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+}
+_PLAIN = {"Accept-Encoding": "identity"}
+
+Ask = Callable[[bytes], bool]
+"""Hands a JSON object to the rig; False where the rig does not take it."""
+
+
+class Door:
+    """Lets people in to the server behind it, from a thread of its own."""
+
+    def __init__(
+        self, host: str, port: int, inside: Path, ask: Ask, stop: StopSender, token: str
+    ) -> None:
+        """Prepare to listen.
+
+        Args:
+            host: the address
+            port: a free port of it
+            inside: the Unix socket of the server
+            ask: called in the door's thread with what is sent to the rig
+            stop: takes stops, beside and before all else
+            token: what whoever comes in must show
+        """
+        self._host = host
+        self._port = port
+        self._inside = str(inside)
+        self._ask = ask
+        self._stop = stop
+        self.token = token
+        self.browsers = Browsers(token)
+        self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
+        self._state: Mapping[str, object] = {}
+        self._asked_rate = Rate(_ASKED_PER_S, _ASKED_BURST)
+        self._tab_rate = Rate(_TABS_PER_S, _TABS_BURST)
+        self._news: set[asyncio.Event] = set()
+        self._lines, self._tabs = Places(MOST_LINES), Places(MOST_TABS)
+        self._loop = asyncio.new_event_loop()
+        self._over = asyncio.Event()
+        self._opened = threading.Event()
+        self._failed: OSError | None = None
+        self._thread = threading.Thread(target=self._run, name="page door", daemon=True)
+
+    def open(self) -> None:
+        """Listen.
+
+        Raises:
+            OSError: the address cannot be listened on.
+        """
+        self._thread.start()
+        if not self._opened.wait(_OPEN_PATIENCE_S):
+            raise OSError("the page's door did not open in time")
+        if self._failed is not None:
+            raise self._failed
+
+    def is_open(self) -> bool:
+        """Return whether people can come in."""
+        return self._thread.is_alive()
+
+    def tell(self, state: Mapping[str, object]) -> None:
+        """Show this to everybody who looks at the stop button; from any thread."""
+        if state != self._state:
+            self._state = dict(state)
+            self._loop.call_soon_threadsafe(self._wake)
+
+    def close(self) -> None:
+        """Send everybody away."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._over.set)
+            self._thread.join(_CLOSE_PATIENCE_S)
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_until_complete(self._serve())
+        self._loop.close()
+
+    async def _serve(self) -> None:
+        app = web.Application(middlewares=[self._doorkeeper()], client_max_size=ASKED_BYTES)
+        app.router.add_get("/rig/stop.js", self._script)
+        app.router.add_get("/rig/line", self._line)
+        app.router.add_post("/rig/ask", self._asked)
+        app.router.add_get("/{path:.*}", self._pass_on)
+        runner = web.AppRunner(
+            app, access_log=None, shutdown_timeout=0.5, lingering_time=0.0, max_line_size=4096
+        )
+        await runner.setup()
+        assert runner.server is not None
+        self._connections = Connections(runner.server)
+        try:
+            listener = await self._loop.create_server(
+                self._connections.accept, self._host, self._port, reuse_address=True, backlog=512
+            )
+        except OSError as error:
+            self._failed = error
+            return
+        finally:
+            self._opened.set()
+        self._stop.attach(self._loop)
+        connector = aiohttp.UnixConnector(self._inside, limit=0)
+        self._client = aiohttp.ClientSession(connector=connector, auto_decompress=True)
+        async with self._client:
+            await until_one_ends(self._over.wait(), self._connections.watch(), self._renew())
+            self._wake()
+            listener.close()
+            await runner.cleanup()
+
+    # --- who may come in ----------------------------------------------------------------
+
+    def _doorkeeper(self) -> Middleware:
+        """Let in, send on without the token in the address, or refuse in one line."""
+
+        @web.middleware
+        async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
+            with self._connections.busy(request):
+                why_not = self._refusal(request)
+                if why_not is not None:
+                    return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
+                if "token" in request.query:
+                    return self._with_cookie(request)
+                return await handler(request)
+
+        return admit
+
+    def _refusal(self, request: web.Request) -> str | None:
+        """Say why somebody may not come in, None for those who may."""
+        sends = request.method not in ("GET", "HEAD") or "upgrade" in request.headers
+        origin = request.headers.get("Origin")
+        if origin is None and sends:
+            return "refused: no Origin; only a browser with this page open may ask for anything"
+        if origin is not None and _netloc(origin) != request.host:
+            return "refused: a page of another origin may not look or ask"
+        if self._host in LOOPBACK and _hostname(request.host) not in LOOPBACK:
+            return f"refused: on this machine the page is at http://{self._host}:{self._port}"
+        given = request.query.get("token") or request.cookies.get(self._cookie) or ""
+        if hmac.compare_digest(given.encode(errors="replace"), self.token.encode()):
+            return None
+        return (
+            "refused: open the address with the token that the rig's terminal shows; "
+            "there is a new one each time the rig is started"
+        )
+
+    def _with_cookie(self, request: web.Request) -> web.Response:
+        """Take the token out of the address, so that it is not seen, kept or sent on."""
+        clean = request.rel_url.without_query_params("token").raw_path_qs
+        # "//elsewhere" is the address of another machine, and so is "/\elsewhere".
+        there = "/" + clean.lstrip("/\\")
+        answer = web.Response(status=302, headers={**_HEADERS, "Location": there})
+        answer.set_cookie(self._cookie, self.token, httponly=True, samesite="Strict", path="/")
+        if self._name_cookie not in request.cookies:
+            answer.set_cookie(
+                self._name_cookie,
+                secrets.token_urlsafe(9),
+                httponly=True,
+                samesite="Strict",
+                path="/",
+                max_age=_DAY_S,
+            )
+        return answer
+
+    @property
+    def _name_cookie(self) -> str:
+        return f"{self._cookie}_browser"
+
+    def _who(self, request: web.Request) -> str:
+        return self.browsers.name(request.cookies.get(self._name_cookie))
+
+    # --- the stop button ------------------------------------------------------------------
+
+    async def _script(self, request: web.Request) -> web.Response:
+        return web.Response(
+            body=_SCRIPT.read_bytes(), content_type="text/javascript", headers=_HEADERS
+        )
+
+    async def _asked(self, request: web.Request) -> web.Response:
+        """Hand what is asked for to the rig, and say whether it was taken."""
+        async with asyncio.timeout(_READ_S):
+            body = await request.read()
+        status, words = await self._heard(body, self._who(request))
+        return web.Response(status=status, text=f"{words}\n" if words else None, headers=_HEADERS)
+
+    async def _heard(self, body: bytes | str, who: str) -> tuple[int, str]:
+        """Hand on what a browser asks; return an HTTP status, and words of a refusal."""
+        asked = from_browser(body, who)
+        if asked is None:
+            return 400, "not a JSON object that can be asked for"
+        if asked.get("order") == "stop":
+            try:
+                words = await self._stop.send(f"{asked.get('why', '')!s:.100} ({who})", who)
+            except OSError as error:
+                return 503, str(error)
+            return (503, words) if words else (204, "")
+        if not self._asked_rate.take(self._loop.time()):
+            return 429, "too many requests; try again"
+        if leads(asked):
+            self.browsers.led_by(who)
+        return (204, "") if self._ask(compact(asked)) else (503, "the rig takes nothing now")
+
+    async def _line(self, request: web.Request) -> web.StreamResponse:
+        """Tell the state whenever it changes, with a sign of life in between; hear stops.
+
+        A connection that stands already when STOP is pressed: a browser opens only six others.
+        """
+        line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False)
+        await line.prepare(request)
+        self._connections.lasting(request)
+        who = self._who(request)
+        news = asyncio.Event()
+        self._news.add(news)
+        try:
+            with self.browsers.connected(who), self._lines.take(who) as leave:
+                await until_one_ends(
+                    self._tell_line(line, news, who),
+                    self._hear_line(line, who),
+                    self._over.wait(),
+                    leave.wait(),
+                )
+        finally:
+            self._news.discard(news)
+        with suppress(TimeoutError, ConnectionError):
+            async with asyncio.timeout(_BEAT_S):
+                await line.close()
+        return line
+
+    async def _tell_line(self, line: web.WebSocketResponse, news: asyncio.Event, who: str) -> None:
+        while not line.closed:
+            news.clear()
+            async with asyncio.timeout(TAKES_S):
+                await line.send_str(json.dumps({"state": {**self._state, "you": who}}))
+            with suppress(TimeoutError):
+                await asyncio.wait_for(news.wait(), _BEAT_S)
+
+    async def _hear_line(self, line: web.WebSocketResponse, who: str) -> None:
+        async for message in line:
+            if message.type is not aiohttp.WSMsgType.TEXT:
+                continue
+            status, words = await self._heard(message.data, who)
+            async with asyncio.timeout(TAKES_S):
+                await line.send_str(json.dumps({"answer": status, "words": words}))
+
+    def _wake(self) -> None:
+        for news in self._news:
+            news.set()
+
+    async def _renew(self) -> None:
+        """Let the rig know that the browser which leads is there; until cancelled."""
+        while True:
+            await asyncio.sleep(_RENEWED_EVERY_S)
+            if who := self.browsers.leading():
+                self._ask(compact({"order": "renew", "who": who}))
+
+    # --- the server behind the door -------------------------------------------------------
+
+    async def _pass_on(self, request: web.Request) -> web.StreamResponse:
+        if "upgrade" in request.headers:
+            return await self._relay(request)
+        async with self._client.get(self._address("http", request), headers=_PLAIN) as inside:
+            body = await inside.read()
+            headers = {k: v for k, v in inside.headers.items() if k.lower() not in _ONE_LEG}
+            status = inside.status
+        if headers.get("Content-Type", "").startswith("text/html"):
+            body = body.replace(_HEAD, _HEAD + _SCRIPT_TAG, 1)
+        return web.Response(status=status, body=body, headers={**headers, **_HEADERS})
+
+    async def _relay(self, request: web.Request) -> web.StreamResponse:
+        """Carry a browser's websocket to the server and back, each side as slow as the other."""
+        if not self._tab_rate.take(self._loop.time()):
+            return web.Response(status=429, text="too many tabs at once\n", headers=_HEADERS)
+        offered = [
+            word.strip()
+            for word in request.headers.get("Sec-WebSocket-Protocol", "").split(",")
+            if word.strip()
+        ]
+        browser = web.WebSocketResponse(
+            protocols=offered, max_msg_size=FROM_BROWSER_BYTES, compress=False
+        )
+        who = self._who(request)
+        with self._tabs.take(who) as leave:
+            async with self._client.ws_connect(
+                self._address("ws", request),
+                protocols=offered,
+                headers={BROWSER_HEADER: who},
+                max_msg_size=TO_BROWSER_BYTES,
+                compress=0,
+            ) as inside:
+                await browser.prepare(request)
+                self._connections.lasting(request)
+                await until_one_ends(
+                    carry_in(browser, inside),
+                    carry_out(inside, browser),
+                    self._over.wait(),
+                    leave.wait(),
+                )
+        with suppress(TimeoutError, ConnectionError):
+            async with asyncio.timeout(_BEAT_S):
+                await browser.close()
+        if request.transport is not None:  # one who reads nothing does not read that it is over
+            request.transport.abort()
+        return browser
+
+    def _address(self, scheme: str, request: web.Request) -> URL:
+        return URL(f"{scheme}://page/{request.rel_url.raw_path_qs.lstrip('/')}", encoded=True)
+
+
+def _netloc(origin: str) -> str | None:
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:
+        return None
+
+
+def _hostname(host: str) -> str | None:
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None

@@ -1,0 +1,48 @@
+"""What a browser may ask of the rig over the page's door: small JSON objects, checked."""
+
+import json
+from collections.abc import Mapping
+from typing import NoReturn
+
+from gazerig.robot.model.commands import KINDS
+
+ASKED_BYTES = 2048
+"""Longest request; a stop with its reason has a hundred bytes."""
+
+_SAY_WHO = tuple(name for name, kind in KINDS.items() if "who" in kind._fields)
+"""Orders that carry who asks."""
+
+
+def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
+    """Return a request with who asks written in, None where it is none.
+
+    Args:
+        body: as it came
+        who: the name of the browser; what it calls itself in the request is overwritten
+    """
+    try:
+        asked = json.loads(body, parse_constant=_no_number)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(asked, dict):
+        return None
+    if (name := asked.get("order")) in _SAY_WHO:
+        asked = {"order": name, **asked, "who": who}
+    if isinstance(pick := asked.get("pick"), dict):
+        asked["pick"] = {**pick, "who": who}
+    return asked
+
+
+def leads(asked: Mapping[str, object]) -> bool:
+    """Return whether a request makes who asks the one that leads the head."""
+    return "pick" in asked or asked.get("order") in ("look_at", "jog")
+
+
+def compact(asked: Mapping[str, object]) -> bytes:
+    """Return a request as JSON without blanks, an order's "order" first."""
+    return json.dumps(asked, separators=(",", ":")).encode()
+
+
+def _no_number(word: str) -> NoReturn:
+    """Refuse NaN and Infinity, which are no JSON."""
+    raise ValueError(f"{word} is no number of JSON")

@@ -1,0 +1,119 @@
+"""Draw where the wish would have head and eyes, as a translucent ghost over the rig itself."""
+
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+import viser
+
+from gazerig.gaze.angles import rotate_back, sub
+from gazerig.robot.dashboard.head_model import (
+    EYE_RADIUS_M,
+    SHELL_HALF_AXES_M,
+    SHELL_MIDDLE_M,
+    SIDES,
+    Colour,
+    lid_turn,
+    lower_lid_turn,
+)
+from gazerig.robot.dashboard.mesh import Mesh, ellipsoid, lid, ring
+from gazerig.robot.dashboard.scene_node import along, put, quaternion
+from gazerig.robot.model.types import Ghost, Snapshot
+
+_GHOST: Colour = (70, 110, 255)
+_SIGHT_M = 0.35
+_SWELL = 1.03  # the ghost's skin lies outside the rig's, or both would flicker
+_IRIS_RAD = radians(29.0)
+_APART = radians(1.5)  # of the head's axes: less would only tint the rig's own shell
+
+
+class _Eye(NamedTuple):
+    side: str
+    ball: viser.FrameHandle
+    upper: viser.FrameHandle
+    lower: viser.FrameHandle
+
+
+class GhostView:
+    """The ghost in the scene."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._frame = scene.add_frame("/ghost", show_axes=False, visible=False)
+        x, y, z = SHELL_HALF_AXES_M
+        shell = ellipsoid((_SWELL * x, _SWELL * y, _SWELL * z), 0.86, 25)
+        self._shell = self._add("/ghost/shell", shell, 0.2)
+        self._shell.position = SHELL_MIDDLE_M
+        self._eyes = tuple(self._add_eye(side) for side in SIDES)
+        self._joints: tuple[str, ...] = ()
+
+    def _add(self, name: str, mesh: Mesh, opacity: float) -> viser.MeshHandle:
+        return self._scene.add_mesh_simple(
+            name,
+            mesh.vertices,
+            mesh.faces,
+            color=_GHOST,
+            opacity=opacity,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def _add_eye(self, side: str) -> _Eye:
+        """Add an iris as a ring with a line of sight, and the lids' edges."""
+        name = f"/ghost/eye_{side}"
+        ball = self._scene.add_frame(name, show_axes=False)
+        iris = ring(1.05 * EYE_RADIUS_M * float(np.sin(_IRIS_RAD)), 0.0007)
+        at_m = 1.05 * EYE_RADIUS_M * float(np.cos(_IRIS_RAD))
+        self._add(f"{name}/iris", iris, 0.8).position = (at_m, 0.0, 0.0)
+        ahead = np.array((((EYE_RADIUS_M, 0.0, 0.0), (_SIGHT_M, 0.0, 0.0)),))
+        self._scene.add_line_segments(
+            f"{name}/sight", ahead, _GHOST, thickness=1.0, thickness_units="screen"
+        )
+        upper, lower = (
+            self._scene.add_frame(f"/ghost/{name}_{side}", show_axes=False)
+            for name in ("lid", "lower_lid")
+        )
+        for frame, sweep_deg in ((upper, 14.0), (lower, -9.0)):
+            edge = lid(1.12 * EYE_RADIUS_M, radians(sweep_deg))
+            self._add(f"{frame.name}/edge", edge, 0.45)
+        return _Eye(side, ball, upper, lower)
+
+    def show(self, snapshot: Snapshot | None) -> None:
+        """Move the ghost to where the wish is; without a snapshot or a wish it is not seen."""
+        ghost = snapshot.ghost if snapshot is not None else None
+        self._frame.visible = ghost is not None
+        if snapshot is not None and ghost is not None:
+            if snapshot.joints != self._joints:
+                self._have(snapshot.joints)
+            self._shell.visible = _apart(ghost, snapshot)
+            self._move(ghost)
+
+    def _have(self, joints: tuple[str, ...]) -> None:
+        """Draw the edges of those lids that a joint moves."""
+        self._joints = joints
+        for eye in self._eyes:
+            eye.upper.visible = f"{eye.side}_upper_lid" in joints
+            eye.lower.visible = f"{eye.side}_lower_lid" in joints
+
+    def _move(self, ghost: Ghost) -> None:
+        R, p_world_head_m = ghost.R_world_head, ghost.p_world_head_m
+        put(self._frame, p_world_head_m, quaternion(R))
+        sides = zip(
+            self._eyes,
+            ghost.p_world_eyes_m,
+            ghost.gaze_world,
+            ghost.lids,
+            ghost.lower_lids or (1.0, 1.0),
+            strict=True,
+        )
+        for eye, p_world_m, gaze_world, opening, lower in sides:
+            p_head_m = rotate_back(R, sub(p_world_m, p_world_head_m))
+            put(eye.ball, p_head_m, along(rotate_back(R, gaze_world)))
+            put(eye.upper, p_head_m, lid_turn(opening))
+            put(eye.lower, p_head_m, lower_lid_turn(lower))
+
+
+def _apart(ghost: Ghost, snapshot: Snapshot) -> bool:
+    """Return whether the wished head is so far off the measured one that both can be seen."""
+    turned = np.array(ghost.R_world_head) - np.array(snapshot.R_world_head)
+    return float(np.abs(turned).max()) > _APART

@@ -1,0 +1,178 @@
+"""What a person can make the rig do: menus, a target to drag, and what the tabs hold."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+
+import viser
+
+from gazerig.robot.dashboard.jog_panel import JogView
+from gazerig.robot.dashboard.outbox import Teller
+from gazerig.robot.dashboard.param_panel import TuningView
+from gazerig.robot.dashboard.widget import put
+from gazerig.robot.model.commands import Ask, LookAt
+from gazerig.robot.model.types import Snapshot
+
+STEER = "steer"
+"""A menu of this name is the steps of a calibration, not something to ask the robot for."""
+
+_TARGET_SCALE = 0.12
+
+
+class ControlsView:
+    """Three tabs: lead, joints, tuning."""
+
+    def __init__(self, server: viser.ViserServer, teller: Teller) -> None:
+        # A window of its own: below words that grow and shrink, a button would slip away from
+        # under the mouse.
+        window = server.gui.add_panel()
+        lead, joints, tuning = (window.add_tab(name) for name in ("lead", "joints", "tuning"))
+        window.dock_below(server.gui.main_panel)
+        self._window = window
+        self._lead = LeadView(server, lead, teller)
+        self._joints = JogView(server.gui, joints, teller)
+        self._tuning = TuningView(server, tuning, teller)
+
+    def leave(self) -> None:
+        """Take everything away: a recording cannot be led."""
+        self._lead.leave()
+        self._window.remove()
+
+    def offer(self, menus: Mapping[str, Sequence[str]]) -> None:
+        """Add menus, each with what can be chosen from it."""
+        for name, choices in menus.items():
+            self._lead.offer(name, choices)
+
+    def knobs(self, knobs: Sequence[Mapping[str, object]]) -> None:
+        """Add parameters that can be tuned, as the rig describes them."""
+        self._tuning.knobs(knobs)
+
+    def values(self, state: Mapping[str, object]) -> None:
+        """Take what is in force: changed values, what is not saved, the file, characters."""
+        self._tuning.values(state)
+        self._joints.values(self._tuning.in_force)
+        characters = state.get("characters")
+        if isinstance(characters, list) and characters:
+            self._lead.characters(characters, str(state.get("character", "")))
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Show what is measured beside what is asked for."""
+        self._lead.show(snapshot)
+        self._joints.show(snapshot)
+
+    def answered(self, who: str, words: str | None) -> None:
+        """Take the rig's answer to a request, for whoever waits for it."""
+        self._tuning.answered(who, words)
+
+
+class LeadView:
+    """Menus, and a target that is dragged through the scene."""
+
+    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Teller) -> None:
+        """Fill the tab; menus and characters follow when the rig names them."""
+        self._server = server
+        self._tab = tab
+        self._teller = teller
+        self._menus: dict[str, viser.GuiButtonGroupHandle] = {}
+        self._characters: viser.GuiButtonGroupHandle | None = None
+        self._target_m = (0.8, 0.0, 0.15)
+        self._now, self._character, self._led = "", "", ""
+        with tab:
+            self._words = server.gui.add_html("", order=1)
+            self._leader = server.gui.add_html(_leader(""), order=1.5)
+            server.gui.add_html(
+                _note("Click in the camera picture, or drag a target: the head looks there."),
+                order=3,
+            )
+            self._drag = server.gui.add_checkbox("drag a target", False, order=4)
+            free = server.gui.add_button("look freely again", order=5, icon=viser.Icon.EYE)
+        self._gizmo = server.scene.add_transform_controls(
+            "/led",
+            scale=_TARGET_SCALE,
+            disable_rotations=True,
+            depth_test=False,
+            position=self._target_m,
+            visible=False,
+        )
+        self._listen(free)
+
+    def leave(self) -> None:
+        """Take the target away."""
+        self._gizmo.remove()
+
+    def _listen(self, free: viser.GuiButtonHandle) -> None:
+        # Coroutines: viser runs these one after the other, plain functions in any order.
+        @self._drag.on_update
+        async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+            self._gizmo.visible = event.target.value
+            if event.target.value:
+                self._gizmo.position = self._target_m
+
+        @self._gizmo.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            x, y, z = map(float, event.target.position)
+            if event.client_id is not None and event.phase != "start":
+                self._teller.order(LookAt((x, y, z)), str(event.client_id))
+
+        @free.on_click
+        async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            put(self._drag, False)
+            self._teller.order(LookAt(None), str(event.client_id))
+
+    def offer(self, name: str, choices: Sequence[str]) -> None:
+        """Add a menu as a row of buttons."""
+        if name in self._menus:
+            self._menus.pop(name).remove()
+        with self._tab:
+            group = self._server.gui.add_button_group(name, tuple(choices), order=2)
+
+        @group.on_click
+        async def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            who, choice = str(event.client_id), event.target.value
+            if name == STEER:
+                self._teller.ask({"steer": choice}, who)
+            else:
+                self._teller.order(Ask(name, choice), who)
+
+        self._menus[name] = group
+
+    def characters(self, names: Sequence[str], present: str) -> None:
+        """Add the characters there are, once, and note the present one."""
+        self._character = present
+        if self._characters is not None:
+            return
+        with self._tab:
+            group = self._server.gui.add_button_group("character", tuple(names), order=2.5)
+
+        @group.on_click
+        async def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            asked = {"tune": {"character": event.target.value}}
+            self._teller.ask(asked, str(event.client_id))
+
+        self._characters = group
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Say what is in force; the target to drag starts where the head looks."""
+        self._target_m = snapshot.p_world_target_m
+        said = {
+            "behaviour": snapshot.behaviour,
+            "conversation": snapshot.conversation,
+            "character": snapshot.character or self._character,
+        }
+        now = ", ".join(f"{name} <b>{escape(word)}</b>" for name, word in said.items() if word)
+        if now != self._now:
+            self._now = now
+            self._words.content = _note(f"in force: {now}")
+        if snapshot.led != self._led:
+            self._led = snapshot.led
+            self._leader.content = _leader(snapshot.led)
+
+
+def _leader(led: str) -> str:
+    """Say who leads on one line, always there: the buttons below must not slip away."""
+    words = f"led by <b>{escape(led)}</b>" if led else "led by nobody"
+    cut = "height:1.5em;overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
+    return _note(f"<div title='{escape(led)}' style='{cut}'>{words}</div>")
+
+
+def _note(html: str) -> str:
+    return f"<div style='padding:4px 12px;font-size:12.5px;opacity:.85'>{html}</div>"

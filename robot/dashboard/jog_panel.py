@@ -1,0 +1,158 @@
+"""Sliders that put joints at angles, each with the joint's limits and its measured angle."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from math import degrees, radians
+
+import viser
+
+from gazerig.robot.dashboard.outbox import Teller
+from gazerig.robot.dashboard.widget import put
+from gazerig.robot.model.commands import Jog, LookAt
+from gazerig.robot.model.types import JOINTS, Snapshot
+
+_STEP_DEG = 0.1
+_FOLLOWS_DEG = 0.15
+"""A slider nobody holds follows its joint in steps of this."""
+_FREE_AFTER_S = 0.5
+"""A jogged joint whose wish is another for this long is no longer jogged."""
+_SAME_DEG = 0.3
+MEASURED, RECKONED = "measured", "reckoned (not measured)"
+_RIGHT = "text-align:right"
+_TABLE_EVERY = 5  # with every fifth picture, some 5 times a second: figures are to be read
+
+
+class JogView:
+    """One slider a joint."""
+
+    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, teller: Teller) -> None:
+        """Fill the tab; the sliders come with the joints' limits."""
+        self._gui = gui
+        self._tab = tab
+        self._teller = teller
+        self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
+        # Joint -> angle asked for and the time of the last picture in which it was wished.
+        self._held: dict[str, tuple[float, float]] = {}
+        self._now_s = 0.0
+        self._table, self._shown = "", 0
+        with tab:
+            gui.add_html(
+                "<div style='padding:4px 12px;font-size:12.5px;opacity:.85'>Moving one holds all "
+                "others where they are, slowly and inside the guard's limits.</div>",
+                order=0,
+            )
+            free = gui.add_button("let go: look freely", order=20, icon=viser.Icon.EYE)
+            self._measured = gui.add_html("", order=21)
+
+        @free.on_click
+        async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            self._held.clear()
+            self._teller.order(LookAt(None), str(event.client_id))
+
+    def values(self, in_force: Mapping[str, object]) -> None:
+        """Make the sliders, and keep their ends where the joints' limits are."""
+        for joint in JOINTS:
+            low, high = (in_force.get(f"joints.{joint}.{end}_deg") for end in ("min", "max"))
+            if not (isinstance(low, int | float) and isinstance(high, int | float)):
+                continue
+            slider = self._sliders.get(joint)
+            if slider is None:
+                self._sliders[joint] = self._add(joint, float(low), float(high))
+            elif (slider.min, slider.max) != (low, high):
+                slider.min, slider.max = float(low), float(high)
+
+    def _add(self, joint: str, low_deg: float, high_deg: float) -> viser.GuiSliderHandle[float]:
+        with self._tab:
+            slider = self._gui.add_slider(
+                joint.replace("_", " "),
+                min=low_deg,
+                max=high_deg,
+                step=_STEP_DEG,
+                initial_value=0.0,
+                hint=f"{low_deg:g} to {high_deg:g} deg; + left, up, open, right ear down",
+                order=1 + JOINTS.index(joint),
+            )
+
+        @slider.on_update
+        async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
+            if event.client_id is not None:  # else it followed its joint
+                self._jog(joint, float(event.target.value), str(event.client_id))
+
+        return slider
+
+    def _jog(self, joint: str, angle_deg: float, who: str) -> None:
+        self._held[joint] = (angle_deg, self._now_s)
+        self._teller.order(Jog(((joint, radians(angle_deg)),)), who)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Write the measured angles; sliders that nobody holds follow them."""
+        if snapshot.t_s < self._now_s:  # the rig's clock was started anew
+            self._held.clear()
+        self._now_s = snapshot.t_s
+        places = {joint: i for i, joint in enumerate(snapshot.joints)}
+        for joint, slider in self._sliders.items():
+            if (i := places.get(joint)) is None:
+                continue
+            self._note_held(joint, degrees(snapshot.wish_rad[i]), bool(snapshot.stopped))
+            angle_deg = degrees(snapshot.measured_rad[i])
+            if joint not in self._held and abs(slider.value - angle_deg) > _FOLLOWS_DEG:
+                put(slider, round(min(max(angle_deg, slider.min), slider.max), 1))
+        self._shown += 1
+        if self._shown % _TABLE_EVERY == 1:
+            table = measured_table(snapshot)
+            if table != self._table:
+                self._measured.content = self._table = table
+
+    def _note_held(self, joint: str, wish_deg: float, stopped: bool) -> None:
+        """Forget a joint that was let go elsewhere, by a stop or another order."""
+        held = self._held.get(joint)
+        if held is None:
+            return
+        angle_deg, at_s = held
+        if stopped:
+            del self._held[joint]
+        elif abs(wish_deg - angle_deg) < _SAME_DEG:
+            self._held[joint] = (angle_deg, self._now_s)
+        elif self._now_s - at_s > _FREE_AFTER_S:
+            del self._held[joint]
+
+
+def measured_table(snapshot: Snapshot) -> str:
+    """List every joint's wish and measured angle in degrees, as HTML.
+
+    What nobody measures stands in a column of its own: a reckoned angle looks like any other.
+    """
+    reckoned = frozenset(snapshot.reckoned)
+    columns = ["wish"]
+    if not reckoned.issuperset(snapshot.joints):
+        columns.append(MEASURED)
+    if reckoned:
+        columns.append(RECKONED)
+    joints = zip(snapshot.joints, snapshot.wish_rad, snapshot.measured_rad, strict=True)
+    rows = "".join(
+        _row(
+            escape(joint.replace("_", " ")),
+            [degrees(wish), *_under(columns[1:], joint in reckoned, degrees(now))],
+        )
+        for joint, wish, now in joints
+    )
+    head = "".join(f"<td style='{_RIGHT}'>{words}</td>" for words in columns)
+    return (
+        "<table style='margin:4px 12px;font-size:12px;width:calc(100% - 24px);"
+        "font-variant-numeric:tabular-nums'><tr style='opacity:.6'><td>degrees</td>"
+        f"{head}</tr>{rows}</table>"
+    )
+
+
+def _under(columns: Sequence[str], reckoned: bool, angle_deg: float) -> list[float | None]:
+    """Put an angle under what it is."""
+    kind = RECKONED if reckoned else MEASURED
+    return [angle_deg if column == kind else None for column in columns]
+
+
+def _row(name: str, angles_deg: Sequence[float | None]) -> str:
+    cells = "".join(
+        f"<td style='{_RIGHT}'>{'' if angle is None else f'{angle:.1f}'}</td>"
+        for angle in angles_deg
+    )
+    return f"<tr><td>{name}</td>{cells}</tr>"

@@ -1,0 +1,112 @@
+"""The main sequence as the rig makes it, in the range of people's: speed and length of saccades.
+
+The ranges are those that the report judges by (gazerig.robot.report.human_norms).
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from gazerig.gaze.types import Floats
+from gazerig.robot.dashboard.html import (
+    BLUE,
+    GREY,
+    LINE_PX,
+    ORANGE,
+    PALE,
+    counted,
+    frame,
+    heading,
+    line,
+    note,
+    svg,
+    text,
+)
+from gazerig.robot.model.types import SeenSaccade
+from gazerig.robot.report.human_norms import fastest_peak, longest_ms, shortest_ms, slowest_peak
+
+KEPT = 400
+"""Saccades shown at most, the newest."""
+
+_LEFT_PX, _RIGHT_PX, _TOP_PX, _FOOT_PX = 34.0, LINE_PX - 8.0, 6.0, 130.0
+_WIDEST_DEG = (5.0, 10.0, 20.0, 40.0, 80.0)
+_FASTEST_DEG_S = (200.0, 400.0, 600.0, 1000.0)
+_LONGEST_MS = (80.0, 160.0, 320.0)
+_TICKS = 4
+Curve = Callable[[Floats], Floats]
+
+
+class MainSequence:
+    """Gathers saccades and draws them."""
+
+    def __init__(self) -> None:
+        self._seen: deque[SeenSaccade] = deque(maxlen=KEPT)
+        self.count = 0
+
+    def note(self, saccade: SeenSaccade) -> None:
+        """Take in a saccade."""
+        self._seen.append(saccade)
+        self.count += 1
+
+    def drawing(self) -> str:
+        """Return both pictures as HTML."""
+        sizes = [s.amplitude_deg for s in self._seen]
+        widest = _room(_WIDEST_DEG, sizes)
+        speeds = [s.peak_deg_s for s in self._seen]
+        lengths = [1e3 * s.duration_s for s in self._seen]
+        return frame(
+            heading("peak speed, deg/s, against size, deg", counted(self.count, "saccade"))
+            + _picture(
+                sizes, speeds, widest, _room(_FASTEST_DEG_S, speeds), slowest_peak, fastest_peak
+            )
+            + heading("duration, ms, against size, deg")
+            + _picture(sizes, lengths, widest, _room(_LONGEST_MS, lengths), shortest_ms, longest_ms)
+            + note(
+                "grey: people, from Baloh et al. 1975 less 15 % to Bahill et al. 1975 and "
+                "Collewijn et al. 1988 and 15 % (speed); 21 ms + 2.2 ms/deg less a quarter to "
+                "25 ms + 2.4 ms/deg (Lee, Badler & Badler 2002) and a quarter (duration); "
+                "orange: the newest"
+            )
+        )
+
+
+def _room(choices: tuple[float, ...], values: list[float]) -> float:
+    """Return the smallest end of an axis that holds all values, else the largest there is."""
+    most = max(values, default=0.0)
+    return next((choice for choice in choices if choice >= most), choices[-1])
+
+
+def _picture(
+    x: list[float], y: list[float], widest: float, highest: float, low: Curve, high: Curve
+) -> str:
+    def at(size: float, value: float) -> tuple[float, float]:
+        across = _LEFT_PX + min(1.0, size / widest) * (_RIGHT_PX - _LEFT_PX)
+        return across, _FOOT_PX - min(1.0, value / highest) * (_FOOT_PX - _TOP_PX)
+
+    sizes = np.linspace(0.0, widest, 41)
+    lower, upper = low(sizes).tolist(), high(sizes).tolist()
+    edge = [*zip(sizes.tolist(), lower, strict=True)]
+    edge += reversed([*zip(sizes.tolist(), upper, strict=True)])
+    band = [at(*point) for point in edge]
+    outline = " ".join(f"{u:.1f},{v:.1f}" for u, v in band)
+    people = f"<polygon points='{outline}' fill='#ced4da' opacity='.75'/>"
+    dots = [
+        _dot(*at(a, b), newest=i == len(x) - 1) for i, (a, b) in enumerate(zip(x, y, strict=True))
+    ]
+    return svg(_FOOT_PX + 16.0, (*_axes(widest, highest), people, *dots))
+
+
+def _dot(x: float, y: float, *, newest: bool) -> str:
+    look = (3.4, ORANGE, 1.0) if newest else (2.0, BLUE, 0.55)
+    return f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{look[0]}' fill='{look[1]}' opacity='{look[2]}'/>"
+
+
+def _axes(widest: float, highest: float) -> Iterable[str]:
+    for i in range(_TICKS + 1):
+        share = i / _TICKS
+        x = _LEFT_PX + share * (_RIGHT_PX - _LEFT_PX)
+        y = _FOOT_PX - share * (_FOOT_PX - _TOP_PX)
+        yield line(((_LEFT_PX, y), (_RIGHT_PX, y)), GREY if i == 0 else PALE)
+        yield text(x, _FOOT_PX + 12.0, f"{share * widest:g}", 9.5, "middle")
+        yield text(_LEFT_PX - 4.0, y + 3.3, f"{share * highest:g}", 9.5, "end")

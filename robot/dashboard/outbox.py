@@ -1,0 +1,63 @@
+"""The page's voice: what people do in their browsers goes to the rig from here."""
+
+import json
+import socket
+import threading
+from collections.abc import Callable, Mapping
+
+from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, telling
+from gazerig.robot.dashboard.token_bucket import Rate
+from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.robot.model.commands import Jog, LookAt, Order, as_json
+
+DOOR = "door"
+"""Who asks where it is the stop button or a click in the picture."""
+
+
+_PER_S, _BURST = 100.0, 200.0
+"""Requests of all browsers together; each drags one thing, at some 20 changes a second."""
+
+
+class Teller:
+    """Sends requests over the page's socket; from any thread.
+
+    name: returns what the browser of a client of the page is called; leads: is told of one
+    that leads the head now
+    """
+
+    def __init__(self, feed: socket.socket, clock: Clock | None = None) -> None:
+        self._feed = feed
+        self._clock = clock if clock is not None else RealClock()
+        self._rate = Rate(_PER_S, _BURST)
+        self._lock = threading.Lock()
+        self.name: Callable[[str], str] = _unnamed
+        self.leads: Callable[[str], object] = _unnamed
+
+    def order(self, order: Order, who: str) -> bool:
+        """Return an order; False where the rig does not take it now."""
+        if isinstance(order, LookAt | Jog):
+            self.leads(self.name(who))
+            order = order._replace(who=self.name(who))
+        return self.ask(as_json(order), who)
+
+    def ask(self, data: Mapping[str, object], who: str) -> bool:
+        """Ask for anything; ``who`` comes back with the answer."""
+        return self.hand_on(json.dumps(data, separators=(",", ":")).encode(), who)
+
+    def hand_on(self, data: bytes, who: str = DOOR) -> bool:
+        """Hand on a compact JSON object."""
+        message = telling(who, data)
+        with self._lock:
+            if len(message) > MESSAGE_BYTES or not self._rate.take(self._clock.now_s()):
+                return False
+        try:
+            # A rig that takes nothing must not hold up the others who ask.
+            self._feed.send(message, socket.MSG_DONTWAIT)
+        except OSError:  # full, or gone: then the page ends by itself
+            return False
+        return True
+
+
+def _unnamed(client: str) -> str:
+    """Return no name: nobody has said which browser a client is."""
+    return ""

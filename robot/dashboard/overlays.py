@@ -1,0 +1,40 @@
+"""What can be drawn into the page's scene besides the rig as it is: wish, camera, eyes' field."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import viser
+
+from gazerig.robot.dashboard.commanded_pose import GhostView
+from gazerig.robot.dashboard.view_frusta import CameraField, EyeFields
+from gazerig.robot.model.types import Snapshot
+
+
+@dataclass
+class Layers:
+    """Which of them are wanted; changed by whoever looks at the page."""
+
+    ghost: bool = True
+    camera: bool = True
+    eyes: bool = False
+
+    NAMES: ClassVar[dict[str, str]] = {
+        "ghost": "ghost of the wish",
+        "camera": "what the camera covers",
+        "eyes": "what the eyes can attend to",
+    }
+
+
+class LayersView:
+    """The layers in the scene."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._ghost = GhostView(scene)
+        self._camera = CameraField(scene)
+        self._eyes = EyeFields(scene)
+
+    def show(self, snapshot: Snapshot, layers: Layers) -> None:
+        """Draw what is wanted and take the rest away."""
+        self._ghost.show(snapshot if layers.ghost else None)
+        self._camera.show(snapshot if layers.camera else None)
+        self._eyes.show(snapshot if layers.eyes else None)

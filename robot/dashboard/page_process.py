@@ -1,0 +1,350 @@
+"""Show the running rig on a web page without ever making the control loop wait.
+
+The page is a process of its own (``gazerig.robot.dashboard.page_main``), fed through a socket pair
+with frozen values. Every call here returns at once: what the page cannot take is dropped and
+counted, and a page that is slow, stopped or dead changes nothing for the caller. The
+page ends when this side of the socket closes, so it never outlives the program, however
+that ends.
+"""
+
+import json
+import os
+import pickle
+import secrets
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from math import nan
+from operator import attrgetter
+from urllib.parse import urlsplit
+
+from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, TELL, Ear, told
+from gazerig.robot.dashboard.stop_channel import StopListener
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
+
+# The first byte of a message says what follows it. To the page: a snapshot, a picture, menus,
+# what can be tuned, its values, an answer or words for everybody, where a replay stands.
+SNAPSHOT, PICTURE, CHOICES, KNOBS, VALUES, WORDS, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
+# From the page: its address, words for the terminal, and TELL, what people ask of the rig.
+URL, NOTICE = b"u", b"n"
+TOKEN_VARIABLE = "GAZERIG_PAGE_TOKEN"
+"""Of the page's environment: what browsers must show."""
+FOLDER_VARIABLE = "GAZERIG_PAGE_FOLDER"
+"""Of the page's environment: a folder of this user's alone, for its server's socket."""
+CANNOT_OPEN = 3
+"""Exit code of a page that cannot have its address: it need not be tried again."""
+EVERYBODY = "*"
+"""In the place of the word that says who asked."""
+
+Hear = Callable[[dict[str, object]], str | None]
+"""Takes what a person at the page asks for; gives what there is to say about it, or None."""
+
+_CLOSE_PATIENCE_S = 2.0
+_LAST_WORDS_BYTES = 4096
+_MOST_WORDS = 20_000  # of one answer, in characters
+_MOST_OWED = 100  # answers to a page that takes none
+_AGAIN_AFTER_S = 0.5
+_AGAIN_LATEST_S = 30.0
+_WELL_AFTER_S = 60.0  # one that lived so long begins with a short wait again
+_TOKEN_BYTES = 16
+
+SHOWN_EVERY_S = 0.0095
+"""Snapshots closer together than some 10 ms are passed over: 100 a second show a saccade of
+40 ms as a slope. A little under 10 ms, so that rounding does not turn it into 15."""
+
+# A frozen dataclass with slots is pickled field by field in Python; taking all fields at
+# once, by names found ahead, costs a third of that.
+_PLAIN = tuple(field.name for field in fields(Snapshot) if field.name not in ("faces", "bodies"))
+_plain_values = attrgetter(*_PLAIN)
+_face_values = attrgetter(*(field.name for field in fields(SeenFace)))
+_body_values = attrgetter(*(field.name for field in fields(SeenBody)))
+
+
+def pack(snapshot: Snapshot) -> bytes:
+    """Write a snapshot as one message."""
+    faces = [_face_values(face) for face in snapshot.faces]
+    bodies = [_body_values(body) for body in snapshot.bodies]
+    values = (_plain_values(snapshot), faces, bodies)
+    return SNAPSHOT + pickle.dumps(values, pickle.HIGHEST_PROTOCOL)
+
+
+def unpack(message: bytes) -> Snapshot:
+    """Read a message that ``pack`` wrote; only ever fed by the process that started the page."""
+    values, faces, bodies = pickle.loads(memoryview(message)[1:])
+    return Snapshot(
+        **dict(zip(_PLAIN, values, strict=True)),
+        faces=tuple(SeenFace(*face) for face in faces),
+        bodies=tuple(SeenBody(*body) for body in bodies),
+    )
+
+
+class Page:
+    """The live page as the control loop sees it.
+
+    ``show`` belongs to one thread; everything else may be called from any.
+
+    A page process that dies is started again, at the same address, after a while that grows.
+
+    dropped: snapshots the page did not take; pictures_dropped: the same for pictures
+    started: how often the page has come up; who feeds it begins anew when this changes
+    gone: it has ended and is not started again
+    """
+
+    def __init__(self, host: str, port: int, hear: Hear | None = None) -> None:
+        """Prepare a page for this address and port; a busy port moves on to the next.
+
+        hear: takes what people do on the page; None: nobody listens
+        """
+        self._host = host
+        self._port = port
+        self._hear = hear
+        self._token = secrets.token_urlsafe(_TOKEN_BYTES)
+        self._socket: socket.socket | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._ear: Ear | None = None
+        self._stops: StopListener | None = None
+        self._choices: Mapping[str, tuple[str, ...]] = {}
+        self._over = threading.Event()
+        self._beginning = threading.Lock()
+        self._clock = RealClock()
+        self._began_s = 0.0
+        self._wait_s = _AGAIN_AFTER_S
+        self._mourned = self._welcomed = False
+        self.started = 0
+        self.gone = False
+        self._errors_fd = -1
+        self._folder = ""
+        self._url: str | None = None
+        self._notices: deque[str] = deque()
+        self._owed: deque[bytes] = deque(maxlen=_MOST_OWED)
+        self._paying = threading.Lock()
+        self._shown_s = nan
+        self.dropped = 0
+        self.pictures_dropped = 0
+
+    def open(self) -> str:
+        """Start the page and return at once, with the words to say meanwhile."""
+        self._begin()
+        return f"the page is starting on port {self._port}"
+
+    def _begin(self) -> None:
+        """Start a process, and talk to it."""
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        stops, their_stops = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        # The page's own words are of interest only if it dies, and a pipe nobody reads fills.
+        self._errors_fd = os.memfd_create("page_errors")
+        self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
+        with theirs, their_stops:
+            fds = theirs.fileno(), their_stops.fileno()
+            self._process = subprocess.Popen(
+                self._command(*fds),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=self._errors_fd,
+                pass_fds=fds,
+                env={
+                    **_environment(),
+                    TOKEN_VARIABLE: self._token,
+                    FOLDER_VARIABLE: self._folder,
+                },
+                start_new_session=True,  # Ctrl-C in the terminal is the rig's, not the page's
+            )
+        self._began_s = self._clock.now_s()
+        self.join(ours, stops)
+
+    def _command(self, fd: int, stop_fd: int) -> list[str]:
+        arguments = [str(fd), str(stop_fd), str(os.getpid()), self._host, str(self._port)]
+        return [sys.executable, "-P", "-m", "gazerig.robot.dashboard.page_main", *arguments]
+
+    def join(self, link: socket.socket, stops: socket.socket | None = None) -> None:
+        """Talk over these from now on; ``open`` makes them with a process at the other ends.
+
+        stops: for stops alone
+        """
+        link.setblocking(False)
+        self._socket = link
+        self._ear = Ear(link, self._take, self._lose, self._refuse)
+        self._stops = StopListener(stops, self._stop) if stops is not None else None
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Hand over a snapshot; dropped and counted where the page does not take it."""
+        if abs(snapshot.t_s - self._shown_s) < SHOWN_EVERY_S:
+            return
+        self._shown_s = snapshot.t_s
+        self._pay()
+        if not self.send(pack(snapshot)):
+            self.dropped += 1
+
+    def show_picture(self, jpeg: bytes) -> None:
+        """Hand over an encoded camera picture with what was found already drawn in."""
+        if not self.send(PICTURE + jpeg):
+            self.pictures_dropped += 1
+
+    def offer(self, choices: Mapping[str, tuple[str, ...]]) -> None:
+        """Put menus on the page: name of the menu -> what can be chosen, the present first."""
+        self._choices = choices
+        self.send(CHOICES + json.dumps(choices).encode())
+
+    def say(self, words: str) -> None:
+        """Tell everybody who looks at the page something."""
+        self._answer(EVERYBODY, words)
+
+    def send(self, message: bytes) -> bool:
+        """Hand over a message as it is; False where the page does not take it now."""
+        page = self._socket
+        if page is None or len(message) > MESSAGE_BYTES:
+            return False
+        try:
+            page.send(message)
+        except OSError:  # full, gone, or closed by close() in this very moment
+            return False
+        return True
+
+    def url(self) -> str | None:
+        """Return the page's address, token included, once it is there and as long as it is."""
+        return self._url
+
+    def notice(self) -> str | None:
+        """Return the next line for the person in front of the rig, each one once."""
+        return self._notices.popleft() if self._notices else None
+
+    def _take(self, message: bytes) -> None:
+        """Do what a message of the page is for; called by the ear."""
+        kind, body = message[:1], message[1:]
+        if kind == URL:
+            self._take_url(body.decode())
+        elif kind == NOTICE:
+            self._notices.append(body.decode())
+        elif kind == TELL:
+            who, data = told(message)
+            self._answer(who, self._heard(data))
+
+    def _take_url(self, url: str) -> None:
+        """Note that the page is there; one that was started again is told what it must know."""
+        self._url = url
+        self._port = int(urlsplit(url).port or self._port)
+        self.started += 1
+        if self.started > 1 and self._choices:
+            self.offer(self._choices)
+        if self._mourned and not self._welcomed:
+            self._welcomed = True
+            self._notices.append(f"the page is there again, at {url}")
+
+    def _refuse(self, message: bytes) -> None:
+        self._answer(told(message)[0], "refused: too many requests at once; try again")
+
+    def _stop(self, asked: Mapping[str, object]) -> str:
+        """Hear a stop; "" where it is obeyed."""
+        return self._heard(json.dumps(asked).encode()) or ""
+
+    def _heard(self, data: bytes) -> str | None:
+        """Have the rig hear a request; what goes wrong with it must not make it deaf."""
+        try:
+            asked = json.loads(data)
+            return self._hear(asked) if self._hear is not None else None
+        except Exception as error:  # a stop must still be heard after any fault
+            return f"the rig could not do that: {type(error).__name__}: {error}"
+
+    def _answer(self, who: str, words: str | None) -> None:
+        """Say that something was heard and what there is to say about it."""
+        words = words[:_MOST_WORDS] if words is not None else None
+        self._owed.append(WORDS + json.dumps((who, words)).encode())
+        self._pay()
+
+    def _pay(self) -> None:
+        """Send the answers that the page had no room for so far."""
+        with self._paying:
+            while self._owed and self.send(self._owed[0]):
+                self._owed.popleft()
+
+    def _lose(self) -> None:
+        """Say that the page has died, once, and start it again where that can help."""
+        process = self._process
+        self._hang_up()
+        words = self._last_words()
+        self.gone = process is None or _code(process) == CANNOT_OPEN
+        if self._clock.now_s() - self._began_s > _WELL_AFTER_S:
+            self._wait_s, self._mourned, self._welcomed = _AGAIN_AFTER_S, False, False
+        if not self._mourned:
+            then = "start it again to see the page" if self.gone else "it is started again"
+            self._notices.append(f"the page has stopped ({words}); the rig runs on, {then}")
+        self._mourned = True
+        if self.gone:
+            return
+        threading.Thread(target=self._begin_again, name="page start", daemon=True).start()
+
+    def _begin_again(self) -> None:
+        wait_s, self._wait_s = self._wait_s, min(2.0 * self._wait_s, _AGAIN_LATEST_S)
+        self._over.wait(wait_s)
+        with self._beginning:
+            if self._over.is_set():
+                return
+            self._end_process()
+            try:
+                self._begin()
+            except OSError as error:  # no memory, no processes, no files
+                self._notices.append(f"the page cannot be started again: {error.strerror}")
+
+    def _last_words(self) -> str:
+        if self._errors_fd < 0:
+            return "it gave no reason"
+        text = os.pread(self._errors_fd, _LAST_WORDS_BYTES, self._errors_from()).decode(
+            errors="replace"
+        )
+        lines = text.strip().splitlines()
+        return lines[-1].strip() if lines else "it gave no reason"
+
+    def _errors_from(self) -> int:
+        return max(0, os.fstat(self._errors_fd).st_size - _LAST_WORDS_BYTES)
+
+    def _hang_up(self) -> None:
+        link, self._socket = self._socket, None
+        if link is not None:
+            link.close()
+        stops, self._stops = self._stops, None
+        if stops is not None:
+            stops.close()
+        self._url = None
+
+    def close(self) -> None:
+        """End the page; safe to call twice."""
+        self._over.set()
+        with self._beginning:
+            ear, self._ear = self._ear, None
+            if ear is not None:
+                ear.close()
+            self._hang_up()
+            self._end_process()
+
+    def _end_process(self) -> None:
+        if self._process is None:
+            return
+        try:
+            self._process.wait(_CLOSE_PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._process = None
+        os.close(self._errors_fd)
+        self._errors_fd = -1
+        shutil.rmtree(self._folder, ignore_errors=True)  # it may have been killed
+
+
+def _code(process: subprocess.Popen[bytes]) -> int | None:
+    """Return the exit code of a process that has hung up, None where it hangs."""
+    try:
+        return process.wait(_CLOSE_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        return None
+
+
+def _environment() -> dict[str, str]:
+    """Return this process's environment with numerics in one thread."""
+    return {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

@@ -1,0 +1,99 @@
+"""Sends the page what can be tuned, once, and afterwards what has changed."""
+
+import json
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from gazerig.robot.dashboard.page_process import KNOBS, VALUES
+from gazerig.robot.model.commands import Value
+from gazerig.robot.remote.request_handler import Change, Knob, plain
+
+_PIECE = 40  # parameters a message: some 20 kB, a tenth of what a message may be
+
+
+class Fed(Protocol):
+    """What the feed asks of the parameters of a running rig (``app.param_store.Tuning``)."""
+
+    @property
+    def version(self) -> int:
+        """Count the changes."""
+        ...
+
+    def knobs(self) -> Iterable[Knob]:
+        """Return all parameters."""
+        ...
+
+    def values(self) -> Mapping[str, Value]:
+        """Return all values in force."""
+        ...
+
+    def unsaved(self) -> Iterable[Change]:
+        """Return what is in force and not in the file."""
+        ...
+
+    def characters(self) -> Sequence[str]:
+        """Return the characters there are."""
+        ...
+
+    @property
+    def character_name(self) -> str:
+        """Return the one in force."""
+        ...
+
+    @property
+    def path(self) -> Path:
+        """Return the rig's file."""
+        ...
+
+
+class TuningFeed:
+    """What the page knows of the parameters, and what it must still be told."""
+
+    def __init__(self, send: Callable[[bytes], bool], tuning: Fed) -> None:
+        """Take where messages go (False: not now), and the parameters.
+
+        What there is to tell at first is written here: it takes a moment, so make this before
+        the torque is on.
+        """
+        self._send = send
+        self._tuning = tuning
+        self._due: deque[bytes] = deque()
+        self._known: dict[str, Value] = {}
+        self._version: int | None = None
+        self._write()
+
+    def begin_anew(self) -> None:
+        """Tell all again: the page that knew it has died, and another is there."""
+        self._due.clear()
+        self._known, self._version = {}, None
+
+    def step(self) -> None:
+        """Send what is due, as far as the page takes it."""
+        if not self._due and self._tuning.version != self._version:
+            self._write()
+        while self._due and self._send(self._due[0]):
+            self._due.popleft()
+
+    def _write(self) -> None:
+        """Write messages: all parameters the first time, then the values that are others."""
+        first = self._version is None
+        self._version = self._tuning.version  # before reading: a change meanwhile is seen next
+        if first:
+            knobs = [plain(knob._asdict()) for knob in self._tuning.knobs()]
+            for start in range(0, len(knobs), _PIECE):
+                self._due.append(KNOBS + json.dumps(knobs[start : start + _PIECE]).encode())
+        now = dict(self._tuning.values())
+        gone = object()
+        changed = [key for key, value in now.items() if self._known.get(key, gone) != value]
+        self._known = now
+        state: dict[str, object] = {
+            "unsaved": [change.key for change in self._tuning.unsaved()],
+            "path": str(self._tuning.path),
+            "character": self._tuning.character_name,
+            "characters": sorted(self._tuning.characters()),
+        }
+        for start in range(0, max(1, len(changed)), _PIECE):
+            piece = {key: plain(now[key]) for key in changed[start : start + _PIECE]}
+            self._due.append(VALUES + json.dumps({**state, "values": piece}).encode())

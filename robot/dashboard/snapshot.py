@@ -1,0 +1,378 @@
+"""One tick in the words and shapes that people are shown: the page's snapshot, status words."""
+
+from collections import Counter, deque
+from dataclasses import replace
+from math import degrees
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.drivers.types import BusHealth
+from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
+from gazerig.gaze.types import PART_NAMES, GazeState, Target, Vec3
+from gazerig.robot.control.loop import Tick
+from gazerig.robot.dashboard.loop_timing import LoopTiming
+from gazerig.robot.model.frames import CameraMount
+from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.types import (
+    Ghost,
+    JointState,
+    Level,
+    SeenBlink,
+    SeenBody,
+    SeenCamera,
+    SeenEvent,
+    SeenFace,
+    SeenFixation,
+    SeenSaccade,
+    ServoLimits,
+    Servos,
+    Snapshot,
+    Timing,
+    Trail,
+    Verdict,
+)
+from gazerig.robot.perception.egomotion_residual import ResidualFigures
+from gazerig.robot.report.event_detector import Blink, Event, Fixation, GazeEvents, Saccade
+from gazerig.robot.safety.health import HealthParams
+from gazerig.robot.safety.motion_limiter import JointLimit
+
+_TICKS_KEPT = 600
+"""Ticks that wait at most: three seconds, should the one who looks be held up."""
+_TRAIL_S = 0.0095
+"""Joints are shown 100 times a second; a little less than 10 ms, for rounding's sake."""
+_TIMING_S = 0.5
+_LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
+_GRAVITY: dict[Level, int] = {"ok": 0, "limited": 1, "hold": 2, "limp": 3}
+
+
+class ShownRig(NamedTuple):
+    """How a rig is built, as far as people are shown it."""
+
+    kinematics: Kinematics
+    limits: tuple[JointLimit, ...]
+    health: HealthParams
+    mount: CameraMount
+    horizontal_rad: float
+    field: FieldOfViewParams
+
+
+class Said(NamedTuple):
+    """What a tick does not tell: bus figures in words, what is seen, what is in force."""
+
+    health: str = ""
+    behaviour: str = ""
+    seeing: str = ""
+    character: str = ""
+    conversation: str = ""
+
+
+class Snapshots:
+    """Makes snapshots of a running rig, with all that has happened since the one before.
+
+    ``note`` belongs to the loop's thread and only lays the tick down; ``take`` does the
+    work and belongs to one other thread, so nothing shown can cost the loop its time or,
+    at fault, its life.
+    """
+
+    def __init__(self, rate_hz: float, rig: ShownRig | None = None) -> None:
+        self.rig = rig
+        self._rate_hz = rate_hz
+        self._ticks: deque[Tick] = deque(maxlen=_TICKS_KEPT)
+        self._newest: Tick | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        self._timing = LoopTiming(self._rate_hz)
+        self._figures: Timing | None = None
+        self._figures_s = self._trail_s = -np.inf
+        self._events = GazeEvents()
+        self._unanswered: Counter[str] = Counter()
+
+    def note(self, tick: Tick) -> None:
+        """Lay a tick down."""
+        self._ticks.append(tick)
+
+    def take(self, said: Said) -> Snapshot | None:
+        """Return a snapshot of the newest tick, None before the first."""
+        trail: list[Trail] = []
+        events: list[SeenEvent] = []
+        worst: Level = "ok"
+        while self._ticks:
+            tick = self._ticks.popleft()
+            if self._newest is not None and tick.t_s < self._newest.t_s:
+                self._begin()
+            self._newest = tick
+            self._count(tick)
+            events += map(_seen, self._events.note(tick))
+            if tick.t_s - self._trail_s >= _TRAIL_S:
+                self._trail_s = tick.t_s
+                trail.append(_trail(tick))
+            if _GRAVITY[tick.verdict.level] > _GRAVITY[worst]:
+                worst = tick.verdict.level
+        if self._newest is None:
+            return None
+        timing = self._timed(self._newest.t_s)
+        plain = snapshot(
+            self._newest, timing.rate_hz if timing else 0.0, said.health, said.behaviour,
+            said.seeing, self.rig,
+        )  # fmt: skip
+        return replace(
+            plain,
+            character=said.character,
+            conversation=said.conversation,
+            servos=plain.servos._replace(
+                unanswered=tuple([self._unanswered[name] for name in plain.joints])
+            ),
+            timing=timing,
+            worst=worst,
+            trail=tuple(trail),
+            events=tuple(events),
+        )
+
+    def _count(self, tick: Tick) -> None:
+        self._timing.note(tick.t_s)
+        if tick.joints.missing:
+            self._unanswered.update(tick.joints.missing)
+
+    def _timed(self, t_s: float) -> Timing | None:
+        """Return the loop's figures, worked out twice a second."""
+        if t_s - self._figures_s >= _TIMING_S:
+            self._figures, self._figures_s = self._timing.figures(), t_s
+        return self._figures
+
+
+def snapshot(
+    tick: Tick,
+    rate_hz: float,
+    health: str,
+    behaviour: str,
+    seeing: str = "",
+    rig: ShownRig | None = None,
+) -> Snapshot:
+    """Return what the page is shown of a single tick.
+
+    rig: how it is built, for the wish's ghost, the camera and the servos' limits
+    """
+    pose, percept, target = tick.pose, tick.percept, tick.target
+    joints = joint_names(tick, rig)
+    return Snapshot(
+        t_s=tick.t_s,
+        measured_rad=tick.joints.position_rad,
+        wish_rad=tick.wish_rad,
+        R_world_head=pose.R_world_head,
+        p_world_head_m=pose.p_world_head_m,
+        p_world_eyes_m=(pose.p_world_eye_left_m, pose.p_world_eye_right_m),
+        gaze_world=(line_of_sight(pose, True), line_of_sight(pose, False)),
+        lids=(pose.lid_left, pose.lid_right),
+        p_world_target_m=tick.gaze.gaze_point_world_m,
+        target_name=target_name(target),
+        why=target.why,
+        phase="blink" if tick.gaze.blink else tick.gaze.phase,
+        level=tick.verdict.level,
+        reasons=tick.verdict.reasons,
+        faces=_faces(tick),
+        bodies=_bodies(tick),
+        rate_hz=rate_hz,
+        health=health,
+        behaviour=behaviour,
+        pulls=target.pulls,
+        seeing=seeing,
+        permitted_rad=tick.verdict.command_rad,
+        target_kind=target.kind,
+        target_id=target.id,
+        target_part=target.part,
+        stopped=tick.stopped,
+        led=lead_words(tick),
+        picture_age_s=percept.age_s(tick.t_s) if percept is not None else None,
+        ghost=_ghost(tick, rig) if rig is not None else None,
+        camera=_camera(tick, rig) if rig is not None else None,
+        field_deg=_field_deg(rig.field) if rig is not None else None,
+        servos=_servos(tick, rig),
+        worst=tick.verdict.level,
+        trail=(_trail(tick),),
+        joints=joints,
+        reckoned=_reckoned(tick.joints, joints),
+        lower_lids=_lower_lids(pose, joints),
+    )
+
+
+def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
+    """Return a name a joint; a recording may know none, then they are numbered."""
+    names = tick.verdict.joints or (rig.kinematics.names if rig is not None else ())
+    count = len(tick.joints.position_rad)
+    return names if len(names) == count else tuple(f"joint {i + 1}" for i in range(count))
+
+
+def _reckoned(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the joints whose place is told by nobody; where nothing is said of it, none."""
+    if not joints.measured:
+        return ()
+    told = zip(names, joints.measured, strict=True)
+    return tuple([name for name, measured in told if not measured])
+
+
+def _lower_lids(pose: GazeState, names: tuple[str, ...]) -> tuple[float, float] | None:
+    return None if _LOWER_LIDS.isdisjoint(names) else (pose.lower_left, pose.lower_right)
+
+
+def _faces(tick: Tick) -> tuple[SeenFace, ...]:
+    if tick.percept is None:
+        return ()
+    return tuple(
+        SeenFace(face.id, face.p_world_m, face.R_world_face, face.parts_world_m, face.v_world_m_s)
+        for face in tick.percept.faces
+    )
+
+
+def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
+    """Return what moves and is no face."""
+    if tick.percept is None:
+        return ()
+    bodies = tick.percept.bodies
+    return tuple(
+        SeenBody(bodies.ids[i], kind, _vec(bodies.p_world_m[i]), float(bodies.radius_m[i]))
+        for i, kind in enumerate(bodies.kinds)
+        if kind != "face"
+    )
+
+
+def _ghost(tick: Tick, rig: ShownRig) -> Ghost:
+    """Return where the wish would have head and eyes."""
+    at_rest = (0.0,) * len(tick.wish_rad)
+    pose: GazeState = rig.kinematics.forward(JointState(tick.wish_rad, at_rest, at_rest, ()))
+    return Ghost(
+        pose.R_world_head,
+        pose.p_world_head_m,
+        (pose.p_world_eye_left_m, pose.p_world_eye_right_m),
+        (line_of_sight(pose, True), line_of_sight(pose, False)),
+        (pose.lid_left, pose.lid_right),
+        _lower_lids(pose, rig.kinematics.names),
+    )
+
+
+def _camera(tick: Tick, rig: ShownRig) -> SeenCamera | None:
+    """Return where the camera is now, None before its first picture, whose shape it needs."""
+    found = tick.detections
+    if found is None:
+        return None
+    R, p = rig.mount.pose(tick.pose.R_world_head, tick.pose.p_world_head_m)
+    horizontal_rad = rig.horizontal_rad
+    if found.lens is not None:
+        horizontal_rad = float(2.0 * np.arctan(0.5 * found.width_px / found.lens.fx_px))
+    return SeenCamera(R, p, horizontal_rad, found.width_px / found.height_px)
+
+
+def _field_deg(field: FieldOfViewParams) -> tuple[float, float, float, float]:
+    return (field.temporal_deg, field.nasal_deg, field.up_deg, field.down_deg)
+
+
+def _servos(tick: Tick, rig: ShownRig | None) -> Servos:
+    joints = tick.joints
+    return Servos(
+        joints.temperature_c,
+        joints.voltage_v,
+        joints.load,
+        joints.torque,
+        joints.fault,
+        tuple([tick.t_s - at_s for at_s in joints.measured_s]),
+        (),
+        _limits(rig) if rig is not None else None,
+    )
+
+
+def _limits(rig: ShownRig) -> ServoLimits:
+    health = rig.health
+    return ServoLimits(
+        tuple([limit.hottest_c - health.warm_c for limit in rig.limits]),
+        tuple([limit.hottest_c - health.hot_c for limit in rig.limits]),
+        tuple([limit.lowest_v + health.voltage_margin_v for limit in rig.limits]),
+        tuple([limit.highest_v - health.voltage_margin_v for limit in rig.limits]),
+        (health.lasting_load,) * len(rig.limits),
+    )
+
+
+def _trail(tick: Tick) -> Trail:
+    return Trail(tick.t_s, tick.wish_rad, tick.verdict.command_rad, tick.joints.position_rad)
+
+
+def _seen(event: Event) -> SeenEvent:
+    match event:
+        case Saccade():
+            return SeenSaccade(
+                event.onset_s, event.duration_s, event.amplitude_deg, event.peak_deg_s
+            )
+        case Fixation():
+            return SeenFixation(event.start_s, event.duration_s, event.part)
+        case Blink():
+            return SeenBlink(event.onset_s, event.duration_s)
+
+
+def seeing_words(tick: Tick, residual: ResidualFigures) -> str:
+    """Say how old the picture is, how far faces are and by what, and what the head's turn leaves.
+
+    e.g. "picture 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
+    0.3 deg/s while the head turns"
+    """
+    if tick.percept is None:
+        return "no picture yet"
+    parts = [f"picture {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old"]
+    head = tick.pose.p_world_head_m
+    for face in tick.percept.faces:
+        by = f" by {face.distance_from}" if face.distance_from else ""
+        parts.append(
+            f"face {face.id} at {norm(sub(face.p_world_m, head)):.2f} m{by}, "
+            f"+- {100.0 * face.along_sd_m:.0f} cm"
+        )
+    if residual.speed_deg_s is not None:
+        parts.append(
+            f"still things seem to move {residual.speed_deg_s:.1f} deg/s while the head turns"
+        )
+    return " | ".join(parts)
+
+
+def target_name(target: Target) -> str:
+    """Return a target's name for people, e.g. "face 3: left eye"."""
+    name = target.kind if target.id < 0 else f"{target.kind} {target.id}"
+    return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
+
+
+def lead_words(tick: Tick) -> str:
+    """Say who leads and how far beside the point the eyes look, "" while nobody leads.
+
+    e.g. "gazerig look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
+    """
+    if not tick.led:
+        return ""
+    words, limited = tick.led, tick.gaze.limited
+    if tick.target.kind != "puppet" or not limited or ": jog " in tick.led:
+        return words
+    error = degrees(gaze_error(tick.target.p_world_m, tick.pose).whole)
+    ends = (
+        f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
+        for one in limited
+    )
+    return f"{words}; {error:.0f} deg beside it: {', '.join(ends)}"
+
+
+def verdict_words(verdict: Verdict) -> str:
+    """Say what the guard made of the wish, e.g. "limited (neck_yaw: too fast, +2)"."""
+    if not verdict.reasons:
+        return verdict.level
+    more = f", +{len(verdict.reasons) - 1}" if len(verdict.reasons) > 1 else ""
+    return f"{verdict.level} ({verdict.reasons[0]}{more})"
+
+
+def health_words(health: BusHealth) -> str:
+    """Say how the bus does, e.g. "bus: 3 lost"."""
+    errors = sum(health.errors.values())
+    if errors == 0:
+        return "bus ok"
+    return "bus: " + ", ".join(f"{n} {kind}" for kind, n in sorted(health.errors.items()) if n)
+
+
+def _vec(row: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Vec3:
+    x, y, z = row.tolist()
+    return (x, y, z)

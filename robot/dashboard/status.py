@@ -1,0 +1,118 @@
+"""Say in a few lines what the rig does, loudly where something is not as it should be."""
+
+from html import escape
+
+from gazerig.robot.dashboard.html import (
+    AMBER,
+    GREY,
+    LEVELS,
+    ORANGE,
+    PHASES,
+    RED,
+    counted,
+    frame,
+    pill,
+)
+from gazerig.robot.model.types import Snapshot
+
+_REASONS_SHOWN = 4
+OLD_PICTURE_S = 0.5
+"""From this age on a picture is called old: the guard stops the neck at three times that."""
+
+
+def status(snapshot: Snapshot) -> str:
+    """Say what the rig does and what is wrong with it."""
+    pills = (
+        pill(snapshot.phase, PHASES.get(snapshot.phase, GREY))
+        + (pill(snapshot.behaviour, GREY) if snapshot.behaviour else "")
+        + (pill(snapshot.character, GREY) if snapshot.character else "")
+        + f"<span style='float:right'>{snapshot.rate_hz:.0f} Hz</span>"
+    )
+    return frame(
+        f"{_guard(snapshot)}{_old_picture(snapshot.picture_age_s)}"
+        f"<div style='font-size:17px;font-weight:600'>{escape(snapshot.target_name)}</div>"
+        f"<div style='opacity:.8;min-height:1.5em'>{escape(snapshot.why)}</div>"
+        f"<div style='margin:6px 0'>{pills}</div>{_without_feedback(snapshot)}"
+        f"<div style='opacity:.8'>{_one_line(snapshot.health)}</div>"
+        f"<div style='opacity:.8'>{_one_line(snapshot.seeing)}</div>"
+    )
+
+
+def silence() -> str:
+    """Say that the rig sends nothing any more."""
+    return frame(
+        f"{pill('silent', GREY)}<div style='margin-top:6px'>nothing has come from the rig "
+        "for a second; what is shown is the last that was seen</div>"
+    )
+
+
+def _guard(snapshot: Snapshot) -> str:
+    """Say what the guard does; what stands still shouts."""
+    if snapshot.stopped:
+        return _banner(f"STOPPED: {snapshot.stopped}; torque is off", (), RED)
+    colour = LEVELS[snapshot.level]
+    if snapshot.level in ("hold", "limp"):
+        return _banner(f"guard: {snapshot.level}", snapshot.reasons, colour)
+    return (
+        f"<div style='display:flex;height:1.7em'>{pill(f'guard: {snapshot.level}', colour)}"
+        f"<span style='color:{AMBER};min-width:0'>{_one_line(drawn_together(snapshot.reasons))}"
+        "</span></div>"
+    )
+
+
+def drawn_together(reasons: tuple[str, ...]) -> str:
+    """Say each reason once, with its first joint and how many more, e.g. "too fast (neck_yaw, +2)".
+
+    A guard that limits for a moment must not push the picture down under somebody's finger.
+    """
+    joints: dict[str, list[str]] = {}
+    for reason in reasons:
+        joint, _, why = reason.partition(": ")
+        joints.setdefault(why, []).append(joint)
+    return ", ".join(
+        f"{why} ({named[0]}{f', +{len(named) - 1}' if len(named) > 1 else ''})"
+        for why, named in joints.items()
+    )
+
+
+def _one_line(words: str) -> str:
+    """Cut words at the panel's edge; the mouse shows all of them."""
+    said = escape(words)
+    cut = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
+    return f"<div title='{said}' style='{cut}'>{said}</div>"
+
+
+def _banner(words: str, reasons: tuple[str, ...], colour: str) -> str:
+    return (
+        f"<div style='background:{colour};color:#fff;border-radius:6px;padding:6px 10px;"
+        f"margin-bottom:6px'><div style='font-size:16px;font-weight:700'>{escape(words)}</div>"
+        f"{_reasons(reasons)}</div>"
+    )
+
+
+def _old_picture(age_s: float | None) -> str:
+    if age_s is None or age_s < OLD_PICTURE_S:
+        return ""
+    return _banner(f"the picture is {age_s:.1f} s old", (), ORANGE)
+
+
+def _without_feedback(snapshot: Snapshot) -> str:
+    """Say of how many joints nobody knows where they are, "" where all are measured."""
+    reckoned = snapshot.reckoned
+    if not reckoned:
+        return ""
+    torque = dict(zip(snapshot.joints, snapshot.servos.torque, strict=False))
+    limp = sum(not torque.get(joint, True) for joint in reckoned)
+    where = "shown where they should be"
+    if limp:  # a finger moves them, and nobody sees it
+        where += f"; {'all' if limp == len(reckoned) else limp} without torque: may be anywhere"
+    return (
+        f"<div style='color:{AMBER}'>{len(reckoned)} of "
+        f"{counted(len(snapshot.joints), 'joint')} without feedback: {where}</div>"
+    )
+
+
+def _reasons(reasons: tuple[str, ...]) -> str:
+    shown = "".join(f"<div>{escape(reason)}</div>" for reason in reasons[:_REASONS_SHOWN])
+    more = len(reasons) - _REASONS_SHOWN
+    return shown + (f"<div>and {more} more</div>" if more > 0 else "")

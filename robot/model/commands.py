@@ -1,0 +1,218 @@
+"""What people ask of a running robot, from the page, another program or the command line.
+
+An order is plain data: it crosses processes as JSON, is obeyed at the next tick, and a
+recording of a run holds it, so that the run can be done again.
+"""
+
+from collections.abc import Mapping
+from math import pi
+from typing import NamedTuple
+
+from gazerig.gaze.types import Vec3
+from gazerig.robot.model.types import JOINTS
+
+Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
+"""What a key of a rig's YAML can hold."""
+
+
+class Ask(NamedTuple):
+    """Choose from a menu: a behaviour, a mode of conversation, what the lids do."""
+
+    menu: str
+    choice: str
+
+
+class LookAt(NamedTuple):
+    """Look at a point of the world in place of all that pulls; None: choose freely again.
+
+    p_world_m: metres, x ahead, y left, z up of the neck base
+    who: who asks, in words; stay: until told otherwise; else for as long as ``Renew`` comes
+        at least every ``gazerig.robot.model.lead.HEARTBEAT_S``
+    """
+
+    p_world_m: Vec3 | None
+    who: str = ""
+    stay: bool = False
+
+
+class Jog(NamedTuple):
+    """Hold all joints, and put these at angles; without any, the gaze is free again.
+
+    angles_rad: (joint, angle) pairs
+    who, stay: as in LookAt
+    """
+
+    angles_rad: tuple[tuple[str, float], ...]
+    who: str = ""
+    stay: bool = False
+
+
+class Renew(NamedTuple):
+    """The heartbeat of one who leads the gaze or the joints; of anybody else it does nothing."""
+
+    who: str = ""
+
+
+class Stop(NamedTuple):
+    """Take the torque off at once, nothing parks; the program goes on and reads."""
+
+    why: str
+    who: str = ""
+
+
+class Resume(NamedTuple):
+    """Put the torque on again after a stop, where the joints are, and go on slowly.
+
+    Obeyed by the rules of ``gazerig.robot.model.stop_latch``: of the one who stopped, or confirmed.
+
+    who: who asks, in words
+    confirmed: a person has said that no hand is in the mechanism
+    """
+
+    who: str = ""
+    confirmed: bool = False
+
+
+class Tune(NamedTuple):
+    """Put parameters in force.
+
+    changes: (dotted key of the rig's YAML, value) pairs, checked beforehand
+    """
+
+    changes: tuple[tuple[str, Value], ...]
+
+
+Order = Ask | LookAt | Jog | Renew | Stop | Resume | Tune
+
+MAX_COORDINATE_M = 1000.0
+"""No point to look at lies farther away along any axis."""
+MAX_ANGLE_RAD = 2.0 * pi
+"""No joint is sent farther than a turn to either side."""
+MAX_WORDS = 200
+"""Longest name or reason that an order may carry, in characters."""
+
+KINDS: dict[str, type[Order]] = {
+    "ask": Ask, "look_at": LookAt, "jog": Jog, "renew": Renew, "stop": Stop, "resume": Resume,
+    "tune": Tune,
+}  # fmt: skip
+_NAMES = {kind: name for name, kind in KINDS.items()}
+
+
+def as_json(order: Order) -> dict[str, object]:
+    """Return an order as plain JSON: its name under "order", and its fields."""
+    return {"order": _NAMES[type(order)], **order._asdict()}
+
+
+def from_json(data: object) -> Order:
+    """Read what ``as_json`` gave, from wherever it comes; fields with defaults may be left out.
+
+    Raises:
+        ValueError: it is no order; the message says what is wrong and what there is.
+    """
+    name = data.get("order") if isinstance(data, dict) else None
+    kind = KINDS.get(name) if isinstance(name, str) else None
+    if kind is None or not isinstance(data, dict):
+        raise ValueError(f"no order; there is {', '.join(KINDS)}")
+    fields = {key: _frozen(value) for key, value in data.items() if key != "order"}
+    needed = set(kind._fields).difference(kind._field_defaults)
+    if not needed <= set(fields) <= set(kind._fields):
+        raise ValueError(f"order {name} takes {', '.join(kind._fields)}; given {', '.join(fields)}")
+    order = kind(**fields)  # type: ignore[arg-type]
+    check(order)
+    return order
+
+
+def from_recording(data: dict[str, object]) -> Order:
+    """Read an order of a recorded run.
+
+    Those of runs made before leads could lapse and stops be guarded say nothing of it: they
+    stayed, and whoever asked could resume.
+
+    Raises:
+        ValueError: as ``from_json``.
+    """
+    old = {"look_at": {"stay": True}, "jog": {"stay": True}, "resume": {"confirmed": True}}
+    name = data.get("order")
+    return from_json({**old.get(name if isinstance(name, str) else "", {}), **data})
+
+
+def signed(order: Order, who: str) -> Order:
+    """Return an order with who asks for it; orders that do not tell stay as they are."""
+    match order:
+        case LookAt() | Jog() | Renew() | Stop() | Resume():
+            return order._replace(who=who[:MAX_WORDS])
+    return order
+
+
+def check(order: Order) -> None:
+    """See that an order's values can be meant.
+
+    Raises:
+        ValueError: with the rule.
+    """
+    match order:
+        case Ask(menu, choice):
+            if not isinstance(menu, str) or not isinstance(choice, str):
+                raise ValueError("menu and choice are names")
+        case LookAt(p, who, stay):
+            if p is not None and not (isinstance(p, tuple) and len(p) == 3 and all(map(_near, p))):
+                raise ValueError(
+                    "a point is three finite numbers in metres, x ahead, y left, z up, none "
+                    f"beyond +-{MAX_COORDINATE_M:g} m"
+                )
+            _check_who(who, stay)
+        case Jog(angles, who, stay):
+            _check_angles(angles)
+            _check_who(who, stay)
+        case Renew(who):
+            _check_who(who)
+        case Stop(why, who):
+            if not isinstance(why, str) or len(why) > MAX_WORDS:
+                raise ValueError(f"the reason of a stop is text of at most {MAX_WORDS} characters")
+            _check_who(who)
+        case Resume(who, confirmed):
+            _check_who(who, confirmed)
+        case Tune(changes):
+            pairs = isinstance(changes, tuple) and all(
+                isinstance(c, tuple) and len(c) == 2 and isinstance(c[0], str) for c in changes
+            )
+            if not pairs:
+                raise ValueError("changes are pairs of a dotted key and a value")
+
+
+def _check_who(who: object, flag: object = False) -> None:
+    if not isinstance(who, str) or len(who) > MAX_WORDS:
+        raise ValueError(f"who asks is text of at most {MAX_WORDS} characters")
+    if not isinstance(flag, bool):
+        raise ValueError("stay and confirmed are true or false")
+
+
+def _check_angles(angles: object) -> None:
+    if not isinstance(angles, tuple) or len(angles) > len(JOINTS):
+        raise ValueError("angles are pairs of a joint and an angle in radians, one a joint")
+    for pair in angles:
+        if not (isinstance(pair, tuple) and len(pair) == 2 and _within(pair[1], MAX_ANGLE_RAD)):
+            raise ValueError(
+                "angles are pairs of a joint and a finite angle in radians within +-360 deg"
+            )
+        if pair[0] not in JOINTS:
+            raise ValueError(f"unknown joint {pair[0]!r:.40}; known are {', '.join(JOINTS)}")
+
+
+def _near(value: object) -> bool:
+    return _within(value, MAX_COORDINATE_M)
+
+
+def _within(value: object, most: float) -> bool:
+    # A comparison is false of NaN, and takes whole numbers that no float can hold.
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and -most <= value <= most  # type: ignore[operator]
+
+
+def _frozen(value: object) -> object:
+    """Make tuples of JSON's lists."""
+    if isinstance(value, list | tuple):
+        return tuple(_frozen(item) for item in value)
+    if isinstance(value, dict):
+        return {key: _frozen(item) for key, item in value.items()}
+    return value

@@ -1,0 +1,229 @@
+"""One joint of a rig: its servo, how it is built in, and its limits."""
+
+from dataclasses import dataclass, field
+from math import ceil, floor, pi, radians
+
+from gazerig.drivers.servo_models import SERVOS, ServoFacts
+from gazerig.drivers.slow_entry import ENTRY_DEG_S
+from gazerig.drivers.types import ServoSetup
+from gazerig.robot.model.transmission import Curve, Linkage, Straight
+from gazerig.robot.safety.motion_limiter import JointLimit
+
+
+@dataclass(frozen=True)
+class JointParams:
+    """One joint: its servo, how it is built in, and its limits."""
+
+    id: int = field(
+        metadata={"low": 0, "high": 252, "unit": "", "says": "servo id; on a Maestro its channel"}
+    )
+    model: str = field(
+        metadata={"unit": "", "says": 'servo model, e.g. "xl330-m077", "sts3215" or "hobby"'}
+    )
+    min_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "lowest joint angle"}
+    )
+    max_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "highest joint angle"}
+    )
+    max_speed_deg_s: float = field(
+        metadata={"low": 1.0, "high": 2000.0, "unit": "deg/s", "says": "top speed of the joint"}
+    )
+    max_accel_deg_s2: float = field(
+        metadata={
+            "low": 10.0,
+            "high": 200000.0,
+            "unit": "deg/s2",
+            "says": "top acceleration of the joint",
+        }
+    )
+    sign: int = field(
+        default=1,
+        metadata={
+            "choices": (1, -1),
+            "unit": "",
+            "says": "1 where more steps turn the joint left, up, open or right ear down; else -1",
+        },
+    )
+    ratio: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.05,
+            "high": 50.0,
+            "unit": "",
+            "says": "turns of the servo for one turn of the joint",
+        },
+    )
+    zero_step: int | None = field(
+        default=None,
+        metadata={
+            "low": 0,
+            "high": 4095,
+            "unit": "steps or us",
+            "says": "servo position at 0 deg, the pulse width in us of a hobby servo; null: "
+            "the middle, 2048 or 1500",
+        },
+    )
+    linkage: tuple[tuple[float, float], ...] = field(
+        default=(),
+        metadata={
+            "low": -180.0,
+            "high": 4095.0,
+            "unit": "deg, steps or us",
+            "says": "measured places of a push rod, each [joint angle, servo position]; they "
+            "take the place of sign, ratio and zero_step",
+        },
+    )
+    bus: str = field(
+        default="",
+        metadata={"unit": "", "says": "name of its bus under buses; empty: the one under bus"},
+    )
+    servo_deg_s: float | None = field(
+        default=None,
+        metadata={
+            "low": 10.0,
+            "high": 5000.0,
+            "unit": "deg/s",
+            "says": "how fast a hobby servo turns its own shaft (0.12 s for 60 deg is 500): its "
+            "place is reckoned with it, as it tells none; null: as fast as max_speed_deg_s",
+        },
+    )
+    gains: tuple[int, int, int] | None = field(
+        default=None,
+        metadata={
+            "low": 0,
+            "high": 16383,
+            "unit": "",
+            "says": "the servo's Position P, I and D Gain; null: left as they are",
+        },
+    )
+    strength: float | None = field(
+        default=None,
+        metadata={
+            "low": 0.05,
+            "high": 1.0,
+            "unit": "",
+            "says": "share of its full drive that the servo may use (PWM Limit), which bounds "
+            "force and top speed alike; null: left as it is",
+        },
+    )
+    firmware_min: int = field(
+        default=0,
+        metadata={"low": 0, "high": 255, "unit": "", "says": "oldest servo firmware that will do"},
+    )
+
+    def __post_init__(self) -> None:
+        """Check that the limits fit each other and the servo's one turn.
+
+        Raises:
+            ValueError: they do not; the message says which.
+        """
+        if self.min_deg >= self.max_deg:
+            raise ValueError(f"min_deg {self.min_deg} must be below max_deg {self.max_deg}")
+        if not self.min_deg <= 0.0 <= self.max_deg:
+            raise ValueError("0 deg, the centre, must lie between min_deg and max_deg")
+        self._check_reach()
+
+    def _check_reach(self) -> None:
+        """See that the servo can go where the joint may; an unknown model is another's business.
+
+        Raises:
+            ValueError: it cannot, or the linkage was not measured so far.
+        """
+        facts = SERVOS.get(self.model)
+        if facts is None:
+            return
+        linkage = self.made()
+        if self.linkage:
+            least, most = self.linkage[0][0], self.linkage[-1][0]
+            if not least <= self.min_deg < self.max_deg <= most:
+                raise ValueError(
+                    f"its linkage was measured from {least:g} to {most:g} deg: min_deg "
+                    f"{self.min_deg} and max_deg {self.max_deg} must lie within"
+                )
+        for key, angle in (("min_deg", self.min_deg), ("max_deg", self.max_deg)):
+            steps = linkage.steps(radians(angle))
+            if not facts.lowest <= steps <= facts.highest:
+                low, high = facts.lowest / facts.unit_steps, facts.highest / facts.unit_steps
+                if facts.unit == "steps":
+                    at = f"lies at step {steps:.0f}, outside the servo's {low:.0f}..{high:.0f}"
+                else:
+                    at = f"lies at {steps / facts.unit_steps:.0f} {facts.unit}, outside the "
+                    at += f"servo's {low:.0f}..{high:.0f} {facts.unit}"
+                raise ValueError(f"{key} {angle} {at}")
+
+    @property
+    def facts(self) -> ServoFacts:
+        """Return what is known of its servo's model.
+
+        Raises:
+            KeyError: there is no such model; rigs that were checked have none such.
+        """
+        return SERVOS[self.model]
+
+    @property
+    def zero(self) -> int:
+        """Return the servo position at 0 deg, in the unit of its model."""
+        return self.zero_step if self.zero_step is not None else self.facts.middle
+
+    def made(self) -> Linkage:
+        """Return what lies between servo and joint.
+
+        Raises:
+            ValueError: the linkage cannot be.
+        """
+        facts = self.facts
+        if self.linkage:
+            angles, places = zip(*self.linkage, strict=True)
+            return Curve([radians(a) for a in angles], [facts.unit_steps * p for p in places])
+        slope = self.sign * self.ratio * facts.steps_per_turn / (2.0 * pi)
+        return Straight(facts.unit_steps * self.zero, slope)
+
+    def steps(self, angle_rad: float) -> float:
+        """Return the servo position of a joint angle, not rounded."""
+        return self.made().steps(angle_rad)
+
+    def angle_rad(self, steps: float) -> float:
+        """Return the joint angle of a servo position."""
+        return self.made().angle_rad(steps)
+
+    def limit(self) -> JointLimit:
+        """Return the limits in radians, and those of the servo's own protection."""
+        facts = self.facts
+        return JointLimit(
+            radians(self.min_deg),
+            radians(self.max_deg),
+            radians(self.max_speed_deg_s),
+            radians(self.max_accel_deg_s2),
+            facts.hottest_c,
+            facts.lowest_v,
+            facts.highest_v,
+        )
+
+    def setup(
+        self, name: str = "", rest_rad: float | None = None, gentle_deg_s: float = ENTRY_DEG_S
+    ) -> ServoSetup:
+        """Return what the bus must know: the range rounded inwards, speed and acceleration there.
+
+        rest_rad: where the joint is taken to be when the torque comes on, for a servo that
+            does not tell its place: the parking pose
+        gentle_deg_s: it is led into its range no faster
+        """
+        linkage, facts = self.made(), self.facts
+        ends = sorted(linkage.steps(radians(end)) for end in (self.min_deg, self.max_deg))
+        own = self.servo_deg_s
+        return ServoSetup(
+            self.id,
+            self.model,
+            ceil(ends[0]),
+            floor(ends[1]),
+            radians(self.max_speed_deg_s) * linkage.steepest,
+            name,
+            self.firmware_min,
+            self.gains,
+            self.strength,
+            radians(self.max_accel_deg_s2) * linkage.steepest,
+            None if rest_rad is None or facts.measured else round(linkage.steps(rest_rad)),
+            None if own is None else own * facts.steps_per_turn / 360.0,
+            radians(min(ENTRY_DEG_S, gentle_deg_s)) * linkage.steepest,
+        )

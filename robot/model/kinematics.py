@@ -1,0 +1,190 @@
+"""Exact geometry of the head: joint angles to lines of sight and back. Pure.
+
+The neck turns yaw, then pitch, then roll about axes that may lie apart; each eye pans,
+then tilts about its own centre, so that vergence comes from geometry. Eyes that one
+linkage turns both stay parallel: they take the mean of what each would need. A joint that
+a rig does not have stands at 0, a lid that it does not have is open. Frames and signs as
+in gaze.types; the world's origin is the neck base on the yaw axis.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from math import asin, atan2, hypot, pi
+
+from gazerig.gaze.angles import add, rotate, rotate_back, rotation, sub, yaw_pitch
+from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
+from gazerig.robot.model.types import JOINTS, JointAngles, JointState, in_order
+
+
+@dataclass(frozen=True)
+class GeometryParams:
+    """Measures of the rig, in millimetres, with the neck level and straight."""
+
+    pitch_axis_height_mm: float = field(
+        metadata={
+            "low": 0.0,
+            "high": 2000.0,
+            "unit": "mm",
+            "says": "neck pitch and roll axes above the neck base",
+        }
+    )
+    eyes_ahead_mm: float = field(
+        metadata={
+            "low": -500.0,
+            "high": 500.0,
+            "unit": "mm",
+            "says": "eye centres ahead of the pitch axis",
+        }
+    )
+    eyes_above_mm: float = field(
+        metadata={
+            "low": -500.0,
+            "high": 1000.0,
+            "unit": "mm",
+            "says": "eye centres above the pitch axis",
+        }
+    )
+    interocular_mm: float = field(
+        default=61.9,
+        metadata={
+            "low": 10.0,
+            "high": 500.0,
+            "unit": "mm",
+            "says": "between the eye centres (Mitake et al., table 1: 61.9)",
+        },
+    )
+
+
+LidEnds = tuple[float, float]
+"""Joint angles at which a lid is shut and fully open, radians."""
+
+NECK = ("neck_yaw", "neck_pitch", "neck_roll")
+LIDS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
+
+
+class Kinematics:
+    """Forward and inverse geometry of one rig.
+
+    names: of its joints, in the order of every sequence of them
+    one_pan, one_tilt: both eyes are turned by one linkage
+    """
+
+    def __init__(
+        self, params: GeometryParams, joints: Iterable[str], lids: Mapping[str, LidEnds]
+    ) -> None:
+        self.names = in_order(joints)
+        self.one_pan, self.one_tilt = "eyes_pan" in self.names, "eyes_tilt" in self.names
+        place = {name: i for i, name in enumerate(self.names)}
+        # What a rig does not have is looked up behind its joints, where a 0 stands.
+        absent = len(self.names)
+        both = {"pan": place.get("eyes_pan", absent), "tilt": place.get("eyes_tilt", absent)}
+        self._eyes = tuple(
+            place.get(f"{side}_eye_{way}", both[way])
+            for side in ("left", "right")
+            for way in ("pan", "tilt")
+        )
+        self._neck = tuple(place.get(name, absent) for name in NECK)
+        self._lid_places = tuple(place.get(name, absent) for name in LIDS)
+        self._wanted = tuple(JOINTS.index(name) for name in self.names)
+        self.retune(params, lids)
+
+    def retune(self, params: GeometryParams, lids: Mapping[str, LidEnds]) -> None:
+        """Take other measures and lid angles."""
+        self._pivot: Vec3 = (0.0, 0.0, params.pitch_axis_height_mm / 1e3)
+        self._arm: Vec3 = (params.eyes_ahead_mm / 1e3, 0.0, params.eyes_above_mm / 1e3)
+        self._half = params.interocular_mm / 2e3
+        # Of an absent lid, whose angle is 0, the opening comes out as 1.
+        ends = [lids[name] if name in self.names else (-1.0, 0.0) for name in LIDS]
+        self._shut = tuple(shut for shut, _ in ends)
+        self._span = tuple(wide - shut for shut, wide in ends)
+
+    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
+        """Return R_world_head and p_world_head_m (midway between the eyes)."""
+        R = rotation(head_rad)
+        return R, add(self._pivot, rotate(R, self._arm))
+
+    def facing(self, p_world_m: Vec3) -> Angles2:
+        """Return the neck yaw and pitch that lead the head's x axis through a point.
+
+        The axis passes above the pivot by the arm's height, so the pitch is that of the
+        point less the angle which that height takes up. A point nearer to the pivot than
+        the height cannot be faced; it gets the pitch of its own direction.
+        """
+        x, y, z = sub(p_world_m, self._pivot)
+        level = hypot(x, y)
+        distance = hypot(level, z)
+        above = self._arm[2]
+        yaw = atan2(y, x)
+        if distance <= abs(above):
+            return (yaw, atan2(z, level))
+        return (yaw, atan2(z, level) - asin(above / distance))
+
+    def eyes_on(
+        self, p_world_m: Vec3, R_world_head: Mat3, p_world_head_m: Vec3
+    ) -> tuple[Angles2, Angles2]:
+        """Return left and right (yaw, pitch) in the head that fixate a point.
+
+        Eyes that cannot turn each by itself come as near to that as both together can.
+        """
+        x, y, z = rotate_back(R_world_head, sub(p_world_m, p_world_head_m))
+        left, right = yaw_pitch((x, y - self._half, z)), yaw_pitch((x, y + self._half, z))
+        if self.one_pan:
+            yaw = _between(left[0], right[0])
+            left, right = (yaw, left[1]), (yaw, right[1])
+        if self.one_tilt:
+            pitch = 0.5 * (left[1] + right[1])
+            left, right = (left[0], pitch), (right[0], pitch)
+        return left, right
+
+    def forward(self, joints: JointState) -> GazeState:
+        """Return where head and eyes are for measured joints."""
+        q, rate = (*joints.position_rad, 0.0), (*joints.velocity_rad_s, 0.0)
+        yaw, pitch, roll = self._neck
+        head = (q[yaw], q[pitch], q[roll])
+        R, p_head = self.head_pose(head)
+        side = rotate(R, (0.0, self._half, 0.0))
+        pan_left, tilt_left, pan_right, tilt_right = self._eyes
+        openings = [
+            min(1.0, max(0.0, (q[i] - shut) / span))
+            for i, shut, span in zip(self._lid_places, self._shut, self._span, strict=True)
+        ]
+        return GazeState(
+            head,
+            (rate[yaw], rate[pitch], rate[roll]),
+            (q[pan_left], q[tilt_left]),
+            (q[pan_right], q[tilt_right]),
+            R,
+            p_head,
+            add(p_head, side),
+            sub(p_head, side),
+            *openings,
+        )
+
+    def inverse(self, command: GazeCommand) -> JointAngles:
+        """Return the joint angles of a command."""
+        left, right, shut, span = (
+            command.eye_left_rad,
+            command.eye_right_rad,
+            self._shut,
+            self._span,
+        )
+        every = (
+            *left,
+            *right,
+            0.5 * (left[0] + right[0]),
+            0.5 * (left[1] + right[1]),
+            shut[0] + command.lid_left * span[0],
+            shut[1] + command.lid_right * span[1],
+            shut[2] + command.lower_left * span[2],
+            shut[3] + command.lower_right * span[3],
+            *command.head_rad,
+        )
+        return tuple([every[i] for i in self._wanted])
+
+
+def _between(one: float, other: float) -> float:
+    """Return the direction midway between two within -pi..pi, the short way round."""
+    middle = 0.5 * (one + other)
+    if abs(one - other) <= pi:
+        return middle
+    return middle - pi if middle > 0.0 else middle + pi

@@ -1,0 +1,147 @@
+"""What became of an order: refused, done, or done as far as the joints reach."""
+
+import threading
+from collections.abc import Callable, Mapping
+from math import degrees, radians
+from typing import Any, NamedTuple
+
+from gazerig.gaze.types import Vec3
+from gazerig.robot.model.commands import Order
+
+_BESIDE_DEG = 1.0
+"""A gaze that rests nearer to its point than this looks there."""
+
+
+class JointReply(NamedTuple):
+    """One joint that was asked for something, in radians.
+
+    low_rad, high_rad: the range in force
+    reason: why ``done_rad`` is another angle than ``asked_rad``, "" where it is not
+    """
+
+    joint: str
+    asked_rad: float
+    done_rad: float
+    low_rad: float
+    high_rad: float
+    reason: str
+
+    def words(self) -> str:
+        """Return one phrase for people."""
+        if self.low_rad == self.high_rad:
+            return f"{self.joint}: {self.reason}"
+        if not self.reason:
+            return f"{self.joint} to {degrees(self.done_rad):.1f} deg"
+        return (
+            f"{self.joint} stays at {degrees(self.done_rad):.1f} of {degrees(self.asked_rad):.1f} "
+            f"deg ({self.reason}, {degrees(self.low_rad):g}..{degrees(self.high_rad):g})"
+        )
+
+
+class Reply(NamedTuple):
+    """What the robot made of one order when it took it up.
+
+    refused: why nothing was done, "" where something was
+    asked_m: the point to look at; done_m: the point as far away that the eyes will rest on;
+        None for other orders
+    joints: those that cannot do what was asked; of a jog, all that were asked for
+    error_rad: angle between the point and the line of sight once head and eyes are there, of
+        the worse eye, or of their mean where one linkage turns both
+    """
+
+    refused: str = ""
+    asked_m: Vec3 | None = None
+    done_m: Vec3 | None = None
+    joints: tuple[JointReply, ...] = ()
+    error_rad: float = 0.0
+
+    @property
+    def error_deg(self) -> float:
+        """Return ``error_rad`` in degrees."""
+        return degrees(self.error_rad)
+
+    @property
+    def limited(self) -> tuple[JointReply, ...]:
+        """Return the joints that cannot do what was asked."""
+        return tuple(joint for joint in self.joints if joint.reason)
+
+    def words(self) -> str:
+        """Return one line for people, "" where there is nothing to say."""
+        if self.refused:
+            return f"refused: {self.refused}"
+        ends = "; ".join(joint.words() for joint in self.joints)
+        if self.asked_m is None:
+            return ends
+        if self.error_deg < _BESIDE_DEG:
+            return "it looks there"
+        return f"it looks {self.error_deg:.0f} deg beside it" + (f": {ends}" if ends else "")
+
+    def as_json(self) -> dict[str, object]:
+        """Return plain JSON values: angles in degrees, metres, words."""
+        return {
+            "refused": self.refused,
+            "asked_m": self.asked_m,
+            "done_m": self.done_m,
+            "error_deg": self.error_deg,
+            "joints": [
+                {
+                    "joint": one.joint,
+                    "asked_deg": degrees(one.asked_rad),
+                    "done_deg": degrees(one.done_rad),
+                    "low_deg": degrees(one.low_rad),
+                    "high_deg": degrees(one.high_rad),
+                    "reason": one.reason,
+                }
+                for one in self.joints
+            ],
+            "words": self.words(),
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "Reply":
+        """Return what ``as_json`` wrote.
+
+        Raises:
+            KeyError, TypeError, ValueError: the data is no reply.
+        """
+        joints = tuple(
+            JointReply(
+                one["joint"],
+                radians(one["asked_deg"]),
+                radians(one["done_deg"]),
+                radians(one["low_deg"]),
+                radians(one["high_deg"]),
+                one["reason"],
+            )
+            for one in data["joints"]
+        )
+        asked, done = (_point(data[key]) for key in ("asked_m", "done_m"))
+        return cls(data["refused"], asked, done, joints, radians(data["error_deg"]))
+
+
+def _point(data: Any) -> Vec3 | None:
+    if data is None:
+        return None
+    x, y, z = data
+    return (x, y, z)
+
+
+class Ticket:
+    """Where the reply to one order comes; made by one thread, answered by the loop's."""
+
+    def __init__(self) -> None:
+        self._answered = threading.Event()
+        self._reply = Reply()
+
+    def answer(self, reply: Reply) -> None:
+        """Leave the reply."""
+        self._reply = reply
+        self._answered.set()
+
+    def wait(self, within_s: float) -> Reply | None:
+        """Wait for the reply; None where the loop has not taken the order up in that time."""
+        return self._reply if self._answered.wait(within_s) else None
+
+
+OrderTaker = Callable[[Order], Ticket | None]
+"""Takes an order for the next tick, as Robot.order does; None: nobody will reply to it."""

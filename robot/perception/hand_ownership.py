@@ -1,0 +1,112 @@
+"""Which motion belongs to whom: a face and the body below it are one thing to look at.
+
+A person who walks is seen twice, as a face and as a patch of flow. The patch would compete
+with the face, and for being larger would often win. It is therefore taken for the person's
+own where it is on the head, or is below it and moves along with it; an arm that waves moves
+otherwise, so it stays a thing of its own, which is what draws the eye to a wave.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from math import hypot
+
+from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
+from gazerig.gaze.types import Vec3
+from gazerig.robot.perception.tracker import Sighting
+
+# What a moving patch is called whose kind is not known; a named one is always itself.
+_UNNAMED = "thing"
+_HEAD_M, _HALF_WIDTH_M, _BELOW_M, _ABOVE_M = 0.25, 0.35, 1.7, 0.25
+# Beside that in depth, and two standard deviations of it.
+_DEEP_M = 0.5
+_ALONG_WITH_M_S, _ALONG_WITH_SHARE = 0.3, 0.5
+
+Known = tuple[Vec3, Vec3 | None]
+"""Place of a face in the world, and its velocity where it is known."""
+
+
+def without_own_motion(
+    faces: list[Sighting],
+    things: Iterable[Sighting],
+    before: Iterable[Known],
+    p_camera: Vec3,
+) -> tuple[list[Sighting], list[Sighting]]:
+    """Return the faces with the spin of their own motion, and the things that are not theirs.
+
+    before: tracked faces, where they are expected now; one that the detector has just missed
+        still owns its body
+    """
+    spins = [0.0] * len(faces)
+    tracked = list(before)
+    known = [(face.p_world_m, _velocity(face, tracked)) for face in faces]
+    others: list[Sighting] = []
+    for thing in things:
+        owner = _owner(thing, [*known, *tracked], p_camera)
+        if owner is None:
+            others.append(thing)
+        elif owner < len(faces) and _on_head(thing, known[owner][0], p_camera):
+            spins[owner] = max(spins[owner], thing.spin_rad_s, key=abs)
+    turned = [
+        replace(face, spin_rad_s=spin) if spin != 0.0 else face
+        for face, spin in zip(faces, spins, strict=True)
+    ]
+    return turned, others
+
+
+def _velocity(face: Sighting, tracked: list[Known]) -> Vec3 | None:
+    """Return the velocity of the tracked face at a sighting's place, None where there is none."""
+    near = [(norm(sub(p, face.p_world_m)), v) for p, v in tracked]
+    away, v = min(near, key=lambda pair: pair[0], default=(1.0, None))
+    return v if away < _HEAD_M else None
+
+
+def _owner(thing: Sighting, faces: list[Known], p_camera: Vec3) -> int | None:
+    """Find the face whose own motion this is."""
+    if thing.kind != _UNNAMED:
+        return None
+    for k, (p_face, v_face) in enumerate(faces):
+        if _on_head(thing, p_face, p_camera):
+            return k
+        if _below(thing, p_face, p_camera) and _goes_along(thing, p_face, v_face, p_camera):
+            return k
+    return None
+
+
+def _on_head(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> bool:
+    """Return whether a patch's middle is on the head."""
+    off = _off(thing, p_face, p_camera)
+    return off is not None and hypot(*off) < _HEAD_M
+
+
+def _below(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> bool:
+    """Return whether a patch's middle is where the body of a face is."""
+    off = _off(thing, p_face, p_camera)
+    return off is not None and off[0] < _HALF_WIDTH_M and -_BELOW_M < off[1] < _ABOVE_M
+
+
+def _off(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:
+    """Return how far aside of and above a face a patch is, None where it is nearer or farther.
+
+    A patch whose distance is only assumed is taken to be as far as the face.
+    """
+    far = norm(sub(p_face, p_camera))
+    way = sub(thing.p_world_m, p_camera)
+    if thing.depth_measured and abs(norm(way) - far) > _DEEP_M + 2.0 * thing.along_sd_m:
+        return None
+    place = add(p_camera, scale(unit(way), far))
+    x, y, z = sub(place, p_face)
+    return hypot(x, y), z
+
+
+def _goes_along(thing: Sighting, p_face: Vec3, v_face: Vec3 | None, p_camera: Vec3) -> bool:
+    """Return whether a patch moves across the view as the face does; unknown counts as so."""
+    if thing.v_world_m_s is None or v_face is None:
+        return True
+    way = sub(thing.p_world_m, p_camera)
+    v = thing.v_world_m_s
+    if not thing.depth_measured:
+        v = scale(v, norm(sub(p_face, p_camera)) / max(norm(way), 1e-6))
+    view = unit(way)
+    other = sub(v, v_face)
+    across = norm(sub(other, scale(view, dot(other, view))))
+    return across < max(_ALONG_WITH_M_S, _ALONG_WITH_SHARE * norm(v_face))

@@ -1,0 +1,69 @@
+"""What moves in a picture, the camera's own turn taken out by where the head was."""
+
+import numpy as np
+
+from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.vision.motion.detector import MotionDetector
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.gaze.types import Floats
+from gazerig.robot.model.frames import LensParams
+from gazerig.robot.perception.intrinsics import intrinsics_of_lens
+
+
+class MotionFinder:
+    """Finds what moves from one picture to the next."""
+
+    def __init__(
+        self,
+        params: MotionParams,
+        lens: LensParams | None,
+        field_rad: float,
+        turns: PoseRing | None,
+    ) -> None:
+        """Take how to look.
+
+        lens, field_rad: for pictures that do not bring their own lens
+        turns: how a camera that turns with the head was turned when; None: it stands still
+        """
+        self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
+        self._turns = turns
+        self._detector = MotionDetector(params)
+
+    def retune(self, params: MotionParams, lens: LensParams | None, field_rad: float) -> None:
+        """Look otherwise from the next picture on; what is followed stays."""
+        self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
+        self._detector.retune(params)
+        if not params.enabled:
+            self._detector.forget()
+
+    def __call__(self, shot: Shot) -> tuple[MovingBlob, ...]:
+        """Find what has moved since the picture before; nothing while not enabled."""
+        if not self._enabled:
+            return ()
+        height, width = shot.picture.shape[:2]
+        own = shot.lens if self._lens is None else None
+        lens = own or intrinsics_of_lens(self._lens, self._field_rad, width, height)
+        before_s = self._detector.before_s
+        turned: Floats | None = np.eye(3)
+        if self._turns is not None:
+            turned = None if before_s is None else self._turns.turned(shot.captured_s, before_s)
+        return self._detector.find(shot.picture, shot.captured_s, lens, turned, shot.depth_m)
+
+
+def motion_finder(
+    params: MotionParams, lens: LensParams | None, field_rad: float, turns: PoseRing | None
+) -> Motion:
+    """Return what finds motion, for the process that will look at the pictures."""
+    return MotionFinder(params, lens, field_rad, turns)
+
+
+def retuned(
+    params: MotionParams, lens: LensParams | None, field_rad: float, finder: Motion | None
+) -> Motion | None:
+    """Let a finder look otherwise, in the process that has it."""
+    if isinstance(finder, MotionFinder):
+        finder.retune(params, lens, field_rad)
+    return finder

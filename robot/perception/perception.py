@@ -1,0 +1,210 @@
+"""Detections and the head's pose at their capture time to a percept in the world.
+
+Faces and moving things are placed in the world (sightings) by where the camera was when
+the picture was taken, not where it is now; each person's own motion is told from other
+things (same_person); tracks give all of them identities and velocities (tracks).
+"""
+
+from collections.abc import Callable, Mapping
+from math import hypot, radians
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.types import Detections
+from gazerig.gaze.angles import add, norm, rotate, scale, sub, unit
+from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
+from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
+from gazerig.robot.perception.egomotion_residual import (
+    HeadTurnResidual,
+    ResidualFigures,
+    Seen,
+    turning_rad_s,
+)
+from gazerig.robot.perception.face_pose import PARTS_FACE_M
+from gazerig.robot.perception.hand_ownership import Known, without_own_motion
+from gazerig.robot.perception.intrinsics import Intrinsics, intrinsics_of_lens
+from gazerig.robot.perception.localisation import (
+    SIZE_SPREAD,
+    Box,
+    Reading,
+    blob_sighting,
+    face_sighting,
+    reader_of,
+)
+from gazerig.robot.perception.tracker import Sighting, Track, Tracker
+
+DepthAt = Callable[[NDArray[Any], Box], Reading]
+"""Reads the distance of what a box of pixels shows from a depth picture."""
+
+# The head's turn at a capture is taken over so long before and after it.
+_HALF_TURN_S = 0.015
+
+
+class Perception:
+    """Sees: one percept for each new picture."""
+
+    def __init__(
+        self,
+        mount: CameraMount,
+        horizontal_field_deg: float,
+        tracker: Tracker,
+        parts_face_m: Mapping[str, Vec3] | None = None,
+        lens: LensParams | None = None,
+        depth_at: DepthAt | None = None,
+    ) -> None:
+        """Take where the camera sits, its field of view and the tracker.
+
+        parts_face_m: a person's own places of some parts in the face's frame, instead of
+            the canonical ones (Nakamoto & Tsuruno 3.7)
+        lens: as measured, used for pictures of the shape it was measured on
+        depth_at: reads depth pictures; without it, distances come from the size of faces
+        """
+        self._mount = mount
+        self.retune(horizontal_field_deg, parts_face_m, lens)
+        self._tracker = tracker
+        self._depth_at = depth_at
+        self._tracks: tuple[Track, ...] = ()
+        self._p_camera: Vec3 = (0.0, 0.0, 0.0)
+        self._residual = HeadTurnResidual()
+        self._percept: Percept | None = None
+        self._number = 0
+        self.pictures = 0
+        self.pictures_with_face = 0
+
+    def retune(
+        self,
+        horizontal_field_deg: float,
+        parts_face_m: Mapping[str, Vec3] | None,
+        lens: LensParams | None,
+    ) -> None:
+        """Take another field of view, parts and lens, from the next picture on."""
+        own = parts_face_m or {}
+        # A measured part is where it was measured; a canonical one is stretched with the face.
+        self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
+        self._field_rad = radians(horizontal_field_deg)
+        self._measured = lens
+        self._size_px = (0, 0)
+        self._intrinsics: Intrinsics | None = None
+
+    def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:
+        """Return the percept of the newest picture, None before the first."""
+        if detections is None or detections.number == self._number:
+            return self._percept
+        self._number = detections.number
+        self.pictures += 1
+        self.pictures_with_face += bool(detections.faces)
+        t_s = detections.captured_s
+        R, p = self._mount.pose(*poses.head_pose(t_s))
+        faces, things = self._sightings(detections, R, p)
+        faces, things = without_own_motion(faces, things, self._known(t_s), p)
+        self._tracks = tracks = self._tracker.step([*faces, *things], p, t_s)
+        self._p_camera = p
+        self._note_residual(t_s, poses)
+        self._percept = Percept(
+            t_s,
+            _bodies(tracks, p),
+            tuple(self._face(track) for track in tracks if track.sighting.kind == "face"),
+        )
+        return self._percept
+
+    def residual(self) -> ResidualFigures:
+        """Return how fast still things seem to move while the head turns."""
+        return self._residual.figures()
+
+    def _sightings(
+        self, found: Detections, R_world_camera: Mat3, p: Vec3
+    ) -> tuple[list[Sighting], list[Sighting]]:
+        """Place everything found in the world: faces, and what else moves."""
+        lens = self._lens(found)
+        depth = reader_of(found.depth_m, self._depth_at)
+        faces = [face_sighting(face, R_world_camera, p, lens, depth) for face in found.faces]
+        things = [blob_sighting(blob, R_world_camera, p) for blob in found.blobs]
+        return [f for f in faces if f is not None], [t for t in things if t is not None]
+
+    def _known(self, t_s: float) -> list[Known]:
+        """Return where the faces of the last picture are expected now."""
+        return [
+            (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
+            for t in self._tracks
+            if t.sighting.kind == "face"
+        ]
+
+    def _note_residual(self, t_s: float, poses: PoseHistory) -> None:
+        """Compare where still things seem to be with how the head turns."""
+        if not self._mount.on_head:
+            return
+        before, after = (poses.head_pose(t_s + dt)[0] for dt in (-_HALF_TURN_S, _HALF_TURN_S))
+        turn = turning_rad_s(before, after, 2.0 * _HALF_TURN_S)
+        seen = [
+            Seen(track.id, track.sighting.p_world_m, norm(track.v_world_m_s))
+            for track in self._tracks
+            if track.seen_s == t_s
+        ]
+        self._residual.step(t_s, turn, self._p_camera, seen)
+
+    def _face(self, track: Track) -> Face:
+        """Return a tracked face with its eight parts."""
+        R = track.R_world_face
+        assert R is not None  # faces are tracked with their pose
+        p, size = track.p_world_m, track.face_size
+        tall = size * track.face_length
+        across_sd, along_sd = _deviations(track, self._p_camera)
+        parts = (
+            (x, y, z) if own else (x * size, y * size, z * tall) for (x, y, z), own in self._parts
+        )
+        return Face(
+            track.id,
+            p,
+            track.v_world_m_s,
+            R,
+            tuple(add(p, rotate(R, part)) for part in parts),
+            track.sighting.confidence,
+            track.depth_from,
+            across_sd,
+            along_sd,
+        )
+
+    def _lens(self, found: Detections) -> Intrinsics:
+        """Return the intrinsics of a picture: as measured, as the camera says, or by its field."""
+        if self._measured is None and found.lens is not None:
+            return Intrinsics(*found.lens)
+        width_px, height_px = found.width_px, found.height_px
+        if self._size_px != (width_px, height_px) or self._intrinsics is None:
+            self._size_px = (width_px, height_px)
+            self._intrinsics = intrinsics_of_lens(
+                self._measured, self._field_rad, width_px, height_px
+            )
+        return self._intrinsics
+
+
+def _deviations(track: Track, p_camera: Vec3) -> tuple[float, float]:
+    """Return how well a face's place is known, across and along the view.
+
+    The filter knows of what changes from picture to picture; that this person's face is
+    not of the usual size is the same in all of them.
+    """
+    way = sub(track.p_world_m, p_camera)
+    view = np.array(unit(way))
+    cov = track.cov[:3, :3]
+    along = float(view @ cov @ view)
+    across = 0.5 * max(0.0, float(np.trace(cov)) - along)
+    unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * norm(way)
+    return across**0.5, hypot(max(0.0, along) ** 0.5, unknown_size)
+
+
+def _bodies(tracks: tuple[Track, ...], p_camera: Vec3) -> Bodies:
+    """List faces and moving things alike; a spin seen in the picture is about the view line."""
+    spins = [
+        scale(unit(sub(track.p_world_m, p_camera)), track.sighting.spin_rad_s) for track in tracks
+    ]
+    return Bodies(
+        tuple(track.id for track in tracks),
+        tuple(track.sighting.kind for track in tracks),
+        np.array([track.p_world_m for track in tracks]).reshape(-1, 3),
+        np.array([track.v_world_m_s for track in tracks]).reshape(-1, 3),
+        np.array(spins).reshape(-1, 3),
+        np.array([track.sighting.radius_m for track in tracks]),
+        np.array([track.cov for track in tracks]).reshape(-1, 6, 6),
+    )

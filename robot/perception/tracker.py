@@ -1,0 +1,376 @@
+"""Who is who from picture to picture: identities, places and velocities of what is seen.
+
+World frame, metres. Every sighting brings its own uncertainty, which along the line of
+view may be many times that across it; a pair of track and sighting is judged by the
+distance in these terms, all pairs together (assignment), and the track takes the sighting
+in by a Kalman filter (track_filter).
+"""
+
+from dataclasses import dataclass, field
+from math import hypot, log
+
+import numpy as np
+
+from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.perception.data_association import FORBIDDEN, get_ready, likeliest_pairs
+from gazerig.robot.perception.kalman import Floats, Restlessness, TrackFilter, far_off, sight_cov
+
+# Two numbers of the detector for one thing, as a cost: 4 standard deviations.
+_OTHER_MARK = 16.0
+# Within so many radii of its middle is about where something is.
+_OUTLINE = 1.5
+_NEAREST_M = 0.05
+
+
+@dataclass(frozen=True)
+class TrackParams:
+    """What is believed of how people and things move, and times of the tracking."""
+
+    quiet_accel_m_s2: float = field(
+        default=0.12,
+        metadata={
+            "low": 0.01,
+            "high": 50.0,
+            "unit": "m/s2",
+            "says": "usual acceleration of faces; smaller is smoother, larger follows sooner",
+        },
+    )
+    lively_accel_m_s2: float = field(
+        default=10.0,
+        metadata={
+            "low": 0.01,
+            "high": 500.0,
+            "unit": "m/s2",
+            "says": "the same at the moment somebody starts or stops, as told by the pictures",
+        },
+    )
+    things_accel_m_s2: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.01,
+            "high": 50.0,
+            "unit": "m/s2",
+            "says": "usual acceleration of hands and things",
+        },
+    )
+    first_speed_m_s: float = field(
+        default=0.7,
+        metadata={
+            "low": 0.0,
+            "high": 20.0,
+            "unit": "m/s",
+            "says": "usual speed of something when it is first seen",
+        },
+    )
+    gate_sigma: float = field(
+        default=4.0,
+        metadata={
+            "low": 1.0,
+            "high": 20.0,
+            "unit": "",
+            "says": "farthest from its expected place that something is taken for the same, in "
+            "standard deviations of all that is uncertain",
+        },
+    )
+    gate_m: float = field(
+        default=0.35,
+        metadata={
+            "low": 0.02,
+            "high": 5.0,
+            "unit": "m",
+            "says": "the same in metres across the line of view, at up to 1 m; beyond, it grows "
+            "with the distance as the errors do",
+        },
+    )
+    gate_speed_m_s: float = field(
+        default=1.0,
+        metadata={
+            "low": 0.0,
+            "high": 20.0,
+            "unit": "m/s",
+            "says": "that gate widens so fast while somebody is not seen",
+        },
+    )
+    turn_gain: float = field(
+        default=0.3,
+        metadata={
+            "low": 0.01,
+            "high": 1.0,
+            "unit": "",
+            "says": "trust in a picture for the turn of a face",
+        },
+    )
+    shape_gain: float = field(
+        default=0.15,
+        metadata={
+            "low": 0.01,
+            "high": 1.0,
+            "unit": "",
+            "says": "trust in a picture for the length and the size of a face",
+        },
+    )
+    coast_ms: float = field(
+        default=250.0,
+        metadata={
+            "low": 0.0,
+            "high": 5000.0,
+            "unit": "ms",
+            "says": "something missed by the detector is still there for this long",
+        },
+    )
+    forget_ms: float = field(
+        default=1500.0,
+        metadata={
+            "low": 0.0,
+            "high": 60000.0,
+            "unit": "ms",
+            "says": "something unseen for this long is somebody new when it returns",
+        },
+    )
+
+
+@dataclass(slots=True)
+class Sighting:
+    """One thing as one picture shows it, placed in the world.
+
+    R_world_face: axes of a face, None of anything else
+    face_length: of a face, in lengths of the canonical one
+    depth_measured: whether the distance was measured by the camera; else a face's is from
+        its size and a thing's is assumed
+    across_sd_m, along_sd_m: standard deviations of the place, across and along the view
+    v_world_m_s: velocity as measured in the picture, None where only the place is known;
+        across_sd_m_s, along_sd_m_s: its standard deviations
+    size_depth: of a face, its distance if it were of an adult's size, over the distance
+        measured; None where the camera measured none
+    mark: the detector's own number of it, None where it gives none
+    """
+
+    kind: str
+    p_world_m: Vec3
+    R_world_face: Mat3 | None
+    radius_m: float
+    spin_rad_s: float
+    confidence: float
+    face_length: float = 1.0
+    depth_measured: bool = False
+    across_sd_m: float = 0.002
+    along_sd_m: float = 0.08
+    v_world_m_s: Vec3 | None = None
+    across_sd_m_s: float = 0.1
+    along_sd_m_s: float = 0.5
+    size_depth: float | None = None
+    mark: int | None = None
+
+
+@dataclass(slots=True)
+class Track:
+    """One thing through time.
+
+    seen_s, at_s: capture times of its last sighting and of its place
+    face_size: of a face, its size over an adult's, learned where the camera measures depth
+    depth_s: capture time of the last measured distance, None before the first
+    """
+
+    id: int
+    sighting: Sighting
+    filter: TrackFilter
+    R_world_face: Mat3 | None
+    seen_s: float
+    at_s: float
+    face_length: float
+    face_size: float = 1.0
+    depth_s: float | None = None
+
+    @property
+    def p_world_m(self) -> Vec3:
+        """Return the place at ``at_s``."""
+        x, y, z = self.filter.state[:3].tolist()
+        return x, y, z
+
+    @property
+    def v_world_m_s(self) -> Vec3:
+        """Return the velocity."""
+        x, y, z = self.filter.state[3:].tolist()
+        return x, y, z
+
+    @property
+    def cov(self) -> Floats:
+        """Return the covariance (6, 6) of place and velocity."""
+        return self.filter.cov
+
+    @property
+    def depth_from(self) -> str:
+        """Say what its distance rests on: "camera", "face size" or "assumed"."""
+        if self.sighting.depth_measured:
+            return "camera"
+        return "face size" if self.R_world_face is not None else "assumed"
+
+
+class Tracker:
+    """Keeps identities and velocities of faces and moving things."""
+
+    def __init__(self, params: TrackParams) -> None:
+        get_ready()
+        self._tracks: list[Track] = []
+        self._next_id = 1
+        self.retune(params)
+
+    def retune(self, params: TrackParams) -> None:
+        """Believe otherwise from now on; all tracks stay."""
+        self._params = params
+        lively = params.lively_accel_m_s2
+        self._of_faces = Restlessness(params.quiet_accel_m_s2, lively)
+        self._of_things = Restlessness(params.things_accel_m_s2, lively)
+        for track in self._tracks:
+            is_face = track.sighting.R_world_face is not None
+            track.filter.retune(self._of_faces if is_face else self._of_things)
+
+    def step(
+        self, sightings: list[Sighting], p_world_camera_m: Vec3, t_s: float
+    ) -> tuple[Track, ...]:
+        """Join one picture's sightings to the tracks; give those that are there now."""
+        par = self._params
+        for track in self._tracks:
+            track.filter.predict(t_s - track.at_s, seen=track.seen_s == track.at_s)
+            track.at_s = t_s
+        costs = np.array(
+            [
+                [self._cost(track, sighting, p_world_camera_m) for sighting in sightings]
+                for track in self._tracks
+            ]
+        )
+        pairs = likeliest_pairs(costs)
+        for i, j in pairs:
+            self._update(self._tracks[i], sightings[j], p_world_camera_m)
+        taken = {j for _, j in pairs}
+        for j, sighting in enumerate(sightings):
+            if j not in taken:
+                self._tracks.append(self._begin(sighting, p_world_camera_m, t_s))
+        self._tracks = [t for t in self._tracks if t_s - t.seen_s <= par.forget_ms / 1e3]
+        return tuple(t for t in self._tracks if t_s - t.seen_s <= par.coast_ms / 1e3)
+
+    def _cost(self, track: Track, sighting: Sighting, p_camera: Vec3) -> float:
+        """Return how unlikely it is that a track is seen so: minus twice the log likelihood.
+
+        A track long unseen could be anywhere; without the logarithm that would make it
+        the best match of everything.
+        """
+        par = self._params
+        if track.sighting.kind != sighting.kind:
+            return FORBIDDEN
+        place = sized(track, sighting, p_camera)
+        off = sub(place, track.p_world_m)
+        view = sub(place, p_camera)
+        wide = self._gate_m(track, sighting, norm(view))
+        unseen_s = track.at_s - track.seen_s
+        if norm(cross(unit(view), off)) > wide + par.gate_speed_m_s * unseen_s:
+            return FORBIDDEN
+        # What people do that no filter expects: a lunge, a jump of the detector.
+        surprise = wide / par.gate_sigma
+        across, along = hypot(sighting.across_sd_m, surprise), hypot(sighting.along_sd_m, surprise)
+        cov = track.cov[:3, :3] + sight_cov(place, p_camera, across, along)
+        far = far_off(off, cov)
+        if far > par.gate_sigma**2:
+            return FORBIDDEN
+        known = log(float(np.linalg.det(cov)) / (across**4 * along**2))
+        return far + known + (0.0 if _same_mark(track, sighting) else _OTHER_MARK)
+
+    def _gate_m(self, track: Track, sighting: Sighting, far_m: float) -> float:
+        """Return the farthest from its expected place that something is taken for the same.
+
+        A detector that tells things apart in the picture has already judged; what it gave
+        another number is the same only about where the track's own outline is.
+        """
+        widest = self._params.gate_m * max(1.0, far_m)
+        if _same_mark(track, sighting):
+            return widest
+        return min(widest, _OUTLINE * max(track.sighting.radius_m, sighting.radius_m))
+
+    def _begin(self, sighting: Sighting, p_camera: Vec3, t_s: float) -> Track:
+        place = sighting.p_world_m
+        track = Track(
+            self._next_id,
+            sighting,
+            TrackFilter(
+                place,
+                sight_cov(place, p_camera, sighting.across_sd_m, sighting.along_sd_m),
+                self._params.first_speed_m_s,
+                self._of_faces if sighting.R_world_face is not None else self._of_things,
+            ),
+            sighting.R_world_face,
+            t_s,
+            t_s,
+            sighting.face_length,
+        )
+        self._next_id += 1
+        self._learn_size(track, sighting, 1.0)
+        self._velocity(track, sighting, p_camera)
+        return track
+
+    def _update(self, track: Track, sighting: Sighting, p_camera: Vec3) -> None:
+        """Take a sighting in."""
+        place = sized(track, sighting, p_camera)
+        track.filter.correct(
+            place, sight_cov(place, p_camera, sighting.across_sd_m, sighting.along_sd_m)
+        )
+        self._velocity(track, sighting, p_camera)
+        gain = self._params.shape_gain
+        if track.R_world_face is not None and sighting.R_world_face is not None:
+            track.R_world_face = blended(
+                track.R_world_face, sighting.R_world_face, self._params.turn_gain
+            )
+            track.face_length += gain * (sighting.face_length - track.face_length)
+        self._learn_size(track, sighting, gain)
+        track.sighting, track.seen_s = sighting, track.at_s
+
+    def _velocity(self, track: Track, sighting: Sighting, p_camera: Vec3) -> None:
+        """Take in a velocity that was measured in the picture."""
+        if sighting.v_world_m_s is None:
+            return
+        share = 1.0
+        if not sighting.depth_measured:
+            # What was seen is an angle a second; at another distance that is another speed.
+            away = norm(sub(track.p_world_m, p_camera))
+            share = away / max(norm(sub(sighting.p_world_m, p_camera)), _NEAREST_M)
+        sds = share * sighting.across_sd_m_s, share * sighting.along_sd_m_s
+        cov = sight_cov(sighting.p_world_m, p_camera, *sds)
+        track.filter.correct_velocity(scale(sighting.v_world_m_s, share), cov)
+
+    def _learn_size(self, track: Track, sighting: Sighting, gain: float) -> None:
+        """Learn how large a face is where its distance is known otherwise."""
+        if sighting.size_depth is None:
+            return
+        gain = 1.0 if track.depth_s is None else gain
+        track.face_size += gain * (1.0 / sighting.size_depth - track.face_size)
+        track.depth_s = track.at_s
+
+
+def _same_mark(track: Track, sighting: Sighting) -> bool:
+    """Return whether the detector takes both for the same, or does not tell things apart."""
+    marks = track.sighting.mark, sighting.mark
+    return None in marks or marks[0] == marks[1]
+
+
+def sized(track: Track, sighting: Sighting, p_camera: Vec3) -> Vec3:
+    """Return a sighting's place with the distance that the size learned of this face tells."""
+    if sighting.depth_measured or track.depth_s is None:
+        return sighting.p_world_m
+    return add(p_camera, scale(sub(sighting.p_world_m, p_camera), track.face_size))
+
+
+def blended(A: Mat3, B: Mat3, share: float) -> Mat3:
+    """Return a rotation a share of the way from A to B (columns blended, made square again)."""
+    x = unit(_column(A, B, 0, share))
+    z = _column(A, B, 2, share)
+    y = unit(cross(z, x))
+    z = cross(x, y)
+    return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
+
+
+def _column(A: Mat3, B: Mat3, k: int, share: float) -> Vec3:
+    return (
+        A[0][k] + share * (B[0][k] - A[0][k]),
+        A[1][k] + share * (B[1][k] - A[1][k]),
+        A[2][k] + share * (B[2][k] - A[2][k]),
+    )

@@ -1,0 +1,141 @@
+"""The machine of a recorded run: gives the models what the real one gave them, in order."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import Detections
+from gazerig.gaze.types import Percept
+from gazerig.robot.control.body import Body
+from gazerig.robot.model.frames import CameraMount, PoseHistory
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.types import JointAngles, JointState
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker, TrackParams
+from gazerig.robot.recording.tick_record import Engaged, Heard, Measured, Moment, Refused
+from gazerig.robot.safety.guard import JointLimit
+
+H = TypeVar("H", bound=Heard)
+
+
+class PlayedBody(Body):
+    """A body that does what it is told, and says what the recorded one said.
+
+    The body behind it sees every call, so that its bus carries the bytes of the first run.
+    """
+
+    def __init__(self, body: Body) -> None:
+        # Not set up as a body of its own: it has no joints, only the other's.
+        self.bus, self.names = body.bus, body.names
+        self._body = body
+        self._moment: Moment | None = None
+        self._said: deque[Heard] = deque()
+        self._newest: JointState | None = None
+
+    def play(self, moment: Moment) -> None:
+        """Take what is to be said until the end of a tick; once for each."""
+        if moment is not self._moment:
+            self._moment = moment
+            self._said = deque((*moment.before, Measured(moment.tick.t_s, moment.tick.joints)))
+
+    def leave_off(self) -> None:
+        """Say from now on what the body behind says."""
+        self._said.clear()
+        self._newest = None
+
+    def retune(
+        self, joints: Mapping[str, JointParams], gentle_deg_s: float
+    ) -> dict[int, tuple[float, float]]:
+        """Count angles otherwise from now on."""
+        return self._body.retune(joints, gentle_deg_s)
+
+    def reach(self) -> tuple[JointLimit, ...]:
+        """Return the ranges and speeds that servos keep to as they were set up."""
+        return self._body.reach()
+
+    def start(self) -> JointAngles:
+        """Start the body behind; give the recorded goals."""
+        goals = self._body.start()
+        said = self._next(Engaged)
+        return said.goals_rad if said is not None else goals
+
+    def read(self, t_s: float) -> JointState:
+        """Return the recorded joints; a reading more than there were gives the newest again."""
+        joints = self._body.read(t_s)
+        said = self._next(Measured)
+        if said is not None:
+            self._newest = said.joints
+        return self._newest if self._newest is not None else joints
+
+    def write(self, command_rad: JointAngles) -> None:
+        """Send one goal to every servo."""
+        self._body.write(command_rad)
+
+    def angles(self, steps: Sequence[float]) -> JointAngles:
+        """Return the joint angles of servo positions."""
+        return self._body.angles(steps)
+
+    def let_go(self) -> None:
+        """Torque off at once."""
+        self._body.let_go()
+
+    def take_hold(self) -> JointAngles:
+        """Torque on again; give the recorded goals.
+
+        Raises:
+            SetupError: it was refused then.
+        """
+        refused = next((one for one in self._said if isinstance(one, Refused)), None)
+        if refused is not None:
+            self._said.remove(refused)
+            raise SetupError(refused.why)
+        goals = self._body.take_hold()
+        said = self._next(Engaged)
+        return said.goals_rad if said is not None else goals
+
+    def stop(self) -> None:
+        """Torque off and close the bus."""
+        self._body.stop()
+
+    def _next(self, kind: type[H]) -> H | None:
+        """Return the next thing of a kind; what comes before it was not asked for."""
+        if not any(isinstance(one, kind) for one in self._said):
+            return None
+        while True:
+            one = self._said.popleft()
+            if isinstance(one, kind):
+                return one
+
+
+class PlayedPerception(Perception):
+    """Sees what was seen, placed in the world as it was then.
+
+    percept: in force from now on
+    """
+
+    def __init__(self, mount: CameraMount, horizontal_field_deg: float) -> None:
+        super().__init__(mount, horizontal_field_deg, Tracker(TrackParams()))
+        self.percept: Percept | None = None
+
+    def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:
+        """Return the recorded percept."""
+        return self.percept
+
+
+class NoCamera:
+    """A camera that sees nothing: what was seen is known."""
+
+    def open(self) -> None:
+        """Start looking."""
+
+    def latest(self, now_s: float) -> Detections | None:
+        """Return nothing."""
+        return None
+
+    def events(self) -> tuple[str, ...]:
+        """Say nothing."""
+        return ()
+
+    def close(self) -> None:
+        """Stop looking."""

@@ -1,0 +1,285 @@
+"""One recorded tick with what else entered it, as plain tuples and as JSON, and back.
+
+The control loop hands plain tuples over, which costs least; the recording holds JSON
+with every field under its own name. Floats come back bit for bit: JSON's shortest
+writing of a float is exact, and what JSON cannot write is written in words.
+"""
+
+from collections.abc import Mapping
+from math import isfinite
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Limited, Percept, Pull, Target
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import as_json as order_as_json
+from gazerig.robot.model.commands import from_recording as order_from_json
+from gazerig.robot.model.types import JOINTS, JointAngles, JointState, Verdict
+
+Json = dict[str, Any]
+Flat = tuple[Any, ...]
+
+
+class Engaged(NamedTuple):
+    """The torque came on, with the present angles as goals."""
+
+    goals_rad: JointAngles
+
+
+class Measured(NamedTuple):
+    """The joints were read, at ``t_s``, beside the reading that every tick begins with."""
+
+    t_s: float
+    joints: JointState
+
+
+class Refused(NamedTuple):
+    """The torque could not be put on; why, in words."""
+
+    why: str
+
+
+Heard = Engaged | Measured | Refused
+"""What the machine said between two ticks."""
+
+
+class Moment(NamedTuple):
+    """A tick, and what entered it beside its own fields.
+
+    dt_s: time since the tick before, or since the loop began
+    before: what the machine said since the tick before, other than the tick's own joints
+    """
+
+    tick: Tick
+    dt_s: float
+    before: tuple[Heard, ...] = ()
+
+
+_ONCE_ALL = tuple([name for name in JOINTS if not name.startswith("eyes_") and "lower" not in name])
+"""The joints of a recording that does not name them: every rig had these."""
+
+_HEARD: dict[str, type[Heard]] = {"engaged": Engaged, "measured": Measured, "refused": Refused}
+_HEARD_NAMES = {kind: name for name, kind in _HEARD.items()}
+_WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
+_ODD = "has_words_for_numbers"
+# A frozen dataclass with slots is pickled field by field; all fields at once cost a third.
+_body_values = attrgetter(*Bodies.__slots__)
+_face_values = attrgetter(*Face.__slots__)
+_SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3)}
+
+
+def flat(tick: Tick, percept_number: int | None, dt_s: float, before: tuple[Heard, ...]) -> Flat:
+    """Return a tick as plain tuples: pickled, they cost a third of the named ones.
+
+    percept_number: which of the percepts handed over the tick went by
+    """
+    target = tick.target
+    pulls = [tuple(pull) for pull in target.pulls]
+    verdict = tick.verdict
+    return (
+        tick.t_s,
+        dt_s,
+        percept_number,
+        tuple(tick.joints),
+        tuple(tick.pose),
+        (*target[:-1], pulls),
+        tuple(tick.gaze),
+        tick.wish_rad,
+        # Nearly always the very same value: written once.
+        (*verdict[:3], None if verdict.wish_rad == tick.wish_rad else verdict[3], *verdict[4:]),
+        tick.events,
+        [order_as_json(order) for order in tick.orders],
+        tick.stopped,
+        tick.led,
+        [(_HEARD_NAMES[type(one)], _plain(one)) for one in before],
+    )
+
+
+def as_json(values: Flat) -> Json:
+    """Name the fields of what ``flat`` gave."""
+    finite = _finite(values)
+    if not finite:
+        values = _worded(values)
+    (t_s, dt_s, percept, joints, pose, target, gaze, wish, verdict, events, orders, stopped,
+     led, before) = values  # fmt: skip
+    data: Json = {
+        "t_s": t_s,
+        "dt_s": dt_s,
+        "joints": _named(JointState, joints),
+        "pose": _named(GazeState, pose),
+        "percept": percept,
+        "target": {
+            **_named(Target, target),
+            "pulls": [_named(Pull, pull) for pull in target[-1]],
+        },
+        "gaze": {
+            **_named(GazeCommand, gaze),
+            "limited": [_named(Limited, one) for one in gaze[-1]],
+        },
+        "wish_rad": wish,
+        "verdict": _named(Verdict, verdict),
+        "events": events,
+        "orders": orders,
+        "stopped": stopped,
+        "led": led,
+    }
+    if before:
+        data["before"] = [{"what": what, **_named(_HEARD[what], one)} for what, one in before]
+    if not finite:
+        data[_ODD] = True
+    return data
+
+
+def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
+    """Return the moment that ``as_json`` named.
+
+    percepts: those read so far, by number
+
+    Raises:
+        KeyError, TypeError, ValueError: the data is none.
+    """
+    if data.get(_ODD):
+        data = _unworded(data)
+    number = data["percept"]
+    wish = tuple(data["wish_rad"])
+    verdict = data["verdict"]
+    if verdict["wish_rad"] is None:
+        verdict["wish_rad"] = wish
+    verdict.setdefault("joints", _ONCE_ALL)
+    target = data["target"]
+    target["pulls"] = tuple([Pull(**pull) for pull in target["pulls"]])
+    tick = Tick(
+        data["t_s"],
+        _made(JointState, data["joints"]),
+        _made(GazeState, data["pose"]),
+        None,
+        percepts[number] if number is not None else None,
+        _made(Target, target),
+        _made(GazeCommand, {**data["gaze"], "limited": _limited(data["gaze"])}),
+        wish,
+        _made(Verdict, verdict),
+        tuple(data["events"]),
+        tuple([order_from_json(order) for order in data["orders"]]),
+        data["stopped"],
+        data.get("led", ""),
+    )
+    before = tuple([_heard(one) for one in data.get("before", ())])
+    return Moment(tick, data["dt_s"], before)
+
+
+def flat_percept(number: int, percept: Percept) -> Flat:
+    """Return a percept as plain tuples and arrays, under the number that ticks refer to."""
+    faces = [_face_values(face) for face in percept.faces]
+    return (number, percept.captured_s, _body_values(percept.bodies), faces)
+
+
+def percept_as_json(values: Flat) -> Json:
+    """Name the fields of what ``flat_percept`` gave."""
+    number, captured_s, bodies, faces = values
+    data = {
+        "captured_s": captured_s,
+        "bodies": dict(zip(Bodies.__slots__, map(_listed, bodies), strict=True)),
+        "faces": [dict(zip(Face.__slots__, face, strict=True)) for face in faces],
+    }
+    if _finite(data):
+        return {"number": number, **data}
+    return {"number": number, **_worded(data), _ODD: True}
+
+
+def percept_from_json(data: Json) -> tuple[int, Percept]:
+    """Return the number and the percept.
+
+    Raises:
+        KeyError, TypeError, ValueError: the data is none.
+    """
+    if data.get(_ODD):
+        data = _unworded(data)
+    found = data["bodies"]
+    arrays = {name: np.array(found[name], float).reshape(to) for name, to in _SHAPES.items()}
+    cov = found["pv_cov"]
+    bodies = Bodies(
+        tuple(found["ids"]),
+        tuple(found["kinds"]),
+        **arrays,
+        radius_m=np.array(found["radius_m"], float),
+        pv_cov=None if cov is None else np.array(cov, float).reshape(-1, 6, 6),
+    )
+    faces = tuple([Face(**{k: _tupled(v) for k, v in face.items()}) for face in data["faces"]])
+    return data["number"], Percept(data["captured_s"], bodies, faces)
+
+
+def _heard(data: Json) -> Heard:
+    """Read one thing that the machine said."""
+    kind = _HEARD[data["what"]]
+    fields = {name: data[name] for name in kind._fields}
+    if kind is Measured:
+        return Measured(fields["t_s"], _made(JointState, fields["joints"]))
+    made: Heard = _made(kind, fields)
+    return made
+
+
+def _plain(one: Heard) -> Flat:
+    """Return one thing that the machine said as plain values."""
+    if isinstance(one, Measured):
+        return (one.t_s, _named(JointState, tuple(one.joints)))
+    return tuple(one)
+
+
+def _named(kind: Any, values: Flat) -> Json:
+    """Put a named tuple's values under their names."""
+    return dict(zip(kind._fields, values, strict=True))
+
+
+def _made(kind: Any, data: Json) -> Any:
+    """Make a named tuple of JSON; a field that this version does not know is left out."""
+    known = kind._fields
+    return kind(**{k: _tupled(v) if type(v) is list else v for k, v in data.items() if k in known})
+
+
+def _limited(gaze: Json) -> list[Limited]:
+    """Read what kept the eyes from their point; recordings of before do not tell."""
+    return [Limited(**one) for one in gaze.get("limited", ())]
+
+
+def _tupled(value: Any) -> Any:
+    """Make tuples of JSON's lists."""
+    if type(value) is not list:
+        return value
+    if value and type(value[0]) is list:
+        return tuple([_tupled(item) for item in value])
+    return tuple(value)
+
+
+def _listed(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _finite(value: Any) -> bool:
+    """Return whether JSON can write all numbers in it."""
+    if isinstance(value, float):
+        return isfinite(value)
+    if isinstance(value, tuple | list):
+        return all([_finite(item) for item in value])
+    return all([_finite(item) for item in value.values()]) if isinstance(value, dict) else True
+
+
+def _worded(value: Any) -> Any:
+    """Write what JSON cannot as {"float": "nan"}, "inf" or "-inf"."""
+    if isinstance(value, float) and not isfinite(value):
+        return {"float": repr(float(value))}
+    if isinstance(value, tuple | list):
+        return [_worded(item) for item in value]
+    return {k: _worded(v) for k, v in value.items()} if isinstance(value, dict) else value
+
+
+def _unworded(value: Any) -> Any:
+    """Undo ``_worded``."""
+    if isinstance(value, list):
+        return [_unworded(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if value.keys() == {"float"}:
+        return _WORDS[value["float"]]
+    return {k: _unworded(v) for k, v in value.items()}

@@ -1,0 +1,417 @@
+"""Steer and tune a rig that runs in another program of the same user.
+
+from gazerig.robot.remote.client import RunningRig
+
+with RunningRig.connect() as rig:
+    rig.set("gaze.lids.blinks_per_min", 12.0)
+    print(rig.look_at(1.0, 0.3, 0.0).words())
+    print(rig.status()["target"])
+    rig.save("/home/me/my.yaml")
+"""
+
+import os
+import threading
+from collections.abc import Callable, Mapping
+from functools import partial
+from math import radians
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, cast
+
+from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.robot.model.commands import (
+    Ask,
+    Jog,
+    LookAt,
+    Order,
+    Resume,
+    Stop,
+    Value,
+    as_json,
+    check,
+)
+from gazerig.robot.model.reply import Reply
+from gazerig.robot.remote.heartbeat import Heartbeat
+from gazerig.robot.remote.socket_io import (
+    ANSWER_BYTES,
+    Garbled,
+    Wire,
+    dial,
+    folder,
+    is_private,
+    sockets,
+)
+
+_CONNECT_S = 1.0
+_ANSWER_S = 10.0
+_FILES_S = 40.0
+"""For what reads or writes files, which the rig leaves to another process."""
+_WITH_FILES = {"save", "character"}
+
+JsonValue = float | int | bool | str | None | list["JsonValue"] | dict[str, "JsonValue"]
+"""A value as it comes over the wire: lists where the rig has tuples."""
+
+
+class NoRig(SetupError):
+    """No rig runs, or not the one that is meant; the message says which do."""
+
+
+class Refused(SetupError):
+    """The rig runs on as before; the message lists every rule that was broken."""
+
+
+class RigGone(DriverError):
+    """The rig ended or does not answer; the message says which."""
+
+
+class KnobInfo(NamedTuple):
+    """One parameter of the rig, its rule and its default.
+
+    unit: "" for a bare number; says: what it is; low, high: None where there is no bound
+    choices: empty where any value of its kind may stand
+    kind: number, whole, bool, text, choice, list or mapping
+    live: when a change takes effect, "next tick", or "next start" with the reason
+    optional: null may stand here; length: of a list, None where it is free; items: their kind
+    """
+
+    key: str
+    group: str
+    unit: str
+    says: str
+    low: float | None
+    high: float | None
+    choices: tuple[Any, ...]
+    kind: str
+    default: JsonValue
+    live: str
+    optional: bool = False
+    length: int | None = None
+    items: str | None = None
+
+
+class Difference(NamedTuple):
+    """One value that differs: from the file (``unsaved``) or from the default (``differs``)."""
+
+    key: str
+    old: JsonValue
+    new: JsonValue
+
+
+class SavedFile(NamedTuple):
+    """What was written; ``backup`` is None where nothing differed or the file is new."""
+
+    path: Path
+    backup: Path | None
+    changes: tuple[Difference, ...]
+
+
+class RunningRig:
+    """A connection to one running rig; answers come when the rig has done what was asked."""
+
+    def __init__(
+        self, wire: Wire, pid: int, who: str = "", dial: Callable[[], Wire] | None = None
+    ) -> None:
+        """Take a connection; ``connect`` makes one.
+
+        who: what people are told of who asks; dial: makes another connection to the same rig
+        """
+        self._wire = wire
+        self._lock = threading.Lock()
+        self._who = who
+        self._dial = dial
+        self._heartbeat: Heartbeat | None = None
+        self.pid = pid
+
+    @classmethod
+    def connect(cls, pid: int | None = None, who: str = "") -> "RunningRig":
+        """Find the one rig that runs, or the one of this process.
+
+        who: what people are told of who asks, e.g. "my show"; the process is added
+
+        Raises:
+            NoRig: none runs, or several and ``pid`` does not say which.
+        """
+        found = running(pid, who)
+        for other in found[1:]:
+            other.close()
+        if len(found) == 1:
+            return found[0]
+        if not found:
+            there = _names(running()) if pid is not None else ""
+            which = f"no rig runs as process {pid}" if pid is not None else "no rig is running"
+            raise NoRig(f"{which}: {there or 'start one with gazerig run ...'}")
+        names = _names(running())
+        raise NoRig(f"{len(found)} rigs are running: {names}; say which with --pid (pid=...)")
+
+    def __enter__(self) -> "RunningRig":
+        """Return the connection itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Hang up."""
+        self.close()
+
+    def close(self) -> None:
+        """Hang up; the rig runs on, and leads that were not to stay end."""
+        self._end_heartbeat()
+        self._wire.close()
+
+    def status(self) -> dict[str, Any]:
+        """Return what the rig does: its name, target and why, guard level, joints, what it said."""
+        return cast(dict[str, Any], self._asked("status"))
+
+    def get(self, prefix: str = "") -> dict[str, JsonValue]:
+        """Return the values in force of all keys that begin with ``prefix``."""
+        return cast(dict[str, JsonValue], self._asked("get", prefix=prefix))
+
+    def knobs(self, prefix: str = "") -> tuple[KnobInfo, ...]:
+        """Return the rules and defaults of all keys that begin with ``prefix``."""
+        found = cast(list[dict[str, Any]], self._asked("knobs", prefix=prefix))
+        return tuple(_knob(one) for one in found)
+
+    def knob(self, key: str) -> KnobInfo:
+        """Return one parameter's rule and default.
+
+        Raises:
+            Refused: there is no such key.
+        """
+        for knob in self.knobs(key):
+            if knob.key == key:
+                return knob
+        raise Refused(f"{key}: unknown key; gazerig get lists all")
+
+    def set(self, key: str, value: Value) -> tuple[str, ...]:
+        """Put a value in force; when this returns, the loop has it. Gives what to know of it.
+
+        Raises:
+            Refused: the value breaks a rule; all is as before.
+        """
+        return self.set_many({key: value})
+
+    def set_many(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
+        """Put several values in force in the same tick, or none of them.
+
+        Raises:
+            Refused: with every rule that is broken.
+        """
+        return self._notes(self._asked("set", changes=dict(changes)))
+
+    def unsaved(self) -> tuple[Difference, ...]:
+        """Return what is in force and not in the rig's file."""
+        return _differences(self._asked("unsaved"))
+
+    def differs(self) -> tuple[Difference, ...]:
+        """Return what differs from the defaults."""
+        return _differences(self._asked("differs"))
+
+    def save(self, path: Path | str | None = None) -> SavedFile:
+        """Write what is in force into the rig's own file, or another of this computer.
+
+        Raises:
+            Refused: the file cannot be written, or comes with the program.
+        """
+        whole = None if path is None else str(Path(path).expanduser().absolute())
+        said = cast(dict[str, Any], self._asked("save", path=whole))
+        backup = None if said["backup"] is None else Path(said["backup"])
+        return SavedFile(Path(said["path"]), backup, _differences(said["changes"]))
+
+    def revert(self) -> tuple[str, ...]:
+        """Put in force what the rig's file says."""
+        return self._notes(self._asked("revert"))
+
+    def characters(self) -> tuple[str, ...]:
+        """Return the characters that can be laid over the rig."""
+        return tuple(cast(list[str], self._asked("characters")))
+
+    def character(self, name: str) -> tuple[str, ...]:
+        """Lay another character over the rig.
+
+        Raises:
+            Refused: there is none of that name.
+        """
+        return self._notes(self._asked("character", name=name))
+
+    def menus(self) -> dict[str, tuple[str, ...]]:
+        """Return what ``ask`` takes: menu -> choices, the present one first."""
+        said = cast(dict[str, list[str]], self._asked("menus"))
+        return {menu: tuple(choices) for menu, choices in said.items()}
+
+    def ask(self, menu: str, choice: str) -> None:
+        """Choose a behaviour, a mode of conversation, or what the lids do.
+
+        Raises:
+            Refused: there is no such menu or choice.
+        """
+        self._order(Ask(menu, choice))
+
+    def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> Reply:
+        """Look at a point: metres, x ahead, y left, z up of the neck base.
+
+        stay: until somebody lets go; else for as long as this connection is open, this
+            program alive, and nobody else leads
+
+        Returns:
+            How far beside the point the gaze will rest, and the joints at their ends.
+
+        Raises:
+            Refused: it is no point, or the rig is stopped.
+        """
+        return self._lead(LookAt((x_m, y_m, z_m), self._who, stay), stay)
+
+    def look_freely(self) -> None:
+        """Let the head choose again what to look at."""
+        self._end_heartbeat()
+        self._order(LookAt(None, self._who))
+
+    def jog(self, joint: str, deg: float, stay: bool = False) -> Reply:
+        """Hold all joints and put one at an angle.
+
+        stay: as in ``look_at``
+
+        Raises:
+            Refused: there is no such joint, the angle is outside its range, or the rig is
+                stopped.
+        """
+        return self._lead(Jog(((joint, radians(deg)),), self._who, stay), stay)
+
+    def jog_free(self) -> None:
+        """Let the models lead the joints again."""
+        self._order(Jog((), self._who))
+
+    @property
+    def leads(self) -> bool:
+        """True while this connection renews a lead that the rig still obeys."""
+        return self._heartbeat is not None and self._heartbeat.leads
+
+    def _lead(self, order: LookAt | Jog, stay: bool) -> Reply:
+        reply = self._order(order)
+        if stay or self._dial is None:
+            self._end_heartbeat()
+        elif not self.leads:
+            self._end_heartbeat()
+            try:
+                self._heartbeat = Heartbeat(self._dial, self._who)
+            except OSError:
+                raise RigGone(f"the rig (process {self.pid}) has ended or hung up") from None
+        return reply
+
+    def _end_heartbeat(self) -> None:
+        heartbeat, self._heartbeat = self._heartbeat, None
+        if heartbeat is not None:
+            heartbeat.end()
+
+    def stop(self, why: str = "asked for from another program") -> None:
+        """Take the torque off at once; when this returns, the loop has done it.
+
+        Raises:
+            RigGone, Refused: nobody knows whether it stopped: press the emergency stop.
+        """
+        self._order(Stop(why, self._who))
+
+    def resume(self, confirmed: bool = False) -> None:
+        """Put the torque on again where the joints are, and go on slowly.
+
+        confirmed: a person has said that no hand is in the mechanism; it is needed where
+            somebody else has stopped it
+
+        Raises:
+            Refused: a servo does not take it, or a rule of stops forbids it; the torque
+                stays off.
+        """
+        self._order(Resume(self._who, confirmed))
+
+    def _order(self, order: Order) -> Reply:
+        try:
+            check(order)
+        except ValueError as error:
+            raise Refused(str(error)) from None
+        said = self._asked("order", order=as_json(order))
+        match said:
+            case {"reply": dict(reply)}:
+                return Reply.from_json(reply)
+        return Reply()
+
+    def _notes(self, said: object) -> tuple[str, ...]:
+        return tuple(cast(dict[str, list[str]], said)["notes"])
+
+    def _asked(self, do: str, **words: object) -> object:
+        """Send a request and give what came of it."""
+        with self._lock:
+            answer = self._answer({"do": do, **words}, _FILES_S if do in _WITH_FILES else _ANSWER_S)
+        match answer:
+            case {"ok": said}:
+                return said
+            case {"refused": str(rules)}:
+                raise Refused(rules)
+            case {"failed": str(what)}:
+                raise RigGone(f"the rig (process {self.pid}) met an error of its own: {what}")
+        raise RigGone(f"process {self.pid} gave no answer of a rig: {answer!r:.80}")
+
+    def _answer(self, request: dict[str, object], within_s: float) -> object:
+        try:
+            self._wire.write(request, _CONNECT_S)
+        except (TypeError, ValueError) as error:
+            raise Refused(f"only finite numbers, text, lists and mappings go: {error}") from None
+        except OSError:
+            raise RigGone(f"the rig (process {self.pid}) has ended or hung up") from None
+        try:
+            return self._wire.read(within_s, within_s)
+        except TimeoutError:
+            self.close()  # an answer that comes late would be taken for that of the next request
+            raise RigGone(f"the rig (process {self.pid}) does not answer") from None
+        except (EOFError, OSError):
+            raise RigGone(f"the rig (process {self.pid}) has ended or hung up") from None
+        except Garbled as error:
+            self.close()
+            raise RigGone(f"process {self.pid} gave no answer of a rig: {error}") from None
+
+
+def running(pid: int | None = None, who: str = "") -> list[RunningRig]:
+    """Connect to every rig of this user that runs, or to that of one process.
+
+    who: as in RunningRig.connect
+    """
+    uid = os.getuid()
+    place = folder(os.environ, uid)
+    if not is_private(place, uid):  # whoever put a socket there is not known
+        return []
+    found: list[RunningRig] = []
+    for number, path in sockets(place).items():
+        if pid is None or number == pid:
+            try:
+                found.append(RunningRig(_wire(path), number, who, partial(_wire, path)))
+            except OSError:  # killed: the next rig that starts removes it
+                continue
+    return found
+
+
+def _wire(path: Path) -> Wire:
+    """Connect to a rig's socket; raises OSError where nobody answers."""
+    return Wire(dial(path, _CONNECT_S), ANSWER_BYTES)
+
+
+def _names(rigs: list[RunningRig]) -> str:
+    """Name rigs by process and file, and hang up."""
+    names = []
+    for rig in rigs:
+        with rig:
+            try:
+                names.append(f"{rig.pid} ({rig.status()['rig']})")
+            except DriverError as error:
+                names.append(f"{rig.pid} ({error})")
+    return ", ".join(names)
+
+
+def _knob(said: Mapping[str, Any]) -> KnobInfo:
+    named = {name: said[name] for name in KnobInfo._fields if name in said}
+    return KnobInfo(**{**named, "choices": tuple(named["choices"])})
+
+
+def _differences(said: object) -> tuple[Difference, ...]:
+    rows = cast(list[dict[str, Any]], said)
+    return tuple(Difference(row["key"], row["old"], row["new"]) for row in rows)

@@ -1,0 +1,97 @@
+"""What reaches a running rig beside the page: other programs, and its files edited by hand."""
+
+import contextlib
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Protocol
+
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.control.loop import Tick
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.remote.file_watch import FileWatch
+from gazerig.robot.remote.request_handler import Orderable, Pulse, Requests, Tuning
+from gazerig.robot.remote.socket_server import RemoteServer
+
+
+class FileTuning(Tuning, Protocol):
+    """The parameters of a running rig, and the files they come from."""
+
+    def files(self) -> Iterable[Path]:
+        """Return the files in use: the rig's, and those laid over it."""
+        ...
+
+    def reload(self, path: Path) -> object:
+        """Put in force what a file says now; raises with every fault, and all is as it was."""
+        ...
+
+
+class LiveControl:
+    """The remote control and the file watch of one running rig."""
+
+    def __init__(
+        self,
+        robot: Orderable,
+        tuning: FileTuning,
+        refusals: tuple[type[Exception], ...],
+        clock: Clock,
+        about: Mapping[str, object],
+        say: Callable[[str], None],
+    ) -> None:
+        """Take the rig.
+
+        refusals: what ``tuning`` raises where a value breaks a rule
+        clock: that of the loop; about: what does not change, as {"rig": name, "pid": process}
+        say: writes a line on the terminal
+        """
+        self._tuning = tuning
+        self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
+        self._say = say
+        self._pulse = Pulse(clock)
+        self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
+        self._watch = FileWatch(self._files, self._read_again)
+        requests = Requests(robot, tuning, self._pulse, about, refusals, self._watch.saved)
+        self._server = RemoteServer(requests, say)
+
+    def open(self) -> None:
+        """Listen to other programs and watch the files; says where that cannot be."""
+        try:
+            self._server.open()
+        except SetupError as error:  # the head runs without
+            self._say(f"gazerig set and stop will not find this rig: {error}")
+        self._watch.start()
+
+    def note(self, tick: Tick) -> None:
+        """Leave the newest tick; called by the loop."""
+        self._pulse.note(tick)
+
+    def saved(self, path: Path) -> None:
+        """Take note that this program itself has written a file."""
+        self._watch.saved(path)
+
+    def close(self) -> None:
+        """Hang up on all programs and look at no file any more."""
+        self._watch.stop()
+        self._server.close()
+
+    def _files(self) -> tuple[Path, ...]:
+        """Return the files in use, those from before where a new one cannot be found."""
+        version, files = self._in_use
+        now = self._tuning.version
+        if now != version:
+            with contextlib.suppress(*self._refusals):
+                files = tuple(self._tuning.files())
+            self._in_use = now, files
+        return files
+
+    def _read_again(self, path: Path) -> None:
+        """Put a file that was edited in force, or say all that is wrong with it."""
+        try:
+            notes = self._tuning.reload(path)
+        except self._refusals as error:
+            self._say(f"{path} changed and is refused; the values from before stay:\n{error}")
+            return
+        words = [str(note) for note in notes] if isinstance(notes, tuple | list) else []
+        if words:
+            self._say("\n".join([f"{path} was edited: read again, in force", *words]))
+        else:
+            self._say(f"{path} was written again: all it says is in force already")

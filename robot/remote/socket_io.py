@@ -1,0 +1,225 @@
+"""The socket of a running rig: where it is, and JSON lines through it, one each way.
+
+A Unix socket in a folder of the user's own: who may open files of the user may steer the
+head, nobody else; nothing of it is seen from another machine.
+"""
+
+import contextlib
+import json
+import os
+import socket
+import stat
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.model.clock import RealClock
+
+REQUEST_BYTES = 1 << 16
+"""Longest request. Reading one holds the interpreter: 64 KiB take less than a millisecond."""
+ANSWER_BYTES = 1 << 23
+"""Longest answer a client takes."""
+_PATH_BYTES = 107
+"""Longest path of a Unix socket on Linux (unix(7), sun_path), without its ending zero."""
+_CHUNK_BYTES = 1 << 16
+
+
+class Garbled(ValueError):
+    """What came is no JSON line; the message says why.
+
+    over: the end of the line is not known, so that nothing after it can be read
+    """
+
+    def __init__(self, message: str, over: bool) -> None:
+        super().__init__(message)
+        self.over = over
+
+
+def folder(environ: Mapping[str, str], uid: int) -> Path:
+    """Return the folder of a user's sockets; it need not be there."""
+    for runtime in (environ.get("XDG_RUNTIME_DIR"), f"/run/user/{uid}"):
+        # unset, or left over from another user by sudo or su
+        if runtime and os.path.isdir(runtime) and os.stat(runtime).st_uid == uid:
+            return Path(runtime) / "gazerig"
+    return Path(f"/tmp/gazerig-{uid}")
+
+
+def make_private(path: Path, uid: int) -> None:
+    """Make a folder that only its owner can enter, or see that it is one.
+
+    Raises:
+        SetupError: somebody else could put a socket there, or it cannot be made.
+    """
+    try:
+        with contextlib.suppress(FileExistsError):
+            path.mkdir(mode=0o700)
+        private = is_private(path, uid)
+    except OSError as error:
+        raise SetupError(f"{path}: cannot be made ({error.strerror}); no remote control") from None
+    if not private:
+        raise SetupError(
+            f"{path}: not a folder of yours alone; remove it, or chmod 700 it if it is yours"
+        )
+
+
+def is_private(path: Path, uid: int) -> bool:
+    """Return whether a path is a folder, no link, of this user and shut to all others."""
+    try:
+        found = path.lstat()
+    except FileNotFoundError:
+        return False
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == uid and not found.st_mode & 0o077
+
+
+def sockets(path: Path) -> dict[int, Path]:
+    """Return the sockets in a folder by the process that made them, dead ones among them."""
+    found = path.glob("*.sock") if path.is_dir() else ()
+    return {int(p.stem): p for p in sorted(found) if p.stem.isdecimal()}
+
+
+def dial(path: Path, within_s: float) -> socket.socket:
+    """Connect to a rig's socket.
+
+    Raises:
+        OSError: nobody answers there; ConnectionRefusedError where the process is dead.
+    """
+    caller = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        caller.settimeout(within_s)
+        caller.connect(str(path))
+    except BaseException:
+        caller.close()
+        raise
+    return caller
+
+
+def listen(path: Path) -> socket.socket:
+    """Put a listening socket at a path, for its owner alone; what was there is replaced.
+
+    Raises:
+        SetupError: the path is too long, or the disk refuses.
+    """
+    if len(os.fsencode(path)) > _PATH_BYTES - len(".new"):
+        raise SetupError(f"{path}: too long for a socket; set XDG_RUNTIME_DIR to a shorter path")
+    # Its name only once it listens: a socket that refuses is taken for a dead rig's.
+    early = path.with_name(f"{path.name}.new")
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        early.unlink(missing_ok=True)
+        listener.bind(str(early))
+        early.chmod(0o600)
+        listener.listen(128)
+        early.rename(path)
+    except OSError as error:
+        listener.close()
+        raise SetupError(f"{path}: no socket there ({error.strerror}); no remote control") from None
+    return listener
+
+
+class Peer(NamedTuple):
+    """Who is at the other end of a Unix socket, as the kernel knows it."""
+
+    pid: int
+    uid: int
+
+
+def peer(end: socket.socket) -> Peer:
+    """Return who connected.
+
+    Raises:
+        OSError: the connection is gone.
+    """
+    data = end.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    pid, uid, _ = struct.unpack("3i", data)
+    return Peer(pid, uid)
+
+
+def clear_dead(path: Path) -> tuple[int, ...]:
+    """Remove the sockets that killed rigs left behind; give their processes' numbers."""
+    dead: list[int] = []
+    for pid, place in sockets(path).items():
+        try:
+            dial(place, 0.2).close()
+        except ConnectionRefusedError:
+            place.unlink(missing_ok=True)
+            dead.append(pid)
+        except OSError:  # busy or gone: nobody's business here
+            continue
+    return tuple(dead)
+
+
+class Wire:
+    """One end of a connection."""
+
+    def __init__(self, end: socket.socket, longest: int) -> None:
+        self._end = end
+        self._longest = longest
+        self._clock = RealClock()
+        self._rest = b""
+
+    def write(self, value: object, within_s: float) -> None:
+        """Send one value.
+
+        Raises:
+            ValueError: it has no JSON, as infinity has none.
+            OSError: the other end is gone, or takes nothing for ``within_s``.
+        """
+        line = json.dumps(value, allow_nan=False, separators=(",", ":")).encode() + b"\n"
+        self._end.settimeout(within_s)
+        self._end.sendall(line)
+
+    def read(self, first_s: float | None, rest_s: float) -> object:
+        """Wait for one value: ``first_s`` for its beginning (None: for ever), then ``rest_s``.
+
+        Raises:
+            EOFError: the other end has closed.
+            TimeoutError: nothing came in ``first_s``.
+            Garbled: what came is no line of JSON.
+            OSError: the connection broke.
+        """
+        line = self._line(first_s, rest_s)
+        try:
+            return json.loads(line, parse_constant=_no_number)
+        except RecursionError:
+            raise Garbled("nested too deep", over=False) from None
+        except ValueError as error:
+            raise Garbled(f"not a line of JSON: {error}", over=False) from None
+
+    def close(self) -> None:
+        """Close this end; whoever waits at either end is told."""
+        with contextlib.suppress(OSError):
+            self._end.shutdown(socket.SHUT_RDWR)
+        self._end.close()
+
+    def _line(self, first_s: float | None, rest_s: float) -> bytes:
+        """Return one line without its end."""
+        held = self._rest or self._received(first_s)
+        due_s = self._clock.now_s() + rest_s
+        while b"\n" not in held:
+            if len(held) > self._longest:
+                raise Garbled(f"longer than {self._longest} bytes", over=True)
+            left_s = due_s - self._clock.now_s()
+            try:
+                if left_s <= 0.0:  # an end that never comes, byte by byte
+                    raise TimeoutError
+                held += self._received(left_s)
+            except TimeoutError:
+                raise Garbled(f"no end of the line within {rest_s:g} s", over=True) from None
+        line, _, self._rest = held.partition(b"\n")
+        if len(line) > self._longest:
+            raise Garbled(f"longer than {self._longest} bytes", over=True)
+        return line
+
+    def _received(self, within_s: float | None) -> bytes:
+        self._end.settimeout(within_s)
+        data = self._end.recv(_CHUNK_BYTES)
+        if not data:
+            raise EOFError
+        return data
+
+
+def _no_number(word: str) -> NoReturn:
+    """Refuse NaN and Infinity, which are no JSON."""
+    raise ValueError(f"{word} is no number of JSON")

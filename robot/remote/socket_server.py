@@ -1,0 +1,165 @@
+"""The running rig's side of its remote control: a thread for each program that steers it.
+
+None of them touches the control loop: they ask the tuning and leave orders, which the loop
+takes up at its next tick. A program that sends rubbish, stops in the middle or reads no
+answers costs a thread and nothing else.
+"""
+
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.remote import socket_io as remote_socket
+from gazerig.robot.remote.budget import ALL, EACH, Budget
+from gazerig.robot.remote.request_handler import Requests, is_stop
+from gazerig.robot.remote.socket_io import REQUEST_BYTES, Garbled, Wire
+
+_REST_S = 2.0
+"""A request that has begun must end within this."""
+_TAKES_S = 2.0
+"""An answer must be taken within this."""
+_LONGEST_WAIT_S = 0.25
+"""Who has used up their processor time waits so long for an answer at most."""
+_MOST = 16
+"""Programs at a time; for one more the one that was quiet longest is hung up on."""
+
+
+class RemoteServer:
+    """Listens while a rig runs."""
+
+    def __init__(self, requests: Requests, say: Callable[[str], None]) -> None:
+        self._requests = requests
+        self._say = say
+        self._clock = RealClock()
+        self._budget = Budget(ALL, self._clock.now_s())
+        self._path: Path | None = None
+        self._listener: socket.socket | None = None
+        self._lock = threading.Lock()
+        self._wires: dict[Wire, None] = {}  # the quietest first
+        self._threads: list[threading.Thread] = []
+
+    def open(self) -> Path:
+        """Begin to listen; sockets of rigs that were killed are removed. Gives the socket's path.
+
+        Raises:
+            SetupError: no socket can be had; the message says why.
+        """
+        uid = os.getuid()
+        folder = remote_socket.folder(os.environ, uid)
+        remote_socket.make_private(folder, uid)
+        remote_socket.clear_dead(folder)
+        self._path = folder / f"{os.getpid()}.sock"
+        self._listener = remote_socket.listen(self._path)
+        self._start(self._accept, self._listener)
+        return self._path
+
+    def close(self) -> None:
+        """Hang up on everybody and remove the socket."""
+        if self._listener is None or self._path is None:
+            return
+        self._path.unlink(missing_ok=True)
+        listener, self._listener = self._listener, None
+        listener.shutdown(socket.SHUT_RDWR)  # wakes who waits for callers
+        listener.close()
+        with self._lock:
+            for wire in self._wires:
+                wire.close()
+            threads = tuple(self._threads)
+        for thread in threads:
+            thread.join(timeout=2.0)
+
+    def _start(self, work: Callable[..., None], *words: object) -> None:
+        thread = threading.Thread(target=work, args=words, name="remote control", daemon=True)
+        with self._lock:
+            self._threads = [t for t in self._threads if t.is_alive()] + [thread]
+            thread.start()
+
+    def _accept(self, listener: socket.socket) -> None:
+        """Give every program that connects a thread."""
+        while self._listener is not None:
+            try:
+                end, _ = listener.accept()
+            except OSError:  # closed
+                return
+            try:
+                caller = remote_socket.peer(end)
+            except OSError:  # gone already
+                end.close()
+                continue
+            if caller.uid != os.getuid():  # the folder is shut to others; twice is safer
+                end.close()
+                continue
+            wire = Wire(end, REQUEST_BYTES)
+            with self._lock:
+                if self._listener is None:  # closed since: nobody would hang up on this one
+                    wire.close()
+                    return
+                if len(self._wires) >= _MOST:
+                    # Somebody who comes to stop the head must always be let in.
+                    quietest = next(iter(self._wires))
+                    del self._wires[quietest]
+                    quietest.close()
+                self._wires[wire] = None
+            self._start(self._serve, wire, f"process {caller.pid}")
+
+    def _serve(self, wire: Wire, peer: str) -> None:
+        """Answer one program until it hangs up or cannot be understood any more."""
+        own = Budget(EACH, self._clock.now_s())
+        try:
+            while self._served(wire, peer, own):
+                pass
+        finally:
+            with self._lock:
+                self._wires.pop(wire, None)
+            wire.close()
+
+    def _served(self, wire: Wire, peer: str, own: Budget) -> bool:
+        """Answer one request; tell whether another can follow."""
+        try:
+            request = wire.read(None, _REST_S)
+        except Garbled as error:
+            return self._answer(wire, {"refused": str(error)}) and not error.over
+        except (EOFError, OSError):
+            return False
+        with self._lock:
+            if wire in self._wires:
+                self._wires[wire] = self._wires.pop(wire)
+        if not is_stop(request) and (words := self._delayed(own)):
+            return self._answer(wire, {"refused": words})
+        began_s = time.thread_time()
+        try:
+            answer = self._requests.answer(request, peer)
+        except Exception as error:
+            # One request that meets an error of ours must not end the remote control: the
+            # stop goes the same way.
+            answer = {"failed": f"{type(error).__name__}: {error}"}
+            self._say(f"remote control: {request!r:.200} met an error: {answer['failed']}")
+        taken = self._answer(wire, answer)
+        used_s, now_s = time.thread_time() - began_s, self._clock.now_s()
+        own.spend(used_s, now_s)
+        self._budget.spend(used_s, now_s)
+        return taken
+
+    def _delayed(self, own: Budget) -> str:
+        """Let a program wait that takes too much time; return why it is refused all the same."""
+        now_s = self._clock.now_s()
+        wait_s = max(own.wait_s(now_s), self._budget.wait_s(now_s))
+        if wait_s > 0.0:
+            self._clock.sleep_until(now_s + min(wait_s, _LONGEST_WAIT_S))
+        left_s = wait_s - _LONGEST_WAIT_S
+        return f"too many requests: ask again in {left_s:.1f} s" if left_s > 0.0 else ""
+
+    def _answer(self, wire: Wire, answer: dict[str, object]) -> bool:
+        """Send an answer; tell whether it was taken."""
+        try:
+            try:
+                wire.write(answer, _TAKES_S)
+            except ValueError as error:
+                wire.write({"failed": f"the answer has no JSON: {error}"}, _TAKES_S)
+        except OSError:
+            return False
+        return True

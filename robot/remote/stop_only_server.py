@@ -1,0 +1,120 @@
+"""Where other programs stop a head that somebody leads by hand; nothing else is to be had.
+
+While a person calibrates, parameters stay as they are and nobody else leads the head. But
+``gazerig stop`` must reach whatever moves.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.control.loop import Tick
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.commands import Order, Resume, Stop, Value
+from gazerig.robot.model.reply import OrderTaker, Ticket
+from gazerig.robot.remote.request_handler import Change, Knob, Pulse, Requests, Saved
+from gazerig.robot.remote.socket_server import RemoteServer
+
+
+class StopDoor:
+    """The remote control of a head that can be stopped and resumed, and told nothing else.
+
+    Args:
+        order: takes orders for the next tick.
+        clock: that of the loop; about: what does not change, as {"rig": name, "pid": process}
+        say: writes a line on the terminal.
+    """
+
+    def __init__(
+        self,
+        order: OrderTaker,
+        clock: Clock,
+        about: Mapping[str, object],
+        say: Callable[[str], None],
+    ) -> None:
+        self._say = say
+        self._pulse = Pulse(clock)
+        requests = Requests(_OnlyStops(order), _Fixed(), self._pulse, about)
+        self._server = RemoteServer(requests, say)
+
+    def open(self) -> None:
+        """Listen to other programs; says where that cannot be."""
+        try:
+            self._server.open()
+        except SetupError as error:  # the head goes on without
+            self._say(f"gazerig stop will not find this rig: {error}")
+
+    def note(self, tick: Tick) -> None:
+        """Leave the newest tick; called by the loop."""
+        self._pulse.note(tick)
+
+    def close(self) -> None:
+        """Hang up on all programs."""
+        self._server.close()
+
+
+class _OnlyStops:
+    """A robot that takes stop and resume alone."""
+
+    def __init__(self, order: OrderTaker) -> None:
+        self._order = order
+
+    def order(self, order: Order) -> Ticket | None:
+        """Hand on a stop or the end of one.
+
+        Raises:
+            ValueError: it is anything else.
+        """
+        if not isinstance(order, Stop | Resume):
+            raise ValueError("it is being calibrated: besides stop and resume nothing goes")
+        return self._order(order)
+
+    def menus(self) -> dict[str, tuple[str, ...]]:
+        """Offer nothing."""
+        return {}
+
+
+class _Fixed:
+    """Parameters that nobody can see or change; implements ``request_handler.Tuning``."""
+
+    version = 0
+
+    def knobs(self) -> Iterable[Knob]:
+        """Return none."""
+        return ()
+
+    def get(self, prefix: str) -> Mapping[str, Value]:
+        """Return none."""
+        return {}
+
+    def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
+        """Refuse."""
+        raise _refused()
+
+    def unsaved(self) -> Iterable[Change]:
+        """Return none: nothing was changed."""
+        return ()
+
+    def differs(self) -> Iterable[Change]:
+        """Refuse: what is in force is not known here."""
+        raise _refused()
+
+    def save(self, path: Path | None = None) -> Saved:
+        """Refuse."""
+        raise _refused()
+
+    def revert(self) -> object:
+        """Refuse."""
+        raise _refused()
+
+    def characters(self) -> Sequence[str]:
+        """Return none."""
+        return ()
+
+    def character(self, name: str) -> object:
+        """Refuse."""
+        raise _refused()
+
+
+def _refused() -> ValueError:
+    return ValueError("it is being calibrated: its parameters stay as they are until that is over")

@@ -1,0 +1,267 @@
+"""What the eyes do, found tick by tick as an eye tracker finds it: saccades, fixations, blinks.
+
+All is as the servos say: the mean of both lines of sight in space, and the opening of the upper
+lids. Of servos that tell nothing it is reckoned from their goals. What was commanded stands
+beside it, so that what the servos make of a saccade can be told.
+"""
+
+from collections import Counter, deque
+from math import degrees
+from typing import NamedTuple, TypeVar
+
+from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
+from gazerig.gaze.types import PARTS, Face, Vec3
+from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.types import JOINTS
+from gazerig.robot.report.blink_finder import Blink as Blink
+from gazerig.robot.report.blink_finder import BlinkFinder
+from gazerig.robot.report.joint_basis import UPPER, openings
+from gazerig.robot.report.saccade_finder import Jump, SaccadeFinder
+
+NEAR_PART_M = 0.03
+"""A line of sight that passes a part within this distance is on it."""
+
+NEAR_FACE_M = 0.12
+"""One that passes the face's centre within this distance is on the face."""
+
+_LOOK_EVERY_S = 0.024
+"""How often the part is looked up while the eyes rest."""
+
+SHORTEST_S = 0.04
+"""Less between two saccades is no fixation."""
+
+_SETTLING_S = 0.02
+"""After a saccade, before the part is looked up."""
+
+_LONGEST_FORESEEN_S = 0.3
+_COMMAND_BEFORE_S, _COMMAND_AFTER_S = 0.12, 0.03
+_EYE_JOINTS = frozenset(name for name in JOINTS if "eye" in name)
+
+
+class Commanded(NamedTuple):
+    """A saccade as the models asked for it."""
+
+    onset_s: float
+    duration_s: float
+    amplitude_deg: float
+    peak_deg_s: float
+
+
+class Saccade(NamedTuple):
+    """One saccade of the gaze in space.
+
+    peak_at: share of the duration at which it was fastest, .5 is symmetric
+    commanded: what had been asked for, None where the eyes jumped by themselves
+    """
+
+    onset_s: float
+    duration_s: float
+    amplitude_deg: float
+    peak_deg_s: float
+    peak_at: float
+    commanded: Commanded | None
+
+    @property
+    def end_s(self) -> float:
+        """Return when it landed."""
+        return self.onset_s + self.duration_s
+
+
+class Fixation(NamedTuple):
+    """Rest of the gaze between two saccades, at one place or with something that moves.
+
+    part: the face part that the lines of sight passed nearest to, None off the parts
+    on_face: whether it was on a face at all; face: that face's id, -1 without one
+    kind, wanted: kind of the target in force, and its face part
+    """
+
+    start_s: float
+    duration_s: float
+    part: str | None
+    on_face: bool
+    face: int
+    kind: str
+    wanted: str | None
+
+    @property
+    def end_s(self) -> float:
+        """Return when the next saccade began."""
+        return self.start_s + self.duration_s
+
+
+Event = Saccade | Fixation | Blink
+T = TypeVar("T")
+
+
+class GazeEvents:
+    """Finds events in ticks as they come; an event is told when it is over."""
+
+    def __init__(self) -> None:
+        self._saccades = SaccadeFinder()
+        self._blinks = BlinkFinder()
+        self._commands: deque[Commanded] = deque(maxlen=4)
+        self._flight: _Flight | None = None
+        self._rest = _Rest(None)
+
+    @property
+    def in_saccade(self) -> bool:
+        """Return whether the measured gaze is jumping, as known some 10 ms late."""
+        return self._saccades.under_way
+
+    def note(self, tick: Tick) -> tuple[Event, ...]:
+        """Take a tick; give the events that are over now, in the order of their beginning."""
+        if tick.stopped or (
+            tick.joints.missing and not _EYE_JOINTS.isdisjoint(tick.joints.missing)
+        ):
+            self._lost(tick)
+            return ()
+        self._note_command(tick)
+        t_s = tick.t_s
+        way = cyclopean(tick)
+        jump = self._saccades.note(t_s, way)
+        names, pose = tick.verdict.joints, tick.pose
+        lids = openings(pose.lid_left, pose.lid_right, names, UPPER)
+        blink = self._blinks.note(t_s, *lids) if lids is not None else None
+        if jump is None:
+            if not self._saccades.under_way:
+                self._rest.note(tick, way)
+            return () if blink is None else (blink,)
+        return self._landed(jump, blink)
+
+    def _landed(self, jump: Jump, blink: Blink | None) -> tuple[Event, ...]:
+        """Return the fixation that a saccade has ended, and the saccade."""
+        events: list[Event] = [] if blink is None else [blink]
+        fixation = self._rest.over(jump.onset_s)
+        if fixation is not None:
+            events.append(fixation)
+        events.append(Saccade(*jump[:5], self._command_of(jump.onset_s)))
+        self._rest = _Rest(jump.onset_s + jump.duration_s)
+        return tuple(events)
+
+    def _lost(self, tick: Tick) -> None:
+        """Begin anew after the eyes were not measured, or not moved by the models."""
+        if tick.stopped:
+            self._blinks.clear()
+        self._saccades.clear()
+        self._flight = None
+        self._rest = _Rest(None)
+
+    def _note_command(self, tick: Tick) -> None:
+        """Follow the saccade that the models have under way."""
+        flying = tick.gaze.phase == "saccade"
+        if not flying and self._flight is None:
+            return
+        way = unit(sub(tick.gaze.gaze_point_world_m, tick.pose.p_world_head_m))
+        if self._flight is None:
+            self._flight = _Flight(tick.t_s, way)
+            return
+        self._flight.note(tick.t_s, way)
+        if not flying:
+            self._commands.append(self._flight.command)
+            self._flight = None
+
+    def _command_of(self, onset_s: float) -> Commanded | None:
+        """Find the command of a saccade that was measured a servo's lag later."""
+        known = list(self._commands)
+        if self._flight is not None:
+            known.append(self._flight.command)
+        for command in reversed(known):
+            if -_COMMAND_AFTER_S <= onset_s - command.onset_s <= _COMMAND_BEFORE_S:
+                if command in self._commands:
+                    self._commands.remove(command)  # an eye that swings back was not told to
+                return command
+        return None
+
+
+class _Flight:
+    """A commanded saccade, followed from its first tick."""
+
+    def __init__(self, t_s: float, way: Vec3) -> None:
+        self._start_s = self._last_s = t_s
+        self._start = self._last = way
+        self._peak_rad_s = 0.0
+
+    def note(self, t_s: float, way: Vec3) -> None:
+        """Take where the command points at ``t_s``."""
+        if t_s > self._last_s:
+            speed = angle_between(self._last, way) / (t_s - self._last_s)
+            self._peak_rad_s = max(self._peak_rad_s, speed)
+        self._last_s, self._last = t_s, way
+
+    @property
+    def command(self) -> Commanded:
+        """Return it as far as it is known."""
+        return Commanded(
+            self._start_s,
+            self._last_s - self._start_s,
+            degrees(angle_between(self._start, self._last)),
+            degrees(self._peak_rad_s),
+        )
+
+
+class _Rest:
+    """The time between two saccades, and what was looked at in it."""
+
+    def __init__(self, start_s: float | None) -> None:
+        self._start_s = start_s
+        self._next_s = -1.0
+        self._parts: Counter[str | None] = Counter()
+        self._faces: Counter[int] = Counter()
+        self._kinds: Counter[tuple[str, str | None]] = Counter()
+
+    def note(self, tick: Tick, way: Vec3) -> None:
+        """Look up now and then what the gaze is on."""
+        t_s = tick.t_s
+        if self._start_s is None:
+            self._start_s = t_s
+        if t_s < self._next_s or t_s < self._start_s + _SETTLING_S:
+            return
+        self._next_s = t_s + _LOOK_EVERY_S
+        part, face = part_looked_at(tick, way)
+        self._parts[part] += 1
+        self._faces[face] += 1
+        self._kinds[tick.target.kind, tick.target.part] += 1
+
+    def over(self, end_s: float) -> Fixation | None:
+        """Return the fixation, None where there was none worth the name."""
+        if self._start_s is None or end_s - self._start_s < SHORTEST_S:
+            return None
+        part = _most(self._parts, None)
+        face = _most(self._faces, -1)
+        kind, wanted = _most(self._kinds, ("", None))
+        length_s = end_s - self._start_s
+        return Fixation(self._start_s, length_s, part, face >= 0, face, kind, wanted)
+
+
+def part_looked_at(tick: Tick, way: Vec3) -> tuple[str | None, int]:
+    """Return the face part that the measured gaze passes, and the face's id, -1 off all faces.
+
+    way: unit vector of the gaze in the world
+    """
+    if tick.percept is None:
+        return None, -1
+    head = tick.pose.p_world_head_m
+    since_s = min(max(0.0, tick.t_s - tick.percept.captured_s), _LONGEST_FORESEEN_S)
+    for face in tick.percept.faces:
+        moved = scale(face.v_world_m_s, since_s)
+        if beside_m(way, sub(add(face.p_world_m, moved), head)) <= NEAR_FACE_M:
+            return _nearest_part(way, face, sub(moved, head)), face.id
+    return None, -1
+
+
+def beside_m(way: Vec3, rel_m: Vec3) -> float:
+    """Return how far a line of sight passes from a place; both from the eye."""
+    if dot(way, rel_m) <= 0.0:
+        return norm(rel_m)
+    return norm(cross(way, rel_m))
+
+
+def _nearest_part(way: Vec3, face: Face, shift_m: Vec3) -> str | None:
+    apart = [beside_m(way, add(p, shift_m)) for p in face.parts_world_m]
+    least = min(apart)
+    return PARTS[apart.index(least)] if least <= NEAR_PART_M else None
+
+
+def _most(counts: Counter[T], otherwise: T) -> T:
+    return counts.most_common(1)[0][0] if counts else otherwise

@@ -1,0 +1,73 @@
+"""What a walk over a face is expected to show: time on each part, visits with refixations."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gazerig.gaze.scanpath import ScanpathParams, Walk, normalised, without_refixations
+from gazerig.gaze.scanpath_dwell import dwell_law
+from gazerig.gaze.types import PARTS, Floats
+from gazerig.robot.report import human_norms as human
+
+_DRAWS = 3000
+
+
+class ModelWalk:
+    """A chain of steps with a dwell each (Nakamoto & Tsuruno 3.2); staying lengthens a visit."""
+
+    def __init__(
+        self,
+        steps: Floats,
+        dwell_mean_s: Sequence[float],
+        dwell_sd_s: Sequence[float],
+        law: str = "lognormal",
+        tempo: float = 1.0,
+        floor_s: float = 0.0,
+    ) -> None:
+        """Take (8, 8) probabilities in the order of PARTS, rows from, and the dwells' statistics.
+
+        tempo: dwells are divided by it; floor_s: and are never shorter
+        """
+        self._steps = steps
+        statistics = zip(dwell_mean_s, dwell_sd_s, strict=True)
+        self._laws = [dwell_law(law, mean, sd) for mean, sd in statistics]
+        self._tempo, self._floor_s = tempo, floor_s
+
+    def visits(self, part: int, count: int, rng: np.random.Generator) -> Floats:
+        """Draw lengths of visits to a part, in s."""
+        steps = rng.geometric(1.0 - self._steps[part, part], count)
+        return np.array([self._dwells(part, int(n), rng).sum() for n in steps])
+
+    def share(self, rng: np.random.Generator) -> Floats:
+        """Return the share of time on each part, (8,)."""
+        mean = [float(self._dwells(part, _DRAWS, rng).mean()) for part in range(len(self._laws))]
+        return human.time_share(self._steps, mean)
+
+    def _dwells(self, part: int, count: int, rng: np.random.Generator) -> Floats:
+        drawn = np.array([self._laws[part](rng) for _ in range(count)])
+        return np.maximum(drawn / self._tempo, self._floor_s)
+
+
+def published() -> ModelWalk:
+    """Return the walk of Nakamoto & Tsuruno, eq 1 and table 1."""
+    return ModelWalk(human.matrix(), human.DWELL_MEAN_S, human.DWELL_SD_S)
+
+
+def own(params: ScanpathParams, walk: Walk) -> ModelWalk | None:
+    """Return the walk that a rig's parameters ask for, None where it has another model."""
+    if params.model != "markov":
+        return None
+    merged = params.diagonal == "whole_visit"
+    steps = without_refixations(walk.matrix) if merged else normalised(walk.matrix)
+    order = [walk.order.index(_OTHER.get(p, p) if params.viewers_left else p) for p in PARTS]
+    return ModelWalk(
+        steps[np.ix_(order, order)],
+        [walk.dwell_mean_s[i] for i in order],
+        [walk.dwell_sd_s[i] for i in order],
+        params.dwell_law,
+        params.tempo,
+        params.shortest_dwell_ms / 1e3,
+    )
+
+
+_OTHER = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}

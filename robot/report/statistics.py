@@ -1,0 +1,106 @@
+"""A measure: rows, one an event, and what is made of them; and the verdict by a pass band."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.types import Floats
+from gazerig.robot.report.norm_bands import Band
+
+VerdictWord = Literal["pass", "outside", "too few events"]
+Statistic = Callable[[Floats], float]
+"""Rows (n,) or (n, k), one an event -> the figure."""
+
+_DRAWS = 300
+_SEED = 20060301
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a run shows of one measure.
+
+    key: of its band; rows: one row an event; of: the figure made of them
+    asked: the same figure of what the models asked for, nan where that is not told
+    count: events it rests on, where a row is not one
+    """
+
+    key: str
+    rows: Floats
+    of: Statistic
+    asked: float = nan
+    count: int | None = None
+
+    @property
+    def events(self) -> int:
+        """Return the number of events."""
+        return len(self.rows) if self.count is None else self.count
+
+
+class Finding(NamedTuple):
+    """A measure with its verdict.
+
+    value, low95, high95: the figure and its bootstrap interval, nan where there is none
+    """
+
+    band: Band
+    measured: Measured
+    value: float
+    low95: float
+    high95: float
+    verdict: VerdictWord
+
+
+def judged(measured: Measured, band: Band) -> Finding:
+    """Hold a figure against its pass band; too few events are no pass."""
+    value = figure(measured.of, measured.rows)
+    if measured.events < band.least or not isfinite(value):
+        return Finding(band, measured, value, nan, nan, "too few events")
+    spread = drawn(measured, np.random.default_rng(_SEED))
+    # Figures that cannot be below 0 are larger in samples drawn again: that much is taken off.
+    bias = float(spread.mean()) - value
+    low, high = (float(x) - bias for x in np.percentile(spread, (2.5, 97.5)))
+    inside = band.low <= value <= band.high
+    return Finding(band, measured, value, low, high, "pass" if inside else "outside")
+
+
+def drawn(measured: Measured, rng: np.random.Generator, draws: int = _DRAWS) -> Floats:
+    """Return the figure of ``draws`` bootstrap samples of the events (Efron 1979)."""
+    rows, n = measured.rows, len(measured.rows)
+    values = [figure(measured.of, rows[rng.integers(0, n, n)]) for _ in range(draws)]
+    found = np.array([value for value in values if isfinite(value)])
+    return found if len(found) else np.array([nan])
+
+
+def figure(of: Statistic, rows: Floats) -> float:
+    """Return the figure of rows, nan of none."""
+    if not len(rows):
+        return nan
+    return float(of(rows))
+
+
+def median(rows: Floats) -> float:
+    """Return the median."""
+    return float(np.median(rows))
+
+
+def mean(rows: Floats) -> float:
+    """Return the mean, which is the share where rows are 0 or 1."""
+    return float(np.mean(rows))
+
+
+def spread_over_mean(rows: Floats) -> float:
+    """Return the standard deviation over the mean."""
+    return float(np.std(rows, ddof=1) / np.mean(rows)) if len(rows) > 1 else nan
+
+
+def one_over_mean(rows: Floats) -> float:
+    """Return events a second of the intervals between them."""
+    return float(1.0 / np.mean(rows))
+
+
+def longest(rows: Floats) -> float:
+    """Return the largest."""
+    return float(np.max(rows))
