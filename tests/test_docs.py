@@ -166,7 +166,8 @@ def defined() -> set[str]:
         names |= set(re.findall(r"^def (\w+)", path.read_text(encoding="utf-8"), re.MULTILINE))
     for folder in FOLDERS:
         for path in (ROOT / folder).rglob("*.py"):
-            names |= {path.stem, ".".join(path.relative_to(ROOT).with_suffix("").parts)}
+            module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+            names |= {path.stem, f"gazerig.{module}"}
             for node in ast.parse(path.read_text(encoding="utf-8")).body:
                 names |= set(_names(node))
     return names
