@@ -25,8 +25,9 @@ from gazerig.drivers.dynamixel.read_windows import (
 )
 from gazerig.drivers.dynamixel.supervisor import DynamixelSupervisor
 from gazerig.drivers.dynamixel.sync_packets import FastGroup, PlainGroup
+from gazerig.drivers.port_bus import CUT
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.bus import CUT, RESTART_S, SmartServoBus
+from gazerig.drivers.servo_bus.bus import RESTART_S, SmartServoBus
 from gazerig.drivers.servo_bus.provisioning import AddressMap
 from gazerig.drivers.servo_bus.sync_read import Heard, Reader, Whole
 from gazerig.drivers.types import ServoReading, ServoSetup

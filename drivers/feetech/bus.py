@@ -24,8 +24,9 @@ from gazerig.drivers.feetech.protocol import HEADER, GoalWrite
 from gazerig.drivers.feetech.readings import Readings
 from gazerig.drivers.feetech.supervisor import FeetechSupervisor
 from gazerig.drivers.feetech.views import Sample, View, again_turns, alone_turns, together_turns
+from gazerig.drivers.port_bus import CUT
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.bus import CUT, RESTART_S, SmartServoBus
+from gazerig.drivers.servo_bus.bus import RESTART_S, SmartServoBus
 from gazerig.drivers.servo_bus.sync_read import Heard, Reader, Whole
 from gazerig.drivers.types import ServoReading, ServoSetup
 

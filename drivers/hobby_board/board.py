@@ -5,22 +5,19 @@ takes pulses as they are, and the driver leads them (PCA9685): then ``send_goals
 the pulses are on their way, and ``lead`` is called again and again.
 """
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.host_lateness import HostLateness
+from gazerig.drivers.port_bus import Exchange
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoSetup
 
 
-class Exchange(Protocol):
-    """Where bytes go: their counts, errors by kind, and answers that come late."""
-
-    tx_bytes: int
-    rx_bytes: int
+class BoardLine(Exchange, Protocol):
+    """Where bytes go: as for every bus, and answers that come late."""
 
     @property
     def lateness(self) -> HostLateness:
@@ -30,11 +27,6 @@ class Exchange(Protocol):
     @property
     def port(self) -> BusPort:
         """Return the port."""
-        ...
-
-    @property
-    def errors(self) -> Counter[str]:
-        """Return the errors by kind; who finds more adds them."""
         ...
 
 
@@ -93,7 +85,7 @@ class Board(Protocol):
     """
 
     @property
-    def line(self) -> Exchange:
+    def line(self) -> BoardLine:
         """Return the line to the board."""
         ...
 

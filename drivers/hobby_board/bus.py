@@ -16,20 +16,22 @@ from math import inf
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import Board
+from gazerig.drivers.hobby_board.board import Board, BoardLine
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
 from gazerig.drivers.hobby_board.silence import Silence
 from gazerig.drivers.hobby_board.start import take_on
 from gazerig.drivers.hobby_board.supervisor import Supervisor
+from gazerig.drivers.port_bus import CUT, PortBus
+from gazerig.drivers.released import Released
 from gazerig.drivers.serial.reconnect import LastingPort
-from gazerig.drivers.types import BusHealth, ServoReading, ServoSetup
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 UNMEASURED = "hobby servos tell no positions: what is shown is where they were sent"
 
 
-class HobbyBoardBus:
+class HobbyBoardBus(PortBus):
     """The channels of one board; implements gazerig.drivers.types.ServoBus.
 
     Args:
@@ -41,17 +43,20 @@ class HobbyBoardBus:
         ValueError: a servo is on a channel or at a pulse width that the board cannot have.
     """
 
+    holding = "still gets pulses"
+    mute = "does not confirm that its pulses have stopped"
+    _line: BoardLine
+    _supervisor: Supervisor
+
     def __init__(self, board: Board, setups: Sequence[ServoSetup]) -> None:
-        for setup in setups:
-            board.check(setup)
         self._board, self._line, self._port = board, board.line, board.line.port
+        self._check_setups(setups)
         self._setups = self._wanted = tuple(setups)
         self._ids = tuple(setup.id for setup in setups)
         if len(set(self._ids)) < len(self._ids):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
-        self._opened = self._told = False
-        self._now_s = 0.0
+        self._told = False
         self._begin()
 
     def _begin(self) -> None:
@@ -100,10 +105,7 @@ class HobbyBoardBus:
         Raises:
             BusLost: port or board have been gone for longer than ``give_up_s``.
         """
-        self._now_s = now_s
-        if self._link.down and not self._link.returned(now_s):
-            return (None,) * len(self._ids)
-        if self._link.release_due and not self._caught_up():
+        if not self._reachable(now_s):
             return (None,) * len(self._ids)
         try:
             answered = self._watch(now_s)
@@ -173,92 +175,17 @@ class HobbyBoardBus:
         except BusLost as lost:
             self._lose(lost)
 
-    def retune(self, setups: Sequence[ServoSetup]) -> None:
-        """Set the servos up so when they are held the next time; the same ids and models.
-
-        Raises:
-            ValueError: these are other servos, or limits that the board cannot have.
-        """
-        same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
-        if not same:
-            raise ValueError("other servos need another bus: ids and models must stay")
-        for setup in setups:
-            self._board.check(setup)
-        self._wanted = tuple(setups)
-
     def faults(self) -> tuple[str, ...]:
         """Name what channels suffer from now, and the board's errors of the last 10 s."""
         channels = (f"{channel_label(c.setup)}: {c.fault}" for c in self._channels if c.fault)
         errors = self._supervisor.errors_of_late(self._port.now_s())
         return (*channels, *(f"{self._board.texts.name}: {name}" for name in errors))
 
-    def events(self) -> tuple[str, ...]:
-        """Say what has happened since the last call."""
-        return self._log.drain()
-
-    def release(self) -> None:
-        """Stop all pulses, confirmed; never raises for a board that does not answer.
-
-        Raises:
-            BusLost: the port is gone, and stays so when tried once more; the
-                torque is taken off by the first read after it is back.
-        """
-        self._supervisor.let_go()
-        if not self._opened:
-            return
-        if self._link.down and not self._link.open_once_more(self._now_s):
-            self._link.refused_release()
-            raise BusLost(self._cannot_release())
-        self._switch_all_off()
-
-    def _caught_up(self) -> bool:
-        """Take off the torque that was asked off while the port was gone; True if that is done."""
-        try:
-            self._switch_all_off()
-        except BusLost:
-            return False
-        return True
-
-    def _switch_all_off(self) -> None:
-        """Take the torque off, see that it is gone, and say where it is not.
-
-        Raises:
-            BusLost: the port is gone.
-        """
-        try:
-            released = switch_off(self._board, self._ids)
-        except BusLost as lost:
-            self._lose(lost)
-            self._link.refused_release()
-            raise BusLost(self._cannot_release()) from lost
-        self._link.released()
-        self._line.errors["refused"] += len(released.holding)
-        for channel in self._channels:
-            if channel.id in released.holding:
-                self._log.add(
-                    f"{channel_label(channel.setup)} still gets pulses: cut the servo power"
-                )
-            elif channel.id in released.mute:
-                self._log.add(
-                    f"{channel_label(channel.setup)} does not confirm that its pulses have "
-                    f"stopped: "
-                    "cut the servo power"
-                )
-            else:
-                channel.stop()
-
-    def health(self) -> BusHealth:
-        """Return byte and error counts of all exchanges."""
-        errors = {kind: count for kind, count in self._line.errors.items() if count}
-        return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
-
-    def close(self) -> None:
-        """Close the port; safe to call twice. The board goes on as it was last told."""
-        self._opened = False
-        self._supervisor.let_go()
-        self._port.closePort()
-
     # --- holding
+
+    def _check_setups(self, setups: Sequence[ServoSetup]) -> None:
+        for setup in setups:
+            self._board.check(setup)
 
     def _take_wanted(self) -> None:
         """Put in force what was asked for since the servos were held last."""
@@ -317,16 +244,23 @@ class HobbyBoardBus:
 
     # --- a port that goes away
 
-    def _lose(self, lost: BusLost) -> None:
-        self._link.lose(lost, self._now_s)
-
     def _trust_nobody(self) -> None:
         """Begin anew with a port that was away."""
         self._supervisor.suspect_all()
+
+    def _switch_off(self) -> Released:
+        released = switch_off(self._board, self._ids)
+        for channel in self._channels:
+            if channel.id not in (*released.holding, *released.mute):
+                channel.stop()
+        return released
+
+    def _servo_label(self, servo_id: int) -> str:
+        return channel_label(next(c.setup for c in self._channels if c.id == servo_id))
 
     def _cannot_release(self) -> str:
         """Say what servos do that cannot be told to let go."""
         return (
             f"{self._port.port_name} is gone: pulses could not be stopped; "
-            f"{self._board.texts.left_alone}: cut the servo power to free them"
+            f"{self._board.texts.left_alone}: {CUT} to free them"
         )

@@ -1,17 +1,12 @@
 """Letting go of hobby servos: no more than whoever does it in an emergency needs."""
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import Protocol
+
+from gazerig.drivers.released import Released
 
 TRIES = 3
 """So often is asked or told again what must not fail."""
-
-
-class Released(NamedTuple):
-    """Channels that still give pulses, and those of which nothing was heard."""
-
-    holding: tuple[int, ...]
-    mute: tuple[int, ...]
 
 
 class Stoppable(Protocol):

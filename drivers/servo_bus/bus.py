@@ -1,11 +1,13 @@
 """Smart servos of one family on one serial bus: one read and one write a tick."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from typing import Protocol
 
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog, servo_label
+from gazerig.drivers.port_bus import PortBus, Supervising
+from gazerig.drivers.released import Released
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.reconnect import LastingPort
 from gazerig.drivers.servo_bus.discovery import find
@@ -17,12 +19,10 @@ from gazerig.drivers.servo_bus.provisioning import AddressMap, Provisioning
 from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import TRIES, Line
-from gazerig.drivers.types import BusHealth, ServoReading, ServoSetup
+from gazerig.drivers.types import ServoReading, ServoSetup
 
 RESTART_S = 0.1
 """Servos that were silent for so long may have restarted: their power was cut."""
-
-CUT = "cut the servo power"
 
 
 class BusParams(Protocol):
@@ -45,19 +45,11 @@ class BusParams(Protocol):
         """How long port or servos may be gone."""
 
 
-class Supervising(Protocol):
-    """What the bus asks of whoever looks after its servos.
-
-    engaged: the torque is on
-    """
-
-    engaged: bool
+class SmartSupervising(Supervising, Protocol):
+    """What the bus asks of whoever looks after its servos."""
 
     def take_on(self, entering: Collection[int]) -> None:
         """Begin to look after servos under torque; some of them are outside their limits."""
-
-    def let_go(self) -> None:
-        """Leave servos without torque alone."""
 
     def mark_all_for_recovery(self) -> None:
         """Trust no servo to be as it was left."""
@@ -76,7 +68,7 @@ class Polled(Protocol):
     roll: Roll
 
 
-class SmartServoBus(ABC):
+class SmartServoBus(PortBus):
     """A chain of smart servos in position mode; implements gazerig.drivers.types.ServoBus.
 
     A family's own bus says how an answer becomes readings, and who looks after the servos.
@@ -92,7 +84,8 @@ class SmartServoBus(ABC):
         ValueError: more servos than one packet of goals can hold, or a range beyond one turn.
     """
 
-    _supervisor: Supervising
+    _line: Line
+    _supervisor: SmartSupervising
     _reader: Polled
     _readings: Limited
 
@@ -109,7 +102,7 @@ class SmartServoBus(ABC):
                 f"{len(setups)} servos are too many for one bus: {family.most_goals} at most"
             )
         self._family, self._watchdog = family, watchdog
-        self._check_ranges(setups)
+        self._check_setups(setups)
         self._port = port
         self._setups = self._wanted = tuple(setups)
         self._bus_params = params
@@ -126,8 +119,6 @@ class SmartServoBus(ABC):
             params.baud,
             {setup.id: servo_label(setup) for setup in setups},
         )
-        self._opened = False
-        self._now_s = 0.0
         self._block: AddressMap | None = None
         self._assemble(None)
 
@@ -172,10 +163,6 @@ class SmartServoBus(ABC):
     def _first_look(self) -> None:
         """Look at servos that have just been prepared."""
 
-    @abstractmethod
-    def _cannot_release(self) -> str:
-        """Say what servos do that cannot be told to let go."""
-
     # --- the bus as others see it
 
     def open(self) -> None:
@@ -215,10 +202,7 @@ class SmartServoBus(ABC):
         Raises:
             BusLost: port or servos have been gone for longer than ``give_up_s``.
         """
-        self._now_s = now_s
-        if self._link.down and not self._link.returned(now_s):
-            return (None,) * len(self._ids)
-        if self._link.release_due and not self._caught_up():
+        if not self._reachable(now_s):
             return (None,) * len(self._ids)
         try:
             readings = tuple(self._read(now_s))
@@ -274,21 +258,6 @@ class SmartServoBus(ABC):
         except BusLost as lost:
             self._lose(lost)
 
-    def retune(self, setups: Sequence[ServoSetup]) -> None:
-        """Set the servos up so when the torque comes on the next time; the same ids and models.
-
-        Ranges and speeds are in the servos' EEPROM, which they only write without torque,
-        so under torque everything stays as it is.
-
-        Raises:
-            ValueError: these are other servos, or a range is beyond one turn.
-        """
-        same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
-        if not same:
-            raise ValueError("other servos need another bus: ids and models must stay")
-        self._check_ranges(setups)
-        self._wanted = tuple(setups)
-
     def _take_wanted(self) -> None:
         """Put in force what was asked for since the torque was on last."""
         if self._wanted == self._setups:
@@ -305,62 +274,11 @@ class SmartServoBus(ABC):
             f"{self._line.who(i)}: {fault}" for i, fault in sorted(self._health.faults.items())
         )
 
-    def events(self) -> tuple[str, ...]:
-        """Say what has happened since the last call."""
-        return self._log.drain()
+    def _switch_off(self) -> Released:
+        return switch_off(self._line, self._ids)
 
-    def release(self) -> None:
-        """Torque off on every servo, confirmed; never raises for a servo that does not answer.
-
-        Raises:
-            BusLost: the port is gone, and stays so when tried once more; the
-                torque is taken off by the first read after it is back.
-        """
-        self._supervisor.let_go()
-        if not self._opened:
-            return
-        if self._link.down and not self._link.open_once_more(self._now_s):
-            self._link.refused_release()
-            raise BusLost(self._cannot_release())
-        self._switch_all_off()
-
-    def _caught_up(self) -> bool:
-        """Take off the torque that was asked off while the port was gone; True if that is done."""
-        try:
-            self._switch_all_off()
-        except BusLost:
-            return False
-        return True
-
-    def _switch_all_off(self) -> None:
-        """Take the torque off, see that it is gone, and say where it is not.
-
-        Raises:
-            BusLost: the port is gone.
-        """
-        try:
-            released = switch_off(self._line, self._ids)
-        except BusLost as lost:
-            self._lose(lost)
-            self._link.refused_release()
-            raise BusLost(self._cannot_release()) from lost
-        self._link.released()
-        self._line.errors["refused"] += len(released.holding)
-        for kind, ids in (("still reports torque", released.holding), ("mute", released.mute)):
-            for servo_id in ids:
-                what = kind if kind != "mute" else "does not confirm that its torque is off"
-                self._log.add(f"{self._line.who(servo_id)} {what}: {CUT}")
-
-    def health(self) -> BusHealth:
-        """Return byte and error counts of all exchanges."""
-        errors = {kind: count for kind, count in self._line.errors.items() if count}
-        return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
-
-    def close(self) -> None:
-        """Close the port; safe to call twice."""
-        self._opened = False
-        self._supervisor.let_go()
-        self._port.closePort()
+    def _servo_label(self, servo_id: int) -> str:
+        return self._line.who(servo_id)
 
     def _mind_silence(self, now_s: float) -> None:
         """Give up where nobody has answered for too long.
@@ -375,16 +293,13 @@ class SmartServoBus(ABC):
                 "check servo power and the cable"
             )
 
-    def _lose(self, lost: BusLost) -> None:
-        self._link.lose(lost, self._now_s)
-
     def _trust_nobody(self) -> None:
         """Begin anew with a port that was away."""
         self._roll = self._reader.roll = Roll(self._ids)
         self._line.starved = False
         self._supervisor.mark_all_for_recovery()
 
-    def _check_ranges(self, setups: Sequence[ServoSetup]) -> None:
+    def _check_setups(self, setups: Sequence[ServoSetup]) -> None:
         """See that ranges lie within one turn: beyond, positions mean nothing after a restart.
 
         Raises:

@@ -8,9 +8,10 @@ the torque comes on, and positions are read again after.
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.released import Released
 from gazerig.drivers.servo_bus.transaction import Line
 
 TRIES = 3
@@ -135,13 +136,6 @@ def switch_on(line: Line, ids: Sequence[int], goals: Sequence[int], speeds: Sequ
             )
     if family.goal_speed:
         _until(line, wanted, send, partial(_ask_goals, line, {}), "goal_position")
-
-
-class Released(NamedTuple):
-    """Servos that still report torque, and those that report nothing."""
-
-    holding: tuple[int, ...]
-    mute: tuple[int, ...]
 
 
 def switch_off(line: Line, ids: Sequence[int]) -> Released:

@@ -1,0 +1,166 @@
+"""What every bus of servos does alike with its port: torque off, a port that goes away, counts."""
+
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Sequence
+from typing import ClassVar, Protocol
+
+from gazerig.drivers.errors import BusLost
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.released import Released
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.reconnect import LastingPort
+from gazerig.drivers.types import BusHealth, ServoSetup
+
+CUT = "cut the servo power"
+
+
+class Exchange(Protocol):
+    """What carries bytes: their counts, and errors by kind."""
+
+    tx_bytes: int
+    rx_bytes: int
+
+    @property
+    def errors(self) -> Counter[str]:
+        """Return the errors by kind; who finds more adds them."""
+        ...
+
+
+class Supervising(Protocol):
+    """Whoever looks after the servos.
+
+    engaged: goals are followed
+    """
+
+    engaged: bool
+
+    def let_go(self) -> None:
+        """Leave servos without torque alone."""
+
+
+class PortBus(ABC):
+    """The servos behind one port; part of an implementation of gazerig.drivers.types.ServoBus.
+
+    A bus makes its parts before any of these methods is called; it may make them anew.
+
+    holding, mute: what is said of a servo whose torque is not off, or that does not confirm it
+    """
+
+    holding: ClassVar[str] = "still reports torque"
+    mute: ClassVar[str] = "does not confirm that its torque is off"
+
+    _port: BusPort
+    _line: Exchange
+    _link: LastingPort
+    _log: EventLog
+    _supervisor: Supervising
+    _setups: tuple[ServoSetup, ...]
+    _wanted: tuple[ServoSetup, ...]
+    _opened = False
+    _now_s = 0.0
+
+    @abstractmethod
+    def _check_setups(self, setups: Sequence[ServoSetup]) -> None:
+        """See that servos can be set up so.
+
+        Raises:
+            ValueError: one cannot.
+        """
+
+    @abstractmethod
+    def _switch_off(self) -> Released:
+        """Take the torque off all servos and see that it is gone.
+
+        Raises:
+            BusLost: the port is gone.
+        """
+
+    @abstractmethod
+    def _servo_label(self, servo_id: int) -> str:
+        """Return how people know a servo."""
+
+    @abstractmethod
+    def _cannot_release(self) -> str:
+        """Say what servos do that cannot be told to let go."""
+
+    def retune(self, setups: Sequence[ServoSetup]) -> None:
+        """Set the servos up so when the torque comes on the next time; the same ids and models.
+
+        Under torque everything stays as it is.
+
+        Raises:
+            ValueError: these are other servos, or they cannot be set up so.
+        """
+        same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
+        if not same:
+            raise ValueError("other servos need another bus: ids and models must stay")
+        self._check_setups(setups)
+        self._wanted = tuple(setups)
+
+    def events(self) -> tuple[str, ...]:
+        """Say what has happened since the last call."""
+        return self._log.drain()
+
+    def health(self) -> BusHealth:
+        """Return byte and error counts of all exchanges."""
+        errors = {kind: count for kind, count in self._line.errors.items() if count}
+        return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
+
+    def release(self) -> None:
+        """Torque off on every servo, confirmed; never raises for a servo that does not answer.
+
+        Raises:
+            BusLost: the port is gone, and stays so when tried once more; the
+                torque is taken off by the first read after it is back.
+        """
+        self._supervisor.let_go()
+        if not self._opened:
+            return
+        if self._link.down and not self._link.open_once_more(self._now_s):
+            self._link.refused_release()
+            raise BusLost(self._cannot_release())
+        self._switch_all_off()
+
+    def close(self) -> None:
+        """Close the port; safe to call twice. Servos go on as they were last told."""
+        self._opened = False
+        self._supervisor.let_go()
+        self._port.closePort()
+
+    def _reachable(self, now_s: float) -> bool:
+        """Return whether the port is there, opened anew if need be, and no torque is due off.
+
+        Raises:
+            BusLost: it has been gone for longer than ``give_up_s``.
+        """
+        self._now_s = now_s
+        if self._link.down and not self._link.returned(now_s):
+            return False
+        if self._link.release_due:
+            try:
+                self._switch_all_off()
+            except BusLost:
+                return False
+        return True
+
+    def _switch_all_off(self) -> None:
+        """Take the torque off, see that it is gone, and say where it is not.
+
+        Raises:
+            BusLost: the port is gone.
+        """
+        try:
+            released = self._switch_off()
+        except BusLost as lost:
+            self._lose(lost)
+            self._link.refused_release()
+            raise BusLost(self._cannot_release()) from lost
+        self._link.released()
+        self._line.errors["refused"] += len(released.holding)
+        for ids, what in ((released.holding, self.holding), (released.mute, self.mute)):
+            for servo_id in ids:
+                self._log.add(f"{self._servo_label(servo_id)} {what}: {CUT}")
+
+    def _lose(self, lost: BusLost) -> None:
+        self._link.lose(lost, self._now_s)
