@@ -29,13 +29,13 @@ from gazerig.gaze.pursuit import PursuitParams
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import ScanpathParams
 from gazerig.gaze.top_down import TopDownParams
-from gazerig.robot.control.loop import LoopParams
 from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, GeometryParams
+from gazerig.robot.model.loop_params import LoopParams
+from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import in_order
-from gazerig.robot.perception.tracker import TrackParams
-from gazerig.robot.safety.guard import GuardParams
 
 
 @dataclass(frozen=True)

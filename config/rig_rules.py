@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from gazerig.config.rig import Rig
 from gazerig.drivers.servo_models import SERVOS
 from gazerig.gaze.types import PARTS
+from gazerig.robot.model.forbidden_range import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import JOINTS
-from gazerig.robot.safety.guard import Guard
 
 
 def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:
@@ -85,11 +85,12 @@ def _lid_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
 
 
 def _collisions(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Let the guard itself say whether its forbidden boxes leave any pose."""
+    """Whether the forbidden ranges leave any pose."""
     if any(True for rule in (_joint_names, _models) for _ in rule(rig)):
         return
     try:
-        Guard(rig.guard, tuple(rig.joints[name].limit() for name in rig.names), rig.names)
+        limits = tuple(rig.joints[name].limit() for name in rig.names)
+        forbidden_pairs(rig.guard.collisions, rig.guard.collision_margin_deg, limits, rig.names)
     except ValueError as error:
         yield "guard.collisions", str(error)
 

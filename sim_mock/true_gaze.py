@@ -3,7 +3,7 @@
 from gazerig.gaze.angles import add, angle_between, rotate, rotation, scale, sub, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, GazeState, Vec3
-from gazerig.robot.perception.face_pose import PARTS_FACE_M
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.sim_mock.scenes.scene import Person
 
 

@@ -14,8 +14,8 @@ from gazerig.robot.calibration.camera_calibration import (
     LensCalibrationParams,
     calibrate_lens,
 )
-from gazerig.robot.calibration.charuco_board import CharucoBoard, SeenBoard
-from gazerig.robot.perception.intrinsics import Intrinsics, intrinsics_of_view, project
+from gazerig.robot.model.charuco_board import CharucoBoard, SeenBoard
+from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view, project
 from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
 from gazerig.sim_mock.cameras.charuco_scene import held_pose
 

@@ -21,8 +21,8 @@ from gazerig.robot.calibration.camera_procedure import (
     neck_angles,
     neck_steps,
 )
-from gazerig.robot.calibration.charuco_board import CharucoBoard
 from gazerig.robot.calibration.hand_eye import camera_on_head
+from gazerig.robot.model.charuco_board import CharucoBoard
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics

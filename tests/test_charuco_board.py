@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.calibration.charuco_board import BoardParams, CharucoBoard
 from gazerig.robot.calibration.charuco_page import PAPERS_MM, RULER_MM, page, write_page
+from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
 
 BOARD = CharucoBoard()
 PX_PER_MM = 12

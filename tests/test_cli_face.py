@@ -28,7 +28,7 @@ from gazerig.robot.cli import calibrate_face as cli_face
 from gazerig.robot.cli.calibrate_group import app
 from gazerig.robot.cli.key_input import BUTTONS, PageKeys, key_and_count, keys_of
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Resume, Stop
-from gazerig.robot.perception.face_pose import PARTS_FACE_M
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 ROOT = Path(__file__).parents[1]
 DESK = ROOT / "config" / "rigs" / "desk.yaml"

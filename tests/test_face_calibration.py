@@ -22,7 +22,7 @@ from gazerig.robot.calibration.face_calibration import (
     point_world_m,
     pressed,
 )
-from gazerig.robot.perception.face_pose import PARTS_FACE_M
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 ANGLE = st.floats(-3.1, 3.1)
 TURN = st.tuples(ANGLE, st.floats(-1.5, 1.5), ANGLE)

@@ -21,7 +21,7 @@ from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import Choice
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.perception.intrinsics import intrinsics_of_lens, project
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
 SECONDS, BEGIN_S, RATE_HZ = 24.0, 1.0, 10.0

@@ -17,9 +17,9 @@ from sts_rig import Rig as StsRig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.robot.app.bus_wiring import ports_of, release_plans
+from gazerig.robot.calibration.guarded_servo import GuardedServo
 from gazerig.robot.calibration.smart_servo_access import SmartServo
 from gazerig.robot.guardian.guarded_bus import RETRY_S, GuardedBus
-from gazerig.robot.guardian.guarded_servo import GuardedServo
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.hang_detector import HANG_S, HangDetector
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, SIZE, Heartbeat, shared_file

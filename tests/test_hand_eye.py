@@ -12,7 +12,6 @@ from desk import JOINTS, LIDS
 from gazerig.gaze.types import Angles3
 from gazerig.robot.calibration.camera_calibration import CameraCalibrationRefused
 from gazerig.robot.calibration.camera_procedure import neck_angles
-from gazerig.robot.calibration.charuco_board import CharucoBoard, SeenBoard
 from gazerig.robot.calibration.hand_eye import (
     HandEye,
     HandEyeParams,
@@ -20,9 +19,10 @@ from gazerig.robot.calibration.hand_eye import (
     camera_on_head,
     turns_deg,
 )
+from gazerig.robot.model.charuco_board import CharucoBoard, SeenBoard
 from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.perception.intrinsics import project
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 BOARD = CharucoBoard()

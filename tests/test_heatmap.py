@@ -15,7 +15,7 @@ from gazerig.robot.analysis.heatmap import (
     share_per_part,
 )
 from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
-from gazerig.robot.perception.face_pose import PARTS_FACE_M
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 MEDIA = Path(__file__).parents[2] / "shared" / "media"
 CENTRES = np.array([PARTS_FACE_M[part][1:] for part in PARTS])

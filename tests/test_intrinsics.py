@@ -11,10 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.drivers.types import DetectedFace, Detections
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, LensParams, PoseHistory
-from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M
-from gazerig.robot.perception.intrinsics import (
+from gazerig.robot.model.intrinsics import (
     Intrinsics,
     fits,
     intrinsics_of_lens,
@@ -23,8 +22,10 @@ from gazerig.robot.perception.intrinsics import (
     rays,
     undistorted,
 )
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker, TrackParams
+from gazerig.robot.perception.tracker import Tracker
 
 BENT = Intrinsics(480.0, 482.0, 327.0, 190.0, (-0.25, 0.09, 0.002, -0.001, -0.01))
 LENS = LensParams(640, 400, 480.0, 482.0, 327.0, 190.0, BENT.distortion)

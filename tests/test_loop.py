@@ -15,14 +15,17 @@ from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import PARTS
 from gazerig.robot.app.assemble import Assembly, Choice, assemble
-from gazerig.robot.control.loop import LoopParams, Tick, run
+from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.clock import RealClock, SimulatedClock
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.model.intrinsics import intrinsics_of_view, project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.model.loop_params import LoopParams
+from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import Verdict
-from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M, intrinsics_of_view, project
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Sighting, Tracker, TrackParams
+from gazerig.robot.perception.tracker import Sighting, Tracker
 from gazerig.sim_mock.scenes.visitor import Visitor
 
 

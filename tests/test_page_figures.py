@@ -9,13 +9,13 @@ from desk import JOINTS
 
 from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis.heatmap_face import on_canvas
+from gazerig.robot.analysis.human_norms import fastest_peak, slowest_peak
 from gazerig.robot.dashboard.dwell_chart import BIN_S, BINS, Dwell
 from gazerig.robot.dashboard.event_timeline import STRIP_S, Timeline
 from gazerig.robot.dashboard.gaze_map import HIGH_PX, SHRINK, WIDE_PX, FaceMap, gaze_on_face
 from gazerig.robot.dashboard.main_sequence_chart import KEPT, MainSequence
 from gazerig.robot.dashboard.view_frusta import field_edge
 from gazerig.robot.model.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
-from gazerig.robot.report.human_norms import fastest_peak, slowest_peak
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 FACING = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))

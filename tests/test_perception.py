@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Angles3, Mat3, Percept, Vec3
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.model.intrinsics import intrinsics_of_view, project
+from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.egomotion_residual import HeadTurnResidual, Seen, turning_rad_s
-from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
-from gazerig.robot.perception.intrinsics import intrinsics_of_view, project
 from gazerig.robot.perception.localisation import Box, Reading
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker, TrackParams
+from gazerig.robot.perception.tracker import Tracker
 
 WIDTH, HEIGHT = 640, 400
 LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)

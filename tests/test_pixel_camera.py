@@ -11,11 +11,13 @@ from gazerig.drivers.vision.face_mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face_params import FaceDetectorParams
 from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.types import Angles3, Mat3, Vec3
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M, face_pose
-from gazerig.robot.perception.intrinsics import intrinsics_of_view, project
+from gazerig.robot.model.intrinsics import intrinsics_of_view, project
+from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker, TrackParams
+from gazerig.robot.perception.tracker import Tracker
 from gazerig.sim_mock.cameras.canvas import Picture3d, Sheet
 from gazerig.sim_mock.cameras.draw_person import (
     LOOKS,

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.robot.recording.playback_clock import SPEEDS, STEPS, Mark, Player
+from gazerig.robot.dashboard.page_process import SPEEDS
+from gazerig.robot.recording.playback_clock import STEPS, Mark, Player
 
 MARKS = (
     Mark(1.0, "saccade", "saccade to face"),

@@ -15,17 +15,17 @@ from typer.testing import CliRunner
 from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import PARTS
+from gazerig.robot.analysis import human_norms as human
+from gazerig.robot.analysis.event_detector import Blink, Commanded, Fixation, Saccade
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import Choice
 from gazerig.robot.cli.report import app, page_file
 from gazerig.robot.control.loop import run
 from gazerig.robot.report import face
-from gazerig.robot.report import human_norms as human
 from gazerig.robot.report import norm_bands as bands
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import differences_of
 from gazerig.robot.report.compare_page import compare_page
-from gazerig.robot.report.event_detector import Blink, Commanded, Fixation, Saccade
 from gazerig.robot.report.gaze_trace import Gathered, Gathering, Row
 from gazerig.robot.report.page import band_words, gauge, number, report_page
 from gazerig.robot.report.plotting import COLOURS, Shown, png

@@ -11,13 +11,13 @@ from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.saccade import Saccade as Jumps
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.types import Vec3
+from gazerig.robot.analysis.blink_finder import BlinkFinder
+from gazerig.robot.analysis.event_detector import Blink, Fixation, GazeEvents, Saccade
+from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import Choice
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.report.blink_finder import BlinkFinder
-from gazerig.robot.report.event_detector import Blink, Fixation, GazeEvents, Saccade
 from gazerig.robot.report.gaze_trace import Gathered, Gathering
-from gazerig.robot.report.saccade_finder import Jump, SaccadeFinder
 
 SECONDS = 40.0
 STEP_DEG = 360.0 / 4096.0

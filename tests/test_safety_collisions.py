@@ -8,9 +8,11 @@ import pytest
 from desk import JOINTS
 
 from gazerig.config.bounds import judge
+from gazerig.robot.model.forbidden_range import CollisionParams
+from gazerig.robot.model.guard_params import GuardParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointState, Verdict
-from gazerig.robot.safety.collisions import CollisionParams
-from gazerig.robot.safety.guard import Guard, GuardParams, JointLimit
+from gazerig.robot.safety.guard import Guard
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
+from gazerig.robot.model.guard_params import GuardParams, HealthParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointState, Verdict
-from gazerig.robot.safety.guard import Guard, GuardParams, JointLimit
-from gazerig.robot.safety.health import HealthParams
+from gazerig.robot.safety.guard import Guard
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000), 70.0, 3.5, 7.0)
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500), 70.0, 3.5, 7.0)

@@ -17,11 +17,13 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
+from gazerig.robot.model.forbidden_range import CollisionParams
+from gazerig.robot.model.guard_params import GuardParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointState
-from gazerig.robot.safety.collisions import CollisionParams
 
 ROOM = Path(__file__).parents[1] / "robot" / "safety"
-PARTS = ("motion", "stuck", "health", "collisions", "late_ticks", "guard")
+PARTS = ("motion_limiter", "stall_detector", "health", "collisions", "late_ticks", "guard")
 DT = 0.005
 YAW, PITCH, LID = 6, 7, 4
 JOINT = YAW
@@ -60,8 +62,8 @@ class Bench:
     """One guard and joints that do as they are told; every command is checked on its way."""
 
     def __init__(self, m: ModuleType, start_deg: float = 0.0, gentle: bool = False, **params: Any):
-        limit = m.JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
-        self.guard = m.Guard(m.GuardParams(**params), (limit,) * 9, JOINTS)
+        limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
+        self.guard = m.Guard(GuardParams(**params), (limit,) * 9, JOINTS)
         self.guard.reset(0.0, (radians(start_deg),) * 9)
         if not gentle:
             self.guard._gentle = [False] * 9
@@ -163,9 +165,9 @@ def stopped_loop(m: ModuleType) -> None:
 
 def late(m: ModuleType) -> None:
     """A joint at full speed, ticks that do not come: it goes on from its goal, softly."""
-    limit = m.JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
+    limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
     soft = radians(500.0)
-    params = m.GuardParams(late_ms=50.0, late_accel_deg_s2=500.0)
+    params = GuardParams(late_ms=50.0, late_accel_deg_s2=500.0)
     for missed in (2, 10, 400):
         guard = m.Guard(params, (limit,) * 9, JOINTS, period_s=DT)
         guard.reset(0.0, (LOW,) * 9)
@@ -183,8 +185,8 @@ def late(m: ModuleType) -> None:
 
 def slow_host(m: ModuleType) -> None:
     """A loop that always takes two slots is a slower loop, and joints come to their speed."""
-    limit = m.JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
-    guard = m.Guard(m.GuardParams(), (limit,) * 9, JOINTS, period_s=DT)
+    limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
+    guard = m.Guard(GuardParams(), (limit,) * 9, JOINTS, period_s=DT)
     guard.reset(0.0, (LOW,) * 9)
     guard._gentle = [False] * 9
     before = LOW
@@ -418,9 +420,9 @@ def collision_lag(m: ModuleType) -> None:
 
 
 def slow_joint(m: ModuleType) -> None:
-    limit = m.JointLimit(LOW, HIGH, radians(20.0), radians(100.0))  # below the gentle ones
+    limit = JointLimit(LOW, HIGH, radians(20.0), radians(100.0))  # below the gentle ones
     pair = CollisionParams("neck_pitch", -20.0, 5.0, "left_upper_lid", -20.0, 15.0)
-    guard = m.Guard(m.GuardParams(collisions=(pair,)), (limit,) * 9, JOINTS)
+    guard = m.Guard(GuardParams(collisions=(pair,)), (limit,) * 9, JOINTS)
     guard.reset(0.0, (0.0,) * 9)
     path, speed = [(0.0,) * 9], np.zeros(9)
     for k in range(1, 300):

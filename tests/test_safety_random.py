@@ -16,9 +16,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from gazerig.robot.model.forbidden_range import CollisionParams
+from gazerig.robot.model.guard_params import GuardParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointState
-from gazerig.robot.safety.collisions import CollisionParams
-from gazerig.robot.safety.guard import Guard, GuardParams, JointLimit
+from gazerig.robot.safety.guard import Guard
 
 Array = NDArray[np.float64]
 Row = tuple[float, ...]

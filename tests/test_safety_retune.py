@@ -10,9 +10,11 @@ import pytest
 from desk import JOINTS
 from numpy.typing import NDArray
 
+from gazerig.robot.model.forbidden_range import CollisionParams
+from gazerig.robot.model.guard_params import GuardParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointState
-from gazerig.robot.safety.collisions import CollisionParams
-from gazerig.robot.safety.guard import Guard, GuardParams, JointLimit
+from gazerig.robot.safety.guard import Guard
 
 DT_S = 0.005
 GENTLE = GuardParams(gentle_ms=50.0)

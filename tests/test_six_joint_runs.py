@@ -18,6 +18,7 @@ from six_joints import SIX
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.analysis.lid_opening import UPPER, openings
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import Choice
@@ -41,7 +42,7 @@ from gazerig.robot.remote.request_handler import Pulse
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import compare
 from gazerig.robot.report.gaze_trace import Gathered, Gathering
-from gazerig.robot.report.joint_basis import UPPER, RunJoints, openings
+from gazerig.robot.report.joint_basis import RunJoints
 from gazerig.robot.report.run_header import About
 
 STARTED = "2026-01-31T12:00:00+00:00"

@@ -11,13 +11,13 @@ from six_joints import SIX
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.angles import angle_between
+from gazerig.robot.analysis.event_detector import Blink, Fixation, GazeEvents, Saccade
 from gazerig.robot.app.assemble import Assembly, assemble, gaze_parts
 from gazerig.robot.app.options import Choice
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.dashboard.page_process import MESSAGE_BYTES, pack, unpack
 from gazerig.robot.dashboard.snapshot import Said, ShownRig, Snapshots, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenFixation, SeenSaccade, Snapshot
-from gazerig.robot.report.event_detector import Blink, Fixation, GazeEvents, Saccade
 
 RATE_HZ = 200.0
 TICKS_BETWEEN = 8

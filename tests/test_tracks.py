@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.kalman import far_off
-from gazerig.robot.perception.tracker import Sighting, Track, Tracker, TrackParams, blended
+from gazerig.robot.perception.tracker import Sighting, Track, Tracker, blended
 
 CAMERA = (0.0, 0.0, 0.2)
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -19,7 +19,7 @@ from gazerig.drivers.vision.face_params import FaceDetectorParams
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
 from gazerig.robot.analysis.heatmap_legend import with_legend
-from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M, PARTS_FACE_M
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 
 Picture = NDArray[np.uint8]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.perception.face_pose import PARTS_FACE_M
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 WIDTH_PX, HEIGHT_PX = 720, 860
 PX_PER_M = 3000.0

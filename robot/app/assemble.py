@@ -43,7 +43,7 @@ from gazerig.robot.app.rig_limits import (
     park_rad,
 )
 from gazerig.robot.control.body import Body
-from gazerig.robot.control.loop import LoopParams, Robot
+from gazerig.robot.control.loop import Robot
 from gazerig.robot.dashboard.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.frames import (
@@ -54,6 +54,7 @@ from gazerig.robot.model.frames import (
     standing_still,
 )
 from gazerig.robot.model.kinematics import NECK, Kinematics
+from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker

@@ -24,7 +24,7 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.options import Choice
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams
-from gazerig.robot.perception.intrinsics import Intrinsics
+from gazerig.robot.model.intrinsics import Intrinsics
 from gazerig.robot.perception.motion_source import motion_finder, retuned
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams

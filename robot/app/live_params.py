@@ -36,15 +36,16 @@ from gazerig.robot.app.rig_limits import (
     park_pose,
 )
 from gazerig.robot.control.body import Body
-from gazerig.robot.control.loop import LoopParams
 from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
-from gazerig.robot.safety.guard import Guard, JointLimit
+from gazerig.robot.safety.guard import Guard
 
 
 class Parts(NamedTuple):

@@ -6,9 +6,9 @@ from math import radians
 from gazerig.config.schema import Rig
 from gazerig.gaze.types import Angles2, Vec3
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.kinematics import LIDS, LidEnds
 from gazerig.robot.model.types import JointAngles, in_order
-from gazerig.robot.safety.motion_limiter import JointLimit
 
 EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
 """Of the left and the right eye: ((yaw low, high), (pitch low, high)), radians."""

@@ -29,9 +29,9 @@ from gazerig.robot.control.observers import left_out
 from gazerig.robot.control.power_down import Again
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Jog
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.safety.guard import Guard
-from gazerig.robot.safety.motion_limiter import JointLimit
 
 _PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
 """Of a fifth-order polynomial from rest to rest, over distance/time and distance/time^2."""

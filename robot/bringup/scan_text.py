@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 
 from gazerig.robot.bringup.doctor.findings import LEVELS, Finding, Level
+from gazerig.robot.control.event_text import runs
 
 _JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 
@@ -25,17 +26,6 @@ def together(places: Sequence[str]) -> str:
         return ", ".join(places)
     names = ", ".join(match[1] for match in found)
     return f"{names} ({nouns.pop()}s {runs([int(match[3]) for match in found])})"
-
-
-def runs(numbers: Sequence[int]) -> str:
-    """Write numbers with neighbours drawn together: 1-3, 7."""
-    runs: list[list[int]] = []
-    for number in sorted(numbers):
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(f"{r[0]}-{r[-1]}" if len(r) > 1 else f"{r[0]}" for r in runs)
 
 
 def as_plain(finding: Finding, bus: str) -> dict[str, object]:

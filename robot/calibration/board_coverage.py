@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.robot.calibration.charuco_board import SeenBoard
 from gazerig.robot.calibration.charuco_pose import board_poses
-from gazerig.robot.perception.intrinsics import Intrinsics
+from gazerig.robot.model.charuco_board import SeenBoard
+from gazerig.robot.model.intrinsics import Intrinsics
 
 
 @dataclass(frozen=True)

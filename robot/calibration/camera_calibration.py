@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.calibration.board_coverage import ViewCollector, ViewParams
-from gazerig.robot.calibration.charuco_board import SeenBoard
+from gazerig.robot.model.charuco_board import SeenBoard
 from gazerig.robot.model.frames import LensParams
-from gazerig.robot.perception.intrinsics import Intrinsics, project, rays
+from gazerig.robot.model.intrinsics import Intrinsics, project, rays
 
 Floats = NDArray[np.float64]
 

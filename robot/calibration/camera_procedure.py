@@ -21,9 +21,9 @@ from gazerig.robot.calibration.camera_calibration import (
     LensCalibrationParams,
     calibrate_lens,
 )
-from gazerig.robot.calibration.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
 from gazerig.robot.calibration.hand_eye import NeckView
-from gazerig.robot.perception.intrinsics import Intrinsics, intrinsics_of_view
+from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
+from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view
 
 Look = Callable[[], Shot | None]
 """Gives the newest picture at once, None before the first."""

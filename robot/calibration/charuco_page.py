@@ -9,7 +9,7 @@ from PIL import Image
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import output_file
 from gazerig.drivers.types import Picture
-from gazerig.robot.calibration.charuco_board import CharucoBoard
+from gazerig.robot.model.charuco_board import CharucoBoard
 
 PAPERS_MM: dict[str, tuple[float, float]] = {"a4": (297.0, 210.0), "letter": (279.4, 215.9)}
 """Width and height of the paper laid crosswise."""

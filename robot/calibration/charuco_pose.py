@@ -1,6 +1,6 @@
 """Where the board is in the camera frame, from one picture of it. Pure.
 
-Frames as in gazerig.robot.calibration.charuco_board and gazerig.robot.perception.intrinsics. A flat
+Frames as in gazerig.robot.model.charuco_board and gazerig.robot.model.intrinsics. A flat
 board seen from far has two poses that explain it nearly as well, mirrored about the line of sight;
 both are given.
 """
@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.robot.calibration.charuco_board import LEAST_CORNERS, SeenBoard
-from gazerig.robot.perception.intrinsics import Intrinsics
+from gazerig.robot.model.charuco_board import LEAST_CORNERS, SeenBoard
+from gazerig.robot.model.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 

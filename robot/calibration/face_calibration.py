@@ -16,7 +16,7 @@ from typing import Literal
 
 from gazerig.gaze.angles import add, rotate, rotate_back, sub
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.perception.face_pose import PARTS_FACE_M
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 Key = Literal["left", "right", "up", "down", "larger", "smaller", "enter", "skip", "back", "end"]
 

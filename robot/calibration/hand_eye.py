@@ -5,7 +5,7 @@ move by what the camera sees, and only one place of the camera on the head makes
 agree. OpenCV's closed forms (manual, cv2.calibrateHandEye) start the search; they trust
 every single pose of the board, whose tilt is poorly seen, so the answer is the place of
 camera and board that brings all corners of all pictures nearest to where they are seen.
-Frames as in gazerig.robot.model.frames; the board's as in gazerig.robot.calibration.charuco_board.
+Frames as in gazerig.robot.model.frames; the board's as in gazerig.robot.model.charuco_board.
 """
 
 from collections.abc import Sequence
@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.calibration.camera_calibration import CameraCalibrationRefused
-from gazerig.robot.calibration.charuco_board import SeenBoard
 from gazerig.robot.calibration.charuco_pose import board_poses
 from gazerig.robot.calibration.hand_eye_solver import Fit, Pose, Sights, refined, start
+from gazerig.robot.model.charuco_board import SeenBoard
 from gazerig.robot.model.frames import CameraParams, mounted_at
-from gazerig.robot.perception.intrinsics import Intrinsics
+from gazerig.robot.model.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.calibration.charuco_board import SeenBoard
-from gazerig.robot.perception.intrinsics import Intrinsics, project
+from gazerig.robot.model.charuco_board import SeenBoard
+from gazerig.robot.model.intrinsics import Intrinsics, project
 
 Floats = NDArray[np.float64]
 

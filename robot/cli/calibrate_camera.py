@@ -29,15 +29,15 @@ from gazerig.robot.calibration.camera_procedure import (
     neck_angles,
     neck_steps,
 )
-from gazerig.robot.calibration.charuco_board import BoardParams, CharucoBoard
 from gazerig.robot.calibration.charuco_page import RULER_MM, write_page
 from gazerig.robot.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
 from gazerig.robot.cli.neck_motion import agrees, go_on, moving_neck
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import NECK, Kinematics
-from gazerig.robot.perception.intrinsics import intrinsics_of_lens
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 app = typer.Typer()

@@ -10,6 +10,7 @@ from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.i2c.port import port_of
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
 from gazerig.robot.calibration.endstop_search import StopSearchParams
+from gazerig.robot.calibration.guarded_servo import GuardedServo
 from gazerig.robot.calibration.hobby_access import OneHobby
 from gazerig.robot.calibration.joint_access import SingleJoint
 from gazerig.robot.calibration.joint_calibration import Calibration, CalibrationRefused, Places
@@ -23,7 +24,6 @@ from gazerig.robot.cli.ports import Wires
 from gazerig.robot.cli.terminal import say
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.power_down import PowerDown
-from gazerig.robot.guardian.guarded_servo import GuardedServo
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import RealClock
 

@@ -7,8 +7,8 @@ from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.slow_entry import ENTRY_DEG_S
 from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointAngles, JointState, in_order
-from gazerig.robot.safety.motion_limiter import JointLimit
 
 
 def setups(

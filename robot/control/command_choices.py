@@ -7,7 +7,7 @@ from gazerig.gaze.aversion import MODES, Aversion
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.top_down import TopDown
 from gazerig.robot.model.commands import Ask, Jog
-from gazerig.robot.safety.motion_limiter import JointLimit
+from gazerig.robot.model.joint_limit import JointLimit
 
 _NEAR_END_RAD = radians(0.05)
 """A slider at the end of a joint's range is rounded to a tenth of a degree."""

@@ -1,9 +1,7 @@
 """What a bus has done, told shortly: the same done to several servos is one line."""
 
 import re
-from collections.abc import Iterable
-
-from gazerig.robot.bringup.scan_text import runs
+from collections.abc import Iterable, Sequence
 
 _SERVO = re.compile(r"servo (\d+)")
 
@@ -24,3 +22,14 @@ def drawn_together(events: Iterable[str]) -> list[str]:
         who = f"servos {runs(ids)}" if several else ", ".join(filter(None, names))
         lines.append(f"{who}: {what}" if who else what)
     return lines
+
+
+def runs(numbers: Sequence[int]) -> str:
+    """Write numbers with neighbours drawn together: 1-3, 7."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(f"{r[0]}-{r[-1]}" if len(r) > 1 else f"{r[0]}" for r in runs)

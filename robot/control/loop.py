@@ -3,7 +3,6 @@
 import contextlib
 import gc
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from math import inf, radians
 from typing import NamedTuple
 
@@ -31,29 +30,11 @@ from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Renew, Resume,
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.lead import Lead
+from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.reply import Reply, Ticket
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.safety.guard import Guard
-
-
-@dataclass(frozen=True)
-class LoopParams:
-    """The control rate."""
-
-    rate_hz: float = field(
-        default=200.0,
-        metadata={"low": 20.0, "high": 1000.0, "unit": "Hz", "says": "control rate"},
-    )
-    park_s: float = field(
-        default=4.0,
-        metadata={
-            "low": 0.0,
-            "high": 30.0,
-            "unit": "s",
-            "says": "longest time for parking before torque goes off",
-        },
-    )
 
 
 class LoopCount(NamedTuple):

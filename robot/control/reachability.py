@@ -9,10 +9,10 @@ from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, Target
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.kinematics import NECK, Kinematics
 from gazerig.robot.model.reply import JointReply, Reply
 from gazerig.robot.model.types import JointAngles, JointState
-from gazerig.robot.safety.motion_limiter import JointLimit
 
 _SAME_RAD = radians(0.1)
 _BESIDE_RAD = radians(0.5)

@@ -11,7 +11,7 @@ from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, un
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.perception.intrinsics import Intrinsics, intrinsics_of_lens, rays
+from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_lens, rays
 
 NEAR_RAD = 0.12
 """A click within 7 deg of somebody means something as far away as they are."""

@@ -6,6 +6,7 @@ Mean dwell times per part are those of Nakamoto & Tsuruno, table 1.
 from collections import Counter, defaultdict
 
 from gazerig.gaze.types import PART_NAMES, PARTS
+from gazerig.robot.analysis.human_norms import DWELL_MEAN_S
 from gazerig.robot.dashboard import html as page_style
 from gazerig.robot.dashboard.html import (
     INK,
@@ -21,7 +22,6 @@ from gazerig.robot.dashboard.html import (
     text,
 )
 from gazerig.robot.model.types import SeenFixation
-from gazerig.robot.report.human_norms import DWELL_MEAN_S
 
 MEASURED_MEAN_S = dict(zip(PARTS, DWELL_MEAN_S, strict=True))
 """Nakamoto & Tsuruno, table 1."""

@@ -1,6 +1,6 @@
 """The main sequence as the rig makes it, in the range of people's: speed and length of saccades.
 
-The ranges are those that the report judges by (gazerig.robot.report.human_norms).
+The ranges are those that the report judges by (gazerig.robot.analysis.human_norms).
 """
 
 from collections import deque
@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from gazerig.gaze.types import Floats
+from gazerig.robot.analysis.human_norms import fastest_peak, longest_ms, shortest_ms, slowest_peak
 from gazerig.robot.dashboard.html import (
     BLUE,
     GREY,
@@ -24,7 +25,6 @@ from gazerig.robot.dashboard.html import (
     text,
 )
 from gazerig.robot.model.types import SeenSaccade
-from gazerig.robot.report.human_norms import fastest_peak, longest_ms, shortest_ms, slowest_peak
 
 KEPT = 400
 """Saccades shown at most, the newest."""

@@ -42,6 +42,10 @@ CANNOT_OPEN = 3
 """Exit code of a page that cannot have its address: it need not be tried again."""
 EVERYBODY = "*"
 """In the place of the word that says who asked."""
+SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+"""What the page offers; any speed between the ends can be asked for."""
+MARK_KINDS = ("saccade", "blink", "event")
+"""What a replay can be led to, one after the other."""
 
 Hear = Callable[[dict[str, object]], str | None]
 """Takes what a person at the page asks for; gives what there is to say about it, or None."""

@@ -16,21 +16,20 @@ import numpy as np
 from gazerig.drivers.types import BusHealth, Detections
 from gazerig.gaze.angles import rotate_back, sub
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.camera_overlay import draw_detections, encode, ground
-from gazerig.robot.dashboard.page_process import Page
-from gazerig.robot.dashboard.param_feed import TuningFeed
-from gazerig.robot.dashboard.snapshot import (
-    Said,
-    Snapshots,
+from gazerig.robot.control.tick_text import (
     health_words,
     lead_words,
     seeing_words,
     target_name,
     verdict_words,
 )
+from gazerig.robot.dashboard.camera_overlay import draw_detections, encode, ground
+from gazerig.robot.dashboard.page_process import Page
+from gazerig.robot.dashboard.param_feed import TuningFeed
+from gazerig.robot.dashboard.snapshot import Said, Snapshots
 from gazerig.robot.model.frames import CameraMount, PoseHistory
+from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view, project
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
-from gazerig.robot.perception.face_pose import Intrinsics, intrinsics_of_view, project
 
 _SNAPSHOT_S = 0.04
 _PICTURE_S = 0.1

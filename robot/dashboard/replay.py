@@ -10,8 +10,8 @@ from typing import Any
 
 import viser
 
+from gazerig.robot.dashboard.page_process import MARK_KINDS, SPEEDS
 from gazerig.robot.dashboard.widget import put
-from gazerig.robot.recording.playback_clock import KINDS, SPEEDS
 
 Tell = Callable[[int, Mapping[str, object]], None]
 """Hands what a person asks for to the rig's side: the browser's number, and the request."""
@@ -41,7 +41,7 @@ class ReplayView:
                 "speed", tuple(_speed_name(s) for s in SPEEDS), initial_value=_speed_name(1.0)
             )
             self._steps = [
-                gui.add_button_group(way, KINDS, hint=f"stand still at the {way} one")
+                gui.add_button_group(way, MARK_KINDS, hint=f"stand still at the {way} one")
                 for way in ("previous", "next")
             ]
             self._list = gui.add_html("")

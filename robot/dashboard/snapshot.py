@@ -2,19 +2,19 @@
 
 from collections import Counter, deque
 from dataclasses import replace
-from math import degrees
 from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.drivers.types import BusHealth
-from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
-from gazerig.gaze.types import PART_NAMES, GazeState, Target, Vec3
+from gazerig.gaze.types import GazeState, Vec3
+from gazerig.robot.analysis.event_detector import Blink, Event, Fixation, GazeEvents, Saccade
 from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick_text import lead_words, target_name
 from gazerig.robot.dashboard.loop_timing import LoopTiming
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.guard_params import HealthParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.types import (
     Ghost,
@@ -32,12 +32,7 @@ from gazerig.robot.model.types import (
     Snapshot,
     Timing,
     Trail,
-    Verdict,
 )
-from gazerig.robot.perception.egomotion_residual import ResidualFigures
-from gazerig.robot.report.event_detector import Blink, Event, Fixation, GazeEvents, Saccade
-from gazerig.robot.safety.health import HealthParams
-from gazerig.robot.safety.motion_limiter import JointLimit
 
 _TICKS_KEPT = 600
 """Ticks that wait at most: three seconds, should the one who looks be held up."""
@@ -308,69 +303,6 @@ def _seen(event: Event) -> SeenEvent:
             return SeenFixation(event.start_s, event.duration_s, event.part)
         case Blink():
             return SeenBlink(event.onset_s, event.duration_s)
-
-
-def seeing_words(tick: Tick, residual: ResidualFigures) -> str:
-    """Say how old the picture is, how far faces are and by what, and what the head's turn leaves.
-
-    e.g. "picture 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
-    0.3 deg/s while the head turns"
-    """
-    if tick.percept is None:
-        return "no picture yet"
-    parts = [f"picture {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old"]
-    head = tick.pose.p_world_head_m
-    for face in tick.percept.faces:
-        by = f" by {face.distance_from}" if face.distance_from else ""
-        parts.append(
-            f"face {face.id} at {norm(sub(face.p_world_m, head)):.2f} m{by}, "
-            f"+- {100.0 * face.along_sd_m:.0f} cm"
-        )
-    if residual.speed_deg_s is not None:
-        parts.append(
-            f"still things seem to move {residual.speed_deg_s:.1f} deg/s while the head turns"
-        )
-    return " | ".join(parts)
-
-
-def target_name(target: Target) -> str:
-    """Return a target's name for people, e.g. "face 3: left eye"."""
-    name = target.kind if target.id < 0 else f"{target.kind} {target.id}"
-    return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
-
-
-def lead_words(tick: Tick) -> str:
-    """Say who leads and how far beside the point the eyes look, "" while nobody leads.
-
-    e.g. "gazerig look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
-    """
-    if not tick.led:
-        return ""
-    words, limited = tick.led, tick.gaze.limited
-    if tick.target.kind != "puppet" or not limited or ": jog " in tick.led:
-        return words
-    error = degrees(gaze_error(tick.target.p_world_m, tick.pose).whole)
-    ends = (
-        f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
-        for one in limited
-    )
-    return f"{words}; {error:.0f} deg beside it: {', '.join(ends)}"
-
-
-def verdict_words(verdict: Verdict) -> str:
-    """Say what the guard made of the wish, e.g. "limited (neck_yaw: too fast, +2)"."""
-    if not verdict.reasons:
-        return verdict.level
-    more = f", +{len(verdict.reasons) - 1}" if len(verdict.reasons) > 1 else ""
-    return f"{verdict.level} ({verdict.reasons[0]}{more})"
-
-
-def health_words(health: BusHealth) -> str:
-    """Say how the bus does, e.g. "bus: 3 lost"."""
-    errors = sum(health.errors.values())
-    if errors == 0:
-        return "bus ok"
-    return "bus: " + ", ".join(f"{n} {kind}" for kind, n in sorted(health.errors.items()) if n)
 
 
 def _vec(row: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Vec3:

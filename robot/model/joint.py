@@ -6,8 +6,8 @@ from math import ceil, floor, pi, radians
 from gazerig.drivers.servo_models import SERVOS, ServoFacts
 from gazerig.drivers.slow_entry import ENTRY_DEG_S
 from gazerig.drivers.types import ServoSetup
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.transmission import Curve, Linkage, Straight
-from gazerig.robot.safety.motion_limiter import JointLimit
 
 
 @dataclass(frozen=True)

@@ -21,45 +21,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gazerig.gaze.types import PARTS, Mat3, Vec3
-from gazerig.robot.perception.intrinsics import Intrinsics as Intrinsics
-from gazerig.robot.perception.intrinsics import intrinsics_of_view as intrinsics_of_view
-from gazerig.robot.perception.intrinsics import project as project
-from gazerig.robot.perception.intrinsics import rays as rays_through
+from gazerig.robot.model.face_geometry import (
+    EYES_TO_MOUTH_M,
+    LANDMARKS_FACE_M,
+    PARTS_FACE_M,
+    PUPIL_DISTANCE_M,
+)
+from gazerig.robot.model.intrinsics import Intrinsics, project
+from gazerig.robot.model.intrinsics import rays as rays_through
 
 Floats = NDArray[np.float64]
 
-# A canonical adult face. The distance between the pupils is Mitake et al. table 1; the
-# heights and the mouth are the proportions of averaged frontal photographs at that
-# distance, the depths those of an average profile, all rounded to millimetres.
-PUPIL_DISTANCE_M = 0.0619
-_PUPIL = (-0.033, PUPIL_DISTANCE_M / 2, 0.035)
-_MOUTH_CORNER = (-0.029, 0.0255, -0.036)
-
-# Centres of the parts a look moves between (Nakamoto & Tsuruno 3.2.2).
-PARTS_FACE_M: dict[str, Vec3] = {
-    "DN": (-0.018, 0.0, -0.080),
-    "FL": (-0.055, 0.058, -0.005),
-    "LE": _PUPIL,
-    "M": (-0.016, 0.0, -0.036),
-    "N": (0.0, 0.0, 0.0),
-    "FR": (-0.055, -0.058, -0.005),
-    "RE": (_PUPIL[0], -_PUPIL[1], _PUPIL[2]),
-    "UP": (-0.026, 0.0, 0.078),
-}
-
-LANDMARKS_FACE_M: Floats = np.array(
-    [
-        PARTS_FACE_M["RE"],
-        PARTS_FACE_M["LE"],
-        PARTS_FACE_M["N"],
-        (_MOUTH_CORNER[0], -_MOUTH_CORNER[1], _MOUTH_CORNER[2]),
-        _MOUTH_CORNER,
-    ]
-)
-"""(5, 3) right eye, left eye, nose tip, right and left mouth corner, as in DetectedFace."""
 
 _PARTS_FACE_M: Floats = np.array([PARTS_FACE_M[part] for part in PARTS])
-_EYES_TO_MOUTH_M = _PUPIL[2] - _MOUTH_CORNER[2]
 
 # A face that looks straight into a camera: its left is the picture's right, its up the
 # picture's up, and what comes out of it comes towards the camera.
@@ -176,7 +150,7 @@ def _most_probable(seen: Floats, noise: float) -> Floats | None:
     eyes, height = (hypot(*span) for span in _spans(seen))
     weight = 1.0 / hypot(noise, _NOISE_OF_EYES * eyes)
     # A turned face shows one of its two lengths shortened, so the longer one tells more.
-    away_m = 1.0 / max(eyes / PUPIL_DISTANCE_M, height / _EYES_TO_MOUTH_M)
+    away_m = 1.0 / max(eyes / PUPIL_DISTANCE_M, height / EYES_TO_MOUTH_M)
     size = np.array([1.0, 1.0, 1.0, away_m, away_m, away_m, 1.0])
     face = np.array([0.0, 0.0, 0.0, 0.0, 0.0, away_m, 0.0])
     slopes, errors = np.zeros((13, 7)), np.zeros(13)

@@ -14,13 +14,9 @@ from numpy.typing import NDArray
 from gazerig.drivers.types import DetectedFace, MovingBlob
 from gazerig.gaze.angles import add, compose, norm, rotate, scale
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.perception.face_pose import (
-    LANDMARKS_FACE_M,
-    PUPIL_DISTANCE_M,
-    FacePose,
-    face_pose,
-)
-from gazerig.robot.perception.intrinsics import Intrinsics
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
+from gazerig.robot.model.intrinsics import Intrinsics
+from gazerig.robot.perception.face_pose import FacePose, face_pose
 from gazerig.robot.perception.tracker import Sighting
 
 Box = tuple[float, float, float, float]

@@ -10,7 +10,7 @@ from gazerig.drivers.vision.motion.detector import MotionDetector
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.frames import LensParams
-from gazerig.robot.perception.intrinsics import intrinsics_of_lens
+from gazerig.robot.model.intrinsics import intrinsics_of_lens
 
 
 class MotionFinder:

@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, norm, rotate, scale, sub, unit
 from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
+from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_lens
 from gazerig.robot.perception.egomotion_residual import (
     HeadTurnResidual,
     ResidualFigures,
     Seen,
     turning_rad_s,
 )
-from gazerig.robot.perception.face_pose import PARTS_FACE_M
 from gazerig.robot.perception.hand_ownership import Known, without_own_motion
-from gazerig.robot.perception.intrinsics import Intrinsics, intrinsics_of_lens
 from gazerig.robot.perception.localisation import (
     SIZE_SPREAD,
     Box,

@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.recording.tick_record import Engaged, Heard, Measured, Refused
-from gazerig.robot.safety.guard import JointLimit
 
 
 class BodyTap(Body):

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import NamedTuple
 
-SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""What the page offers; any speed between the ends can be asked for."""
+from gazerig.robot.dashboard.page_process import MARK_KINDS, SPEEDS
 
 _SAME_S = 1e-6
 
@@ -22,8 +21,7 @@ class Mark(NamedTuple):
     words: str
 
 
-KINDS = ("saccade", "blink", "event")
-STEPS = tuple(f"{way} {kind}" for kind in KINDS for way in ("previous", "next"))
+STEPS = tuple(f"{way} {kind}" for kind in MARK_KINDS for way in ("previous", "next"))
 
 
 class State(NamedTuple):
@@ -44,7 +42,7 @@ class Player:
 
     def __init__(self, duration_s: float, marks: Sequence[Mark] = ()) -> None:
         self._duration_s = duration_s
-        self._marks = {kind: tuple(m.at_s for m in marks if m.kind == kind) for kind in KINDS}
+        self._marks = {kind: tuple(m.at_s for m in marks if m.kind == kind) for kind in MARK_KINDS}
         self._from_s, self._since_s = 0.0, 0.0
         self._playing, self._speed = False, 1.0
         self._sought_s: float | None = None

@@ -10,11 +10,12 @@ from gazerig.gaze.types import Percept
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker, TrackParams
+from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.recording.tick_record import Engaged, Heard, Measured, Moment, Refused
-from gazerig.robot.safety.guard import JointLimit
 
 H = TypeVar("H", bound=Heard)
 

@@ -5,9 +5,9 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from gazerig.robot.dashboard.page_process import PICTURE, REPLAY
+from gazerig.robot.dashboard.page_process import MARK_KINDS, PICTURE, REPLAY
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.recording.playback_clock import KINDS, Mark, Player, State
+from gazerig.robot.recording.playback_clock import Mark, Player, State
 from gazerig.robot.recording.snapshot_index import Frames
 
 ROUND_S = 0.04
@@ -146,7 +146,7 @@ def introduction(frames: Frames) -> dict[str, object]:
     return {
         "marks": {
             kind: counts([m for m in frames.marks if m.kind == kind], frames.duration_s)
-            for kind in KINDS
+            for kind in MARK_KINDS
         },
         "events": [(round(m.at_s, 3), m.words[:_MOST_WORDS]) for m in events[:_MOST_EVENTS]],
     }

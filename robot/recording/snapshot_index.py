@@ -14,8 +14,9 @@ from dataclasses import replace
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_text import seeing_words, verdict_words
 from gazerig.robot.dashboard.page_process import pack, unpack
-from gazerig.robot.dashboard.snapshot import Said, ShownRig, Snapshots, seeing_words, verdict_words
+from gazerig.robot.dashboard.snapshot import Said, ShownRig, Snapshots
 from gazerig.robot.model.commands import Ask, Renew
 from gazerig.robot.model.types import SeenEvent, Trail
 from gazerig.robot.perception.egomotion_residual import ResidualFigures

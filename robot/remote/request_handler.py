@@ -14,7 +14,7 @@ from typing import Protocol
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.feedback_basis import reckoned_joints
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.snapshot import lead_words, target_name
+from gazerig.robot.control.tick_text import lead_words, target_name
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Order, Renew, Tune, Value, from_json, signed
 from gazerig.robot.model.reply import Ticket

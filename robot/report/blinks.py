@@ -6,7 +6,7 @@ from math import nan
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report.blink_finder import Blink
+from gazerig.robot.analysis.blink_finder import Blink
 from gazerig.robot.report.gaze_trace import Gathered
 from gazerig.robot.report.statistics import Measured, figure, mean, median, spread_over_mean
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report import human_norms as human
+from gazerig.robot.analysis import human_norms as human
+from gazerig.robot.analysis.saccade_finder import THRESHOLD_DEG_S
 from gazerig.robot.report.gaze_trace import Gathered
-from gazerig.robot.report.saccade_finder import THRESHOLD_DEG_S
 from gazerig.robot.report.statistics import Measured, median
 
 LEAST_DEG = 5.0

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import PARTS, Floats
-from gazerig.robot.perception.face_pose import PARTS_FACE_M
-from gazerig.robot.report import human_norms as human
+from gazerig.robot.analysis import human_norms as human
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.report.gaze_trace import Gathered
 from gazerig.robot.report.statistics import Measured, mean, median
 

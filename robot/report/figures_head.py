@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.report import eye_head
-from gazerig.robot.report import human_norms as human
 from gazerig.robot.report import pursuit as following
 from gazerig.robot.report.norm_bands import FOLLOWING, HEAD
 from gazerig.robot.report.plotting import HUMAN, HUMAN_FILL, Drawing, Shown, label, legend, nothing

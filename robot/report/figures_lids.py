@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.report import blinks
 from gazerig.robot.report import eye_contact as social
-from gazerig.robot.report import human_norms as human
 from gazerig.robot.report.norm_bands import LIDS, SOCIAL
 from gazerig.robot.report.plotting import (
     HUMAN,

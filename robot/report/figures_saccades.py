@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gazerig.robot.report import human_norms as human
+from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.report import saccades
 from gazerig.robot.report.norm_bands import SACCADES
 from gazerig.robot.report.plotting import HUMAN, HUMAN_FILL, Drawing, Shown, label, legend, nothing

@@ -12,13 +12,8 @@ from numpy.typing import NDArray
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Face, Floats, Vec3
-from gazerig.robot.analysis.gaze_on_face import on_face
-from gazerig.robot.analysis.summary import cyclopean
-from gazerig.robot.control.feedback_basis import reckoned_joints
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.commands import Ask
-from gazerig.robot.report.blink_finder import BlinkFinder
-from gazerig.robot.report.event_detector import (
+from gazerig.robot.analysis.blink_finder import BlinkFinder
+from gazerig.robot.analysis.event_detector import (
     NEAR_FACE_M,
     Blink,
     Fixation,
@@ -26,7 +21,13 @@ from gazerig.robot.report.event_detector import (
     Saccade,
     beside_m,
 )
-from gazerig.robot.report.joint_basis import LOWER, UPPER, RunJoints, joints_of, openings
+from gazerig.robot.analysis.gaze_on_face import on_face
+from gazerig.robot.analysis.lid_opening import LOWER, UPPER, openings
+from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.control.feedback_basis import reckoned_joints
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import Ask
+from gazerig.robot.report.joint_basis import RunJoints, joints_of
 
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""

@@ -3,12 +3,10 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from gazerig.robot.analysis.lid_opening import UPPER
 from gazerig.robot.control.feedback_basis import Basis, basis_of
 from gazerig.robot.model.types import in_order
 from gazerig.robot.report.norm_bands import GROUPS, LIDS, PARALLEL
-
-UPPER = ("left_upper_lid", "right_upper_lid")
-LOWER = ("left_lower_lid", "right_lower_lid")
 
 
 @dataclass(frozen=True)
@@ -107,16 +105,3 @@ _RULES: tuple[tuple[Sequence[str], Callable[[RunJoints], bool], str], ...] = (
 def joints_of(names: Iterable[str], reckoned: Iterable[str]) -> RunJoints:
     """Gather what ticks say of their joints."""
     return RunJoints(in_order(names), in_order(reckoned))
-
-
-def openings(
-    left: float, right: float, names: Sequence[str], pair: tuple[str, str]
-) -> tuple[float, float] | None:
-    """Return the openings of two lids, None without any; one that is alone stands for both.
-
-    pair: joints of the left and the right one; names: of the rig, all where empty
-    """
-    if not names:
-        return left, right
-    there = [o for name, o in zip(pair, (left, right), strict=True) if name in names]
-    return (there[0], there[-1]) if there else None

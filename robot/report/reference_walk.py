@@ -7,7 +7,7 @@ import numpy as np
 from gazerig.gaze.scanpath import ScanpathParams, Walk, normalised, without_refixations
 from gazerig.gaze.scanpath_dwell import dwell_law
 from gazerig.gaze.types import PARTS, Floats
-from gazerig.robot.report import human_norms as human
+from gazerig.robot.analysis import human_norms as human
 
 _DRAWS = 3000
 

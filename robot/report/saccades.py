@@ -3,7 +3,7 @@
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report import human_norms as human
+from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.report.gaze_trace import Gathered
 from gazerig.robot.report.statistics import Measured, figure, mean, median, one_over_mean
 

@@ -7,60 +7,14 @@ the forbidden box however long a tick is.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from math import degrees, isfinite, radians
-from typing import NamedTuple
+from math import isfinite
 
-from gazerig.robot.model.types import JOINTS, JointAngles
-from gazerig.robot.safety.motion_limiter import JointLimit, Motion
+from gazerig.robot.model.forbidden_range import CollisionParams, ForbiddenRange, forbidden_pairs
+from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.types import JointAngles
+from gazerig.robot.safety.motion_limiter import Motion
 
 _ROUNDING_RAD = 1e-9
-
-
-@dataclass(frozen=True)
-class CollisionParams:
-    """Two joints that touch when both are in these ranges."""
-
-    first: str = field(metadata={"choices": JOINTS, "unit": "", "says": "a joint"})
-    first_min_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "from this angle"}
-    )
-    first_max_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "to this one"}
-    )
-    second: str = field(metadata={"choices": JOINTS, "unit": "", "says": "the other joint"})
-    second_min_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "from this angle"}
-    )
-    second_max_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "to this one"}
-    )
-
-    def __post_init__(self) -> None:
-        """Check that these are two ranges of two joints.
-
-        Raises:
-            ValueError: they are not; the message says why.
-        """
-        for name in (self.first, self.second):
-            if name not in JOINTS:
-                raise ValueError(f"unknown joint {name!r}; known are {', '.join(JOINTS)}")
-        if self.first == self.second:
-            raise ValueError(f"first and second are both {self.first}; name two joints")
-        for key in ("first", "second"):
-            low, high = getattr(self, f"{key}_min_deg"), getattr(self, f"{key}_max_deg")
-            if not low < high:
-                raise ValueError(f"{key}_min_deg {low} must be below {key}_max_deg {high}")
-
-
-class _Span(NamedTuple):
-    """One joint's half of a forbidden box, and the walls a margin outside it."""
-
-    joint: int
-    low: float
-    high: float
-    below: float
-    above: float
 
 
 class Collisions:
@@ -85,18 +39,7 @@ class Collisions:
             ValueError: a pair leaves no pose at all inside the limits, or names a joint
                 that is not there.
         """
-        self._pairs = [
-            (
-                _span(_place(one.first, joints), one.first_min_deg, one.first_max_deg, margin_deg),
-                _span(
-                    _place(one.second, joints), one.second_min_deg, one.second_max_deg, margin_deg
-                ),
-            )
-            for one in params
-        ]
-        for pair in self._pairs:
-            if not any(_room(span, limits[span.joint]) for span in pair):
-                raise ValueError(_no_pose(pair, margin_deg, limits, joints))
+        self._pairs = forbidden_pairs(params, margin_deg, limits, joints)
         self._keeper = [0] * len(self._pairs)
         self.exits: dict[int, float] = {}
         self.still: set[int] = set()
@@ -134,7 +77,7 @@ class Collisions:
     def _keep_out(
         self,
         k: int,
-        pair: tuple[_Span, _Span],
+        pair: tuple[ForbiddenRange, ForbiddenRange],
         motion: Motion,
         wish: JointAngles,
         position: JointAngles,
@@ -157,7 +100,9 @@ class Collisions:
         _wall_off(pair[keeper], motion)
         return True
 
-    def _lead_out(self, pair: tuple[_Span, _Span], motion: Motion, held: Sequence[bool]) -> None:
+    def _lead_out(
+        self, pair: tuple[ForbiddenRange, ForbiddenRange], motion: Motion, held: Sequence[bool]
+    ) -> None:
         """Send one joint of a pair that began in its box out by the shortest way."""
         ways = [
             (abs(exit_rad - motion.command[span.joint]), span.joint, exit_rad)
@@ -180,47 +125,14 @@ class Collisions:
         return (self.exits.get(joint, exit_rad) - now) * (exit_rad - now) >= 0.0
 
 
-def _place(name: str, joints: tuple[str, ...]) -> int:
-    if name not in joints:
-        raise ValueError(f"a collision names {name}, which this rig does not have: take it out")
-    return joints.index(name)
-
-
-def _span(joint: int, low_deg: float, high_deg: float, margin_deg: float) -> _Span:
-    low, high, margin = radians(low_deg), radians(high_deg), radians(margin_deg)
-    return _Span(joint, low, high, low - margin, high + margin)
-
-
-def _room(span: _Span, limit: JointLimit) -> bool:
-    """Return whether a joint can be outside its half of the box."""
-    return limit.low_rad <= span.below or limit.high_rad >= span.above
-
-
-def _no_pose(
-    pair: tuple[_Span, _Span],
-    margin_deg: float,
-    limits: tuple[JointLimit, ...],
-    joints: tuple[str, ...],
-) -> str:
-    halves = [
-        f"{joints[span.joint]} {degrees(span.low):g}..{degrees(span.high):g} deg of "
-        f"{degrees(limits[span.joint].low_rad):g}..{degrees(limits[span.joint].high_rad):g}"
-        for span in pair
-    ]
-    return (
-        f"the collision of {' with '.join(halves)} leaves no pose, with its margin of "
-        f"{margin_deg:g} deg; narrow one of the two"
-    )
-
-
-def _side(span: _Span, motion: Motion) -> int:
+def _side(span: ForbiddenRange, motion: Motion) -> int:
     """Tell on which side a joint is and can stay: -1 below, 1 above, 0 neither."""
     if motion.keeps_below(span.joint, span.below):
         return -1
     return 1 if motion.keeps_above(span.joint, span.above) else 0
 
 
-def _wall_off(span: _Span, motion: Motion) -> None:
+def _wall_off(span: ForbiddenRange, motion: Motion) -> None:
     """Keep a joint on the side where it is."""
     i = span.joint
     if _side(span, motion) < 0:
@@ -229,7 +141,7 @@ def _wall_off(span: _Span, motion: Motion) -> None:
         motion.low[i] = max(motion.low[i], span.above)
 
 
-def _crosses(span: _Span, motion: Motion, wish: JointAngles) -> bool:
+def _crosses(span: ForbiddenRange, motion: Motion, wish: JointAngles) -> bool:
     """Return whether a joint's way to its wish leads into its half of the box."""
     i = span.joint
     if not isfinite(wish[i]):
@@ -241,6 +153,6 @@ def _crosses(span: _Span, motion: Motion, wish: JointAngles) -> bool:
     )
 
 
-def _is_out(span: _Span, position: JointAngles) -> bool:
+def _is_out(span: ForbiddenRange, position: JointAngles) -> bool:
     """Return whether a joint is measured outside its half of the box."""
     return not span.low <= position[span.joint] <= span.high

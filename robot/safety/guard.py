@@ -10,12 +10,12 @@ from collections.abc import Callable
 from math import isfinite, radians
 from typing import Literal, NamedTuple
 
+from gazerig.robot.model.guard_params import GuardParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointAngles, JointState, Level, Verdict
 from gazerig.robot.safety.collisions import Collisions
-from gazerig.robot.safety.guard_params import GuardParams as GuardParams
 from gazerig.robot.safety.health import Health
 from gazerig.robot.safety.late_ticks import LateTicks
-from gazerig.robot.safety.motion_limiter import JointLimit as JointLimit
 from gazerig.robot.safety.motion_limiter import Motion
 from gazerig.robot.safety.stall_detector import Stuck
 

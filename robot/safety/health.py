@@ -1,95 +1,16 @@
 """What servos bear: heat, load and voltage slow a joint down before they stop it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from math import isfinite
 from typing import Literal
 
+from gazerig.robot.model.guard_params import HealthParams
+from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointState
-from gazerig.robot.safety.motion_limiter import JointLimit
 
 Strain = Literal["", "hot", "overloaded", "voltage"]
 _Column = tuple[float | None, ...]
 _COOLER_C = 2.0  # temperatures come in whole degrees: without this a joint would stutter
-
-
-@dataclass(frozen=True)
-class HealthParams:
-    """From where servos are slowed down and stopped, before they switch themselves off."""
-
-    warm_c: float = field(
-        default=15.0,
-        metadata={
-            "low": 1.0,
-            "high": 60.0,
-            "unit": "degC",
-            "says": "slower from so far below the temperature at which the servo gives up",
-        },
-    )
-    hot_c: float = field(
-        default=5.0,
-        metadata={
-            "low": 0.0,
-            "high": 40.0,
-            "unit": "degC",
-            "says": "standing still from so far below it",
-        },
-    )
-    slowest: float = field(
-        default=0.2,
-        metadata={
-            "low": 0.01,
-            "high": 1.0,
-            "unit": "",
-            "says": "share of speed and acceleration that is left just before standing still",
-        },
-    )
-    lasting_load: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.05,
-            "high": 0.95,
-            "unit": "",
-            "says": "share of the stall torque that may last; more is counted by its square "
-            "(I2t), as the motor's heat goes",
-        },
-    )
-    overload_ms: float = field(
-        default=700.0,
-        metadata={
-            "low": 50.0,
-            "high": 60000.0,
-            "unit": "ms",
-            "says": "full load for so long stops a joint; slower from half of that",
-        },
-    )
-    voltage_margin_v: float = field(
-        default=0.3,
-        metadata={
-            "low": 0.0,
-            "high": 5.0,
-            "unit": "V",
-            "says": "slower when the voltage is so near the servo's own limits",
-        },
-    )
-    voltage_ms: float = field(
-        default=500.0,
-        metadata={
-            "low": 0.0,
-            "high": 60000.0,
-            "unit": "ms",
-            "says": "standing still when it is outside for longer",
-        },
-    )
-
-    def __post_init__(self) -> None:
-        """Check that there is a way from warm to hot.
-
-        Raises:
-            ValueError: there is none.
-        """
-        if self.hot_c >= self.warm_c:
-            raise ValueError(f"hot_c {self.hot_c} must be below warm_c {self.warm_c}")
 
 
 class Health:

@@ -5,26 +5,11 @@ later sequence of braking steps, a joint that keeps this can always stop in time
 the length of the ticks to come.
 """
 
-from math import copysign, inf, sqrt
-from typing import NamedTuple
+from math import copysign, sqrt
+
+from gazerig.robot.model.joint_limit import JointLimit
 
 _ROUNDING_RAD = 1e-9
-
-
-class JointLimit(NamedTuple):
-    """One joint's range, top speed and top acceleration (rad, rad/s, rad/s^2).
-
-    The rest is what the joint's servo bears before it switches itself off: degrees
-    Celsius, lowest and highest volts.
-    """
-
-    low_rad: float
-    high_rad: float
-    speed_rad_s: float
-    accel_rad_s2: float
-    hottest_c: float = 70.0
-    lowest_v: float = 0.0
-    highest_v: float = inf
 
 
 class Motion:

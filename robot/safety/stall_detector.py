@@ -4,73 +4,9 @@ A servo pushes harder the farther its goal is away, so what does not move must n
 pushed: the command comes back to where the joint is, waits, and tries again softly.
 """
 
-from dataclasses import dataclass, field
 from math import nan, radians
 
-
-@dataclass(frozen=True)
-class StuckParams:
-    """When a joint counts as stuck, and how it tries again."""
-
-    stuck_deg: float = field(
-        default=3.0,
-        metadata={
-            "low": 0.5,
-            "high": 45.0,
-            "unit": "deg",
-            "says": "a joint this far from its command ought to be moving; more than friction "
-            "and weight leave",
-        },
-    )
-    moved_deg: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.1,
-            "high": 10.0,
-            "unit": "deg",
-            "says": "a way towards the command that counts as moving",
-        },
-    )
-    # Dead time of a healthy servo is some 30 ms; with an answer's age and one tick more the
-    # joint is found within 200 ms.
-    stuck_ms: float = field(
-        default=150.0,
-        metadata={
-            "low": 50.0,
-            "high": 5000.0,
-            "unit": "ms",
-            "says": "a joint that has not moved for so long is stuck: it stops pushing",
-        },
-    )
-    retry_ms: float = field(
-        default=1000.0,
-        metadata={
-            "low": 100.0,
-            "high": 60000.0,
-            "unit": "ms",
-            "says": "a stuck joint tries again, slowly, after so long",
-        },
-    )
-    retry_deg: float = field(
-        default=4.5,
-        metadata={
-            "low": 0.5,
-            "high": 45.0,
-            "unit": "deg",
-            "says": "then the command is never farther ahead of the joint, so it pushes weakly",
-        },
-    )
-
-    def __post_init__(self) -> None:
-        """Check that a joint that tries again can be found stuck again.
-
-        Raises:
-            ValueError: it could not; the message says what would do.
-        """
-        if self.retry_deg <= self.stuck_deg:
-            raise ValueError(f"retry_deg {self.retry_deg} must be above stuck_deg {self.stuck_deg}")
-        if self.moved_deg >= self.stuck_deg:
-            raise ValueError(f"moved_deg {self.moved_deg} must be below stuck_deg {self.stuck_deg}")
+from gazerig.robot.model.guard_params import StuckParams
 
 
 class Stuck:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.perception.intrinsics import Intrinsics
+from gazerig.robot.model.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.types import Picture
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.calibration.charuco_board import CharucoBoard
-from gazerig.robot.perception.intrinsics import Intrinsics, rays
+from gazerig.robot.model.charuco_board import CharucoBoard
+from gazerig.robot.model.intrinsics import Intrinsics, rays
 
 Floats = NDArray[np.float64]
 

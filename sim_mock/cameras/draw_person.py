@@ -15,7 +15,7 @@ import numpy as np
 
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Vec3
-from gazerig.robot.perception.face_pose import LANDMARKS_FACE_M
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.sim_mock.cameras.canvas import Bytes, Colour, Floats, Picture3d, Sheet
 from gazerig.sim_mock.scenes.scene import Person, Thing
 

@@ -21,7 +21,7 @@ from gazerig.drivers.types import Detections, FaceDetector, MovingBlob, Picture
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.perception.intrinsics import Intrinsics, intrinsics_of_view
+from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view
 from gazerig.sim_mock.cameras.canvas import Picture3d
 from gazerig.sim_mock.cameras.draw_person import draw_person, draw_thing
 from gazerig.sim_mock.cameras.draw_room import draw_room

@@ -11,13 +11,13 @@ from typing import NamedTuple, TypeVar
 
 from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.types import PARTS, Face, Vec3
+from gazerig.robot.analysis.blink_finder import Blink as Blink
+from gazerig.robot.analysis.blink_finder import BlinkFinder
+from gazerig.robot.analysis.lid_opening import UPPER, openings
+from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.types import JOINTS
-from gazerig.robot.report.blink_finder import Blink as Blink
-from gazerig.robot.report.blink_finder import BlinkFinder
-from gazerig.robot.report.joint_basis import UPPER, openings
-from gazerig.robot.report.saccade_finder import Jump, SaccadeFinder
 
 NEAR_PART_M = 0.03
 """A line of sight that passes a part within this distance is on it."""

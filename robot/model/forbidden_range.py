@@ -1,0 +1,119 @@
+"""Ranges of two joints that may not be taken together: a lid and a frame, chin and chest."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import degrees, radians
+from typing import NamedTuple
+
+from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.types import JOINTS
+
+
+@dataclass(frozen=True)
+class CollisionParams:
+    """Two joints that touch when both are in these ranges."""
+
+    first: str = field(metadata={"choices": JOINTS, "unit": "", "says": "a joint"})
+    first_min_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "from this angle"}
+    )
+    first_max_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "to this one"}
+    )
+    second: str = field(metadata={"choices": JOINTS, "unit": "", "says": "the other joint"})
+    second_min_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "from this angle"}
+    )
+    second_max_deg: float = field(
+        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "to this one"}
+    )
+
+    def __post_init__(self) -> None:
+        """Check that these are two ranges of two joints.
+
+        Raises:
+            ValueError: they are not; the message says why.
+        """
+        for name in (self.first, self.second):
+            if name not in JOINTS:
+                raise ValueError(f"unknown joint {name!r}; known are {', '.join(JOINTS)}")
+        if self.first == self.second:
+            raise ValueError(f"first and second are both {self.first}; name two joints")
+        for key in ("first", "second"):
+            low, high = getattr(self, f"{key}_min_deg"), getattr(self, f"{key}_max_deg")
+            if not low < high:
+                raise ValueError(f"{key}_min_deg {low} must be below {key}_max_deg {high}")
+
+
+class ForbiddenRange(NamedTuple):
+    """One joint's half of a forbidden box, and the walls a margin outside it."""
+
+    joint: int
+    low: float
+    high: float
+    below: float
+    above: float
+
+
+def forbidden_pairs(
+    params: Sequence[CollisionParams],
+    margin_deg: float,
+    limits: tuple[JointLimit, ...],
+    joints: tuple[str, ...],
+) -> list[tuple[ForbiddenRange, ForbiddenRange]]:
+    """Return the two ranges of every collision.
+
+    Args:
+        params: the joint ranges that may not be taken together.
+        margin_deg: distance kept from them; servos round and lag.
+        limits: one a joint.
+        joints: their names, in the order of the limits.
+
+    Raises:
+        ValueError: a pair leaves no pose at all inside the limits, or names a joint that is
+            not there.
+    """
+    pairs = [
+        (
+            _range(_index(one.first, joints), one.first_min_deg, one.first_max_deg, margin_deg),
+            _range(_index(one.second, joints), one.second_min_deg, one.second_max_deg, margin_deg),
+        )
+        for one in params
+    ]
+    for pair in pairs:
+        if not any(_room(span, limits[span.joint]) for span in pair):
+            raise ValueError(_no_pose(pair, margin_deg, limits, joints))
+    return pairs
+
+
+def _index(name: str, joints: tuple[str, ...]) -> int:
+    if name not in joints:
+        raise ValueError(f"a collision names {name}, which this rig does not have: take it out")
+    return joints.index(name)
+
+
+def _range(joint: int, low_deg: float, high_deg: float, margin_deg: float) -> ForbiddenRange:
+    low, high, margin = radians(low_deg), radians(high_deg), radians(margin_deg)
+    return ForbiddenRange(joint, low, high, low - margin, high + margin)
+
+
+def _room(span: ForbiddenRange, limit: JointLimit) -> bool:
+    """Return whether a joint can be outside its half of the box."""
+    return limit.low_rad <= span.below or limit.high_rad >= span.above
+
+
+def _no_pose(
+    pair: tuple[ForbiddenRange, ForbiddenRange],
+    margin_deg: float,
+    limits: tuple[JointLimit, ...],
+    joints: tuple[str, ...],
+) -> str:
+    halves = [
+        f"{joints[span.joint]} {degrees(span.low):g}..{degrees(span.high):g} deg of "
+        f"{degrees(limits[span.joint].low_rad):g}..{degrees(limits[span.joint].high_rad):g}"
+        for span in pair
+    ]
+    return (
+        f"the collision of {' with '.join(halves)} leaves no pose, with its margin of "
+        f"{margin_deg:g} deg; narrow one of the two"
+    )
