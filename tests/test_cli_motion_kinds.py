@@ -196,12 +196,12 @@ def test_on_real_wires_hobby_servos_are_asked_for_first(
     served: tuple[str, str, PtyBuses],
 ) -> None:
     rig, ports, buses = served
-    refused = run("jog", "neck_yaw", "5", "--rig", rig, "--port", ports)
+    refused = run("jog", rig, "neck_yaw", "5", "--port", ports)
     assert refused.exit_code == 2 and "say --yes" in refused.stderr
     assert "torque on" not in refused.stderr
     assert all(one["target"] == 0 for one in json.loads(buses.command("status"))["servos"])
-    words = ("--rig", rig, "--port", ports, "--yes", "--speed", "60", "--seconds", "0")
-    done = run("jog", "eyes_pan", "8", *words)
+    words = ("--port", ports, "--yes", "--speed", "60", "--seconds", "0")
+    done = run("jog", rig, "eyes_pan", "8", *words)
     assert done.exit_code == 0, done.stderr
     assert "go to their parking place at once" in done.stderr
     assert "torque on: 2 servos hold where they are, 6 hobby servos" in done.stderr
@@ -218,7 +218,7 @@ def test_home_opens_all_four_lids() -> None:
 
 
 def test_look_at_of_a_maker_s_head_says_what_it_cannot_do() -> None:
-    words = ("1", "-0.2", "0.1", "--rig", "maker", "--mock", "--seconds", "1.5", "--no-park")
+    words = ("maker", "1", "-0.2", "0.1", "--mock", "--seconds", "1.5", "--no-park")
     done = run("look-at", *words)
     assert done.exit_code == 0, done.stderr
     assert "mean line of sight" in done.stderr and "vergence: none" in done.stderr

@@ -111,7 +111,7 @@ def test_doctor_on_a_port_served_elsewhere_names_what_is_wrong():
         code, out, _ = gazerig("doctor", "--port", path)
         assert code == 1
         assert "neck_yaw (servo 7): has latched: overload" in out
-        assert "then gazerig reboot 7" in out
+        assert f"then gazerig reboot desk 7 --port {path}" in out
         assert "does not answer" in out and "neck_pitch" in out
         code, out, _ = gazerig("doctor", "--port", path, "--json")
         found = json.loads(out)

@@ -79,7 +79,7 @@ def test_scan_of_feetech_servos():
 
 
 def test_scan_of_every_bus_of_a_rig(mixed):
-    code, out, _ = gazerig("scan", "--mock", "--rig", mixed, "--bauds", "1000000", "--json")
+    code, out, _ = gazerig("scan", mixed, "--mock", "--bauds", "1000000", "--json")
     told = [json.loads(line) for line in out.splitlines()]
     assert code == 0 and len(told) == 3
     assert len(told[0]["boards"]) == 1
@@ -245,15 +245,15 @@ def test_setup_goes_through_all_buses(mixed):
 def test_reboot_of_a_feetech_servo():
     with served("feetech") as (port, paths, command):
         command("overload 7")
-        code, _, err = gazerig("reboot", "neck_yaw", "--rig", "feetech", "--port", port)
+        code, _, err = gazerig("reboot", "feetech", "neck_yaw", "--port", port)
         assert code == 0 and "neck_yaw (servo 7): reports: overload" in err
         assert "back after" in err and "no errors, torque off" in err
 
 
 def test_reboot_by_a_number_needs_one_bus_that_has_it(mixed):
-    code, _, err = gazerig("reboot", "1", "--rig", mixed, "--mock")
+    code, _, err = gazerig("reboot", mixed, "1", "--mock")
     assert code == 2 and "1: which bus (the main bus, bus tilt)? name the joint instead" in err
-    code, _, err = gazerig("reboot", "7", "--rig", mixed, "--mock")
+    code, _, err = gazerig("reboot", mixed, "7", "--mock")
     assert code == 0 and "neck_yaw (servo 7): back after" in err
 
 
@@ -263,7 +263,7 @@ def test_reboot_of_a_maestro_says_what_there_is_instead():
         line.setBaudRate(115_200)
         line.write(bytes.fromhex("84 00 70 2E 2B"))
         line.closePort()
-        words = ("reboot", "eyes_pan", "--rig", "maker", "--port", port)
+        words = ("reboot", "maker", "eyes_pan", "--port", port)
         code, _, err = gazerig(*words, answers="n\n")
         assert code == 0 and "has no restart over its serial line" in err and "left as it is" in err
         assert json.loads(command("status"))["servos"][0]["position"] == 6000

@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ import typer
 from command_line import gazerig, parse, typed
 from typer.core import TyperGroup
 
+from gazerig import __version__
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.cli.main import app
@@ -81,6 +83,11 @@ def test_every_example_names_options_that_there_are(words: str) -> None:
 def test_what_there_is_not_is_no_example(words: str) -> None:
     with pytest.raises(ValueError):
         parse(shlex.split(words))
+
+
+def test_the_version_is_that_of_the_package(capfd: Terminal) -> None:
+    assert typed("--version") == 0
+    assert capfd.readouterr().out == f"gazerig {__version__}\n" == f"gazerig {version('gazerig')}\n"
 
 
 def test_help_shows_them(capfd: Terminal) -> None:

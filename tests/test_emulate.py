@@ -171,7 +171,7 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
 def test_it_stays_without_standard_input_and_ends_on_sigterm(tmp_path):
     link = tmp_path / "servos"
     with open(os.devnull) as nothing:
-        emulator = Emulator("--rig", "desk", "--firmware", "45", "--link", str(link), stdin=nothing)
+        emulator = Emulator("desk", "--firmware", "45", "--link", str(link), stdin=nothing)
     port = connect(link)
     assert PacketHandler(2.0).read1ByteTxRx(port, 9, 6) == (45, COMM_SUCCESS, 0)
     port.closePort()
@@ -245,7 +245,7 @@ def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
 
 
 def test_a_rig_of_hobby_servos_is_a_board_that_sends_no_pulses_yet():
-    emulator = Emulator("--rig", "maker")
+    emulator = Emulator("maker")
     assert emulator.ready == {"path": emulator.path, "baud": None}
     # The rig's board wants a check byte: it says nothing to whoever sends none.
     plain, checked = Speech().position(0), Speech(crc=True).position(0)
@@ -265,7 +265,7 @@ MIXED = {
 def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monkeypatch):
     monkeypatch.setattr(command, "emulated_lines", lambda rig: MIXED)
     link = tmp_path / "head"
-    emulator = Emulator("--rig", "desk", "--link", str(link), "--set", "wrong-baud=silence")
+    emulator = Emulator("desk", "--link", str(link), "--set", "wrong-baud=silence")
     assert emulator.ready == {"bus": "", "path": str(link), "baud": 1_000_000}
     assert emulator.hear() == {"bus": "eyes", "path": f"{link}-eyes", "baud": 57_600}
     assert asked(link, STS_PING, 6) == STS_PONG
@@ -283,19 +283,19 @@ def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monke
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ((), "name the servos: --servos 1-6:xl330-m077"),
-        (("--servos", "1:sts3215", "--maestro", "6"), "name the servos"),
+        ((), "name a rig, or its servos: --servos 1-6:xl330-m077"),
+        (("--servos", "1:sts3215", "--maestro", "6"), "name a rig, or its servos"),
         (("--servos", "1:sts3215,2:xl330-m077"), "start a second `gazerig emulate`"),
         (("--servos", "1:sts3215", "--baud", "2000000"), "STS servos know 1000000"),
         (("--servos", "1:sts3215", "--set", "bad-crc=reply"), "there is after-missing"),
         (("--servos", "1:sts3215", "--crc"), "--crc: only with --maestro"),
-        (("--rig", "desk", "--device", "3"), "--device: only with --maestro"),
+        (("desk", "--device", "3"), "--device: only with --maestro"),
         (("--maestro", "7"), "--maestro 7: a board has 6, 12, 18, 24 channels"),
         (("--maestro", "6", "--baud", "12"), "a Maestro's pins know 9600"),
         (("--maestro", "6", "--firmware", "3"), "does not tell its version"),
         (("--maestro", "6", "--set", "mode=usb"), "it can be usb-dual-port"),
-        (("--servos", "1:xl330-m077", "--rig", "desk"), "name the servos"),
-        (("--rig", "nobody"), "there are desk"),
+        (("--servos", "1:xl330-m077", "desk"), "name a rig, or its servos"),
+        (("nobody",), "there are desk"),
         (("--servos", "1:xl330-m077", "--baud", "12"), "--baud 12: servos know 9600"),
         (("--servos", "1:xl330-m077", "--set", "bad-crc"), "not CASE=VALUE"),
         (("--servos", "1:xl330-m077", "--set", "bad-crc=no"), "it can be silent, reply"),

@@ -530,7 +530,7 @@ def test_export_writes_a_data_set_and_not_twice(recorded: Path, tmp_path: Path) 
         (("export", "run.mcap"), "one of --csv and --bids"),
         (("export", "run.mcap", "--csv", "--bids"), "one of --csv and --bids"),
         (("export", "run.mcap", "--csv", "--task", "t"), "name files of --bids"),
-        (("replay", "run.mcap", "--rig", "desk"), "need --rerun"),
+        (("replay", "run.mcap", "desk"), "need --rerun"),
         (("replay", "run.mcap", "--page", "8080"), "not HOST:PORT"),
         (("replay", "absent.mcap"), "absent.mcap"),
         (("export", "absent.mcap", "--csv"), "absent.mcap"),

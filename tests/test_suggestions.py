@@ -25,7 +25,7 @@ GIVEN = {"rig": "my rig.yaml", "port": "/dev/ttyACM3", "mock": False}
     ("said", "wanted"),
     [
         ("gazerig doctor --fix", "gazerig doctor 'my rig.yaml' --fix --port /dev/ttyACM3"),
-        ("then gazerig reboot 7", "then gazerig reboot 7 --rig 'my rig.yaml' --port /dev/ttyACM3"),
+        ("then gazerig reboot 7", "then gazerig reboot 'my rig.yaml' 7 --port /dev/ttyACM3"),
         ("gazerig setup --joint neck_yaw, as", 
          "gazerig setup 'my rig.yaml' --joint neck_yaw --port /dev/ttyACM3, as"),
         ("run gazerig scan: it", "run gazerig scan --port /dev/ttyACM3: it"),
@@ -80,21 +80,24 @@ def test_every_cure_of_the_doctor_can_be_typed(
 @pytest.mark.parametrize(
     "asked",
     [
-        ["jog", "neck_yaw", "5", "--rig"],
-        ["look-at", "1", "0", "0.2", "--rig"],
-        ["home"],
-        ["run", "--scene", "visitor", "--no-page", "--seconds", "1"],
+        ["jog", "RIG", "neck_yaw", "5"],
+        ["look-at", "RIG", "1", "0", "0.2"],
+        ["home", "RIG"],
+        ["run", "RIG", "--scene", "visitor", "--no-page", "--seconds", "1"],
     ],
 )
 def test_what_a_driver_says_at_the_start_can_be_typed(asked: list[str], tmp_path, capfd) -> None:
     rig = tmp_path / "mine.yaml"
     rig.write_text(DESK.read_text())
+    words = [str(rig) if word == "RIG" else word for word in asked]
     with PtyBus() as bus:
         path = bus.start(
             next(iter(emulated_lines(load_rig("desk")).values())).servos, baud=1_000_000
         )
         bus.command("overload 7")
-        made = CliRunner().invoke(app, [*asked, str(rig), "--port", path])
+        made = CliRunner().invoke(
+            app, [w.replace("RIG", str(rig)) for w in asked] + ["--port", path]
+        )
         _writer.flush(20.0)
     said = made.output + capfd.readouterr().err
     assert made.exit_code in (1, 2), said

@@ -13,7 +13,8 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.servo_models import BusKind
 from gazerig.robot.app.emulation import emulated_lines
-from gazerig.robot.cli.terminal import clear_errors
+from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.terminal import clear_errors, complete_rig
 from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
 from gazerig.sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.line import BusSettings
@@ -33,8 +34,16 @@ _WHO: dict[BusKind, tuple[str, str]] = {
 """Each kind as it is named, and as it stands before its baud rates."""
 
 
-@app.command()
+@app.command(cls=RigCommand)
 def emulate(
+    rig: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="RIG",
+            help="All buses of a rig, each with its own terminal.",
+            autocompletion=complete_rig,
+        ),
+    ] = None,
     servos: Annotated[
         str | None,
         typer.Option(
@@ -55,9 +64,6 @@ def emulate(
             metavar="ADDRESS,...",
             help="PCA9685 boards behind an I2C bridge, with a hobby servo on each channel: 0x40.",
         ),
-    ] = None,
-    rig: Annotated[
-        str | None, typer.Option(help="All buses of a rig instead, each with its own terminal.")
     ] = None,
     link: Annotated[
         Path | None,
@@ -120,7 +126,7 @@ def emulate(
     with clear_errors(rig):
         if sum(one is not None for one in (servos, maestro, pca9685, rig)) != 1:
             raise SetupError(
-                f"name the servos: --servos {EXAMPLE}, or --maestro 12, --pca9685 0x40, --rig NAME"
+                f"name a rig, or its servos: --servos {EXAMPLE}, --maestro 12 or --pca9685 0x40"
             )
         _see_what_fits(maestro is not None, firmware, device, crc)
         if servos is not None:

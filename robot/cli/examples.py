@@ -1,8 +1,10 @@
 """Examples for every command's help, and the names a shell completes."""
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
 from gazerig.config.load import shipped_names
 from gazerig.sim_mock.scenes.registry import scenes
@@ -32,10 +34,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("setup my.yaml", "give new servos their ids, one at a time; try a Maestro's channels"),
         ("setup my.yaml --joint neck_yaw", "one servo only"),
     ),
-    "reboot": (("reboot neck_yaw --rig my.yaml", "clear what a servo has latched"),),
-    "jog": (("jog neck_yaw 20 --rig my.yaml", "turn the neck 20 deg to the left, slowly"),),
+    "reboot": (("reboot my.yaml neck_yaw", "clear what a servo has latched"),),
+    "jog": (("jog my.yaml neck_yaw 20", "turn the neck 20 deg to the left, slowly"),),
     "home": (("home my.yaml", "all joints to 0 deg, then torque off"),),
-    "look-at": (("look-at 1 0.2 0.3 --rig my.yaml", "1 m ahead, 20 cm left, 30 cm up"),),
+    "look-at": (("look-at my.yaml 1 0.2 0.3", "1 m ahead, 20 cm left, 30 cm up"),),
     "calibrate": (
         ("calibrate joints my.yaml", "find zeros and ends of all joints"),
         ("calibrate board board.pdf", "print the board for the next one"),
@@ -50,7 +52,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("emulate --servos 1-9:xl330-m077", "servos on a pseudo-terminal"),
         ("emulate --servos 1-6:sts3215", "servos of Feetech"),
         ("emulate --maestro 12", "a Pololu Maestro with twelve hobby servos"),
-        ("emulate --rig my.yaml", "every bus of a rig, each on its own terminal"),
+        ("emulate my.yaml", "every bus of a rig, each on its own terminal"),
     ),
     "fit-scanpath": (
         ("fit-scanpath gaze.csv --parts boxes.yaml", "a walk from an eye tracker's samples"),
@@ -95,20 +97,58 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
 }
 """Command -> examples, each with what it is for."""
 
+PANELS: dict[str, tuple[str, ...]] = {
+    "Run": (
+        *("run", "ctl", "get", "set", "save", "revert", "stop", "resume", "character"),
+        *("ask", "status", "look"),
+    ),
+    "Look back": ("replay", "report", "compare", "export"),
+    "Bring-up": (
+        *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),
+    ),
+    "Tools": ("check", "schema", "emulate", "record-camera", "fit-scanpath"),
+}
+"""What help shows together."""
 
-def add_examples(app: typer.Typer) -> None:
-    """Put the examples under the help of every command of an app and of its parts."""
+
+class PanelGroup(TyperGroup):
+    """A group whose help shows the commands in the order of ``PANELS``."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands."""
+        order = [name for commands in PANELS.values() for name in commands]
+        return sorted(
+            super().list_commands(ctx),
+            key=lambda name: order.index(name) if name in order else len(order),
+        )
+
+
+def add_examples(app: typer.Typer, panels: bool = True) -> None:
+    """Put examples under the help of every command of an app.
+
+    panels: each command is put into its panel, too
+    """
     for command in app.registered_commands:
         name = command.name or _dashed(command.callback)
+        if panels:
+            command.rich_help_panel = panel_of(name)
         if name in EXAMPLES:
             command.epilog = epilog(EXAMPLES[name])
     for group in app.registered_groups:
         part = group.typer_instance
         if part is None:
             continue
-        if part.info.name in EXAMPLES:
-            part.info.epilog = epilog(EXAMPLES[part.info.name])
-        add_examples(part)
+        title = part.info.name
+        if isinstance(title, str):
+            group.rich_help_panel = panel_of(title)
+        if title in EXAMPLES:
+            part.info.epilog = epilog(EXAMPLES[title])
+        add_examples(part, panels and not isinstance(title, str))
+
+
+def panel_of(command: str) -> str:
+    """Return the panel of a command in the help of all."""
+    return next((panel for panel, commands in PANELS.items() if command in commands), "Tools")
 
 
 def epilog(examples: Iterable[tuple[str, str]]) -> str:

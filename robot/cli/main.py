@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+import gazerig
 from gazerig.config.load import load
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.file_input import read_limited
@@ -21,7 +22,7 @@ from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.cli import report as cli_report
 from gazerig.robot.cli import run as cli_run
 from gazerig.robot.cli import tune as cli_tune
-from gazerig.robot.cli.examples import add_examples
+from gazerig.robot.cli.examples import PanelGroup, add_examples
 from gazerig.robot.cli.terminal import (
     DEBUG_LOGGER,
     ForceOption,
@@ -34,6 +35,7 @@ from gazerig.robot.cli.welcome import next_steps
 from gazerig.robot.remote.client import running
 
 app = typer.Typer(
+    cls=PanelGroup,
     invoke_without_command=True,
     pretty_exceptions_enable=False,
 )
@@ -50,11 +52,23 @@ for part in (
     app.add_typer(part.app)
 
 
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"gazerig {gazerig.__version__}")
+        raise typer.Exit
+
+
 @app.callback()
 def begin(
     context: typer.Context,
     debug: Annotated[
         bool, typer.Option("--debug", help="Show where an error comes from, with any command.")
+    ] = False,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Show the version and end.", callback=_version, is_eager=True
+        ),
     ] = False,
 ) -> None:
     """Makes an animatronic head look at people the way people look at each other."""

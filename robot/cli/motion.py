@@ -19,7 +19,8 @@ from gazerig.robot.bringup.move_result import PASSING, Moved, Step
 from gazerig.robot.cli import calibrate_group as cli_calibrations
 from gazerig.robot.cli import monitor as cli_monitor
 from gazerig.robot.cli.messages import holding, left_alone
-from gazerig.robot.cli.ports import MockOption, PortOption, RigOption, Wires, wires
+from gazerig.robot.cli.ports import MockOption, PortOption, Wires, wires
+from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.event_text import drawn_together
@@ -48,8 +49,10 @@ NoParkOption = Annotated[
 ]
 
 
-@app.command(context_settings=_NEGATIVE)
+@app.command(cls=RigCommand, context_settings=_NEGATIVE)
 def jog(
+    rig: RigArgument = "desk",
+    *,
     joint: Annotated[str, typer.Argument(metavar="JOINT", help="A joint, e.g. neck_yaw.")],
     deg: Annotated[float, typer.Argument(metavar="DEG", help="Where to, in degrees.")],
     speed: SpeedOption = 20.0,
@@ -57,11 +60,10 @@ def jog(
     hold: HoldOption = False,
     no_park: NoParkOption = False,
     yes: YesOption = False,
-    rig: RigOption = "desk",
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
-    """Move one joint slowly while the others hold: gazerig jog neck_yaw 20."""
+    """Move one joint slowly while the others hold: gazerig jog my.yaml neck_yaw 20."""
     with clear_errors(rig, port, mock):
         loaded = load_rig(rig)
         refuse_beyond(joint, deg, loaded.names, limits(loaded.joints))
@@ -93,8 +95,10 @@ def home(
     _exit_unless(moved.arrived)
 
 
-@app.command("look-at", context_settings=_NEGATIVE)
+@app.command("look-at", cls=RigCommand, context_settings=_NEGATIVE)
 def look_at_command(
+    rig: RigArgument = "desk",
+    *,
     x: Annotated[float, typer.Argument(metavar="X", help="Metres forward of the neck base.")],
     y: Annotated[float, typer.Argument(metavar="Y", help="Metres to the left.")],
     z: Annotated[float, typer.Argument(metavar="Z", help="Metres up.")],
@@ -103,11 +107,10 @@ def look_at_command(
     no_park: NoParkOption = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of blinks.")] = 0,
     yes: YesOption = False,
-    rig: RigOption = "desk",
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
-    """Turn eyes and head to a point and tell how well they meet it: gazerig look-at 1 0.2 0.3."""
+    """Turn eyes and head to a point and tell how well they meet it: X Y Z in metres."""
     with clear_errors(rig, port, mock):
         refuse_not_finite((x, y, z))
         loaded = load_rig(rig)

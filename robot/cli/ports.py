@@ -27,9 +27,6 @@ PortOption = Annotated[
         metavar="PORT", help="Serial port instead of the rig's; NAME=PORT for a further bus."
     ),
 ]
-RigOption = Annotated[
-    str, typer.Option(metavar="RIG", help="A rig's YAML file, or the name of a shipped rig.")
-]
 
 
 class Wires(NamedTuple):

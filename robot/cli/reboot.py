@@ -16,7 +16,8 @@ from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.bringup.servo_family import ServoKind
 from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, wires
 from gazerig.robot.cli.progress import YesOption, to_open
-from gazerig.robot.cli.terminal import FAULT, clear_errors, say
+from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say
 from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer()
@@ -28,11 +29,12 @@ HIGHEST_ID: dict[str, int] = {
 }
 
 
-@app.command()
+@app.command(cls=RigCommand)
 def reboot(
+    rig: RigArgument = "desk",
+    *,
     servos: Annotated[list[str], typer.Argument(metavar="ID...", help="Servo ids or joints.")],
     port: PortOption = None,
-    rig: Annotated[str, typer.Option(help="The rig whose ports and baud rates.")] = "desk",
     mock: MockOption = False,
     yes: YesOption = False,
 ) -> None:
@@ -79,7 +81,10 @@ def _servo(rig: Rig, text: str) -> tuple[str, int]:
     most = HIGHEST_ID[rig.bus_named(buses[0]).kind]
     if text.isdecimal() and int(text) <= most:
         return buses[0], int(text)
-    raise SetupError(f"{text}: neither an id from 0 to {most} nor a joint ({', '.join(rig.names)})")
+    raise SetupError(
+        f"{text}: neither an id from 0 to {most} nor a joint ({', '.join(rig.names)}) nor a rig "
+        "(a file, or the name of a shipped one, before the ids)"
+    )
 
 
 def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, yes: bool) -> bool:

@@ -41,7 +41,7 @@ def record_camera(
     ] = None,
     force: Annotated[bool, typer.Option(help="Write over an existing file.")] = False,
 ) -> None:
-    """Record what a camera gives: gazerig record-camera seen.mcap --oak, then run --replay."""
+    """Record what a camera gives, for gazerig run --camera-recording FILE."""
     with clear_errors():
         source, name = _source(oak, camera, video, (width, height, rate))
         with signals() as stopped:

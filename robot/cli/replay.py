@@ -15,8 +15,16 @@ from rich.table import Table
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing
+from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.run import host_port
-from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, say, signals
+from gazerig.robot.cli.terminal import (
+    FAULT,
+    ForceOption,
+    clear_errors,
+    complete_rig,
+    say,
+    signals,
+)
 from gazerig.robot.control.loop import Tick
 
 if TYPE_CHECKING:
@@ -30,17 +38,22 @@ Recording = Annotated[
 ]
 
 
-@app.command()
+@app.command(cls=RigCommand)
 def replay(
     file: Recording,
+    rig: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="RIG",
+            help="With --rerun: another rig than the recorded one.",
+            autocompletion=complete_rig,
+        ),
+    ] = None,
     page: Annotated[str, typer.Option(help="Where the page is served.")] = "127.0.0.1:8080",
     play: Annotated[bool, typer.Option(help="Play at once, not only when asked.")] = False,
     rerun: Annotated[
         bool, typer.Option(help="Feed what was seen through the models of now; no page.")
     ] = False,
-    rig: Annotated[
-        str | None, typer.Option(help="With --rerun: another rig than the recorded one.")
-    ] = None,
     character: Annotated[str | None, typer.Option(help="With --rerun: another character.")] = None,
     joints: Annotated[
         str | None, typer.Option(help="With --rerun: recorded or emulated joints.")
@@ -55,7 +68,7 @@ def replay(
             well = _rerun(file, rig, character, joints)
         elif rig is not None or character is not None or joints is not None:
             raise SetupError(
-                "--rig, --character and --joints need --rerun: a replay shows what was"
+                "another RIG, --character and --joints need --rerun: a replay shows what was"
             )
         else:
             with signals() as stopped:

@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from gazerig.config.load import ConfigError
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing
+from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say, signals
 
 if TYPE_CHECKING:
@@ -43,16 +44,20 @@ class _Layers(NamedTuple):
     profile: str | None
 
 
-@app.command()
+@app.command(cls=RigCommand)
 def report(
     file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="A recording of gazerig run --record.")
+        Path | None,
+        typer.Argument(
+            metavar="[FILE | RIG]",
+            help="A recording of gazerig run --record; with --scene the rig of that run "
+            f"(default: {DEFAULT_RIG}).",
+        ),
     ] = None,
     scene: Annotated[
-        str | None, typer.Option(help="Without a file: run this scene in simulated time.")
+        str | None, typer.Option(help="Instead of a file: run this scene in simulated time.")
     ] = None,
     seconds: Annotated[float, typer.Option(min=5.0, help="Length of that run.")] = 180.0,
-    rig: Annotated[str, typer.Option(help="The rig of that run.")] = "desk",
     character: Annotated[str | None, typer.Option(help="A character laid over it.")] = None,
     profile: Annotated[str | None, typer.Option(help="Its style of gaze.")] = None,
     scanpath: Annotated[str | None, typer.Option(help="Face scanpath instead of its own.")] = None,
@@ -66,6 +71,9 @@ def report(
 ) -> None:
     """Say how human a run's gaze was: gazerig report run.mcap, then open report.html."""
     with clear_errors():
+        rig = DEFAULT_RIG
+        if scene is not None and file is not None and file.suffix != ".mcap":
+            rig, file = str(file), None
         if (file is None) == (scene is None):
             raise SetupError("report takes a recording, or --scene NAME: one of them")
         # Drawing and models are heavy; `--help` does without them.

@@ -16,6 +16,7 @@ from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing, write_file
 from gazerig.robot.cli.examples import complete_scene, complete_shipped
+from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from gazerig.robot.control.joint_faults import JointFault
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
-@app.command()
+@app.command(cls=RigCommand)
 def run(
     rig: RigArgument = "desk",
     mock: Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")] = False,
@@ -43,7 +44,10 @@ def run(
     camera: Annotated[int | None, typer.Option(help="Look through webcam N.")] = None,
     oak: Annotated[bool, typer.Option(help="Look through an OAK-D camera.")] = False,
     replay: Annotated[
-        Path | None, typer.Option(help="Look at a recording of record-camera, again and again.")
+        Path | None,
+        typer.Option(
+            "--camera-recording", help="Look at a recording of record-camera, again and again."
+        ),
     ] = None,
     pixels: Annotated[
         bool, typer.Option(help="Draw the scene and find faces and motion in the pictures.")

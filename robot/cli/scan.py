@@ -27,14 +27,23 @@ from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.cli import progress as bench
 from gazerig.robot.cli.ports import MockOption, wires
 from gazerig.robot.cli.progress import JsonOption, console
+from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.suggestions import completed
-from gazerig.robot.cli.terminal import FAULT, clear_errors, say
+from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, say
 
 app = typer.Typer()
 
 
-@app.command()
+@app.command(cls=RigCommand)
 def scan(
+    rig: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="RIG",
+            help="Ask the ports of this rig; default: the only port, with --mock rig desk.",
+            autocompletion=complete_rig,
+        ),
+    ] = None,
     port: Annotated[str | None, typer.Option(help="Serial port; default: the only one.")] = None,
     kind: Annotated[
         str | None,
@@ -48,14 +57,13 @@ def scan(
         bool, typer.Option("--thorough", help="Wait long, and ask every id, at every baud rate.")
     ] = False,
     mock: MockOption = False,
-    rig: Annotated[str, typer.Option(help="With --mock: the rig whose servos.")] = "desk",
     as_json: JsonOption = False,
 ) -> None:
     """List serial ports, and who answers on one at every baud rate.
 
     Moves and changes nothing; only a Maestro's list of errors is cleared by asking for it.
     """
-    with clear_errors(rig, port, mock):
+    with clear_errors(rig or DEFAULT_RIG, port, mock):
         rates, kinds = parse_bauds(bauds), _parse_kind(kind or "all")
         found_ports = bench.ports_here()
         if not as_json:
@@ -73,15 +81,15 @@ def scan(
 
 @contextlib.contextmanager
 def _paths(
-    rig: str, mock: bool, port: str | None, found: Sequence[SerialPort]
+    rig: str | None, mock: bool, port: str | None, found: Sequence[SerialPort]
 ) -> Iterator[list[tuple[str, bool]]]:
     """Return the ports to search, a rig's or one, and whether each is an I2C bus."""
-    if not mock:
+    if rig is None and not mock:
         path = port if port is not None else _only_port(found)
         yield [(path, is_i2c(path))]
         return
-    model = load_rig(rig)
-    with wires(model, True, port) as wired:
+    model = load_rig(rig or DEFAULT_RIG)
+    with wires(model, mock, port) as wired:
         yield [
             (path, model.bus_named(name).kind == "pca9685") for name, path in wired.paths.items()
         ]

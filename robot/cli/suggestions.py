@@ -15,7 +15,6 @@ _SUGGESTED = re.compile(
 )
 _given: list[Mapping[str, object]] = [{}]
 """Of the command in force, last; for all threads, as those that watch a run speak, too."""
-_TAKE_RIG_AS_OPTION = ("reboot", "scan")
 
 
 @contextlib.contextmanager
@@ -53,7 +52,7 @@ def completed(text: str, given: Mapping[str, object] | None = None) -> str:
     known = given
 
     def whole(found: re.Match[str]) -> str:
-        named = (f" {shlex.quote(str(known['rig']))}", " --rig ", " --port ")
+        named = (f" {shlex.quote(str(known['rig']))}", " --port ")
         if text[found.end() :].startswith(named):
             return found[0]  # it says so itself
         if found["command"] == "reboot" and not found["words"]:
@@ -70,6 +69,4 @@ def _command(command: str, words: str, given: Mapping[str, object]) -> str:
     more += " --mock" if mock is True else ""
     if command == "scan" and mock is not True:
         return f"gazerig scan{words}{more}"
-    if command in _TAKE_RIG_AS_OPTION:
-        return f"gazerig {command}{words} --rig {named}{more}"
     return f"gazerig {command} {named}{words}{more}"

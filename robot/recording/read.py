@@ -191,7 +191,7 @@ class RunRecording:
         if profile.startswith(_CAMERA):
             raise BadRecording(
                 f"{self.path} is a recording of a camera, not of a run: look at it with "
-                "gazerig run --replay"
+                "gazerig run --camera-recording"
             )
         if profile.startswith(_RUN):
             raise BadRecording(

@@ -58,8 +58,8 @@ def commands(rig: str) -> dict[str, list[str]]:
     by = [] if rig == "maker" else ["--by", "motion"]
     return {
         "run": ["run", rig, "--scene", "visitor", "--no-page"],
-        "jog": ["jog", joint, "8", "--hold", "--yes", "--rig", rig],
-        "look-at": ["look-at", "1", "0.1", "0.3", "--seconds", "60", "--yes", "--rig", rig],
+        "jog": ["jog", rig, joint, "8", "--hold", "--yes"],
+        "look-at": ["look-at", rig, "1", "0.1", "0.3", "--seconds", "60", "--yes"],
         "home": ["home", rig, "--hold", "--yes"],
         "calibrate": ["calibrate", rig, "--dry-run", "--joint", joint, *by, "--yes"],
         "calibrate face": ["calibrate", "face", rig, "--scene", "sits-still", "--no-page",
