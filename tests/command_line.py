@@ -68,7 +68,8 @@ def options(of: str = "") -> set[str]:
     assert isinstance(group, TyperGroup)
     waiting = [command for name, command in group.commands.items() if of in ("", name)]
     for command in waiting:
-        found |= {"--help", *(o for param in command.params for o in param.opts)}
+        opts = {o for param in command.params for o in param.opts}
+        found |= {"--help", *(o for o in opts if o.startswith("-"))}
         found |= {o for param in command.params for o in param.secondary_opts}
         if isinstance(command, TyperGroup):
             waiting.extend(command.commands.values())

@@ -95,9 +95,7 @@ def test_what_a_driver_says_at_the_start_can_be_typed(asked: list[str], tmp_path
             next(iter(emulated_lines(load_rig("desk")).values())).servos, baud=1_000_000
         )
         bus.command("overload 7")
-        made = CliRunner().invoke(
-            app, [w.replace("RIG", str(rig)) for w in asked] + ["--port", path]
-        )
+        made = CliRunner().invoke(app, [*words, "--port", path])
         _writer.flush(20.0)
     said = made.output + capfd.readouterr().err
     assert made.exit_code in (1, 2), said
