@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 OTHER_SDK := dynamixel-sdk==3.8.4
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: run test check bench links figures clean
+.PHONY: run test check docs bench links figures clean
 
 run: $(VENV)/.installed
 	$(BIN)/gazerig run --mock
@@ -40,11 +40,15 @@ links:
 	@ln -sf ../../api/__init__.py ../../api/py.typed .links/gazerig/
 	@for room in config drivers gaze robot sim_mock; do ln -sfn ../../$$room .links/gazerig/$$room; done
 
+# The documentation as a site, in site/; a link to nothing or a faulty docstring fails it.
+docs: $(VENV)/.installed-docs links
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+
 figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/make_figures.py
 
 clean:
-	rm -rf $(VENV) .links build *.egg-info
+	rm -rf $(VENV) .links build site *.egg-info
 
 # $(call install,WHAT) makes the environment and installs WHAT into it.
 define install
@@ -69,6 +73,9 @@ endef
 
 $(VENV)/.installed: pyproject.toml
 	$(call install,.)
+
+$(VENV)/.installed-docs: pyproject.toml
+	$(call install,.[docs])
 
 $(VENV)/.installed-dev: pyproject.toml
 	$(call install,.[dev])

@@ -91,7 +91,7 @@ def save_copy(
 
     Raises:
         gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is no
-        YAML file.
+            YAML file.
     """
     if not to.endswith((".yaml", ".yml")):
         raise ConfigError([Fault(to, None, "", "", "a rig's file ends in .yaml; name it so")])

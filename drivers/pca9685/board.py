@@ -60,7 +60,7 @@ class Pca9685Board:
 
     Args:
         port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge behind
-        it.
+            it.
         params: how to reach them.
     """
 

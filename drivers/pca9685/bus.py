@@ -14,7 +14,7 @@ class Pca9685Bus(HobbyBoardBus):
 
     Args:
         port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge behind
-        it.
+            it.
         setups: the servos, in the order of every sequence given and taken; a servo's id is
             its channel, and steps are quarter microseconds.
         params: how to reach them.

@@ -34,7 +34,8 @@ class Provisioning:
     """Compares servos with what they should be, and makes them so.
 
     Args:
-        line, registers: the bus, for groups and for single servos.
+        line: the bus, for groups of servos.
+        registers: the bus, for single servos.
         setups: the servos.
         log: notes every write.
         block: what their indirect blocks hold, None where there are none.

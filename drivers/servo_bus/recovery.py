@@ -23,10 +23,12 @@ class Recovery:
     """Sets servos up again while others run.
 
     Args:
-        line, provisioning: the bus, and what its servos must be like.
+        line: the bus.
+        provisioning: what its servos must be like.
         setups: the servos by id.
         watchdog: Bus Watchdog to arm, in its units; 0 for none.
-        health, log: told what was found and done.
+        health: told what was found.
+        log: told what was done.
     """
 
     def __init__(

@@ -96,7 +96,8 @@ class Reader(Generic[View, Sample]):
     Args:
         line: the bus.
         roll: who is asked; told who failed.
-        together, alone: the views of the group's reading, and of servos asked alone.
+        together: the views of the group's reading.
+        alone: the views of servos that are asked alone.
         kind: makes the read of some servos with a view.
         header: first bytes of every answer.
         second: views of readings that confirm others, and have other lengths than they.

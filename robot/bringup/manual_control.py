@@ -89,7 +89,8 @@ class ManualControl:
     """A rig whose goals come from a person.
 
     Args:
-        body, guard: of one rig.
+        body: the joints of one rig.
+        guard: the same rig's.
         clock: the host's, or a simulated one with the emulated bus.
         params: how slowly.
         stopped: asked at every step; gives why to stop, None while there is no reason.

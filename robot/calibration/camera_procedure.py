@@ -128,7 +128,7 @@ class LensSteps:
 
         Raises:
             gazerig.robot.calibration.camera_calibration.CameraCalibrationRefused: more views will
-            not help.
+                not help.
         """
         try:
             return self.result(), ""
@@ -143,7 +143,7 @@ class LensSteps:
 
         Raises:
             gazerig.robot.calibration.camera_calibration.CameraCalibrationRefused: the views do not
-            show it.
+                show it.
         """
         views: Sequence[SeenBoard] = self._collector.views if self._collector is not None else ()
         width, height = self._size if self._collector is not None else (1, 1)

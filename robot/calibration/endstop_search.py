@@ -112,7 +112,8 @@ class StopSearch:
     Args:
         params: how gently.
         direction: 1 towards more steps, -1 towards fewer.
-        low, high: the goals that the servo allows, in steps.
+        low: the least goal that the servo allows, in steps.
+        high: the greatest one.
     """
 
     def __init__(self, params: StopSearchParams, direction: int, low: int, high: int) -> None:

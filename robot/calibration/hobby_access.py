@@ -35,7 +35,8 @@ class OneHobby:
     """The servo of one joint.
 
     Args:
-        name, joint: the joint as configured.
+        name: the joint's.
+        joint: as configured.
         port: of the board; opened by ``open``.
         params: how to speak with the board.
         clock: the host's.

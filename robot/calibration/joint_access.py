@@ -27,7 +27,8 @@ class SingleJoint:
     """The servo of one joint. Where it does not answer any more, methods raise BusLost.
 
     Args:
-        name, joint: the joint as configured.
+        name: the joint's.
+        joint: as configured.
         servo: its servo.
         clock: the host's.
         stopped: asked all the time; tells why to stop, None while there is no reason.

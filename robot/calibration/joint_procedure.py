@@ -72,7 +72,7 @@ def by_hand(single: SingleJoint, person: Person, margin_deg: float) -> Calibrati
 
     Raises:
         gazerig.robot.calibration.joint_calibration.CalibrationRefused: what was marked makes no
-        calibration.
+            calibration.
         DriverError: the servo does not answer any more.
         gazerig.robot.calibration.joint_access.Stopped: the person wants it to end.
     """
@@ -102,7 +102,7 @@ def by_motion(
 
     Raises:
         gazerig.robot.calibration.joint_calibration.CalibrationRefused: what was found makes no
-        calibration.
+            calibration.
         DriverError: the servo is not fit for it, or does not answer any more.
         gazerig.robot.calibration.joint_access.Stopped: the person wants it to end.
     """

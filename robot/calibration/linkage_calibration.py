@@ -45,12 +45,15 @@ def likely_angle(joint: JointParams, position: float, one: Place, other: Place) 
 def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: float) -> Places:
     """Make linkage and range of a joint; a lid's range ends at its marked places.
 
-    marked: in any order; margin_deg: kept from the ends of any other joint
+    Args:
+        name: the joint's.
+        marked: angles in degrees and positions, in any order.
+        joint: as configured.
+        margin_deg: kept from the ends of any other joint.
 
     Raises:
         gazerig.robot.calibration.joint_calibration.CalibrationRefused: they make no linkage, or no
-        range
-            with 0 inside.
+            range with 0 inside.
     """
     linkage = tuple(sorted((round(angle, 1) + 0.0, position) for angle, position in marked))
     kept = 0.0 if is_lid(name) else margin_deg

@@ -22,7 +22,8 @@ class SmartServo:
 
     Args:
         name: the joint's.
-        servo_id, model: as configured.
+        servo_id: as configured.
+        model: as configured.
         port: opened.
     """
 

@@ -336,8 +336,16 @@ def run(
     A tick that takes too long costs the slots it overran: they are counted and
     skipped, never caught up in a burst.
 
-    params: a function where the rate may change while running; slots of another rate begin
-        at the last tick's
+    Args:
+        robot: reads, decides and writes once a tick.
+        clock: the host's, or a simulated one.
+        params: rate and slots; a function where the rate may change while running. Slots of another
+            rate begin at the last tick's.
+        stop: is given the seconds since the start, and returns why to stop, or None.
+        watch: gets every tick.
+
+    Returns:
+        Ticks done, slots missed and why it ended.
     """
     now = params if callable(params) else lambda: params
     start_s = slots_s = last_s = clock.now_s()

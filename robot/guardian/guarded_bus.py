@@ -20,7 +20,8 @@ class GuardedBus:
     Args:
         bus: of servos without a watchdog.
         count: how many servos.
-        guardian, plan: who watches, and the number of the plan for this bus's port.
+        guardian: the process that watches the loop.
+        plan: the number of its plan for this bus's port.
     """
 
     def __init__(self, bus: ServoBus, count: int, guardian: Guardian, plan: int) -> None:

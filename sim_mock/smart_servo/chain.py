@@ -36,7 +36,8 @@ class ServoChain(ABC, Generic[S, Q]):
         now_s: the chain's clock.
         quirks: what servos do where documents and devices differ.
         heed_baud: only a client at a servo's baud rate is heard; else every client is.
-        framing, faults: of this make of servos.
+        framing: packets of this make of servos.
+        faults: faults of this make of servos.
     """
 
     unreadable = 0
