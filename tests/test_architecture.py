@@ -17,11 +17,7 @@ ROOMS = ("config", "drivers", "gaze", "robot", "sim_mock")
 # Vendor packages, and the only modules that may see each.
 OWNERS = {
     "serial": ("drivers.serial.", "sim_mock.in_process_port"),
-    "dynamixel_sdk": (
-        "drivers.dynamixel.",
-        "drivers.serial.port",
-        "sim_mock.in_process_port",
-    ),
+    "dynamixel_sdk": ("drivers.serial.port", "sim_mock.in_process_port"),
     "depthai": ("drivers.camera.oak_sdk",),
     "mcap": ("drivers.camera.recording_", "robot.recording."),
     "smbus2": ("drivers.i2c.port",),

@@ -9,9 +9,10 @@ from desk import JOINTS
 from typer.testing import CliRunner
 
 from gazerig.config.save import copy_shipped, save_rig
-from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.serial.list_ports import Host, SerialPort
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.cli import bringup_commands as cli_servos
 from gazerig.robot.cli import progress as bench
 from gazerig.sim_mock.pty.client import PtyBus
@@ -192,7 +193,7 @@ def test_reboot_asks_before_a_joint_goes_limp():
 def switch_on(path):
     port = BlockingPort(path)
     port.setBaudRate(1_000_000)
-    assert Registers(port).write(7, "torque_enable", 1)
+    assert Registers(port, DYNAMIXEL).write(7, "torque_enable", 1)
     port.closePort()
 
 

@@ -2,10 +2,11 @@
 
 import pytest
 
-from gazerig.drivers.dynamixel.discovery import Found
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.feetech.memory_table import REGISTERS, TABLE_END
 from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
+from gazerig.drivers.servo_bus.discovery import Found, ping
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.bus_search import Looked
 from gazerig.robot.bringup.doctor.checks import CHECKS, apply_fix, examine, take
@@ -74,7 +75,7 @@ class Rig:
         self.chain[servo_id].write(64 if self.kind is DYNAMIXEL else 40, b"\x01")
 
     def get(self, servo_id, name):
-        return self.kind.registers(self.port, 3).read(servo_id, name)
+        return Registers(self.port, self.kind.family).read(servo_id, name)
 
     def command(self, text):
         self.port.faults.command(text)
@@ -112,7 +113,9 @@ FIRMWARE = {"dynamixel": 53, "feetech": 353}
 
 
 def found_as(kind, **other):
-    return Found(1, NUMBER[kind.name], FIRMWARE[kind.name], BAUD)._replace(**other)
+    number = other.pop("number", NUMBER[kind.name])
+    model = kind.family.model_name(number)
+    return Found(1, number, FIRMWARE[kind.name], BAUD, model)._replace(**other)
 
 
 def servo_state(kind, setup=None, found=None, corrupt=0, **values):
@@ -334,10 +337,10 @@ def test_every_rule_stands_registers_that_were_not_read(kind):
 @each
 def test_a_servo_that_does_not_tell(kind):
     rig = Rig(kind)
-    found = kind.ping(rig.port, 1, BAUD, 1)
+    found = ping(rig.port, kind.family, 1, BAUD, 1)
     rig.command("lose 1")
     checks = CHECKS[kind.name]
-    (only,) = examine(take(kind.registers(rig.port, 3), checks, rig.setups[0], found, 0))
+    (only,) = examine(take(Registers(rig.port, kind.family), checks, rig.setups[0], found, 0))
     says = "no good answer about its registers" if kind is FEETECH else "answers pings and nothing"
     assert only.level == "error" and says in only.what
 
@@ -371,7 +374,7 @@ def test_the_voltage_latch_is_explained_where_it_is_armed():
 def test_a_missing_servo_a_stranger_and_one_at_another_rate(kind):
     eye, neck = EYE[kind.name], NECK[kind.name]
     rig = Rig(kind, [ServoSpec(1, eye), ServoSpec(2, eye), ServoSpec(30, neck)])
-    rig.set(2, baud_rate=kind.baud_rates.index(115_200))
+    rig.set(2, baud_rate=kind.family.baud_rates.index(115_200))
     findings = rig.check()
     assert "115200" in one(findings, "error", TILT, "answers at 115200").what
     assert "gazerig setup" in one(findings, "error", YAW, "does not answer").remedy
@@ -386,7 +389,7 @@ def test_a_missing_servo_a_stranger_and_one_at_another_rate(kind):
 def test_a_new_servo_among_the_others(kind):
     eye, neck = EYE[kind.name], NECK[kind.name]
     rig = Rig(kind, [ServoSpec(1, eye), ServoSpec(2, eye), ServoSpec(11, neck)])
-    rig.set(11, baud_rate=kind.baud_rates.index(57_600))
+    rig.set(11, baud_rate=kind.family.baud_rates.index(57_600))
     found = one(rig.check(), "warn", "the bus", f"servo 11 ({neck}) answers at 57600")
     assert "gazerig setup" in found.remedy
 
@@ -606,7 +609,7 @@ def test_findings_in_words():
 
 
 def test_remarks_of_a_scan():
-    two = (Found(1, 1190, 53, BAUD), Found(1, 1190, 53, BAUD))
+    two = (Found(1, 1190, 53, BAUD, "xl330-m077"), Found(1, 1190, 53, BAUD, "xl330-m077"))
     said = " ".join(remarks([Looked("dynamixel", BAUD, True, two)], "/dev/x"))
     assert "2 servos on /dev/x" in said and "two or more servos have id 1 at 1000000" in said
     merged = [Looked("dynamixel", BAUD, True, two[:1], shared=(1,))]

@@ -39,7 +39,7 @@ Faults on the wire and in servos, by number, and their tests here:
 31 group write lost      test_31_lost_writes
 32 write blocked         test_32_blocked_write
 
-What the maker's SDK makes of a single read is in test_dynamixel_sdk_packets. Of its group
+Single reads are in test_servo_registers. Of the maker's SDK's group
 reads: silent, corrupt, lost byte, refused, alert, late and truncated are numbers 1 to 14
 and 22 here; a broadcast ping with noise or a bad CRC is test_ping_among_noise; fast bulk
 reads, which it takes apart wrongly, are never sent.

@@ -4,9 +4,10 @@ import pytest
 from dynamixel_sdk import PacketHandler
 
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.protocol import HEADER
-from gazerig.drivers.dynamixel.registers import Registers
 from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
@@ -206,16 +207,16 @@ def test_a_lost_setup_answer_is_asked_for_again():
 def test_a_refused_setup_read_gives_none():
     rig = Rig()
     rig.port.setBaudRate(1_000_000)
-    assert Registers(rig.port).read(1, "goal_current") == 1750
+    assert Registers(rig.port, DYNAMIXEL).read(1, "goal_current") == 1750
     rig.port.spoil = lambda code, raw: status(1, 7, b"") if code == 2 else raw
-    assert Registers(rig.port).read(1, "goal_current") is None
+    assert Registers(rig.port, DYNAMIXEL).read(1, "goal_current") is None
 
 
 def test_negative_registers_are_read_as_negative():
     rig = Rig()
     rig.port.setBaudRate(1_000_000)
     PacketHandler(2.0).write4ByteTxRx(rig.port, 1, 20, (-100) & 0xFFFFFFFF)
-    assert Registers(rig.port).read(1, "homing_offset") == -100
+    assert Registers(rig.port, DYNAMIXEL).read(1, "homing_offset") == -100
 
 
 def test_servos_without_a_current_sensor_report_no_current():

@@ -8,9 +8,10 @@ import pytest
 from mixed_rig import mixed_text
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.dynamixel.registers import Registers
-from gazerig.drivers.feetech.registers import StsRegisters
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.feetech.family import FEETECH as STS
 from gazerig.drivers.maestro.commands import Speech
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.bringup.monitor import Monitor, as_json
@@ -49,9 +50,9 @@ class Bench:
             if config.kind == "maestro":
                 looks[name] = MaestroLooks(port, config.maestro)
             elif config.kind == "feetech":
-                looks[name] = FeetechLooks(StsRegisters(port, 1))
+                looks[name] = FeetechLooks(Registers(port, STS, 1))
             else:
-                looks[name] = DynamixelLooks(Registers(port, 1))
+                looks[name] = DynamixelLooks(Registers(port, DYNAMIXEL, 1))
         joints = {name: rig.joints[name] for name in rig.names}
         self.monitor = Monitor(looks, joints, self.clock.now_s)
 
@@ -63,7 +64,7 @@ class Bench:
 
 def test_sts_servos_tell_all_and_nothing_is_written() -> None:
     bench = Bench(FEETECH)
-    registers = StsRegisters(bench.ports[""])
+    registers = Registers(bench.ports[""], STS)
     registers.write(7, "goal_speed", 300)
     registers.write(7, "goal_position", 1500)
     registers.write(7, "torque_enable", 1)

@@ -6,7 +6,7 @@ from math import radians
 
 import pytest
 
-from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.bringup.monitor import Monitor, as_json
 from gazerig.robot.bringup.servo_families import DYNAMIXEL
 from gazerig.robot.bringup.telemetry import DynamixelLooks, look
@@ -30,9 +30,9 @@ class Bench:
         self.sent: list[bytes] = []
         self.port = InProcessPort(self.chain, self.sent.append, sleep_until=self.clock.sleep_until)
         self.port.setBaudRate(1_000_000)
-        self.registers = Registers(self.port)
+        self.registers = Registers(self.port, DYNAMIXEL.family)
         self.monitor = Monitor(
-            {"": DynamixelLooks(Registers(self.port, 1))}, JOINTS, self.port.now_s
+            {"": DynamixelLooks(Registers(self.port, DYNAMIXEL.family, 1))}, JOINTS, self.port.now_s
         )
 
 
@@ -78,7 +78,6 @@ def test_a_latched_error_is_named() -> None:
     bench.port.faults.command("encoder 7")
     neck = bench.monitor.sample().looks["neck_yaw"]
     assert neck is not None and set(neck.errors) == {"overload", "encoder"}
-    bench.registers.alerts.clear()
     eye = bench.monitor.sample().looks["left_eye_pan"]
     assert eye is not None and eye.errors == ()
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gazerig.drivers.dynamixel.discovery import COMMON_FIRST
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.robot.bringup.bus_search import (
     BOARD_RATES,
     Looked,
@@ -158,7 +158,7 @@ def test_nobody():
 
 def test_all_rates_of_a_kind_are_in_the_plan():
     rows = plan("", ALL, None)
-    assert [rate for kind, rate in rows if kind == "dynamixel"] == list(COMMON_FIRST)
+    assert [rate for kind, rate in rows if kind == "dynamixel"] == list(DYNAMIXEL.usual_rates)
     assert rows[0] == ("maestro", 115_200)
 
 

@@ -1,10 +1,13 @@
 """Setting servos up one at a time, and restarting them: on emulated servos, byte for byte."""
 
+from dataclasses import replace
+
 import pytest
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES
-from gazerig.drivers.dynamixel.discovery import COMMON_FIRST, Found
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
+from gazerig.drivers.servo_bus.discovery import Found, any_reply, ping
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH
 from gazerig.robot.bringup.servo_reboot import Standing, restart
@@ -19,6 +22,8 @@ BAUD = 1_000_000
 MODELS = {"dynamixel": "xc330-m288", "feetech": "sts3215"}
 YAW = ServoSetup(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw")
 
+RATES = DYNAMIXEL.family.usual_rates
+
 each = pytest.mark.parametrize("kind", [DYNAMIXEL, FEETECH], ids=lambda kind: kind.name)
 
 
@@ -28,7 +33,7 @@ class Bench:
     def __init__(self, *specs, baud=None, kind=DYNAMIXEL):
         self.now = 10.0
         self.kind = kind
-        self.baud = kind.factory_baud if baud is None else baud
+        self.baud = kind.family.factory_baud if baud is None else baud
         self.model = MODELS[kind.name]
         self.yaw = YAW._replace(model=self.model)
         build = build_feetech if kind is FEETECH else build_dynamixel
@@ -59,7 +64,7 @@ class Bench:
         assert self.registers().write(servo_id, "torque_enable", 1)
 
     def registers(self):
-        return self.kind.registers(self.port, 3)
+        return Registers(self.port, self.kind.family)
 
     def kept(self, servo_id):
         return bytes(self.chain[servo_id].memory.bytes[:40])
@@ -78,7 +83,7 @@ def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, b
     bench.sleep_until(bench.now + 1.0)
     bench.chain.refresh()
     bench.port.setBaudRate(BAUD)
-    assert kind.ping(bench.port, 7, BAUD, 1) is not None
+    assert ping(bench.port, kind.family, 7, BAUD, 1) is not None
     assert kind.family.lock is None or bench.registers().read(7, kind.family.lock) == 1
 
 
@@ -123,8 +128,8 @@ def test_two_servos_at_two_rates_are_refused(kind):
     model = MODELS[kind.name]
     bench = Bench(ServoSpec(1, model), ServoSpec(2, model), kind=kind)
     bench.port.setBaudRate(bench.baud)
-    index = kind.baud_rates.index(115_200)
-    kind.write_lasting(bench.registers(), 2, "baud_rate", index)
+    index = kind.family.baud_rates.index(115_200)
+    bench.registers().write_lasting(2, "baud_rate", index)
     bench.chain.refresh()
     both = rf"id 1 \({model}\) at {bench.baud} .*id 2 \({model}\) at 115200"
     with pytest.raises(ServoMissing, match=both):
@@ -135,9 +140,9 @@ def test_two_servos_at_two_rates_are_refused(kind):
 def test_another_model_is_refused_and_left_alone(kind):
     bench = Bench(kind=kind)
     before = bench.kept(1)
-    models = {bench.model: kind.models[bench.model]._replace(number=1029)}
-    bench.kind = kind._replace(models=models)
-    with pytest.raises(ServoMissing, match=rf"this is {bench.model}, neck_yaw \(servo 7\) wants"):
+    models = {bench.model: kind.family.models[bench.model]._replace(number=1029)}
+    bench.kind = kind._replace(family=replace(kind.family, models=models))
+    with pytest.raises(ServoMissing, match=r"this is model number \d+, neck_yaw \(servo 7\) wants"):
         bench.assign()
     assert bench.kept(1) == before
 
@@ -145,7 +150,7 @@ def test_another_model_is_refused_and_left_alone(kind):
 @each
 def test_what_there_is_not_is_refused(kind):
     bench = Bench(kind=kind)
-    with pytest.raises(ValueError, match=rf"id 254 is not in 0\.\.{kind.highest_id}"):
+    with pytest.raises(ValueError, match=rf"id 254 is not in 0\.\.{kind.family.highest_id}"):
         bench.assign(bench.yaw._replace(id=254))
     with pytest.raises(ValueError, match="1234 bit/s is none of"):
         bench.assign(baud=1234)
@@ -183,10 +188,10 @@ def test_a_restart_of_a_servo_that_holds_leaves_it_limp(kind):
 
 
 @each
-def test_firmware_that_does_not_know_how_to_restart_is_told_by_the_torque(kind):
+def test_firmware_that_does_not_know_how_to_restart_is_told_by_the_torque(kind, monkeypatch):
     bench = Bench(kind=kind)
     bench.hold()
-    bench.kind = kind._replace(reboot=lambda port, servo_id: None)
+    monkeypatch.setattr("gazerig.robot.bringup.servo_reboot.reboot", lambda *what: None)
     with pytest.raises(ServoFault, match="servo 1 has not restarted, its torque is still on"):
         bench.restart()
 
@@ -234,20 +239,19 @@ def test_a_standing_in_words(standing, text):
 
 
 def test_kinds_write_firmware_as_their_makers_do():
-    assert (FEETECH.version(353), FEETECH.version(310), DYNAMIXEL.version(53)) == (
-        "3.53", "3.10", "53",
-    )  # fmt: skip
+    assert [FEETECH.family.version(number) for number in (353, 310)] == ["3.53", "3.10"]
+    assert DYNAMIXEL.family.version(53) == "53"
 
 
 def test_any_reply_is_a_matter_of_answers_not_of_echoes():
     bench = Bench(kind=FEETECH)
     bench.port.setBaudRate(BAUD)
-    assert FEETECH.any_reply(bench.port)
+    assert any_reply(bench.port, FEETECH.family)
     bench.port.faults.command("lose all")
-    assert not FEETECH.any_reply(bench.port)
+    assert not any_reply(bench.port, FEETECH.family)
     bench.port.faults.command("echo on")
-    assert not FEETECH.any_reply(bench.port)
-    assert DYNAMIXEL.any_reply(InProcessPort(build_dynamixel([], lambda: 0.0)))
+    assert not any_reply(bench.port, FEETECH.family)
+    assert any_reply(InProcessPort(build_dynamixel([], lambda: 0.0)), DYNAMIXEL.family)
 
 
 # --- Dynamixel servos, packet by packet
@@ -256,24 +260,24 @@ def test_any_reply_is_a_matter_of_answers_not_of_echoes():
 def test_a_factory_fresh_servo_gets_its_id_and_rate():
     bench = Bench()
     result = bench.assign()
-    assert result.before == Found(1, 1240, 53, 57_600)
-    assert result.now == Found(7, 1240, 53, BAUD)
+    assert result.before == Found(1, 1240, 53, 57_600, "xc330-m288")
+    assert result.now == Found(7, 1240, 53, BAUD, "xc330-m288")
     assert result.done == ("id 1 -> 7", f"baud rate 57600 -> {BAUD} bit/s")
     (servo,) = bench.chain.servos
     assert (servo.id, servo.memory.get("baud_rate")) == (7, BAUD_RATES.index(BAUD))
     assert servo.memory.get("torque_enable") == 0
 
 
-@pytest.mark.parametrize("baud", [b for b in COMMON_FIRST if b != 4_500_000])
+@pytest.mark.parametrize("baud", [b for b in RATES if b != 4_500_000])
 def test_it_is_found_whatever_its_id_and_rate(baud):
     bench = Bench(ServoSpec(200, "xc330-m288"), baud=baud)
-    assert bench.find() == Found(200, 1240, 53, baud)
+    assert bench.find() == Found(200, 1240, 53, baud, "xc330-m288")
     assert bench.assign().now.id == 7
 
 
 def test_the_likely_rates_are_asked_first():
     assert search_order(DYNAMIXEL, 2_000_000)[:2] == (57_600, 2_000_000)
-    assert sorted(search_order(DYNAMIXEL, 57_600)) == sorted(COMMON_FIRST)
+    assert sorted(search_order(DYNAMIXEL, 57_600)) == sorted(RATES)
 
 
 def test_a_servo_that_answers_pings_alone():
@@ -353,7 +357,7 @@ def test_a_lost_confirmation_does_not_matter(address):
 
     bench = Bench()
     bench.port = Lossy(bench.chain)
-    assert bench.assign().now == Found(7, 1240, 53, BAUD)
+    assert bench.assign().now == Found(7, 1240, 53, BAUD, "xc330-m288")
 
 
 def test_a_lost_status_of_the_restart_does_not_matter():

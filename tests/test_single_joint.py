@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing, SetupError
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.calibration.endstop_search import STEPS_PER_DEG, StopSearchParams
 from gazerig.robot.calibration.joint_access import SingleJoint, Stopped
@@ -44,7 +45,7 @@ class Bench:
         self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
         self.port.setBaudRate(1_000_000)
         self.kind = kind_of(joint.model)
-        self.registers = self.kind.registers(self.port, 3)
+        self.registers = Registers(self.port, self.kind.family)
         self.why: str | None = None
         self.id = joint.id
         self.script: list[int] = []
@@ -60,7 +61,7 @@ class Bench:
         return value
 
     def put(self, register: str, value: int) -> None:
-        assert self.kind.write_lasting(self.registers, self.id, register, value)
+        assert self.registers.write_lasting(self.id, register, value)
 
     def limits(self) -> tuple[int, int]:
         return self.get("min_position_limit"), self.get("max_position_limit")

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from gazerig.drivers.dynamixel import protocol
 from gazerig.drivers.dynamixel.control_table import (
+    BAUD_RATES,
     MODELS,
     PWM_FULL,
     REGISTERS,
@@ -14,8 +15,7 @@ from gazerig.drivers.dynamixel.control_table import (
     name_errors,
     speed_units,
 )
-from gazerig.drivers.dynamixel.registers import Registers
-from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.dynamixel.protocol_1 import ask_protocol_1
 from gazerig.drivers.servo_bus.family import Arming, Family
 
 if TYPE_CHECKING:  # the guardian starts without numpy
@@ -27,13 +27,11 @@ STEEPEST_PWM = 255
 """PWM Slope: with the factory's 140 a motor needs 36 ms from full drive to full brake, in which a
 lid at 600 deg/s runs 4 deg too far."""
 
-PING_QUIET_S = 0.04
-"""All who will answer a ping to everybody have done so when nothing came for so long."""
+USUAL_RATES = (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600, 4_500_000)
+"""Every baud rate of the servos, the usual ones first."""
 
-PING_MOST_S = 0.8
-"""The SDK waits so long for them; nobody answers later."""
-
-_ROOM = 4096
+THOROUGH_S = 0.016 + 0.003 * 253
+"""What the maker's SDK allows for all ids: 3 ms each and the adaptor's latency."""
 
 
 class Goals(protocol.SyncWrite):
@@ -46,24 +44,6 @@ class Goals(protocol.SyncWrite):
     def packet(self, goals: Sequence[int], speeds: Sequence[int] = ()) -> bytes:
         """Build the packet for one goal a servo."""
         return super().packet(goals)
-
-
-def ping_all(port: BusPort, baud: int) -> dict[int, tuple[int, int]]:
-    """Ask everybody who is there; return (model number, firmware) by id."""
-    port.clearPort()
-    port.write(protocol.instruction(protocol.BROADCAST, protocol.PING))
-    end_s = port.now_s() + PING_MOST_S
-    raw = b""
-    while port.now_s() < end_s:
-        more = port.read_until(_ROOM, port.now_s() + PING_QUIET_S)
-        raw += more
-        if not more or len(raw) >= 4 * _ROOM:
-            break
-    return {
-        status.id: (status.params[0] | status.params[1] << 8, status.params[2])
-        for status in protocol.statuses(raw)
-        if status.intact and len(status.params) == 3
-    }
 
 
 def wanted_settings(setup: "ServoSetup") -> dict[str, int]:
@@ -101,8 +81,11 @@ DYNAMIXEL = Family(
     speed_units=speed_units,
     acceleration_units=acceleration_units,
     goals=Goals,
-    single=Registers,
-    ping_all=ping_all,
+    baud_rates=BAUD_RATES,
+    usual_rates=USUAL_RATES,
+    factory_baud=57_600,
+    highest_id=252,
+    version=str,
     # Written in this order, as a new operating mode puts gains and profile back.
     spans=(
         ("return_delay_time", "operating_mode"),
@@ -123,6 +106,10 @@ DYNAMIXEL = Family(
     goal_speed=False,
     single_turn=False,
     broadcast_ping=True,
+    quiet_s=0.1,
+    thorough_s=THOROUGH_S,
+    telling=("realtime_tick", "present_position"),
+    protocol_1=ask_protocol_1,
     arming=Arming("profile_velocity", speed=True),
     most_goals=253,
     usual_bauds="57600 or 1000000",

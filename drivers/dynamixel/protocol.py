@@ -13,13 +13,14 @@ from collections.abc import Iterable, Sequence
 
 from fastcrc.crc16 import umts
 
-from gazerig.drivers.servo_bus.family import Status
+from gazerig.drivers.servo_bus.family import Identity, Status
 
 HEADER = b"\xff\xff\xfd\x00"
 RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
 BROADCAST = 0xFE
 STATUS = 0x55
-PING, SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x01, 0x82, 0x83, 0x8A
+PING, READ, WRITE, REBOOT = 0x01, 0x02, 0x03, 0x08
+SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
 
 STATUS_OVERHEAD = 11
 """Bytes of a status without params."""
@@ -29,8 +30,14 @@ ERROR_NUMBER, ALERT = 0x7F, 0x80
 
 REFUSAL = ERROR_NUMBER
 
+ECHO_LENGTH = None
+"""An answer has a byte that no instruction has, so an echo never looks like one."""
+
 LONGEST_STATUS = 256
 """No answer asked for here is longer; a larger length is noise."""
+
+_IDENTITY = struct.Struct("<HB")
+IDENTITY_LENGTH = _IDENTITY.size
 
 _HEAD = struct.Struct("<4sBHB")
 _SPAN = struct.Struct("<HH")
@@ -44,6 +51,37 @@ def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
         params = params.replace(RAW, STUFFED)
     packet = _HEAD.pack(HEADER, servo_id, len(params) + 3, code) + params
     return packet + _CRC.pack(umts(packet))
+
+
+def ping(servo_id: int) -> bytes:
+    """Build a ping."""
+    return instruction(servo_id, PING)
+
+
+identify = ping
+"""A ping's answer tells model and firmware."""
+
+
+def identity(status: Status) -> Identity | None:
+    """Return what a servo's answer to a ping says it is, None where this is none."""
+    if len(status.params) != IDENTITY_LENGTH or status.error & ERROR_NUMBER:
+        return None
+    return Identity(*_IDENTITY.unpack(status.params))
+
+
+def reboot(servo_id: int) -> bytes:
+    """Build an order to restart."""
+    return instruction(servo_id, REBOOT)
+
+
+def read(servo_id: int, address: int, length: int) -> bytes:
+    """Build a request for registers of one servo."""
+    return instruction(servo_id, READ, _SPAN.pack(address, length))
+
+
+def write(servo_id: int, address: int, data: bytes) -> bytes:
+    """Build an order to write registers of one servo."""
+    return instruction(servo_id, WRITE, address.to_bytes(2, "little") + data)
 
 
 def sync_read(ids: Sequence[int], address: int, length: int, fast: bool = False) -> bytes:

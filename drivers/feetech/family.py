@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING
 
 from gazerig.drivers.feetech import protocol
 from gazerig.drivers.feetech.memory_table import (
+    BAUD_RATES,
+    HIGHEST_ID,
     MODELS,
     MULTI_TURN,
     REGISTERS,
@@ -14,21 +16,12 @@ from gazerig.drivers.feetech.memory_table import (
     speed_units,
 )
 from gazerig.drivers.feetech.protocol import MOST_GOALS, GoalWrite
-from gazerig.drivers.feetech.registers import StsRegisters
-from gazerig.drivers.feetech.scan import everybody
-from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Arming, Family
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoSetup
 
 POSITION_MODE = 0
-
-
-def ping_all(port: BusPort, baud: int) -> dict[int, tuple[int, int]]:
-    """Ask every id that there is, one after the other; return (model number, firmware) by id."""
-    found, _ = everybody(port, baud)
-    return {one.id: (one.number, one.firmware) for one in found}
 
 
 def wanted_settings(setup: "ServoSetup") -> dict[str, int]:
@@ -70,8 +63,11 @@ FEETECH = Family(
     speed_units=speed_units,
     acceleration_units=acceleration_units,
     goals=GoalWrite,
-    single=StsRegisters,
-    ping_all=ping_all,
+    baud_rates=BAUD_RATES,
+    usual_rates=BAUD_RATES,
+    factory_baud=1_000_000,
+    highest_id=HIGHEST_ID,
+    version=lambda firmware: f"{firmware // 100}.{firmware % 100}",
     spans=(("return_delay_time", "operating_mode"), ("torque_limit", "lock")),
     wanted=wanted_settings,
     target=_target,
@@ -84,6 +80,10 @@ FEETECH = Family(
     goal_speed=True,
     single_turn=True,
     broadcast_ping=False,
+    quiet_s=0.004,
+    thorough_s=0.004,
+    telling=("present_position", "present_current"),
+    protocol_1=None,
     arming=Arming("acceleration", speed=False),
     most_goals=MOST_GOALS,
     usual_bauds="115200 or 1000000",

@@ -7,15 +7,16 @@ Source: Feetech memory table STS3215, register 40.
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.feetech.memory_table import SET_MIDDLE, STEPS_PER_TURN
-from gazerig.drivers.feetech.registers import StsRegisters
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.family import Family
+from gazerig.drivers.servo_bus.registers import Registers
 
 MIDDLE = STEPS_PER_TURN // 2
 NEAR_STEPS = 8
 """The joint may be moved by a hand's tremor meanwhile."""
 
 
-def set_middle(port: BusPort, servo_id: int) -> int:
+def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
     """Let a limp servo call its present place 2048; gives the offset it has now, in steps.
 
     Raises:
@@ -23,7 +24,7 @@ def set_middle(port: BusPort, servo_id: int) -> int:
         ServoFault: its torque is on, or it does not take the order.
         BusLost: the port is gone.
     """
-    registers = StsRegisters(port)
+    registers = Registers(port, family)
     where = f"{port.port_name}: servo {servo_id}"
     torque = registers.read(servo_id, "torque_enable")
     if torque is None:

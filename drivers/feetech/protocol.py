@@ -17,7 +17,7 @@ Source: Feetech, communication protocol of the SCS and STS series.
 import struct
 from collections.abc import Iterable, Sequence
 
-from gazerig.drivers.servo_bus.family import Status
+from gazerig.drivers.servo_bus.family import Identity, Status
 
 HEADER = b"\xff\xff"
 BROADCAST = 0xFE
@@ -29,6 +29,15 @@ STATUS_OVERHEAD = 6
 
 REFUSAL = 0
 """No bit of the error byte says that an order was refused: it says how the servo is."""
+
+ALERT = 0xFF
+"""Bits of the error byte that say that something ails the servo."""
+
+ECHO_LENGTH = 2
+"""A question about registers has two params, as an answer of two bytes has."""
+
+IDENTITY_LENGTH = 9
+"""Registers 0..8: firmware, model, id, baud rate, return delay, status level."""
 
 LONGEST_STATUS = 128
 """Length of a status with more than the whole table: noise."""
@@ -51,6 +60,32 @@ def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
 def checksum(body: bytes) -> int:
     """Return the checksum over the bytes from the id to the last param."""
     return ~sum(body) & 0xFF
+
+
+def ping(servo_id: int) -> bytes:
+    """Build a ping; its echo looks like its answer."""
+    return instruction(servo_id, PING)
+
+
+def reboot(servo_id: int) -> bytes:
+    """Build an order to restart."""
+    return instruction(servo_id, REBOOT)
+
+
+def identify(servo_id: int) -> bytes:
+    """Build a question about what a servo is: its first registers."""
+    return read(servo_id, 0, IDENTITY_LENGTH)
+
+
+def identity(status: Status) -> Identity | None:
+    """Return what a servo's first registers say it is, None where these are others.
+
+    The firmware is a hundred times the major version and the minor one, 310 for 3.10.
+    """
+    data = status.params
+    if len(data) != IDENTITY_LENGTH or data[5] != status.id:
+        return None
+    return Identity(data[3] | data[4] << 8, 100 * data[0] + data[1])
 
 
 def read(servo_id: int, address: int, length: int) -> bytes:

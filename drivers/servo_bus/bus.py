@@ -17,8 +17,9 @@ from gazerig.drivers.servo_bus.goals import clipped
 from gazerig.drivers.servo_bus.poll_list import Roll
 from gazerig.drivers.servo_bus.provisioning import AddressMap, Provisioning
 from gazerig.drivers.servo_bus.recovery import Recovery
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.torque import switch_off
-from gazerig.drivers.servo_bus.transaction import TRIES, Line
+from gazerig.drivers.servo_bus.transaction import Line
 from gazerig.drivers.types import ServoReading, ServoSetup
 
 RESTART_S = 0.1
@@ -135,7 +136,7 @@ class SmartServoBus(PortBus):
         self._roll = Roll(self._ids)
         self._health = Health(by_id, log)
         self._block = self._address_map(firmware)
-        single = self._family.single(self._port, 1)
+        single = Registers(self._port, self._family, 1)
         self._provisioning = Provisioning(line, single, self._setups, log, self._block)
         self._recovery = Recovery(
             line, self._provisioning, by_id, self._watchdog, self._health, log
@@ -178,7 +179,7 @@ class SmartServoBus(PortBus):
             raise PortError(
                 f"{where} cannot run at {baud} bit/s: choose {self._family.usual_bauds}"
             )
-        registers = self._family.single(self._port, TRIES)
+        registers = Registers(self._port, self._family)
         try:
             firmware = find(self._line, registers, self._setups, self._log)
             self._assemble(firmware)

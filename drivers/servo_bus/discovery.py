@@ -1,16 +1,231 @@
-"""Who is on the bus, against who should be: one message with everything that is wrong."""
+"""Who is on a bus: servos looked for at every baud rate, and those found against those expected.
 
-from collections.abc import Mapping, Sequence
+Where a ping to all servos is answered by one after the other that is what is asked. Elsewhere all
+would answer at once, over each other, so every id is asked for what it is; an answer names its id,
+so one that an adapter hands over late is counted all the same.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog, servo_label
-from gazerig.drivers.servo_bus.family import Family, Identity, SingleRegisters
+from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
+from gazerig.drivers.servo_bus.family import Family, Identity, Status
+from gazerig.drivers.servo_bus.registers import REPLY_S, Registers, transact
 from gazerig.drivers.servo_bus.transaction import Line
 from gazerig.drivers.types import ServoSetup
 
+FIND_QUIET_S = 0.04
+"""All servos of a rig have answered a ping to all when nothing came for so long."""
+
+BABBLE_S = 2.0
+"""Listening gives up on a line that never falls silent."""
+
+SHARED, ANSWERS = 2, 6
+"""So many of so many answers in pieces are no accident."""
+
+_ROOM = 1 << 12
+_MOST = 1 << 13
+"""More bytes than all ids can say."""
+
+Progress = Callable[[int, int], None]
+"""Called with the baud rate and the id that is asked."""
+
+
+class Found(NamedTuple):
+    """One servo that answered.
+
+    number: its model number; firmware: as its make counts it
+    baud: at which it answered; model: the name of its model
+    """
+
+    id: int
+    number: int
+    firmware: int
+    baud: int
+    model: str
+
+
+class BaudScan(NamedTuple):
+    """What one baud rate has brought.
+
+    possible: the adaptor can run at it; junk: bytes that made no sense
+    shared: ids that two servos seem to have, as their longer answers come in pieces
+    protocol_1: ids that answer to Protocol 1.0 only
+    """
+
+    baud: int
+    possible: bool
+    found: tuple[Found, ...] = ()
+    junk: int = 0
+    shared: tuple[int, ...] = ()
+    protocol_1: tuple[int, ...] = ()
+
+
+def scan(
+    port: BusPort,
+    family: Family,
+    bauds: Sequence[int] | None = None,
+    thorough: bool = False,
+    progress: Progress | None = None,
+    ids: Sequence[int] | None = None,
+) -> Iterator[BaudScan]:
+    """Ask at one baud rate after the other who is there; the port is left open at the last.
+
+    Args:
+        port: it is opened.
+        family: the make of servo to look for.
+        bauds: all of the make's where None.
+        thorough: wait long; ask every id even where no servo answers a ping to all.
+        progress: called for every id that is asked alone.
+        ids: those that are asked where ids are asked alone; all where None.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
+    """
+    for baud in family.usual_rates if bauds is None else bauds:
+        if not port.setBaudRate(baud):
+            yield BaudScan(baud, False)
+            continue
+        if not thorough and not any_reply(port, family):
+            yield BaudScan(baud, True)
+            continue
+        quiet_s = family.thorough_s if thorough else family.quiet_s
+        found, junk = scan_ids(port, family, baud, quiet_s, progress, ids)
+        old = family.protocol_1(port) if family.protocol_1 and not found else ()
+        each = {one.id: 0 for one in found}
+        shared = tuple(i for i in each if corrupt(port, family, i) >= SHARED)
+        yield BaudScan(baud, True, found, junk, shared, old)
+
+
+def scan_ids(
+    port: BusPort,
+    family: Family,
+    baud: int,
+    quiet_s: float | None = None,
+    progress: Progress | None = None,
+    ids: Sequence[int] | None = None,
+) -> tuple[tuple[Found, ...], int]:
+    """Ask all servos who is there; return them and the number of bytes that made no sense.
+
+    Two servos with one id answer over each other; whole answers that differ are two servos.
+
+    Raises:
+        BusLost: the port is gone.
+    """
+    codec, quiet_s = family.codec, family.quiet_s if quiet_s is None else quiet_s
+    port.drain()
+    if family.broadcast_ping:
+        request = codec.identify(codec.BROADCAST)
+        port.write(request)
+        size = len(request) + codec.STATUS_OVERHEAD + codec.IDENTITY_LENGTH
+        raw = read_until_quiet(port, quiet_s + size * BITS_PER_BYTE / baud)
+    else:
+        raw = b""
+        for servo_id in range(family.highest_id + 1) if ids is None else ids:
+            if progress is not None:
+                progress(baud, servo_id)
+            request = codec.identify(servo_id)
+            raw += transact(port, family, request, codec.IDENTITY_LENGTH, quiet_s)[0]
+        raw += port.read_until(_ROOM, port.now_s() + REPLY_S)
+    whole = [status for status in codec.statuses(raw) if status.intact]
+    used = sum(codec.STATUS_OVERHEAD + len(status.params) for status in whole)
+    found = [one for status in whole if (one := _found(family, status, baud)) is not None]
+    # A ping to all is answered once; a servo asked alone may be heard again, late.
+    each = found if family.broadcast_ping else dict.fromkeys(found)
+    return tuple(each), max(0, len(raw) - used)
+
+
+def any_reply(port: BusPort, family: Family) -> bool:
+    """Return whether any servo answers a ping to all, whose answers may spoil each other.
+
+    True where ``scan_ids`` asks nothing else.
+    """
+    if family.broadcast_ping:
+        return True
+    question = family.codec.ping(family.codec.BROADCAST)
+    port.drain()
+    port.write(question)
+    heard = port.read_until(_ROOM, port.now_s() + REPLY_S)
+    # An adapter that echoes puts the question before the answers.
+    return bool(heard.replace(question, b"", 1))
+
+
+def ping(port: BusPort, family: Family, servo_id: int, baud: int, tries: int = 2) -> Found | None:
+    """Ask one servo what it is; None where no whole answer came."""
+    codec = family.codec
+    for _ in range(tries):
+        port.drain()
+        request = codec.identify(servo_id)
+        _, status = transact(port, family, request, codec.IDENTITY_LENGTH, REPLY_S, servo_id)
+        found = None if status is None else _found(family, status, baud)
+        if found is not None:
+            return found
+    return None
+
+
+def corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANSWERS) -> int:
+    """Count how many of some answers of one servo came in pieces, or disagreed about where it is.
+
+    Two servos with one id speak at the same time: where their bytes differ they spoil
+    each other. Their pings are often equal, their positions hardly ever.
+    """
+    first, last = (family.registers[name] for name in family.telling)
+    length = last.address + last.size - first.address
+    position = family.registers["present_position"]
+    at = position.address - first.address
+    bad, places = 0, list[int]()
+    for _ in range(tries):
+        port.drain()
+        request = family.codec.read(servo_id, first.address, length)
+        raw, status = transact(port, family, request, length, REPLY_S, servo_id)
+        if status is None:
+            bad += bool(raw)
+        elif len(status.params) == length:
+            places.append(position.decode(status.params[at : at + position.size]))
+    # A check of one byte over two answers is right now and then by chance, but not the place.
+    wide = bool(places) and max(places) - min(places) > family.steps_per_turn // 8
+    return max(bad, SHARED if wide else 0)
+
+
+def reboot(port: BusPort, family: Family, servo_id: int) -> None:
+    """Tell a servo to restart; whether it has is seen by asking it afterwards."""
+    port.drain()
+    port.write(family.codec.reboot(servo_id))
+    port.drain()  # some firmware confirms it
+
+
+def read_until_quiet(port: BusPort, quiet_s: float) -> bytes:
+    """Return all that comes until the line has been quiet for a while."""
+    end_s = port.now_s() + BABBLE_S
+    raw = port.read_until(1, port.now_s() + quiet_s)
+    while raw and port.now_s() < end_s and len(raw) <= _MOST:
+        more = port.read_until(1, port.now_s() + quiet_s)
+        if not more:
+            break
+        raw += more
+    return raw
+
+
+def _found(family: Family, status: Status, baud: int) -> Found | None:
+    """Return the servo that told what it is, None where this is no such answer."""
+    identity = family.codec.identity(status)
+    if identity is None:
+        return None
+    return Found(status.id, *identity, baud, family.model_name(identity.model_number))
+
+
+def identities(line: Line) -> dict[int, Identity]:
+    """Ask all servos of a bus who is there, expected or not."""
+    quiet_s = min(line.family.quiet_s, FIND_QUIET_S)
+    found, _ = scan_ids(line.port, line.family, line.baud, quiet_s)
+    return {one.id: Identity(one.number, one.firmware) for one in found}
+
 
 def find(
-    line: Line, registers: SingleRegisters, setups: Sequence[ServoSetup], log: EventLog
+    line: Line, registers: Registers, setups: Sequence[ServoSetup], log: EventLog
 ) -> dict[int, int]:
     """Find every servo and check its model and firmware; return the firmware of each.
 
@@ -22,7 +237,7 @@ def find(
             named at once, with those that are there and not expected.
     """
     family = line.family
-    heard = line.ping_all() if family.broadcast_ping else {}
+    heard = identities(line) if family.broadcast_ping else {}
     found = {
         # Two with one id, or a noisy line, spoil an answer to everybody: asked alone as well.
         setup.id: heard.get(setup.id) or registers.identify(setup.id)
@@ -31,7 +246,7 @@ def find(
     problems = [text for setup in setups if (text := _problem(family, setup, found[setup.id]))]
     if problems and not family.broadcast_ping:
         # Another one may be the one that is missing; only now is it worth asking every id.
-        heard = line.ping_all()
+        heard = identities(line)
     strangers = {i: identity for i, identity in heard.items() if i not in found}
     where = line.port.port_name
     if not any(found.values()) and not strangers:

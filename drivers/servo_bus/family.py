@@ -65,6 +65,14 @@ class Model(Protocol):
     def no_load_steps_s(self) -> float:
         """Speed of its shaft without load."""
 
+    @property
+    def max_voltage(self) -> int:
+        """Upper voltage limit from the factory, 0.1 V."""
+
+    @property
+    def rated_v(self) -> float:
+        """Voltage that it is made for."""
+
 
 class Identity(NamedTuple):
     """What a servo says it is: the model number and the firmware version."""
@@ -85,8 +93,42 @@ class Codec(Protocol):
         """Bytes of an answer without params."""
 
     @property
+    def BROADCAST(self) -> int:
+        """Id that stands for all servos."""
+
+    @property
     def REFUSAL(self) -> int:
         """Bits of an answer's error byte that say that nothing was done."""
+
+    @property
+    def ALERT(self) -> int:
+        """Bits of an answer's error byte that say that something ails the servo."""
+
+    @property
+    def ECHO_LENGTH(self) -> int | None:
+        """Params of a read whose echo looks like an answer, None where none does."""
+
+    @property
+    def IDENTITY_LENGTH(self) -> int:
+        """Params of an answer about what a servo is."""
+
+    def identify(self, servo_id: int) -> bytes:
+        """Build a question about what a servo is."""
+
+    def identity(self, status: Status) -> Identity | None:
+        """Return what a servo says it is, None where an answer does not tell."""
+
+    def ping(self, servo_id: int) -> bytes:
+        """Build a ping."""
+
+    def reboot(self, servo_id: int) -> bytes:
+        """Build an order to restart."""
+
+    def read(self, servo_id: int, address: int, length: int) -> bytes:
+        """Build a request for registers of one servo."""
+
+    def write(self, servo_id: int, address: int, data: bytes) -> bytes:
+        """Build an order to write registers of one servo."""
 
     def sync_read(self, ids: Sequence[int], address: int, length: int) -> bytes:
         """Build a request for the same registers of several servos."""
@@ -110,27 +152,6 @@ class GoalPackets(Protocol):
         """Build the packet for one goal and one speed a servo."""
 
 
-class SingleRegisters(Protocol):
-    """Single registers of single servos, each exchange confirmed.
-
-    refusal: error number of the newest refused exchange, 0 where it was not refused
-    """
-
-    refusal: int
-
-    def identify(self, servo_id: int) -> Identity | None:
-        """Return what a servo is, None where it does not answer."""
-
-    def write(self, servo_id: int, name: str, value: int) -> bool:
-        """Write a register; True if the servo confirmed it."""
-
-    def write_bytes(self, servo_id: int, address: int, data: bytes) -> bool:
-        """Write bytes; True if the servo confirmed it."""
-
-    def write_all(self, ids: Sequence[int], name: str, value: int) -> None:
-        """Write one value to a register of several servos at once, unconfirmed."""
-
-
 class Arming(NamedTuple):
     """A register written before the torque comes on; ``speed``: it bounds the speed of goals."""
 
@@ -150,8 +171,11 @@ class Family:
         speed_units: from steps/s to the register of speed limits; at least 1
         acceleration_units: likewise from steps/s^2, None for no limit
         goals: packets of goals for some servos
-        single: single registers on a port, each exchange tried so often
-        ping_all: who is there at a baud rate, as (model number, firmware) by id
+        baud_rates: bit/s by the value of the servo's register
+        usual_rates: all of them, the usual ones first
+        factory_baud: of a new servo
+        highest_id: of a servo
+        version: writes a firmware number as the maker does
 
     Settings:
         spans: first and last of registers that are read together
@@ -167,7 +191,10 @@ class Family:
         watchdog_unit_s: of Bus Watchdog; None where there is no watchdog
         goal_speed: a goal carries the speed that may be used for it
         single_turn: beyond its encoder's zero a servo would go the long way round
-        broadcast_ping: a ping to all is answered one after the other
+        broadcast_ping: a ping to all is answered one after the other; else each id is asked
+        quiet_s, thorough_s: patience of a search: silence after a ping to all, or for each id
+        telling: first and last of registers in which two servos with one id differ
+        protocol_1: ids that answer to Protocol 1.0 only, where they may have been set to it
         arming: what is written before the torque comes on
         most_goals: so many servos' goals fit into one packet
         usual_bauds: bit/s to choose where an adaptor cannot run at another
@@ -183,8 +210,11 @@ class Family:
     speed_units: Callable[[float], int]
     acceleration_units: Callable[[float | None], int]
     goals: Callable[[Sequence[int]], GoalPackets]
-    single: Callable[[BusPort, int], SingleRegisters]
-    ping_all: Callable[[BusPort, int], Mapping[int, tuple[int, int]]]
+    baud_rates: tuple[int, ...]
+    usual_rates: tuple[int, ...]
+    factory_baud: int
+    highest_id: int
+    version: Callable[[int], str]
     spans: tuple[tuple[str, str], ...]
     wanted: Callable[["ServoSetup"], Mapping[str, int]]
     target: Callable[[str, int, int], int]
@@ -197,6 +227,10 @@ class Family:
     goal_speed: bool
     single_turn: bool
     broadcast_ping: bool
+    quiet_s: float
+    thorough_s: float
+    telling: tuple[str, str]
+    protocol_1: Callable[[BusPort], tuple[int, ...]] | None
     arming: Arming
     most_goals: int
     usual_bauds: str

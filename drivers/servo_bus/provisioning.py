@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog, register_label, servo_label
-from gazerig.drivers.servo_bus.family import Register, SingleRegisters
+from gazerig.drivers.servo_bus.family import Register
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.transaction import Line
 from gazerig.drivers.types import ServoSetup
 
@@ -44,7 +45,7 @@ class Provisioning:
     def __init__(
         self,
         line: Line,
-        registers: SingleRegisters,
+        registers: Registers,
         setups: Sequence[ServoSetup],
         log: EventLog,
         block: AddressMap | None = None,

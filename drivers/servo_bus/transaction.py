@@ -7,7 +7,7 @@ from math import inf
 from gazerig.drivers.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 from gazerig.drivers.servo_bus.adaptive_timeout import Patience
-from gazerig.drivers.servo_bus.family import Family, Identity
+from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.poll_list import silent_ones
 
 TRIES, HURRIED = 3, 4.0
@@ -59,7 +59,7 @@ class Line:
         self._unheard = self._owed = False
         self.quiet = True
         self.whole_s = self.deadline_s = 0.0
-        self._byte_s = BITS_PER_BYTE / baud
+        self.baud, self._byte_s = baud, BITS_PER_BYTE / baud
         self._sent_s = port.now_s()
         self._free_s = self._sent_s
 
@@ -183,11 +183,6 @@ class Line:
         register = self.family.registers[name]
         rows = [register.encode(value) for value in values]
         self.send(self.family.codec.sync_write(ids, register.address, register.size, rows))
-
-    def ping_all(self) -> dict[int, Identity]:
-        """Ask all servos who is there, expected or not."""
-        found = self.family.ping_all(self.port, round(BITS_PER_BYTE / self._byte_s))
-        return {servo_id: Identity(*one) for servo_id, one in found.items()}
 
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos once; gives those of who answered well."""

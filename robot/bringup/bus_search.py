@@ -23,9 +23,9 @@ from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
+from gazerig.drivers.servo_bus.discovery import Found, scan
 from gazerig.drivers.servo_models import BUS_KINDS, BusKind
 from gazerig.robot.bringup.servo_families import KINDS
-from gazerig.robot.bringup.servo_family import Found
 
 BOARD_RATES = (115_200, 9_600, 57_600, 38_400, 19_200)
 """Of a Maestro's serial pins, the usual ones first; on USB any will do."""
@@ -35,7 +35,7 @@ ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
 
 RATES: Mapping[BusKind, Sequence[int]] = {
     "maestro": BOARD_RATES,
-    **{kind.name: kind.rates for kind in KINDS.values()},
+    **{kind.name: kind.family.usual_rates for kind in KINDS.values()},
 }
 
 
@@ -114,7 +114,7 @@ def search(
 def _look(port: BusPort, usb: str, kind: BusKind, baud: int, thorough: bool) -> Looked:
     if kind == "maestro":
         return _board(port, usb, baud)
-    one = KINDS[kind].scan(port, baud, thorough)
+    (one,) = scan(port, KINDS[kind].family, (baud,), thorough)
     return Looked(kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1)
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Container, Iterator, Sequence
 
 from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.servo_bus.discovery import Found
 from gazerig.drivers.servo_models import BusKind
 from gazerig.robot.bringup.bus_search import Looked, found_of
-from gazerig.robot.bringup.servo_family import Found
 
 
 def servo_plain(kind: BusKind, servo: Found) -> dict[str, object]:

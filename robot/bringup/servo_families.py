@@ -3,19 +3,13 @@
 from collections.abc import Callable
 
 from gazerig.drivers.dynamixel import control_table as dynamixel
-from gazerig.drivers.dynamixel import discovery as dynamixel_scan
 from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
-from gazerig.drivers.dynamixel.registers import Registers
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.feetech import homing
 from gazerig.drivers.feetech import memory_table as feetech
-from gazerig.drivers.feetech import scan as feetech_scan
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
-from gazerig.drivers.feetech.protocol import REBOOT, instruction
-from gazerig.drivers.feetech.registers import StsRegisters
-from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import SERVOS
-from gazerig.robot.bringup.servo_family import Driving, Scanned, ServoKind, Setting
+from gazerig.robot.bringup.servo_family import Driving, ServoKind, Setting
 
 XL430_LOAD_FULL = 1000.0
 """Models without current measurement give their load in 0.1 % of the stall torque there."""
@@ -59,36 +53,10 @@ def _gentle_feetech(
     }
 
 
-def _scan_dynamixel(port: BusPort, baud: int, thorough: bool) -> Scanned:
-    (one,) = dynamixel_scan.scan(port, (baud,), thorough)
-    return Scanned(one.possible, one.found, one.junk, one.shared, one.protocol_1)
-
-
-def _scan_feetech(port: BusPort, baud: int, thorough: bool) -> Scanned:
-    """Ask all ids, which takes a second or more; unless thorough only where any servo answers."""
-    if not thorough and port.setBaudRate(baud) and not feetech_scan.anybody(port):
-        return Scanned(True, (), 0, ())
-    (one,) = feetech_scan.scan(port, (baud,))
-    return Scanned(one.possible, one.found, one.junk, one.shared)
-
-
-def _reboot_feetech(port: BusPort, servo_id: int) -> None:
-    """Tell a servo to restart; whether it has is seen by asking it afterwards."""
-    port.drain()
-    port.write(instruction(servo_id, REBOOT))
-    # Some firmware confirms it.
-    port.drain()
-
-
 DYNAMIXEL = ServoKind(
     name="dynamixel",
     title="Dynamixel",
     family=DYNAMIXEL_FAMILY,
-    models=dynamixel.MODELS,
-    rates=dynamixel_scan.COMMON_FIRST,
-    baud_rates=dynamixel.BAUD_RATES,
-    factory_baud=dynamixel_scan.FACTORY_BAUD,
-    highest_id=252,
     no_reply="is the servo supply on? does each servo's LED flash once when it comes on? is the "
     "adaptor's plug the TTL one (3 pins), and the first cable in?",
     notes=(),
@@ -100,25 +68,12 @@ DYNAMIXEL = ServoKind(
         gentle=_gentle_dynamixel,
         load=_dynamixel_load,
     ),
-    version=str,
-    registers=Registers,
-    scan_ids=dynamixel_scan.everybody,
-    scan=_scan_dynamixel,
-    any_reply=lambda port: True,
-    ping=dynamixel_scan.ping,
-    corrupt=dynamixel_scan.garbled,
-    reboot=dynamixel_scan.reboot,
 )
 
 FEETECH = ServoKind(
     name="feetech",
     title="Feetech STS",
     family=FEETECH_FAMILY,
-    models=feetech.MODELS,
-    rates=feetech_scan.COMMON_FIRST,
-    baud_rates=feetech.BAUD_RATES,
-    factory_baud=feetech_scan.FACTORY_BAUD,
-    highest_id=feetech.HIGHEST_ID,
     no_reply="is the servo supply on, and its voltage that of the servos (7.4 or 12 V)? is the "
     "first cable in, and the adaptor's jumper set to USB?",
     notes=(
@@ -137,14 +92,6 @@ FEETECH = ServoKind(
         gentle=_gentle_feetech,
         load=_feetech_load,
     ),
-    version=lambda firmware: f"{firmware // 100}.{firmware % 100}",
-    registers=StsRegisters,
-    scan_ids=feetech_scan.everybody,
-    scan=_scan_feetech,
-    any_reply=feetech_scan.anybody,
-    ping=feetech_scan.ping,
-    corrupt=feetech_scan.garbled,
-    reboot=_reboot_feetech,
     set_middle=homing.set_middle,
 )
 

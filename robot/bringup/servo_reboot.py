@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
-from gazerig.robot.bringup.servo_family import TRIES, Found, ServoKind
+from gazerig.drivers.servo_bus.discovery import Found, ping, reboot
+from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.robot.bringup.servo_family import ServoKind
 
 BACK_S = 3.0
 """A servo that is not back after so long will not come; they take about 0.4 to 0.8 s."""
@@ -49,7 +51,7 @@ def present(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> Found:
     Raises:
         ServoMissing: it does not answer.
     """
-    found = kind.ping(port, servo_id, baud, 3)
+    found = ping(port, kind.family, servo_id, baud, 3)
     if found is None:
         raise ServoMissing(
             f"{port.port_name}: servo {servo_id} does not answer at {baud} bit/s: "
@@ -64,7 +66,7 @@ def standing(port: BusPort, kind: ServoKind, servo_id: int) -> Standing:
     Raises:
         BusLost: the port is gone.
     """
-    registers = kind.registers(port, TRIES)
+    registers = Registers(port, kind.family)
     status = registers.read(servo_id, kind.family.error_register)
     torque = registers.read(servo_id, "torque_enable")
     volts = registers.read(servo_id, "present_input_voltage")
@@ -93,10 +95,10 @@ def restart(
     """
     present(port, kind, servo_id, baud)
     before, began_s = standing(port, kind, servo_id), port.now_s()
-    kind.reboot(port, servo_id)
+    reboot(port, kind.family, servo_id)
     for _ in range(round(BACK_S / PAUSE_S)):
         sleep_until(port.now_s() + PAUSE_S)
-        if kind.ping(port, servo_id, baud, 1) is None:
+        if ping(port, kind.family, servo_id, baud, 1) is None:
             continue
         away_s = port.now_s() - began_s
         after = standing(port, kind, servo_id)

@@ -13,12 +13,11 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.discovery import SHARED, Found, any_reply, corrupt, ping, scan_ids
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.servo_family import TRIES, Found, ServoKind, Tell
-
-SHARED, ANSWERS = 2, 6
-"""So many of so many answers in pieces are no accident."""
+from gazerig.robot.bringup.servo_family import ServoKind, Tell
 
 
 class SetUp(NamedTuple):
@@ -31,7 +30,7 @@ class SetUp(NamedTuple):
 
 def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
     """List all baud rates, those that a servo is likely to have first."""
-    return tuple(dict.fromkeys((kind.factory_baud, baud, *kind.rates)))
+    return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.usual_rates)))
 
 
 def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell) -> Found:
@@ -46,12 +45,12 @@ def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell)
     junk = 0
     for baud in bauds:
         tell(f"asking at {baud} bit/s")
-        if not port.setBaudRate(baud) or (found and not kind.any_reply(port)):
+        if not port.setBaudRate(baud) or (found and not any_reply(port, kind.family)):
             continue
-        answers, noise = kind.scan_ids(port, baud)
+        answers, noise = scan_ids(port, kind.family, baud)
         found += answers
         junk += noise
-        shared = answers and kind.corrupt(port, answers[0].id, ANSWERS) >= SHARED
+        shared = answers and corrupt(port, kind.family, answers[0].id) >= SHARED
         found += [answers[0]] if shared else []
     where = port.port_name
     if len(found) > 1:
@@ -80,7 +79,7 @@ def refuse_model(found: Found, kind: ServoKind, setup: ServoSetup, where: str) -
     Raises:
         ServoMissing: it is another.
     """
-    if found.number != kind.models[setup.model].number:
+    if found.number != kind.family.models[setup.model].number:
         raise ServoMissing(
             f"{where}: this is {found.model}, {servo_label(setup)} wants {setup.model}: "
             "connect the right one, or correct the model in the YAML"
@@ -102,10 +101,10 @@ def assign(
         BusLost: the port is gone.
     """
     refuse_model(found, kind, setup, port.port_name)
-    if not 0 <= setup.id <= kind.highest_id:
-        raise ValueError(f"id {setup.id} is not in 0..{kind.highest_id}")
-    if baud not in kind.baud_rates:
-        raise ValueError(f"{baud} bit/s is none of {', '.join(map(str, kind.baud_rates))}")
+    if not 0 <= setup.id <= kind.family.highest_id:
+        raise ValueError(f"id {setup.id} is not in 0..{kind.family.highest_id}")
+    if baud not in kind.family.baud_rates:
+        raise ValueError(f"{baud} bit/s is none of {', '.join(map(str, kind.family.baud_rates))}")
     return _Assignment(port, kind, found).carry_out(setup.id, baud, tell)
 
 
@@ -114,7 +113,7 @@ class _Assignment:
 
     def __init__(self, port: BusPort, kind: ServoKind, found: Found) -> None:
         self._port, self._kind, self._found = port, kind, found
-        self._registers = kind.registers(port, TRIES)
+        self._registers = Registers(port, kind.family)
         self._id, self._baud = found.id, found.baud
         self._done: list[str] = []
 
@@ -126,11 +125,11 @@ class _Assignment:
         if self._id != servo_id:
             tell(f"id {self._id} -> {servo_id}")
             self._change_id(servo_id)
-        rate = kind.baud_rates.index(baud)
+        rate = kind.family.baud_rates.index(baud)
         if self._baud != baud or registers.read(self._id, "baud_rate") != rate:
             tell(f"baud rate {self._baud} -> {baud}")
             self._change_baud(baud)
-        seen = kind.ping(self._port, self._id, self._baud, 3)
+        seen = ping(self._port, kind.family, self._id, self._baud, 3)
         if seen is None or seen.number != self._found.number:
             raise ServoMissing(
                 f"{self._port.port_name}: the servo does not answer as id {self._id} at "
@@ -153,14 +152,16 @@ class _Assignment:
         self._unlock()
         written = self._registers.write(self._id, "id", servo_id)
         # The confirmation may come from either id, or be lost.
-        if not written and self._kind.ping(self._port, servo_id, self._baud, 2) is None:
+        if not written and ping(self._port, self._kind.family, servo_id, self._baud, 2) is None:
             raise self._refused(f"take the id {servo_id}")
         self._done.append(f"id {self._id} -> {servo_id}")
         self._id = servo_id
 
     def _change_baud(self, baud: int) -> None:
         self._unlock()
-        written = self._registers.write(self._id, "baud_rate", self._kind.baud_rates.index(baud))
+        written = self._registers.write(
+            self._id, "baud_rate", self._kind.family.baud_rates.index(baud)
+        )
         if not written and self._registers.refusal:  # a mere silence may be a lost confirmation
             raise self._refused(f"take {baud} bit/s")
         self._done.append(f"baud rate {self._baud} -> {baud} bit/s")

@@ -12,11 +12,10 @@ from typing import NamedTuple, Protocol
 
 from gazerig.drivers.dynamixel.control_table import REGISTERS, VELOCITY_UNIT_STEPS_S
 from gazerig.drivers.dynamixel.control_table import name_errors as name_dynamixel
-from gazerig.drivers.dynamixel.registers import Registers
+from gazerig.drivers.dynamixel.protocol import ALERT
 from gazerig.drivers.feetech.memory_table import LOAD_UNIT
 from gazerig.drivers.feetech.memory_table import REGISTERS as STS
 from gazerig.drivers.feetech.memory_table import name_errors as name_feetech
-from gazerig.drivers.feetech.registers import StsRegisters
 from gazerig.drivers.feetech.views import ARMED
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.maestro.commands import MOST_INPUT
@@ -25,6 +24,7 @@ from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.bringup.servo_families import DYNAMIXEL
 from gazerig.robot.model.joint import JointParams
 
@@ -79,13 +79,12 @@ class DynamixelLooks:
     def look(self, joint: JointParams) -> Look | None:
         """Ask a joint's servo; see Looks."""
         registers, servo_id = self._registers, joint.id
-        registers.alerts.discard(servo_id)
         live = registers.read_bytes(servo_id, _LIVE_AT, _LIVE.size)
         torque = None if live is None else registers.read(servo_id, "torque_enable")
         if live is None or torque is None:
             return None
         latched = 0
-        if servo_id in registers.alerts:
+        if registers.error & ALERT:
             latched = registers.read(servo_id, "hardware_error_status") or 0
         return look(joint, live, bool(torque), latched)
 
@@ -112,7 +111,7 @@ class FeetechLooks:
 
     _GOAL = STS["goal_position"]
 
-    def __init__(self, registers: StsRegisters) -> None:
+    def __init__(self, registers: Registers) -> None:
         self._registers = registers
 
     def look(self, joint: JointParams) -> Look | None:

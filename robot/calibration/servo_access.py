@@ -3,7 +3,7 @@
 from typing import NamedTuple, Protocol
 
 from gazerig.drivers.errors import BusLost
-from gazerig.robot.bringup.servo_family import Registers
+from gazerig.drivers.servo_bus.registers import Registers
 
 
 class Found(NamedTuple):

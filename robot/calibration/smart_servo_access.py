@@ -7,8 +7,8 @@ its EEPROM keeps the old ones, so switching it off and on puts back what a kille
 
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.bringup.servo_families import kind_of
-from gazerig.robot.bringup.servo_family import TRIES
 from gazerig.robot.calibration.servo_access import Asked, Found
 
 WATCHDOG_S = 0.3
@@ -38,7 +38,7 @@ class SmartServo:
                 "weakly until the servo power is cut"
             )
         self._id, self._model, self._port = servo_id, model, port
-        self._registers = self._kind.registers(port, TRIES)
+        self._registers = Registers(port, self._kind.family)
         self._asked = Asked(self._registers, servo_id, self.who)
         self._was: dict[str, int] = {}
 
@@ -94,7 +94,7 @@ class SmartServo:
         was = self._asked.value(register)
         if was:
             self.let_go()
-            if not self._kind.write_lasting(self._registers, self._id, register, 0):
+            if not self._registers.write_lasting(self._id, register, 0):
                 raise ServoMissing(f"{self.who} does not take {register} 0: restart its power")
         return was
 
@@ -106,7 +106,7 @@ class SmartServo:
                 "some firmware loses its Homing Offset; take the horn off and turn the shaft"
             )
         self.let_go()
-        return self._kind.set_middle(self._port, self._id)
+        return self._kind.set_middle(self._port, self._kind.family, self._id)
 
     def let_go(self) -> None:
         """Switch the torque off, and see that it is.

@@ -12,9 +12,10 @@ from rich.live import Live
 from rich.table import Table
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.dynamixel.registers import Registers
-from gazerig.drivers.feetech.registers import StsRegisters
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.bringup.monitor import Monitor, Sample, as_json
 from gazerig.robot.bringup.telemetry import (
@@ -89,8 +90,8 @@ def _looks_on(rig: Rig, bus: str, port: BusPort) -> Looks:
     if config.kind == "pca9685":
         return Pca9685Looks(port, config.pca9685)
     if config.kind == "feetech":
-        return FeetechLooks(StsRegisters(port, tries=1))
-    return DynamixelLooks(Registers(port, tries=1))
+        return FeetechLooks(Registers(port, FEETECH, tries=1))
+    return DynamixelLooks(Registers(port, DYNAMIXEL, tries=1))
 
 
 def _samples(

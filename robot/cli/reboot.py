@@ -25,7 +25,7 @@ app = typer.Typer()
 HIGHEST_ID: dict[str, int] = {
     "maestro": 23,
     "pca9685": 255,
-    **{kind.name: kind.highest_id for kind in KINDS.values()},
+    **{kind.name: kind.family.highest_id for kind in KINDS.values()},
 }
 
 

@@ -230,7 +230,7 @@ def _show(rounds: Sequence[Looked], where: str, wished: Sequence[BusKind], as_js
     if found:
         table = Table("id", "model", "firmware", "baud", "kind")
         for kind, servo in found:
-            version = KINDS[kind].version(servo.firmware)
+            version = KINDS[kind].family.version(servo.firmware)
             table.add_row(str(servo.id), servo.model, version, str(servo.baud), KINDS[kind].title)
         out.print(table)
     for one in boards:

@@ -124,17 +124,15 @@ def _fresh(rig: Rig, one: ServoSetup, kind: ServoKind) -> Emulated:
     """Return a servo as it comes from the factory."""
     spec = (ServoSpec(FACTORY_ID, one.model, rig.joints[one.name].zero),)
     if kind.name == "feetech":
-        return FeetechLine(spec, kind.factory_baud)
-    return DynamixelLine(spec, kind.factory_baud)
+        return FeetechLine(spec, kind.family.factory_baud)
+    return DynamixelLine(spec, kind.family.factory_baud)
 
 
 def _set_up(line: BusPort, kind: ServoKind, wanted: ServoSetup, baud: int, yes: bool) -> bool:
     found = servo_setup.find_alone(line, kind, servo_setup.search_order(kind, baud), progress)
     wipe()
-    say(
-        f"   found: {found.model}, firmware {kind.version(found.firmware)}, id {found.id} at "
-        f"{found.baud} bit/s"
-    )
+    firmware = kind.family.version(found.firmware)
+    say(f"   found: {found.model}, firmware {firmware}, id {found.id} at {found.baud} bit/s")
     servo_setup.refuse_model(found, kind, wanted, line.port_name)
     question = f"   give it id {wanted.id} and {baud} bit/s?"
     if not yes and not typer.confirm(question, default=True, err=True):

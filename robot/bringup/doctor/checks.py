@@ -6,6 +6,8 @@ Every rule is a function of one ``ServoState`` and yields verdicts.
 from collections.abc import Iterator
 
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.discovery import SHARED, Found
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.doctor.dynamixel import DYNAMIXEL
 from gazerig.robot.bringup.doctor.feetech import FEETECH
@@ -13,13 +15,10 @@ from gazerig.robot.bringup.doctor.findings import Finding, Fix
 from gazerig.robot.bringup.doctor.settings import SETTINGS
 from gazerig.robot.bringup.doctor.state import STATE
 from gazerig.robot.bringup.doctor.subject import FIX, ServoChecks, ServoState, Verdict
-from gazerig.robot.bringup.servo_family import TRIES, Found, Registers, ServoKind
+from gazerig.robot.bringup.servo_family import ServoKind
 
 CHECKS: dict[str, ServoChecks] = {checks.kind.name: checks for checks in (DYNAMIXEL, FEETECH)}
 """By the name of the kind."""
-
-SHARED = 2
-"""So many of six answers in pieces are no accident."""
 
 MOST_NAMED = 6
 
@@ -32,7 +31,7 @@ def visit(
     Raises:
         BusLost: the port is gone.
     """
-    return examine(take(kind.registers(port, TRIES), CHECKS[kind.name], setup, found, corrupt))
+    return examine(take(Registers(port, kind.family), CHECKS[kind.name], setup, found, corrupt))
 
 
 def take(
@@ -71,7 +70,7 @@ def _finding(state: ServoState, verdict: Verdict) -> Finding:
 def _well(state: ServoState) -> str:
     values, found = state.values, state.found
     return (
-        f"{found.model}, firmware {state.checks.kind.version(found.firmware)}, "
+        f"{found.model}, firmware {state.checks.kind.family.version(found.firmware)}, "
         f"{(values['present_input_voltage'] or 0) / 10.0:.1f} V, "
         f"{values['present_temperature']} degC, at step {values['present_position']}"
     )
@@ -130,7 +129,7 @@ def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
     Raises:
         BusLost: the port is gone.
     """
-    registers, servo_id = kind.registers(port, TRIES), fix.servo_id
+    registers, servo_id = Registers(port, kind.family), fix.servo_id
     torque = registers.read(servo_id, "torque_enable")
     if not torque and registers.read(servo_id, "status_return_level") != kind.family.answer_level:
         # A servo that answers questions or pings alone confirms nothing of what follows.
@@ -140,7 +139,7 @@ def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
         return "its torque is on"
     if torque is None:
         return "the servo does not take it" if registers.refusal else "the servo does not answer"
-    if not kind.write_lasting(registers, servo_id, fix.register, fix.value):
+    if not registers.write_lasting(servo_id, fix.register, fix.value):
         return "the servo does not take it"
     if registers.read(servo_id, fix.register) != fix.value:
         return "it reads back otherwise"

@@ -10,6 +10,7 @@ from gazerig.drivers.dynamixel.control_table import (
     VELOCITY_UNIT_STEPS_S,
     X330_WIDE_INDIRECT_SINCE,
 )
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.bringup.doctor.subject import (
     FIX,
     FirmwareNote,
@@ -20,7 +21,6 @@ from gazerig.robot.bringup.doctor.subject import (
     WantedSetting,
 )
 from gazerig.robot.bringup.servo_families import DYNAMIXEL as KIND
-from gazerig.robot.bringup.servo_family import Registers
 
 GUARDING = (2, 4, 5)
 """Bits of Shutdown that protect motor and gears: overheating, electrical shock, overload."""

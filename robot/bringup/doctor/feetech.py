@@ -12,6 +12,7 @@ from gazerig.drivers.feetech.memory_table import (
     STEPS_PER_TURN,
     TORQUE_FULL,
 )
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.bringup.doctor.subject import (
     FIX,
     Protection,
@@ -21,7 +22,6 @@ from gazerig.robot.bringup.doctor.subject import (
     WantedSetting,
 )
 from gazerig.robot.bringup.servo_families import FEETECH as KIND
-from gazerig.robot.bringup.servo_family import Registers
 
 SPANS = ((0, EEPROM_END), (EEPROM_END, 71 - EEPROM_END))
 """First address and length of what is read at once: all that is kept, and all that lives."""

@@ -18,12 +18,13 @@ from gazerig.drivers.serial.list_ports import (
     set_latency,
 )
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.discovery import Found, any_reply, corrupt, ping, scan_ids
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.doctor.checks import visit
 from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
 from gazerig.robot.bringup.doctor.port import examine_latency, examine_port, port_facts
-from gazerig.robot.bringup.servo_family import Found, ServoKind, Tell
+from gazerig.robot.bringup.servo_family import ServoKind, Tell
 
 
 class Presence(NamedTuple):
@@ -107,16 +108,16 @@ def look(
     """
     tell(f"asking everybody at {baud} bit/s")
     _open(port, baud)
-    answers, _ = kind.scan_ids(port, baud)
+    answers, _ = scan_ids(port, kind.family, baud)
     there = {found.id: found for found in answers}
     spoilt = {i: n for i, n in Counter(found.id for found in answers).items() if n > 1}
     for setup in setups:
         if setup.id not in there:
             tell(f"asking {servo_label(setup)}")
-            found = kind.ping(port, setup.id, baud, 2)
+            found = ping(port, kind.family, setup.id, baud, 2)
             if found is not None:
                 there[setup.id] = found
-        pieces = kind.corrupt(port, setup.id, 6 if setup.id in there else 1)
+        pieces = corrupt(port, kind.family, setup.id, 6 if setup.id in there else 1)
         if pieces:
             spoilt[setup.id] = pieces
     missing = tuple(setup for setup in setups if setup.id not in there)
@@ -135,12 +136,12 @@ def _open(port: BusPort, baud: int) -> None:
 
 def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterator[Found]:
     """Look at all other baud rates."""
-    for other in kind.rates:
+    for other in kind.family.usual_rates:
         if other == baud:
             continue
         tell(f"somebody is missing: asking at {other} bit/s")
-        if port.setBaudRate(other) and kind.any_reply(port):
-            yield from kind.scan_ids(port, other)[0]
+        if port.setBaudRate(other) and any_reply(port, kind.family):
+            yield from scan_ids(port, kind.family, other)[0]
 
 
 def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[Finding]:

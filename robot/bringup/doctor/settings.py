@@ -21,7 +21,7 @@ def _firmware(state: ServoState) -> Iterator[Verdict]:
 
 
 def _baud(state: ServoState) -> Iterator[Verdict]:
-    value, rates = state.values["baud_rate"], state.checks.kind.baud_rates
+    value, rates = state.values["baud_rate"], state.checks.kind.family.baud_rates
     if value is None or value >= len(rates) or rates[value] == state.found.baud:
         return
     yield Verdict(

@@ -8,9 +8,9 @@ a restart.
 
 from collections.abc import Iterator
 
+from gazerig.drivers.servo_bus.family import Model
 from gazerig.robot.bringup.doctor.findings import Level
 from gazerig.robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
-from gazerig.robot.bringup.servo_family import ServoModel
 
 TRIPPED = 255
 WARM_C = 10
@@ -60,7 +60,7 @@ def _too_high(state: ServoState, volts: int) -> str:
     model, program = state.model, state.checks.program
     versions = [
         one
-        for one in state.checks.kind.models.values()
+        for one in state.checks.kind.family.models.values()
         if one.number == model.number and one.rated_v != model.rated_v
     ]
     for other in versions:
@@ -78,7 +78,7 @@ def _too_high(state: ServoState, volts: int) -> str:
     return ""
 
 
-def _raise_limit(model: ServoModel, program: str) -> str:
+def _raise_limit(model: Model, program: str) -> str:
     return f"set Max Voltage (14) to {model.max_voltage} with {program}"
 
 

@@ -4,10 +4,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from gazerig.drivers.servo_bus.discovery import Found
+from gazerig.drivers.servo_bus.family import Model
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.doctor.findings import Level
-from gazerig.robot.bringup.servo_family import Found, Registers, ServoKind, ServoModel
+from gazerig.robot.bringup.servo_family import ServoKind
 
 FIX = "gazerig doctor --fix"
 
@@ -105,9 +108,9 @@ class ServoState:
     corrupt: int = 0
 
     @property
-    def model(self) -> ServoModel:
+    def model(self) -> Model:
         """Return the model that it should be."""
-        return self.checks.kind.models[self.setup.model]
+        return self.checks.kind.family.models[self.setup.model]
 
     @property
     def where(self) -> str:

@@ -1,6 +1,6 @@
-"""Single reads and writes through the SDK, with every fault that a single answer can have.
+"""Single reads and writes, with every fault that a single answer can have.
 
-Faults of a single read and their tests, then what else the SDK does wrong:
+Faults of a single read and their tests:
 
 no answer, absent, wrong id, wrong baud     test_no_good_answer
 byte lost, truncated, LEN too large or 0    test_no_good_answer
@@ -16,20 +16,24 @@ alert                                       test_an_alert_is_data_and_a_note
 answer of another protocol, an instruction  test_no_good_answer
 babble                                      test_babble_takes_a_bounded_time
 port vanishes                               test_a_port_that_vanished_is_not_busy_for_ever
-not stuffed on send, unstuffed wrongly      test_what_looks_like_a_header_passes_both_ways
+stuffed on send, unstuffed on arrival       test_what_looks_like_a_header_passes_both_ways
 a status left behind by reboot              test_nothing_is_left_behind_by_a_reboot
+a check of one byte, an echo                test_faults_of_answers_with_a_check_of_one_byte
 """
 
 import struct
 from itertools import pairwise
 
 import pytest
-from dynamixel_sdk import COMM_SUCCESS
+from sts_rig import Rig as StsRig
 
-from gazerig.drivers.dynamixel.protocol import instruction, statuses
-from gazerig.drivers.dynamixel.registers import Identity, Registers
-from gazerig.drivers.dynamixel.sdk_handler import SdkPackets
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.protocol import ALERT, instruction, statuses
 from gazerig.drivers.errors import BusLost
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.servo_bus.discovery import reboot
+from gazerig.drivers.servo_bus.family import Identity
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -48,7 +52,7 @@ class Rig:
         self.sent = []
         self.port = SpoiltPort(self.chain, self.sent.append, sleep_until=self.sleep_until)
         self.port.setBaudRate(1_000_000)
-        self.registers = Registers(self.port)
+        self.registers = Registers(self.port, DYNAMIXEL)
 
     def sleep_until(self, t_s):
         self.now_s = max(self.now_s, t_s)
@@ -155,10 +159,7 @@ def test_a_refusal_is_no_value_and_no_exception(rig):
     assert rig.registers.refusal == 7
     assert rig.read() == 2002
     assert rig.registers.refusal == 0
-    packets = SdkPackets()
-    rig.command("refuse 2 7")
-    for read in (packets.read1ByteTxRx, packets.read2ByteTxRx, packets.read4ByteTxRx):
-        assert read(rig.port, 2, 132) == (0, COMM_SUCCESS, 7)
+    assert len(rig.sent) == 2  # a refusal is an answer: nothing is asked again
 
 
 def test_a_write_to_the_eeprom_under_torque_is_refused(rig):
@@ -170,7 +171,7 @@ def test_a_write_to_the_eeprom_under_torque_is_refused(rig):
 def test_an_alert_is_data_and_a_note(rig):
     rig.command("overload 2")
     assert rig.read() == 2002
-    assert rig.registers.alerts == {2}
+    assert rig.registers.error == ALERT
     assert rig.registers.write(2, "led", 1)
 
 
@@ -202,11 +203,11 @@ def test_what_looks_like_a_header_passes_both_ways(rig):
 
 
 def test_nothing_is_left_behind_by_a_reboot(rig):
-    assert SdkPackets().reboot(rig.port, 3) == (COMM_SUCCESS, 0)
+    reboot(rig.port, DYNAMIXEL, 3)
     assert rig.registers.identify(2) == Identity(1190, 53)
-    assert rig.registers.ping(3) is None
+    assert rig.registers.identify(3) is None
     rig.now_s += 1.0
-    assert rig.registers.ping(3) == 1190
+    assert rig.registers.identify(3).model_number == 1190
 
 
 def test_the_bytes_sent_are_the_protocols(rig):
@@ -218,3 +219,43 @@ def test_the_bytes_sent_are_the_protocols(rig):
     assert rig.sent[0] == instruction(2, 2, struct.pack("<HH", 132, 4))
     assert rig.sent[1] == instruction(2, 3, struct.pack("<Hi", 116, -3))
     assert statuses(b"".join(rig.sent)) == []
+
+
+# --- a family with a lock, and answers that echoes look like
+
+
+@pytest.fixture
+def sts():
+    rig = StsRig([ServoSpec(4, "sts3215", 1928)], setups=[], baud=1_000_000)
+    rig.port.setBaudRate(1_000_000)
+    rig.registers = Registers(rig.port, FEETECH)
+    return rig
+
+
+def test_registers_behind_a_lock(sts):
+    registers = sts.registers
+    assert registers.identify(4) == Identity(777, 353)
+    assert registers.identify(5) is None and registers.read(5, "id") is None
+    assert registers.read(4, "present_position") == 1928
+    assert registers.settle(4, "torque_limit", 600)
+    assert registers.read(4, "torque_limit") == 600
+    assert registers.write_lasting(4, "position_offset", -85)
+    sts.chain[4].restart()
+    sts.now_s += 1.0
+    assert registers.read(4, "position_offset") == -85
+    assert registers.read(4, "lock") == 1
+    sts.command("voltage 4 12.0")
+    sts.now_s += 0.1
+    sts.chain.positions_steps()
+    assert registers.read(4, "present_input_voltage") == 120
+    assert registers.error == 1
+
+
+@pytest.mark.parametrize("fault", ["lose 4 count 2", "corrupt 4 40 count 2", "delay 4 60 count 1",
+                                   "echo on", "truncate 4 3 count 2"])  # fmt: skip
+def test_faults_of_answers_with_a_check_of_one_byte(sts, fault):
+    sts.command(fault)
+    assert sts.registers.read(4, "present_position") == 1928
+    sts.command(fault)
+    assert sts.registers.write(4, "torque_limit", 321)
+    assert sts.registers.read(4, "torque_limit") == 321

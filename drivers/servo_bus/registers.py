@@ -1,0 +1,165 @@
+"""Single registers of single servos: for all that is not done every tick."""
+
+from collections.abc import Sequence
+
+from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
+from gazerig.drivers.servo_bus.family import Family, Identity, Status
+
+TRIES = 3
+
+REPLY_S = 0.04
+"""Time-out for one servo: the longest return delay and two turns of a 16 ms latency timer."""
+
+LATE_S = 0.15
+"""No answer is later than so long after waiting for it has ended."""
+
+ROOM = 4096
+LONGEST = 1024
+"""A line that babbles is not listened to for longer than so many bytes."""
+
+
+class Registers:
+    """Single registers by name; every exchange is tried three times.
+
+    Args:
+        port: open at the servos' baud rate.
+        family: the make of the servos.
+        tries: how often a servo that does not answer is asked.
+
+    error: error byte of the newest answer
+    refusal: error number of the newest exchange that was refused, 0 where it was not
+    """
+
+    def __init__(self, port: BusPort, family: Family, tries: int = TRIES) -> None:
+        self._port, self._family, self._codec = port, family, family.codec
+        self._tries = tries
+        self._late_until_s: dict[int, float] = {}
+        self.error = self.refusal = 0
+
+    def identify(self, servo_id: int) -> Identity | None:
+        """Return what a servo calls itself, None where it does not answer."""
+        codec = self._codec
+        status = self._exchange(servo_id, codec.identify(servo_id), codec.IDENTITY_LENGTH)
+        return None if status is None else codec.identity(status)
+
+    def read(self, servo_id: int, name: str) -> int | None:
+        """Return a register's value, None where no good answer came."""
+        register = self._family.registers[name]
+        data = self.read_bytes(servo_id, register.address, register.size)
+        return None if data is None else register.decode(data)
+
+    def read_bytes(self, servo_id: int, address: int, length: int) -> bytes | None:
+        """Return bytes of the table, None where no good answer came."""
+        # Where a question's echo looks like an answer the answer must be of another length.
+        asked = length + (length == self._codec.ECHO_LENGTH)
+        status = self._exchange(servo_id, self._codec.read(servo_id, address, asked), asked)
+        return None if status is None else status.params[:length]
+
+    def write(self, servo_id: int, name: str, value: int) -> bool:
+        """Write a register; return whether the servo confirmed it."""
+        register = self._family.registers[name]
+        return self.write_bytes(servo_id, register.address, register.encode(value))
+
+    def write_bytes(self, servo_id: int, address: int, data: bytes) -> bool:
+        """Write bytes of the table; return whether the servo confirmed it."""
+        request = self._codec.write(servo_id, address, data)
+        return self._exchange(servo_id, request, 0, insist=True) is not None
+
+    def write_all(self, ids: Sequence[int], name: str, value: int) -> None:
+        """Write one value to a register of several servos at once, unconfirmed."""
+        register = self._family.registers[name]
+        rows = [register.encode(value)] * len(ids)
+        self._port.write(self._codec.sync_write(ids, register.address, register.size, rows))
+
+    def settle(self, servo_id: int, name: str, value: int) -> bool:
+        """Write a register only where it differs; return whether it now has the value."""
+        return self.read(servo_id, name) == value or self.write(servo_id, name, value)
+
+    def write_lasting(self, servo_id: int, name: str, value: int) -> bool:
+        """Write a register so that it outlives the power, where it is one that can.
+
+        A lock is open for this alone. Returns whether the servo has the value.
+        """
+        lock = self._family.lock
+        if lock is None or self._family.registers[name].area != "eeprom":
+            return self.settle(servo_id, name, value)
+        if not self.write(servo_id, lock, 0):
+            return False
+        written = self.write(servo_id, name, value)
+        closed = self.write(servo_id, lock, 1)
+        return closed and written and self.read(servo_id, name) == value
+
+    def _exchange(
+        self, servo_id: int, request: bytes, length: int, insist: bool = False
+    ) -> Status | None:
+        """Send a request until a good answer comes; ``insist``: also after a refusal."""
+        for _ in range(self._tries):
+            self._let_late_ones_pass(servo_id)
+            self._port.clearPort()
+            self.refusal = 0
+            _, status = transact(self._port, self._family, request, length, REPLY_S, servo_id)
+            if status is None:
+                self._late_until_s[servo_id] = self._port.now_s() + LATE_S
+                self._port.drain()
+                continue
+            self.error = status.error
+            self.refusal = status.error & self._codec.REFUSAL
+            if not self.refusal:
+                return status
+            if not insist:
+                return None
+        return None
+
+    def _let_late_ones_pass(self, servo_id: int) -> None:
+        """Wait until no answer to an earlier question can come any more.
+
+        An answer does not say which register it is of.
+        """
+        until_s = self._late_until_s.pop(servo_id, None)
+        if until_s is not None:
+            while self._port.read_until(ROOM, until_s):
+                pass
+
+
+def transact(
+    port: BusPort,
+    family: Family,
+    request: bytes,
+    length: int,
+    patience_s: float,
+    servo_id: int | None = None,
+) -> tuple[bytes, Status | None]:
+    """Send a request to one servo and wait for its answer.
+
+    Noise, echoes, answers of other servos and of another length are passed over.
+
+    Args:
+        port: open.
+        family: the make of the servo.
+        request: the packet.
+        length: of the answer's params.
+        patience_s: time-out beyond the time on the wire, s.
+        servo_id: who must answer; None for any servo.
+
+    Returns:
+        All that came, and the answer; None where none came.
+    """
+    codec = family.codec
+    port.write(request)
+    byte_s = BITS_PER_BYTE / float(getattr(port, "baudrate", family.factory_baud))
+    wire_s = (len(request) + length + codec.STATUS_OVERHEAD) * byte_s
+    # A refusal may be shorter than the answer.
+    shortest = 0 if codec.REFUSAL else length
+    deadline_s, raw, seen = port.now_s() + wire_s + patience_s, b"", 0
+    while len(raw) < LONGEST:
+        more = port.read_until(codec.bytes_missing(raw, seen + 1, shortest) or 1, deadline_s)
+        raw += more
+        found = codec.statuses(raw)
+        seen = len(found)
+        for status in found:
+            mine = status.intact and servo_id in (None, status.id)
+            if mine and (len(status.params) == length or status.error & codec.REFUSAL):
+                return raw, status
+        if not more:
+            break
+    return raw, None

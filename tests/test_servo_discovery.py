@@ -1,0 +1,276 @@
+"""Who is on the bus: every baud rate, pieces, shared ids, echoes, the old protocol; homing."""
+
+import pytest
+from sts_rig import Rig
+
+from gazerig.drivers.dynamixel.control_table import BAUD_RATES
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.protocol_1 import protocol_1_ids
+from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.homing import set_middle
+from gazerig.drivers.servo_bus.discovery import Found, corrupt, ping, scan, scan_ids
+from gazerig.drivers.servo_bus.registers import Registers, transact
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+XL, XC, STS = "xl330-m077", "xc330-m288", "sts3215"
+SPECS = (
+    ServoSpec(9, XC, 2100, 53),
+    ServoSpec(1, XL, 2000, 45),
+    ServoSpec(250, "xl430-w250", 1000, 46),
+)
+
+
+class Bench:
+    """Some servos of one family on a port, and how the driver names them."""
+
+    def __init__(self, family, baud, *ids):
+        self.family, self.baud = family, baud
+        if family is FEETECH:
+            self.rig = Rig([ServoSpec(i, STS, 1900 + 7 * i) for i in ids], setups=[], baud=baud)
+            self.port, self.chain = self.rig.port, self.rig.chain
+            self.names = [Found(i, 777, 353, baud, STS) for i in ids]
+        else:
+            specs, self.now_s = [ServoSpec(i, XL, 2000) for i in ids], 0.0
+            chain = self.chain = build_dynamixel(specs, lambda: self.now_s)
+            for servo in chain.servos:
+                servo.memory.set("baud_rate", BAUD_RATES.index(baud))
+            chain.choose("baud", "heed")
+            chain.refresh()
+            self.port = InProcessPort(chain, sleep_until=self.sleep_until)
+            self.names = [Found(i, 1190, 53, baud, XL) for i in ids]
+
+    def sleep_until(self, t_s):
+        self.now_s = max(self.now_s, t_s)
+
+    def opened(self):
+        assert self.port.setBaudRate(self.baud)
+        return self
+
+    def command(self, text):
+        self.chain.faults.command(text)
+
+    def found(self):
+        ids = range(50)
+        return [one.id for one in scan_ids(self.port, self.family, self.baud, ids=ids)[0]]
+
+    def ping(self, servo_id):
+        return ping(self.port, self.family, servo_id, self.baud)
+
+    def corrupt(self, servo_id):
+        return corrupt(self.port, self.family, servo_id)
+
+
+@pytest.fixture(params=[DYNAMIXEL, FEETECH], ids=lambda family: family.name)
+def family(request):
+    return request.param
+
+
+def mixed(bauds=None):
+    """Return a port to Dynamixel servos, each at its own baud rate, or heard at every one."""
+    chain = build_dynamixel(SPECS, lambda: 0.0)
+    for servo, baud in zip(chain.servos, bauds or (), strict=False):
+        servo.memory.set("baud_rate", BAUD_RATES.index(baud))
+    if bauds is not None:
+        chain.choose("baud", "heed")
+    chain.refresh()
+    return InProcessPort(chain)
+
+
+# --- servos of every family
+
+
+def test_all_servos_are_found_at_their_own_rate_and_no_other(family):
+    bench = Bench(family, 57_600, 1, 7, family.highest_id)
+    rounds = list(scan(bench.port, family, thorough=True))
+    assert [one.baud for one in rounds] == list(family.usual_rates)
+    assert sorted(family.usual_rates) == sorted(family.baud_rates)
+    assert {one.baud: one.found for one in rounds if one.found} == {57_600: tuple(bench.names)}
+    assert all(one.possible and not one.shared and not one.junk for one in rounds)
+
+
+@pytest.mark.parametrize(
+    "fault", ["echo on", "noise before", "noise after FF", "fragment all", "delay all 15"]
+)
+def test_servos_are_found_whatever_the_adapter_does(family, fault):
+    bench = Bench(family, 1_000_000, 1, 2, 3, 40).opened()
+    bench.command(fault)
+    assert bench.found() == [1, 2, 3, 40]
+
+
+def test_an_echo_is_no_servo(family):
+    bench = Bench(family, 1_000_000, 9).opened()
+    bench.command("lose 9")
+    bench.command("echo on")
+    assert bench.found() == [] and bench.ping(9) is None
+    bench.command("clear 9")
+    assert bench.ping(9) == bench.names[0]
+
+
+def test_one_servo_is_asked_alone(family):
+    bench = Bench(family, 1_000_000, 9).opened()
+    assert bench.ping(9) == bench.names[0]
+    assert bench.ping(3) is None
+    bench.command("wrong-id 9 4")
+    assert bench.ping(9) is None
+    bench.command("clear")
+    bench.command("lose 9 count 1")
+    assert bench.ping(9) is not None
+
+
+def test_two_servos_with_one_id_are_seen(family):
+    bench = Bench(family, 57_600, 1, 2).opened()
+    assert bench.corrupt(1) == 0 == bench.corrupt(77)
+    bench.command("collide 1")
+    # What they say they are is equal and looks healthy.
+    assert bench.corrupt(1) >= 2
+    assert bench.corrupt(2) == 0
+    (one,) = scan(bench.port, family, (57_600,), ids=range(5))
+    assert one.shared == (1,)
+
+
+def test_a_rate_the_adaptor_cannot_run_at_is_passed_over(family):
+    bench = Bench(family, 57_600, 1)
+    real = bench.port.setBaudRate
+    bench.port.setBaudRate = lambda baud: baud != 115_200 and real(baud)
+    rounds = list(scan(bench.port, family, (115_200, 57_600), ids=range(3)))
+    assert [(one.possible, len(one.found)) for one in rounds] == [(False, 0), (True, 1)]
+
+
+# --- what differs
+
+
+def test_a_ping_to_all_finds_servos_with_model_and_firmware():
+    port = mixed()
+    port.setBaudRate(57_600)
+    assert scan_ids(port, DYNAMIXEL, 57_600) == (
+        (
+            Found(1, 1190, 45, 57_600, XL),
+            Found(9, 1240, 53, 57_600, XC),
+            Found(250, 1060, 46, 57_600, "xl430-w250"),
+        ),
+        0,
+    )
+    assert DYNAMIXEL.model_name(350) == "model number 350"
+
+
+def test_servos_at_several_rates_are_found_where_they_are():
+    rounds = list(scan(mixed(bauds=(57_600, 1_000_000, 4_500_000)), DYNAMIXEL))
+    assert {one.baud: [f.id for f in one.found] for one in rounds if one.found} == {
+        1_000_000: [1],
+        57_600: [9],
+        4_500_000: [250],
+    }
+
+
+def test_noise_counts_as_junk():
+    port = mixed()
+    port.setBaudRate(57_600)
+    for command in ("noise before FFFFFD00", "noise after random", "echo on", "fragment all"):
+        port.faults.command(command)
+    found, junk = scan_ids(port, DYNAMIXEL, 57_600)
+    assert [one.id for one in found] == [1, 9, 250] and junk > 0
+
+
+def test_latched_errors_and_stuffed_answers_are_heard():
+    port = mixed()
+    port.setBaudRate(57_600)
+    port.faults.command("overload 9")
+    assert ping(port, DYNAMIXEL, 9, 57_600).model == XC
+    assert corrupt(port, DYNAMIXEL, 9) == 0
+    port.faults.command("refuse 9 7")
+    assert ping(port, DYNAMIXEL, 9, 57_600) is None
+
+
+def test_ids_are_asked_one_by_one_where_a_ping_to_all_tells_nothing():
+    bench, asked = Bench(FEETECH, 500_000, 1, 7), []
+    told = {"progress": lambda baud, servo_id: asked.append((baud, servo_id))}
+    list(scan(bench.port, FEETECH, thorough=True, **told))
+    assert len(asked) == 8 * 254
+    asked.clear()
+    # Unless thorough only where a servo answers at all.
+    list(scan(bench.port, FEETECH, **told))
+    assert asked == [(500_000, servo_id) for servo_id in range(254)]
+    assert FEETECH.version(353) == "3.53"
+
+
+class ScriptedPort:
+    """A port that answers every write with the same bytes, at a byte a read."""
+
+    port_name, baudrate = "script", 57_600
+
+    def __init__(self, *answers):
+        self.answers, self.waiting, self.time_s = list(answers), b"", 0.0
+
+    def now_s(self):
+        return self.time_s
+
+    def setBaudRate(self, baud):
+        return True
+
+    def write(self, data):
+        self.waiting = self.answers.pop(0) if self.answers else b""
+
+    def drain(self):
+        self.waiting = b""
+        return 0
+
+    def read_until(self, length, deadline_s):
+        taken, self.waiting = self.waiting[:length], self.waiting[length:]
+        self.time_s = deadline_s if len(taken) < length else self.time_s + 0.0002
+        return taken
+
+
+def test_the_old_protocol_is_noticed():
+    assert protocol_1_ids(b"\xff\xff\x05\x02\x00\xf8") == (5,)
+    assert protocol_1_ids(b"\x00\xff\xff\xff\x05\x02\x00\xf8\xff\xff\x06\x02\x20\xd7") == (5, 6)
+    assert protocol_1_ids(b"\xff\xff\x05\x02\x00\xf9") == ()  # checksum
+    assert protocol_1_ids(b"\xff\xff\xfe\x02\x01\xfe") == ()  # the question, echoed
+    assert protocol_1_ids(b"\xff\xff\x05\x02") == ()
+    (one,) = scan(ScriptedPort(b"", b"\xff\xff\x05\x02\x00\xf8"), DYNAMIXEL, (57_600,))
+    assert one.found == () and one.protocol_1 == (5,)
+
+
+def test_listening_ends_on_a_line_that_never_falls_silent():
+    port = ScriptedPort(b"\xff\xff\xfd\x00" * 10_000, b"")
+    found, junk = scan_ids(port, DYNAMIXEL, 57_600)
+    assert found == () and 0 < junk < 10_000
+    assert port.time_s < 5.0
+
+
+def test_a_thorough_scan_waits_as_long_as_the_sdk():
+    quick, thorough = ScriptedPort(), ScriptedPort()
+    list(scan(quick, DYNAMIXEL, (57_600,)))
+    list(scan(thorough, DYNAMIXEL, (57_600,), thorough=True))
+    assert quick.time_s < 0.2 and thorough.time_s > 0.77
+
+
+def test_an_answer_in_time_is_not_waited_beyond():
+    port = ScriptedPort(bytes.fromhex("FFFFFD000107005500060426655D"))
+    raw, status = transact(port, DYNAMIXEL, b"ping", 3, 0.04)
+    assert len(raw) == 14 and status.id == 1
+    assert port.time_s < 0.01
+
+
+# --- making a place the middle
+
+
+def test_the_present_place_becomes_the_middle_for_good():
+    bench = Bench(FEETECH, 1_000_000, 7).opened()
+    registers = Registers(bench.port, FEETECH)
+    assert abs(set_middle(bench.port, FEETECH, 7)) == 2048 - 1949
+    bench.chain[7].restart()
+    bench.rig.now_s += 1.0
+    assert registers.read(7, "present_position") == pytest.approx(2048, abs=1)
+    assert (bench.rig.get(7, 40), bench.rig.get(7, 55)) == (0, 1)
+
+
+def test_the_middle_is_not_set_under_torque_nor_of_nobody():
+    bench = Bench(FEETECH, 1_000_000, 7).opened()
+    bench.chain[7].write(40, b"\x01")
+    with pytest.raises(ServoFault, match="servo 7 holds its place: let it go"):
+        set_middle(bench.port, FEETECH, 7)
+    with pytest.raises(ServoMissing, match="servo 8 does not answer"):
+        set_middle(bench.port, FEETECH, 8)
