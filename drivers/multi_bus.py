@@ -2,11 +2,12 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import chain
 from math import inf
 from typing import NamedTuple
 
 from gazerig.drivers.errors import BusLost
-from gazerig.drivers.types import BusHealth, ServoBus, ServoReading, ServoSetup
+from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoSetup
 
 IN_A_ROW = 3
 """So many reads may stay without any answer before a bus is asked less often."""
@@ -37,9 +38,9 @@ class _Patience:
         """Return whether to read it now."""
         return now_s >= self._due_s
 
-    def note(self, readings: Sequence[ServoReading | None], now_s: float) -> None:
+    def note(self, feedback: Feedback, now_s: float) -> None:
         """Note what it gave."""
-        if readings.count(None) < len(readings):
+        if len(feedback.missing) < len(feedback.at_s):
             self._in_vain = 0
             return
         self._in_vain += 1
@@ -68,6 +69,9 @@ class MixedBus:
         if places != list(range(len(places))):
             raise ValueError(f"buses share out places {places}: each from 0 on must be there once")
         self._count = len(places)
+        given = [place for share in shares for place in share.places]
+        self._order = sorted(range(len(given)), key=given.__getitem__)
+        self._nothing = [Feedback.of_none(len(share.places)) for share in shares]
 
     def open(self) -> None:
         """Open every bus; where one cannot be opened, those before it are closed again.
@@ -87,8 +91,8 @@ class MixedBus:
                 share.bus.close()
             raise
 
-    def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
-        """Read all servos of all buses; None where no fresh answer came.
+    def read(self, now_s: float) -> Feedback:
+        """Read all servos of all buses.
 
         A bus of which nobody answers is asked five times a second until somebody does: the
         servos of the others are not to wait for it.
@@ -96,22 +100,32 @@ class MixedBus:
         Raises:
             BusLost: nobody has answered on a bus for longer than its patience.
         """
-        whole: list[ServoReading | None] = [None] * self._count
+        told = list(self._nothing)
         lost: list[BusLost] = []
-        for (_, bus, places), patience in zip(self._shares, self._patience, strict=True):
+        for i, (share, patience) in enumerate(zip(self._shares, self._patience, strict=True)):
             if not patience.due(now_s):
                 continue
             try:
-                readings = bus.read(now_s)
+                told[i] = share.bus.read(now_s)
             except BusLost as error:  # the others are read all the same, and may come back
                 lost.append(error)
                 continue
-            patience.note(readings, now_s)
-            for place, reading in zip(places, readings, strict=True):
-                whole[place] = reading
+            patience.note(told[i], now_s)
         if lost:
             raise lost[0]
-        return tuple(whole)
+        return self._together(told)
+
+    def _together(self, told: Sequence[Feedback]) -> Feedback:
+        """Return the feedback of all buses as one."""
+        order = self._order
+        columns = [list(chain.from_iterable(parts)) for parts in zip(*told, strict=True)]
+        missing = [
+            share.places[i]
+            for share, feedback in zip(self._shares, told, strict=True)
+            for i in feedback.missing
+        ]
+        ordered = [tuple([column[k] for k in order]) for column in columns[:-1]]
+        return Feedback._make((*ordered, tuple(sorted(missing))))
 
     def engage(self) -> tuple[int, ...]:
         """Switch torque on, bus by bus; where one refuses, all are released again.

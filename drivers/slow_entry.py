@@ -3,13 +3,13 @@
 A goal outside is never sent, so such a servo gets the nearest end and a low speed of its own.
 It has arrived when it is at that end, or stands still short of it under its load. Until then
 plans must not run on, or the servo leaps after them as soon as its full speed comes back: each of
-its readings is marked ``rearmed``, which makes plans begin where it is.
+its answers is marked ``rearmed``, which makes plans begin where it is.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from gazerig.drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.types import ServoSetup
 
 ENTRY_DEG_S = 30.0
 """Speed at a joint that is brought inside its limits."""
@@ -24,7 +24,7 @@ STILL_STEPS, STILL_S = 2, 0.3
 class _Place(NamedTuple):
     """Where a servo was, and since when it has not gone farther."""
 
-    steps: int
+    steps: float
     since_s: float
 
 
@@ -63,25 +63,8 @@ class SlowEntry:
         """Forget all of them."""
         self._places.clear()
 
-    def arrived(
-        self, ids: Sequence[int], readings: list[ServoReading | None], now_s: float
-    ) -> tuple[int, ...]:
-        """Mark the readings of those on their way, and return those that have arrived."""
-        there = []
-        for slot, servo_id in enumerate(ids):
-            reading = readings[slot]
-            if servo_id not in self._places or reading is None:
-                continue
-            readings[slot] = reading._replace(rearmed=True)
-            if self._is_there(servo_id, reading.position_steps, now_s):
-                there.append(servo_id)
-        return tuple(there)
-
-    def end(self, servo_id: int) -> None:
-        """Let one go at its full speed again."""
-        self._places.pop(servo_id, None)
-
-    def _is_there(self, servo_id: int, steps: int, now_s: float) -> bool:
+    def arrived(self, servo_id: int, steps: float, now_s: float) -> bool:
+        """Return whether one on its way, which is here now, has come to its limits."""
         if not self._outside(servo_id, steps, NEAR_STEPS):
             return True
         before = self._places[servo_id]
@@ -90,7 +73,11 @@ class SlowEntry:
             return False
         return now_s - before.since_s >= STILL_S
 
-    def _outside(self, servo_id: int, steps: int, room_steps: int = 0) -> bool:
+    def end(self, servo_id: int) -> None:
+        """Let one go at its full speed again."""
+        self._places.pop(servo_id, None)
+
+    def _outside(self, servo_id: int, steps: float, room_steps: int = 0) -> bool:
         setup = self._setups[servo_id]
         return not setup.min_steps - room_steps <= steps <= setup.max_steps + room_steps
 

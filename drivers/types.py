@@ -7,6 +7,7 @@ at a joint is known by gazerig.robot.control.body alone. Times are host monotoni
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf, nan
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -20,40 +21,60 @@ Depth = NDArray[np.float32]
 """(height, width) metres along the optical axis, NaN where unknown."""
 
 
-class ServoReading(NamedTuple):
-    """One servo's answer.
+class Feedback(NamedTuple):
+    """What all servos of a bus told in one exchange: a column a quantity, a value a servo.
 
-    position_steps: present position
+    All columns are in the order of the setups. A servo without a fresh answer has NaN for
+    position, velocity and load, and -inf for time: nothing of it can be taken for new.
+
+    position_steps: present position, a whole number of steps
     velocity_steps_s: present velocity
-    current_ma: present current, signed (0 where the model has none)
+    load: share of the stall torque that it gives, signed, -1..1
     at_s: host time at which the answer arrived
-    alert: the servo reports a latched hardware error
 
     What follows may be some cycles old, as it is read in turn:
 
+    temperature_c, voltage_v: None before they were read first
     torque: the torque is on
     fault: latched hardware errors in words, "overload and input voltage"; "" where none
-    load: share of the stall torque that it gives, signed, -1..1
-    temperature_c, voltage_v: None before the first reading
-    rearmed: True in the first reading after the torque came on anew with the present
-        position as goal (a restarted servo, a port that was unplugged), and in every reading
-        of a servo on its slow way into its limits: whoever plans goals begins there
+
     measured: False where the servo tells nothing and position and velocity are its goal
         moved by the speed it is known to have
+    rearmed: True in the first answer after the torque came on anew with the present
+        position as goal (a restarted servo, a port that was unplugged), and in every answer
+        of a servo on its slow way into its limits: whoever plans goals begins there
+    missing: indices of the servos without a fresh answer, rising
     """
 
-    position_steps: int
-    velocity_steps_s: float
-    current_ma: float
-    at_s: float
-    alert: bool
-    torque: bool = True
-    fault: str = ""
-    load: float = 0.0
-    temperature_c: float | None = None
-    voltage_v: float | None = None
-    rearmed: bool = False
-    measured: bool = True
+    position_steps: tuple[float, ...]
+    velocity_steps_s: tuple[float, ...]
+    load: tuple[float, ...]
+    at_s: tuple[float, ...]
+    temperature_c: tuple[float | None, ...]
+    voltage_v: tuple[float | None, ...]
+    torque: tuple[bool, ...]
+    fault: tuple[str, ...]
+    measured: tuple[bool, ...]
+    rearmed: tuple[bool, ...]
+    missing: tuple[int, ...]
+
+    @classmethod
+    def of_none(cls, count: int) -> "Feedback":
+        """Return what is told when no servo has answered."""
+        unknown, never, no = (nan,) * count, (-inf,) * count, (False,) * count
+        return cls(
+            unknown, unknown, unknown, never, (None,) * count, (None,) * count, no,
+            ("",) * count, (True,) * count, no, tuple(range(count)),
+        )  # fmt: skip
+
+    def filled(self, last: "Feedback") -> "Feedback":
+        """Return the same with last values, of their own age, for servos without a fresh answer."""
+        gone = frozenset(self.missing)
+        columns = (
+            tuple([old if i in gone else new for i, (old, new) in enumerate(both)])
+            for both in (zip(*pair, strict=True) for pair in zip(last[:9], self[:9], strict=True))
+        )
+        return Feedback._make((*columns, self.rearmed, self.missing))
 
 
 class BusHealth(NamedTuple):
@@ -113,10 +134,10 @@ class ServoBus(Protocol):
         """
         ...
 
-    def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
-        """Read all servos in one exchange; None where no fresh answer came.
+    def read(self, now_s: float) -> Feedback:
+        """Read all servos in one exchange.
 
-        While the port is gone every value is None and the port is tried again now and then;
+        While the port is gone all servos are missing and the port is tried again now and then;
         when it is back the servos hold where they are, marked ``rearmed``.
 
         Raises:

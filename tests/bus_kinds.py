@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
+from servo_rows import Row, rows
+
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
 from gazerig.drivers.hobby_board.channel import Channel
@@ -15,7 +17,7 @@ from gazerig.drivers.multi_bus import MixedBus, Share
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
-from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
+from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
     DynamixelLine,
@@ -125,7 +127,7 @@ class Twin:
             for s, at in zip(self.setups, steps, strict=True)
         ]
 
-    def seen(self, readings: Sequence[ServoReading | None]) -> list[float]:
+    def seen(self, readings: Sequence[Row | None]) -> list[float]:
         """Return the shares that readings tell."""
         return self.shares([None if r is None else r.position_steps for r in readings])
 
@@ -195,12 +197,12 @@ class Twin:
 
     def run(
         self, bus: ServoBus, seconds: float, goals: Sequence[float] | None = None
-    ) -> tuple[ServoReading | None, ...]:
+    ) -> tuple[Row | None, ...]:
         """Tick every 10 ms, with goals in shares; gives the last readings."""
         steps = None if goals is None else self.steps(goals)
         end_s = self.now_s() + seconds - 1e-9
         while True:
-            readings = bus.read(self.now_s())
+            readings = rows(bus.read(self.now_s()))
             if steps is not None:
                 bus.write(steps)
             if self.now_s() >= end_s:
@@ -210,10 +212,10 @@ class Twin:
     def until(
         self,
         bus: ServoBus,
-        done: Callable[[tuple[ServoReading | None, ...]], bool],
+        done: Callable[[tuple[Row | None, ...]], bool],
         goals: Sequence[float] | None = None,
         patience_s: float = 8.0,
-    ) -> tuple[ServoReading | None, ...]:
+    ) -> tuple[Row | None, ...]:
         """Tick until something is so; gives the readings then."""
         end_s = self.now_s() + patience_s
         while self.now_s() < end_s:

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import pi, sin
 
+from servo_rows import Row, rows
+
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
-from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
+from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
 from gazerig.sim_mock.hobby_servo import HobbySpec
@@ -150,7 +152,7 @@ class Noisy:
             for i in range(len(IDS))
         ]
 
-    def _led(self, readings: Sequence[ServoReading | None], goals: Sequence[int]) -> list[int]:
+    def _led(self, readings: Sequence[Row | None], goals: Sequence[int]) -> list[int]:
         """Return goals as a guard does: from where a servo was taken back, no faster than armed."""
         most = SPEED_STEPS_S[self._make] * TICK_S
         for k, reading in enumerate(readings):
@@ -193,7 +195,7 @@ class Noisy:
     def _tick(self, outcome: Outcome | None) -> None:
         began = self.now
         self._seen.clear()
-        readings = self.bus.read(self.now)
+        readings = rows(self.bus.read(self.now))
         if outcome is not None:
             self._judge(outcome, readings)
         self.bus.write(self._led(readings, self.goals(self.now)))
@@ -208,7 +210,7 @@ class Noisy:
                 outcome.fastest = max(outcome.fastest, speed)
             self._since, self._since_s = truth, self.now
 
-    def _judge(self, outcome: Outcome, readings: Sequence[ServoReading | None]) -> None:
+    def _judge(self, outcome: Outcome, readings: Sequence[Row | None]) -> None:
         for k, (reading, place) in enumerate(zip(readings, self.truth(), strict=True)):
             beyond = max(self.low - place, place - self.high)
             outcome.farthest = max(outcome.farthest, beyond)
@@ -233,7 +235,7 @@ class Noisy:
         while self.now - began < patience_s:
             tick = self.now
             try:
-                readings = self.bus.read(self.now)
+                readings = rows(self.bus.read(self.now))
                 self.bus.write(self._led(readings, self.goals(began)))
             except DriverError:
                 return None

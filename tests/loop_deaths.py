@@ -12,6 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from servo_rows import rows
+
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BlockingPort
@@ -51,7 +53,7 @@ def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
     while True:
         for event in bus.events():
             print(f"event {event}", flush=True)
-        readings = bus.read(time.monotonic())
+        readings = rows(bus.read(time.monotonic()))
         if any(reading is not None and reading.rearmed for reading in readings):
             goals = [
                 goal if r is None else r.position_steps

@@ -3,6 +3,8 @@
 A bus's own test makes the chain and the driver; here is what is done with them.
 """
 
+from servo_rows import rows
+
 IDS = (1, 2, 3, 4)
 NAMES = ("eye", "jaw", "neck", "lid")
 LONGEST_S = 0.1
@@ -45,7 +47,7 @@ class MovingBus:
         self.now_s += 0.01
         self.k += 1
         before, began_s = self.chain.positions_steps(), self.now_s
-        readings = self.bus.read(self.now_s)
+        readings = rows(self.bus.read(self.now_s))
         self.longest_s = max(self.longest_s, self.now_s - began_s)
         after = self.chain.positions_steps()
         for reading, was, is_now in zip(readings, before, after, strict=self.alone):

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import pytest
 from dynamixel_sdk import PacketHandler
+from servo_rows import rows
 
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.dynamixel.protocol import instruction
@@ -44,7 +45,7 @@ class Twin(NamedTuple):
         """Tick every 10 ms; give the last readings."""
         end_s = self.port.now_s() + seconds
         while True:
-            readings = bus.read(self.port.now_s())
+            readings = rows(bus.read(self.port.now_s()))
             if goals is not None:
                 bus.write(goals)
             if self.port.now_s() >= end_s:
@@ -97,10 +98,12 @@ def places(readings):
 
 
 def test_from_open_to_release_with_fast_and_with_plain_reads(twin, bus):
-    assert places(bus.read(twin.port.now_s())) == [1800, 2048, 2300, 2048]
+    assert places(rows(bus.read(twin.port.now_s()))) == [1800, 2048, 2300, 2048]
     assert bus.engage() == (1800, 2048, 2300, 2048)
     twin.run(bus, 0.6, [1900, 1900, 2200, 2200])
-    assert places(bus.read(twin.port.now_s())) == pytest.approx([1900, 1900, 2200, 2200], abs=12)
+    assert places(rows(bus.read(twin.port.now_s()))) == pytest.approx(
+        [1900, 1900, 2200, 2200], abs=12
+    )
     assert registers(twin, 64, 1) == {3: 1, 1: 1, 12: 1, 7: 1}
     assert registers(twin, 116, 4) == {3: 1900, 1: 1900, 12: 2200, 7: 2200}
     bus.release()
@@ -156,7 +159,7 @@ def test_a_joint_outside_its_limits_comes_in_slowly(kind):
         assert bus.engage() == (1000, 3000)
         slowest = 30 / 360 * 4096
         for _ in range(60):
-            readings = bus.read(twin.port.now_s())
+            readings = rows(bus.read(twin.port.now_s()))
             outside = [r for r in readings if not 1000 <= r.position_steps <= 3000]
             assert all(abs(r.velocity_steps_s) <= slowest + 64 for r in outside)
             twin.wait(0.02)

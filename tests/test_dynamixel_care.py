@@ -1,6 +1,7 @@
 """Servos that stop, restart or start outside their limits while the driver looks after them."""
 
 import pytest
+from servo_rows import rows
 
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.types import ServoSetup
@@ -27,7 +28,7 @@ class Rig:
 
     def tick(self, goals=None):
         self.now_s += 0.005
-        readings = self.bus.read(self.now_s)
+        readings = rows(self.bus.read(self.now_s))
         if goals is not None:
             self.bus.write(goals)
         return readings

@@ -3,6 +3,7 @@
 import struct
 
 import pytest
+from servo_rows import rows
 
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.dynamixel.protocol import instruction
@@ -53,7 +54,7 @@ class Rig:
 
     def tick(self, goals=None, dt_s=0.005):
         self.now_s += dt_s
-        readings = self.bus.read(self.now_s)
+        readings = rows(self.bus.read(self.now_s))
         if goals is not None:
             self.bus.write(goals)
         return readings
@@ -160,7 +161,7 @@ def test_the_everyday_stuffed_answer_is_read():
     rig.port.spoil = lambda code, raw: b"".join(status(i, 0, everyday) for i in IDS)
     readings = rig.tick()
     assert [r.position_steps for r in readings] == [2048] * 3
-    assert readings[0].current_ma == -1.0
+    assert readings[0].load == pytest.approx(-1.0 / 1470.0)
     assert readings[0].velocity_steps_s == pytest.approx(-3 * 0.229 / 60 * 4096)
     assert rig.errors() == {}
 
@@ -230,7 +231,7 @@ def test_an_alert_keeps_its_value_and_is_named_once(rig):
     rig.bus.engage()
     rig.chain[2].fail("overload")
     readings = rig.tick([2500] * 3)
-    assert [r.alert for r in readings] == [False, True, False]
+    assert [r.fault for r in readings] == ["", "overload", ""]
     assert readings[1].position_steps == 2002
     assert rig.bus.faults() == ("servo 2: overload",)
     for _ in range(5):

@@ -2,6 +2,7 @@
 
 import pytest
 from dynamixel_sdk import PacketHandler
+from servo_rows import rows
 
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
@@ -46,7 +47,7 @@ class Rig:
 
     def tick(self, goals):
         self.now_s += 0.005
-        readings = self.bus.read(self.now_s)
+        readings = rows(self.bus.read(self.now_s))
         self.bus.write(goals)
         return readings
 
@@ -148,7 +149,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
     spans = set()
     for _ in range(60):
         now_s[0] += 0.01
-        readings = bus.read(now_s[0])
+        readings = rows(bus.read(now_s[0]))
         read = next(p for p in reversed(sent) if p[7] == (0x8A if fast else 0x82))
         spans.add((int.from_bytes(read[8:10], "little"), read[10]))
         bus.write([2001, 2002])
@@ -187,7 +188,7 @@ def test_old_firmware_is_read_the_plain_way():
     setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
     bus = DynamixelBus(port, setups, DynamixelParams())
     bus.open()
-    assert None not in bus.read(0.0)
+    assert None not in rows(bus.read(0.0))
     assert sent[-1][7] == 0x82
 
 
@@ -225,7 +226,7 @@ def test_servos_without_a_current_sensor_report_no_current():
     rig.tick([2500] * 3)
     readings = rig.tick([2500] * 3)
     assert readings[0].velocity_steps_s > 0.0
-    assert readings[0].current_ma == 0.0
+    assert readings[0].load == 0.0
 
 
 def test_the_same_run_sends_the_same_bytes():

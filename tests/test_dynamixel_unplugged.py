@@ -8,6 +8,8 @@ import sys
 import time
 from pathlib import Path
 
+from servo_rows import rows
+
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.types import ServoSetup
@@ -44,7 +46,7 @@ def run(bus, seconds, goals=None, until=lambda readings: False):
     """Run at about 100 Hz; gives the last readings."""
     end_s = time.monotonic() + seconds
     while True:
-        readings = bus.read(time.monotonic())
+        readings = rows(bus.read(time.monotonic()))
         if goals is not None:
             bus.write(goals)
         if until(readings) or time.monotonic() >= end_s:
@@ -63,7 +65,7 @@ def test_pulled_out_and_put_back_it_goes_on_from_where_the_joints_are():
         bus.events()
         server.command("unplug")
         # The first read after the plug is out knows it.
-        assert bus.read(time.monotonic()) == (None, None, None)
+        assert rows(bus.read(time.monotonic())) == (None, None, None)
         assert bus.events()[0].startswith("port lost: ")
         for servo_id in IDS:
             server.command(f"turn {servo_id} -100")

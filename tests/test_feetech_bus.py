@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from moving_bus import IDS
+from servo_rows import rows
 from sts_rig import Rig
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
@@ -40,7 +41,7 @@ class Twin:
     def run(self, bus, seconds, goals=None):
         end_s = self.port.now_s() + seconds
         while True:
-            readings = bus.read(self.port.now_s())
+            readings = rows(bus.read(self.port.now_s()))
             if goals is not None:
                 bus.write(goals)
             if self.port.now_s() >= end_s:
@@ -69,10 +70,10 @@ def test_from_open_to_close(twin):
     bus.open()
     assert any("Return Delay Time 250 -> 0" in line for line in bus.events())
     before_s = twin.port.now_s()
-    readings = bus.read(before_s)
+    readings = rows(bus.read(before_s))
     assert places(readings) == STARTS
     assert all(before_s <= r.at_s <= twin.port.now_s() and r.measured for r in readings)
-    assert not any(r.torque or r.alert for r in readings)
+    assert not any(r.torque or r.fault for r in readings)
     bus.write([2000] * 3)
     assert places(twin.run(bus, 0.1)) == STARTS
     assert bus.engage() == tuple(STARTS)
@@ -81,7 +82,7 @@ def test_from_open_to_close(twin):
     assert places(readings) == pytest.approx([1900, 1900, 2200], abs=12)
     assert all(r.torque for r in readings)
     twin.run(bus, 1.2, [-5000, 99999, 999])
-    assert places(bus.read(twin.port.now_s())) == pytest.approx([1000, 3000, 1000], abs=12)
+    assert places(rows(bus.read(twin.port.now_s()))) == pytest.approx([1000, 3000, 1000], abs=12)
     bus.release()
     readings = twin.run(bus, 0.1, [2000] * 3)
     assert places(readings) == pytest.approx([1000, 3000, 1000], abs=12)

@@ -4,9 +4,9 @@ import struct
 
 import pytest
 
+from gazerig.drivers.feetech.feedback import FeetechFeedback
 from gazerig.drivers.feetech.group import Group
 from gazerig.drivers.feetech.protocol import checksum
-from gazerig.drivers.feetech.readings import Readings
 from gazerig.drivers.feetech.views import ARMED, SENSED, View, alone_turns, together_turns
 from gazerig.drivers.servo_bus.sync_read import Heard, Whole
 from gazerig.drivers.types import ServoSetup
@@ -79,15 +79,18 @@ def test_a_whole_answer_at_once_reads_as_servo_by_servo():
     for velocity, load, current in ((0x8064, 0x052C, 0x8002), (100, 0x7FF, 7), (0, 0x3FF, 0)):
         block = struct.pack("<HHHBBBBB2xH", 906, velocity, load, 74, 31, 0, 0, 1, current)
         raw = status(2, block) + status(5, block)
-        one, other = Readings(setups), Readings(setups)
-        for readings in (one, other):
-            readings.expect_torque(True)
+        one, other = FeetechFeedback(setups), FeetechFeedback(setups)
+        for columns in (one, other):
+            columns.expect_torque(True)
             for slot in (0, 1):
-                readings.places.place(slot, 900, 0.99)
-            assert readings.places.one(0, 900, 1.0) and readings.places.one(1, 900, 1.0)
+                columns.places.place(slot, 900, 0.99)
+            assert columns.places.one(0, 900, 1.0) and columns.places.one(1, 900, 1.0)
         whole = Whole(group, raw, group.whole(raw), 1.01)
         each = whole.each()
-        assert one.whole(whole) == [other.one(k, each[i]) for k, i in enumerate((2, 5))]
+        assert one.take_whole(whole)
+        for k, i in enumerate((2, 5)):
+            other.take(k, each[i])
+        assert one.feedback() == other.feedback() and one.feedback().missing == ()
 
 
 def test_twice_the_same_is_an_echo_and_two_that_differ_are_nobodys():
@@ -105,11 +108,11 @@ def test_an_answer_of_another_length_is_not_the_one_asked_for():
 
 
 def test_a_place_that_no_joint_can_have_come_to_must_be_said_twice():
-    readings = Readings([ServoSetup(1, "sts3215", 0, 4095, 3000.0)])
+    columns = FeetechFeedback([ServoSetup(1, "sts3215", 0, 4095, 3000.0)])
 
     def believes(position, at_s):
         sample = SENSED.sample(0, struct.pack("<H", position) + BLOCK[2:])
-        return readings.believes(0, Heard(sample, at_s))
+        return columns.believes(0, Heard(sample, at_s))
 
     assert believes(1000, 0.0)
     assert not believes(3000, 0.01)
@@ -122,5 +125,5 @@ def test_a_place_that_no_joint_can_have_come_to_must_be_said_twice():
     assert believes(2980, 0.07)
     # What the motor can do in a second is no leap, nor is anything after a port was gone.
     assert believes(200, 1.07)
-    readings.places.forget()
+    columns.places.forget()
     assert believes(4000, 1.08)

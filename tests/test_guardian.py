@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from loop_deaths import PATIENCE_S, driven
 from mixed_rig import mixed_text
+from servo_rows import rows
 from sts_rig import Rig as StsRig
 
 from gazerig.config.schema import load_rig
@@ -196,7 +197,7 @@ def test_a_loop_that_wakes_takes_hold_where_the_joints_are(sts):
     other = sts.guardian.other
     other.set_state(0, RELEASING)
     count = len(sts.sent)
-    assert sts.bus.read(sts.now_s) == (None,) * 4
+    assert rows(sts.bus.read(sts.now_s)) == (None,) * 4
     sts.bus.write([2900] * 4)
     assert len(sts.sent) == count, "hands off while the guardian speaks"
     for i in (1, 2, 3):  # the guardian's work

@@ -5,6 +5,7 @@ import time
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from servo_rows import rows
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
@@ -60,7 +61,7 @@ class Bench:
         seen = []
         for _ in range(round(seconds / TICK_S)):
             self.now_s += TICK_S
-            seen.append(self.bus.read(self.now_s))
+            seen.append(rows(self.bus.read(self.now_s)))
             if goals is not None:
                 self.bus.write(goals)
         return seen
@@ -99,9 +100,9 @@ def test_open_moves_nothing_and_readings_say_that_they_are_not_measured(bench):
     readings = bench.run(0.05)[-1]
     assert places(readings) == [6100, CENTRE, HIGH]
     for reading in readings:
-        assert not reading.measured and not reading.torque and not reading.alert
+        assert not reading.measured and not reading.torque and not reading.fault
         assert reading.at_s == pytest.approx(bench.now_s)
-        assert (reading.current_ma, reading.load) == (0.0, 0.0)
+        assert reading.load == 0.0
         assert reading.temperature_c is None and reading.voltage_v is None
     bench.bus.write([5000] * 3)
     assert bench.pulses() == [0, 0, 0]
@@ -613,15 +614,15 @@ def test_over_a_pseudo_terminal():
         assert bus.engage() == (6100, CENTRE, HIGH)
         goals = [5500, 5600, 6600]
         end_s = port.now_s() + 20.0
-        readings = bus.read(port.now_s())
+        readings = rows(bus.read(port.now_s()))
         while places(readings) != goals and port.now_s() < end_s:
             bus.write(goals)
             time.sleep(0.01)
-            readings = bus.read(port.now_s())
+            readings = rows(bus.read(port.now_s()))
         assert places(readings) == goals
         assert bus.health().errors == {}
         bus.release()
-        assert not any(reading.torque for reading in bus.read(port.now_s()))
+        assert not any(reading.torque for reading in rows(bus.read(port.now_s())))
         bus.close()
 
 

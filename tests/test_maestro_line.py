@@ -88,12 +88,12 @@ def held(setup=SETUP, pulse=6000):
     return channel
 
 
-def test_a_damaged_pulse_never_puts_a_reading_outside_the_limits():
+def test_a_damaged_pulse_never_puts_a_position_outside_the_limits():
     channel = held(pulse=4400)
     assert not channel.strange(4300, 0.0)
     channel.found(4300)
     channel.advance(0.004)
-    assert channel.reading(0.004).position_steps == 4400
+    assert round(channel.ramp.shaft_steps) == 4400
 
 
 def test_a_pulse_far_from_every_goal_is_strange():
@@ -118,30 +118,30 @@ def test_an_end_of_the_board_is_believed_when_it_was_met_twice():
     assert not channel.met_end(7400)
     assert channel.met_end(7400)
     channel.advance(5.0)
-    assert channel.reading(5.0).position_steps == 7400
+    assert round(channel.ramp.shaft_steps) == 7400
     assert not channel.met_end(7600)
     channel.advance(9.0)
-    assert channel.reading(9.0).position_steps == 7600
+    assert round(channel.ramp.shaft_steps) == 7600
 
 
-def test_a_reading_is_anew_once():
+def test_a_servo_is_rearmed_once():
     channel = held()
     channel.rearm()
-    assert [channel.reading(0.0).rearmed for _ in range(2)] == [True, False]
+    assert [channel.take_rearmed() for _ in range(2)] == [True, False]
 
 
 @pytest.mark.parametrize(("rest", "place"), [(None, 6000), (5000, 5000), (9000, 7600), (0, 4400)])
 def test_where_a_servo_without_pulses_is_taken_to_be(rest, place):
     channel = Channel(SETUP._replace(rest_steps=rest))
-    assert channel.reading(0.0).position_steps == place
+    assert round(channel.ramp.shaft_steps) == place
     assert channel.start(0, 0.0) == place
 
 
 def test_new_limits_bring_the_guess_inside_but_leave_a_known_place():
     channel = Channel(SETUP)
     channel.want(SETUP._replace(rest_steps=5000))
-    assert channel.reading(0.0).position_steps == 5000
+    assert round(channel.ramp.shaft_steps) == 5000
     channel.settle(7000)
     channel.want(SETUP._replace(max_steps=6500))
-    assert channel.reading(0.0).position_steps == 7000
+    assert round(channel.ramp.shaft_steps) == 7000
     assert channel.start(7000, 0.0) == 6500

@@ -2,6 +2,7 @@
 
 import pytest
 from numpy.random import default_rng
+from servo_rows import rows
 
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
 from gazerig.drivers.types import ServoSetup
@@ -62,7 +63,7 @@ class Bench:
     def tick(self, wish):
         """Read and write once, as a loop does: goals go on from where servos are held."""
         slot_s = self.now_s = self.now_s + TICK_S
-        readings = self.bus.read(slot_s)
+        readings = rows(self.bus.read(slot_s))
         self.slowest_s = max(self.slowest_s, self.now_s - slot_s)
         for i, reading in enumerate(readings):
             if reading is not None and reading.rearmed:

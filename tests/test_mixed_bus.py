@@ -4,12 +4,21 @@ from collections import Counter
 from math import nan
 
 import pytest
+from servo_rows import Row, feedback_of, rows
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.multi_bus import AGAIN_S, IN_A_ROW, MixedBus, Share
-from gazerig.drivers.types import BusHealth, ServoReading, ServoSetup
+from gazerig.drivers.types import BusHealth, ServoSetup
 
 WANTED = tuple(ServoSetup(i, "xl330-m077", 0, 4095, 100.0) for i in range(5))
+
+
+def row_at(steps, now_s):
+    """Return what a servo tells, with something of its own in every column."""
+    return Row(
+        steps, steps + 0.1, steps / 100.0, now_s, steps + 0.3, None if steps % 2 else steps + 0.4,
+        steps % 2 == 0, f"fault {steps}", steps % 3 > 0, steps % 5 == 0,
+    )  # fmt: skip
 
 
 class Scripted:
@@ -20,7 +29,7 @@ class Scripted:
 
     def __init__(self, name, steps, log):
         self.name, self.steps, self.log = name, list(steps), log
-        self.wrong, self.silent, self.reads_s = {}, False, []
+        self.wrong, self.silent, self.absent, self.reads_s = {}, False, (), []
 
     def _do(self, what):
         self.log.append(f"{self.name} {what}")
@@ -33,9 +42,10 @@ class Scripted:
     def read(self, now_s):
         self._do("read")
         self.reads_s.append(now_s)
-        if self.silent:
-            return (None,) * len(self.steps)
-        return tuple(ServoReading(at, 0.0, 0.0, now_s, False) for at in self.steps)
+        gone = range(len(self.steps)) if self.silent else self.absent
+        return feedback_of(
+            [None if i in gone else row_at(at, now_s) for i, at in enumerate(self.steps)]
+        )
 
     def engage(self):
         self._do("engage")
@@ -96,7 +106,9 @@ def test_every_place_must_be_there_once(places):
 
 def test_every_sequence_is_in_the_order_of_the_whole(mixture):
     assert mixture.bus.engage() == (10, 11, 12, 13, 14)
-    assert steps(mixture.bus.read(1.0)) == [10, 11, 12, 13, 14]
+    told = mixture.bus.read(1.0)
+    assert rows(told) == tuple(row_at(at, 1.0) for at in (10, 11, 12, 13, 14))
+    assert told.missing == ()
     mixture.bus.write([20, 21, 22, 23, 24])
     assert (mixture.a.steps, mixture.b.steps) == ([21, 23, 24], [22, 20])
     mixture.told()
@@ -159,26 +171,23 @@ def test_a_bus_that_gives_up_ends_it_for_all(mixture):
 def test_a_silent_bus_is_asked_seldom_and_the_others_as_ever(mixture):
     mixture.b.silent = True
     for k in range(100):
-        assert steps(mixture.bus.read(0.01 * k)) == [None, 11, None, 13, 14]
+        assert steps(rows(mixture.bus.read(0.01 * k))) == [None, 11, None, 13, 14]
     assert len(mixture.a.reads_s) == 100
     # So many in a row, and then five a second.
     assert mixture.b.reads_s[:IN_A_ROW] == [0.0, 0.01, 0.02]
     assert len(mixture.b.reads_s) == IN_A_ROW + int(0.97 / AGAIN_S)
     mixture.b.silent = False
-    answered = [mixture.bus.read(1.0 + 0.01 * k)[0] is not None for k in range(30)]
+    answered = [rows(mixture.bus.read(1.0 + 0.01 * k))[0] is not None for k in range(30)]
     assert answered.index(True) * 0.01 <= AGAIN_S
     assert all(answered[answered.index(True) :])
 
 
 def test_one_answer_is_enough_to_be_asked_every_time(mixture):
-    mixture.b.read = lambda now_s: (mixture.b.reads_s.append(now_s), None)[1:] * 2
+    mixture.b.silent = True
     mixture.bus.read(0.0)
-    mixture.b.read = lambda now_s: (
-        mixture.b.reads_s.append(now_s),
-        (None, ServoReading(10, 0.0, 0.0, now_s, False)),
-    )[1]
+    mixture.b.silent, mixture.b.absent = False, (0,)
     for k in range(1, 50):
-        assert steps(mixture.bus.read(0.01 * k)) == [10, 11, None, 13, 14]
+        assert steps(rows(mixture.bus.read(0.01 * k))) == [10, 11, None, 13, 14]
     assert len(mixture.b.reads_s) == 50
 
 
@@ -190,4 +199,4 @@ def test_close_closes_all_and_open_begins_anew(mixture):
     mixture.b.silent = False
     mixture.bus.open()
     assert mixture.told()[-4:] == ["a close", "b close", "a open", "b open"]
-    assert None not in mixture.bus.read(0.1)
+    assert None not in rows(mixture.bus.read(0.1))

@@ -4,6 +4,7 @@ import errno
 from dataclasses import replace
 
 import pytest
+from servo_rows import rows
 from smbus2 import i2c_msg
 
 from gazerig.config.load import shipped
@@ -59,7 +60,7 @@ class World:
 
     def run(self, seconds, goals=None, period_s=0.01):
         for _ in range(round(seconds / period_s)):
-            readings = self.bus.read(self.now[0])
+            readings = rows(self.bus.read(self.now[0]))
             if goals is not None:
                 self.bus.write(goals)
             self.now[0] += period_s

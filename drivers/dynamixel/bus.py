@@ -12,7 +12,7 @@ from gazerig.drivers.dynamixel.control_table import (
     indirect_blocks,
 )
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.feedback import Readings
+from gazerig.drivers.dynamixel.feedback import DynamixelFeedback
 from gazerig.drivers.dynamixel.params import DynamixelParams as DynamixelParams
 from gazerig.drivers.dynamixel.protocol import ERROR_NUMBER, HEADER
 from gazerig.drivers.dynamixel.read_windows import (
@@ -30,7 +30,7 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.bus import RESTART_S, SmartServoBus
 from gazerig.drivers.servo_bus.provisioning import AddressMap
 from gazerig.drivers.servo_bus.sync_read import Heard, Reader, Whole
-from gazerig.drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.types import ServoSetup
 
 
 class DynamixelBus(SmartServoBus):
@@ -43,7 +43,7 @@ class DynamixelBus(SmartServoBus):
     """
 
     _supervisor: DynamixelSupervisor
-    _readings: Readings
+    _feedback: DynamixelFeedback
 
     def __init__(
         self, port: BusPort, setups: Sequence[ServoSetup], params: DynamixelParams
@@ -54,7 +54,7 @@ class DynamixelBus(SmartServoBus):
 
     def _assemble_family(self, firmware: Mapping[int, int] | None) -> None:
         block = self._common_block(firmware)
-        self._readings = Readings(self._setups)
+        self._feedback = DynamixelFeedback(self._setups)
         together = indirect_turns(block) if block else direct_turns()
         self._fast = self._all_fast(firmware)
         group = FastGroup if self._fast else PlainGroup
@@ -67,7 +67,7 @@ class DynamixelBus(SmartServoBus):
             self._watchdog,
             self._recovery,
             self._health,
-            self._readings,
+            self._feedback,
             covered=block is not None,
         )
 
@@ -97,24 +97,20 @@ class DynamixelBus(SmartServoBus):
             return None
         return AddressMap(block.address_base, pack(f"<{len(INDIRECT_MAP)}H", *INDIRECT_MAP))
 
-    def _read(self, now_s: float) -> list[ServoReading | None]:
+    def _read(self, now_s: float) -> None:
         if self._line.starved:
             self._supervisor.recover_tripped(self._roll.group)
         answer = self._reader.read(now_s)
-        readings = self._readings.whole(answer) if isinstance(answer, Whole) else None
-        if readings is None:
-            readings = self._take(answer, now_s)
+        if not (isinstance(answer, Whole) and self._feedback.take_whole(answer)):
+            self._take(answer, now_s)
         elif self._health.returning:
             self._health.heard_again(now_s, self._line.lateness)
-        self._supervisor.service(readings, self._roll.group, now_s)
-        return readings
+        self._supervisor.service(self._roll.group, now_s)
 
-    def _take(
-        self, answer: Whole[Sample] | dict[int, Heard[Sample]], now_s: float
-    ) -> list[ServoReading | None]:
+    def _take(self, answer: Whole[Sample] | dict[int, Heard[Sample]], now_s: float) -> None:
         """Take an answer servo by servo, each with its errors."""
         heard = answer.each() if isinstance(answer, Whole) else answer
-        readings: list[ServoReading | None] = [None] * len(self._ids)
+        self._feedback.begin()
         if heard and self._health.silent_for_s(now_s) >= RESTART_S:
             self._supervisor.mark_all_for_recovery()
         dark = not self._roll.group
@@ -128,14 +124,13 @@ class DynamixelBus(SmartServoBus):
                 self._line.errors["refused"] += 1
             elif was_out and dark:
                 continue  # the first answer after long silence may be an old one
-            elif believed and self._readings.believes(slot, one):
-                readings[slot] = self._readings.one(slot, one)
+            elif believed and self._feedback.believes(slot, one):
+                self._feedback.take(slot, one)
             elif believed:
                 self._line.errors["implausible"] += 1
         self._health.note_silent(
             self._roll.out, now_s, self._roll.garbling, self._line.lateness, bool(heard)
         )
-        return readings
 
     def _cannot_release(self) -> str:
         """Say what servos do that cannot be told to let go."""

@@ -9,7 +9,7 @@ from gazerig.drivers.dynamixel.control_table import (
     name_errors,
     speed_units,
 )
-from gazerig.drivers.dynamixel.feedback import Readings
+from gazerig.drivers.dynamixel.feedback import DynamixelFeedback
 from gazerig.drivers.dynamixel.protocol import ALERT
 from gazerig.drivers.dynamixel.read_windows import Sample
 from gazerig.drivers.servo_bus.faults import Health
@@ -17,7 +17,7 @@ from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.supervisor import AGAIN_S, Supervisor
 from gazerig.drivers.servo_bus.torque import TRIPPED, heal_tripped
 from gazerig.drivers.servo_bus.transaction import TRIES, Line
-from gazerig.drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.types import ServoSetup
 
 CHECK_S = 1.0
 """So often one servo is asked whether it is still armed, each in turn."""
@@ -29,7 +29,7 @@ SLOW_S = 0.05
 class DynamixelSupervisor(Supervisor):
     """What is done about the servos' health."""
 
-    _readings: Readings
+    _feedback: DynamixelFeedback
 
     def __init__(
         self,
@@ -38,12 +38,12 @@ class DynamixelSupervisor(Supervisor):
         watchdog: int,
         recovery: Recovery,
         health: Health,
-        readings: Readings,
+        feedback: DynamixelFeedback,
         covered: bool,
     ) -> None:
         super().__init__(line, setups, recovery, health)
         self._watchdog = watchdog
-        self._readings = readings
+        self._feedback = feedback
         self._covered = covered
         self._unnamed: set[int] = set()
         self._name_at_s = self._check_at_s = self._slow_at_s = -inf
@@ -55,8 +55,8 @@ class DynamixelSupervisor(Supervisor):
         self.engaged = True
         self.entering.begin(entering)
         self._line.starving_s, self._line.tries = self._watchdog * WATCHDOG_UNIT_S or inf, 1
-        self._readings.expect_torque(True)
-        self._readings.places.forget()
+        self._feedback.expect_torque(True)
+        self._feedback.places.forget()
 
     def let_go(self) -> None:
         """Leave servos without torque alone."""
@@ -65,7 +65,7 @@ class DynamixelSupervisor(Supervisor):
         self._suspects.clear()
         self._rearmed.clear()
         self._line.starving_s, self._line.starved, self._line.tries = inf, False, TRIES
-        self._readings.expect_torque(False)
+        self._feedback.expect_torque(False)
 
     def mark_all_for_recovery(self) -> None:
         """Trust no servo to be as it was left."""
@@ -104,30 +104,26 @@ class DynamixelSupervisor(Supervisor):
     def _latched(self, servo_id: int, status: int) -> None:
         if self._health.latched(servo_id, name_errors(status)):
             self._line.errors["alert"] += 1
-            self._readings.name_fault(self._slot[servo_id], self._health.faults[servo_id])
+            self._feedback.name_fault(self._slot[servo_id], self._health.faults[servo_id])
 
     # --- after every read
 
-    def service(
-        self, readings: list[ServoReading | None], group: Collection[int], now_s: float
-    ) -> None:
-        """Do what is due after a read; servos that are well again get their reading here.
+    def service(self, group: Collection[int], now_s: float) -> None:
+        """Do what is due after a read; servos that are well again are taken here.
 
         Raises:
             BusLost: the port is gone.
         """
         if now_s >= self._due_s:
-            self._do_due(readings, group, now_s)
+            self._do_due(group, now_s)
         if self.entering:
-            self._mind_entry(readings, now_s)
+            self._mind_entry(now_s)
         if self._rearmed:
-            self._mark_rearmed(readings)
+            self._mark_rearmed()
 
-    def _do_due(
-        self, readings: list[ServoReading | None], group: Collection[int], now_s: float
-    ) -> None:
+    def _do_due(self, group: Collection[int], now_s: float) -> None:
         if self._suspects and now_s >= self._recover_at_s:
-            self._recover(readings, group, now_s)
+            self._recover(group, now_s)
         if self._unnamed and now_s >= self._name_at_s:
             self._name_at_s = now_s + AGAIN_S
             self.find_alerts(tuple(self._unnamed))
@@ -155,11 +151,11 @@ class DynamixelSupervisor(Supervisor):
             self._latched(servo_id, status)
         if latched and not self._covered:
             for servo_id, torque in self._line.ask(tuple(latched), "torque_enable").items():
-                self._readings.torque(self._ids.index(servo_id), torque)
+                self._feedback.set_torque(self._slot[servo_id], bool(torque))
 
-    def _mind_entry(self, readings: list[ServoReading | None], now_s: float) -> None:
+    def _mind_entry(self, now_s: float) -> None:
         """Give back its speed, confirmed, to every joint that has come inside its limits."""
-        for servo_id in self.entering.arrived(self._ids, readings, now_s):
+        for servo_id in self._arrived(now_s):
             speed = speed_units(self._setups[servo_id].max_speed_steps_s)
             self._line.write_all((servo_id,), "profile_velocity", (speed,))
             if self._line.ask((servo_id,), "profile_velocity").get(servo_id) == speed:
@@ -196,10 +192,10 @@ class DynamixelSupervisor(Supervisor):
         if climate:
             register = REGISTERS["present_input_voltage"]
             for data in self._line.ask_bytes((servo_id,), register.address, 3).values():
-                self._readings.climate(slot, int.from_bytes(data[:2], "little"), data[2])
+                self._feedback.set_climate(slot, int.from_bytes(data[:2], "little"), data[2])
         else:
             for torque in self._line.ask((servo_id,), "torque_enable").values():
-                self._readings.torque(slot, torque)
+                self._feedback.set_torque(slot, bool(torque))
                 if self._limp(servo_id, torque):
                     self._suspect(servo_id)
 

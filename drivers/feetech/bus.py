@@ -18,17 +18,17 @@ Faults do not latch: their bits come and go, and so do the names in ``faults``.
 from collections.abc import Mapping, Sequence
 
 from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.feedback import FeetechFeedback
 from gazerig.drivers.feetech.group import Group
 from gazerig.drivers.feetech.params import FeetechParams as FeetechParams
 from gazerig.drivers.feetech.protocol import HEADER, GoalWrite
-from gazerig.drivers.feetech.readings import Readings
 from gazerig.drivers.feetech.supervisor import FeetechSupervisor
 from gazerig.drivers.feetech.views import Sample, View, again_turns, alone_turns, together_turns
 from gazerig.drivers.port_bus import CUT
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.bus import RESTART_S, SmartServoBus
 from gazerig.drivers.servo_bus.sync_read import Heard, Reader, Whole
-from gazerig.drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.types import ServoSetup
 
 
 class FeetechBus(SmartServoBus):
@@ -44,7 +44,7 @@ class FeetechBus(SmartServoBus):
     """
 
     _supervisor: FeetechSupervisor
-    _readings: Readings
+    _feedback: FeetechFeedback
 
     def __init__(self, port: BusPort, setups: Sequence[ServoSetup], params: FeetechParams) -> None:
         self._params = params
@@ -52,36 +52,36 @@ class FeetechBus(SmartServoBus):
         super().__init__(port, setups, FEETECH, params)
 
     def _assemble_family(self, firmware: Mapping[int, int] | None) -> None:
-        self._readings = Readings(self._setups)
+        self._feedback = FeetechFeedback(self._setups)
         turns = together_turns(self._params.torque_every)
         self._reader: Reader[View, Sample] = Reader(
             self._line, self._roll, turns, alone_turns(), Group, HEADER, again_turns()
         )
         self._supervisor = FeetechSupervisor(
-            self._line, self._by_id, self._recovery, self._health, self._readings
+            self._line, self._by_id, self._recovery, self._health, self._feedback
         )
 
     def _first_look(self) -> None:
         """Every answer tells its faults: there is nothing to ask for."""
 
-    def _read(self, now_s: float) -> list[ServoReading | None]:
+    def _read(self, now_s: float) -> None:
         answer = self._reader.read(now_s)
-        readings = None
-        if isinstance(answer, Whole):
-            doubtful = self._disturbed(now_s) or self._reader.any_owing(now_s)
-            if self._supervisor.at_ease and not doubtful:
-                readings = self._readings.whole(answer)
-        if readings is None:
-            heard = answer.each() if isinstance(answer, Whole) else answer
-            readings = self._take(heard, now_s)
+        if not isinstance(answer, Whole):
+            self._take(answer, now_s)
+        elif not self._take_whole(answer, now_s):
+            self._take(answer.each(), now_s)
         elif self._health.returning:
             self._health.heard_again(now_s, self._line.lateness)
-        self._supervisor.service(readings, self._roll.group, now_s)
-        return readings
+        self._supervisor.service(self._roll.group, now_s)
 
-    def _take(self, heard: dict[int, Heard[Sample]], now_s: float) -> list[ServoReading | None]:
+    def _take_whole(self, answer: Whole[Sample], now_s: float) -> bool:
+        """Take an answer in which nothing is amiss; False where anything must be looked at."""
+        doubtful = self._disturbed(now_s) or self._reader.any_owing(now_s)
+        return self._supervisor.at_ease and not doubtful and self._feedback.take_whole(answer)
+
+    def _take(self, heard: dict[int, Heard[Sample]], now_s: float) -> None:
         """Take an answer servo by servo."""
-        readings: list[ServoReading | None] = [None] * len(self._ids)
+        self._feedback.begin()
         if heard and self._health.silent_for_s(now_s) >= RESTART_S:
             # All were silent together: their power may have been cut.
             self._supervisor.mark_all_for_recovery()
@@ -90,25 +90,24 @@ class FeetechBus(SmartServoBus):
         if doubtful:
             sure = {i: h for i, h in heard.items() if i not in doubtful}
             heard = sure | self._confirmed(doubtful)
-        believed, dark = self._readings.all_believed(heard), not self._roll.group
+        believed, dark = self._feedback.all_believed(heard), not self._roll.group
         for servo_id, one in heard.items():
             slot = self._slot[servo_id]
             if self._roll.answered(servo_id) and dark:
                 continue  # the first answer after long silence may be an old one
-            if believed or self._readings.believes(slot, one):
+            if believed or self._feedback.believes(slot, one):
                 self._supervisor.check_status(servo_id, one.sample, now_s)
-                readings[slot] = self._readings.one(slot, one)
+                self._feedback.take(slot, one)
             else:
                 self._line.errors["implausible"] += 1
         self._supervisor.note_out(self._roll.out, now_s)
         self._health.note_silent(
             self._roll.out, now_s, self._roll.garbling, self._line.lateness, bool(heard)
         )
-        return readings
 
     def _disturbed(self, now_s: float) -> bool:
         """Return whether answers have been damaged of late."""
-        places = self._readings.places
+        places = self._feedback.places
         if (damaged := self._line.errors["corrupt"]) != self._damaged:
             self._damaged = damaged
             places.damaged(now_s)
@@ -125,7 +124,7 @@ class FeetechBus(SmartServoBus):
         for servo_id, first in heard.items():
             self._roll.answered(servo_id)
             second = again.get(servo_id)
-            both = second and self._readings.confirmed(self._slot[servo_id], first, second)
+            both = second and self._feedback.confirmed(self._slot[servo_id], first, second)
             if both:
                 kept[servo_id] = both
             else:

@@ -3,19 +3,19 @@
 from collections.abc import Collection, Mapping
 from math import inf
 
+from gazerig.drivers.feetech.feedback import FeetechFeedback
 from gazerig.drivers.feetech.memory_table import (
     REGISTERS,
     TORQUE_FULL,
     acceleration_units,
     name_errors,
 )
-from gazerig.drivers.feetech.readings import Readings
 from gazerig.drivers.feetech.views import ARMED, Sample
 from gazerig.drivers.servo_bus.faults import Health
 from gazerig.drivers.servo_bus.recovery import FAR_SIDE, Recovery
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 from gazerig.drivers.servo_bus.transaction import TRIES, Line
-from gazerig.drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.types import ServoSetup
 
 CHECK_S = 0.1
 """On a disturbed line one servo's settings are compared so often, each in turn."""
@@ -33,7 +33,7 @@ TAKES_TORQUE = REGISTERS["unloading_condition"].initial or 0
 class FeetechSupervisor(Supervisor):
     """What is done about the servos' health."""
 
-    _readings: Readings
+    _feedback: FeetechFeedback
 
     def __init__(
         self,
@@ -41,10 +41,10 @@ class FeetechSupervisor(Supervisor):
         setups: Mapping[int, ServoSetup],
         recovery: Recovery,
         health: Health,
-        readings: Readings,
+        feedback: FeetechFeedback,
     ) -> None:
         super().__init__(line, setups, recovery, health)
-        self._readings = readings
+        self._feedback = feedback
         self._limp: set[int] = set()
         self._out_since_s: dict[int, float] = {}
         self._seen_s: dict[int, dict[int, float]] = {}
@@ -61,12 +61,12 @@ class FeetechSupervisor(Supervisor):
         self._limp.clear()
         self._doubted.clear()
         self._line.tries = 1
-        self._readings.expect_torque(True)
-        self._readings.places.forget()
+        self._feedback.expect_torque(True)
+        self._feedback.places.forget()
         # What was wrong of old is not: all have just taken their goals and their torque.
         for servo_id in [i for i in self._health.faults if i not in self._health.latches]:
             del self._health.faults[servo_id]
-            self._readings.name_fault(self._slot[servo_id], "")
+            self._feedback.name_fault(self._slot[servo_id], "")
 
     def let_go(self) -> None:
         """Leave servos without torque alone."""
@@ -75,7 +75,7 @@ class FeetechSupervisor(Supervisor):
         for one in (self._suspects, self._rearmed, self._limp, self._doubted):
             one.clear()
         self._line.tries = TRIES
-        self._readings.expect_torque(False)
+        self._feedback.expect_torque(False)
 
     @property
     def at_ease(self) -> bool:
@@ -150,14 +150,14 @@ class FeetechSupervisor(Supervisor):
             self._line.errors["alert"] += 1
         else:
             health.cleared(servo_id)
-        self._readings.name_fault(self._slot[servo_id], health.faults.get(servo_id, ""))
+        self._feedback.name_fault(self._slot[servo_id], health.faults.get(servo_id, ""))
 
     def _mind_far_side(self, servo_id: int, steps: int) -> None:
         """See whether somebody has turned a joint back into its range."""
         if not self._recovery.is_lost(servo_id, steps):
             self._health.latches.add(servo_id)
             self._health.cleared(servo_id)
-            self._readings.name_fault(self._slot[servo_id], "")
+            self._feedback.name_fault(self._slot[servo_id], "")
             self._suspects.add(servo_id)
 
     def _mind_torque(self, servo_id: int, sample: Sample) -> None:
@@ -208,7 +208,7 @@ class FeetechSupervisor(Supervisor):
         servo_id = self._ids[self._checked]
         if servo_id not in group:
             return
-        # The readings of a line that has just been in trouble do not tell the torque.
+        # The answers of a line that has just been in trouble do not tell the torque.
         self._doubted.add(servo_id)
         if self._recovery.differs(servo_id):
             self._line.errors["setting changed"] += 1
@@ -222,22 +222,20 @@ class FeetechSupervisor(Supervisor):
 
     # --- after every read
 
-    def service(
-        self, readings: list[ServoReading | None], group: Collection[int], now_s: float
-    ) -> None:
-        """Do what is due after a read; servos that are well again get their reading here.
+    def service(self, group: Collection[int], now_s: float) -> None:
+        """Do what is due after a read; servos that are well again are taken here.
 
         Raises:
             BusLost: the port is gone.
         """
-        if self.engaged and now_s >= self._check_at_s and self._readings.places.disturbed(now_s):
+        if self.engaged and now_s >= self._check_at_s and self._feedback.places.disturbed(now_s):
             self._check_next(group, now_s)
         if self._doubted and group:
             self._look_again(group)
         if self._suspects and now_s >= self._recover_at_s:
-            self._recover(readings, group, now_s)
+            self._recover(group, now_s)
         if self.entering:
-            for servo_id in self.entering.arrived(self._ids, readings, now_s):
+            for servo_id in self._arrived(now_s):
                 self.entering.end(servo_id)
         if self._rearmed:
-            self._mark_rearmed(readings)
+            self._mark_rearmed()

@@ -2,7 +2,7 @@
 
 What such a board cannot do, and so this bus cannot promise:
 
-- Nobody measures a servo. Readings are goals moved by known speeds (``measured`` is
+- Nobody measures a servo. Positions are goals moved by known speeds (``measured`` is
   False), no load and no current is known, and a stuck servo is not noticed.
 - Where a servo is before its pulses begin is unknown. It goes to the first pulse at its
   own speed, whatever limit is armed.
@@ -12,7 +12,7 @@ What such a board cannot do, and so this bus cannot promise:
 """
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, nan
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
@@ -26,7 +26,7 @@ from gazerig.drivers.hobby_board.supervisor import Supervisor
 from gazerig.drivers.port_bus import CUT, PortBus
 from gazerig.drivers.released import Released
 from gazerig.drivers.serial.reconnect import LastingPort
-from gazerig.drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.types import Feedback, ServoSetup
 
 UNMEASURED = "hobby servos tell no positions: what is shown is where they were sent"
 
@@ -56,6 +56,7 @@ class HobbyBoardBus(PortBus):
         if len(set(self._ids)) < len(self._ids):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
+        self._nothing = Feedback.of_none(len(self._ids))
         self._told = False
         self._begin()
 
@@ -95,29 +96,45 @@ class HobbyBoardBus(PortBus):
             raise
         self._opened = True
 
-    def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
+    def read(self, now_s: float) -> Feedback:
         """Ask the board for its errors and one pulse, and say where all servos must be.
 
-        None where the board did not answer, and for channels that lost their pulses until
-        they are held again. Whatever is wrong, a read takes a bounded time. While the port
-        is gone all is None, and the port is tried again now and then.
+        All are missing where the board did not answer, and so are channels that lost their
+        pulses until they are held again. Whatever is wrong, a read takes a bounded time. While
+        the port is gone all are missing, and the port is tried again now and then.
 
         Raises:
             BusLost: port or board have been gone for longer than ``give_up_s``.
         """
         if not self._reachable(now_s):
-            return (None,) * len(self._ids)
+            return self._nothing
         try:
             answered = self._watch(now_s)
         except BusLost as lost:
             self._lose(lost)
-            return (None,) * len(self._ids)
+            return self._nothing
         if not answered:
             self._mind_silence(now_s)
-            return (None,) * len(self._ids)
-        return tuple(
-            channel.reading(self._heard_s) if self._supervisor.believed(channel) else None
-            for channel in self._channels
+            return self._nothing
+        return self._feedback(self._heard_s)
+
+    def _feedback(self, at_s: float) -> Feedback:
+        """Return where all servos are taken to be; never measured."""
+        channels, nothing = self._channels, self._nothing
+        sure = [self._supervisor.believed(channel) for channel in channels]
+        each = tuple(zip(channels, sure, strict=True))
+        return Feedback(
+            tuple([round(c.ramp.shaft_steps) if known else nan for c, known in each]),
+            tuple([c.ramp.shaft_steps_s if known else nan for c, known in each]),
+            tuple([0.0 if known else nan for known in sure]),
+            tuple([at_s if known else -inf for known in sure]),
+            nothing.temperature_c,
+            nothing.voltage_v,
+            tuple([c.on for c in channels]),
+            tuple([c.fault for c in channels]),
+            (False,) * len(channels),
+            tuple([known and c.take_rearmed() for c, known in each]),
+            tuple([i for i, known in enumerate(sure) if not known]),
         )
 
     def engage(self) -> tuple[int, ...]:

@@ -6,7 +6,7 @@ from math import inf
 from gazerig.drivers.hobby_board.models import HOBBY
 from gazerig.drivers.hobby_board.ramp import Ramp
 from gazerig.drivers.slow_entry import entry_speed_steps_s
-from gazerig.drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.types import ServoSetup
 
 RECENT_S = 0.1
 """The board may be so far behind the last goals: its own period is 20 ms, and lines are slow."""
@@ -212,20 +212,10 @@ class Channel:
         self.rearmed = True
         self.ramp.shaft_steps = self.ramp.pulse_steps
 
-    def reading(self, at_s: float) -> ServoReading:
-        """Return where it is taken to be; never measured."""
+    def take_rearmed(self) -> bool:
+        """Return whether plans must begin at its pulse; after being taken hold of, once."""
         anew, self.rearmed = self.rearmed, False
-        return ServoReading(
-            round(self.ramp.shaft_steps),
-            self.ramp.shaft_steps_s,
-            0.0,
-            at_s,
-            bool(self.fault),
-            self.on,
-            self.fault,
-            rearmed=anew or self.entering,
-            measured=False,
-        )
+        return anew or self.entering
 
 
 def _rest(setup: ServoSetup) -> float:

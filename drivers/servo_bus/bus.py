@@ -13,6 +13,7 @@ from gazerig.drivers.serial.reconnect import LastingPort
 from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.faults import Health
+from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.goals import clipped
 from gazerig.drivers.servo_bus.poll_list import Roll
 from gazerig.drivers.servo_bus.provisioning import AddressMap, Provisioning
@@ -20,7 +21,7 @@ from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Line
-from gazerig.drivers.types import ServoReading, ServoSetup
+from gazerig.drivers.types import Feedback, ServoSetup
 
 RESTART_S = 0.1
 """Servos that were silent for so long may have restarted: their power was cut."""
@@ -56,13 +57,6 @@ class SmartSupervising(Supervising, Protocol):
         """Trust no servo to be as it was left."""
 
 
-class Limited(Protocol):
-    """What makes readings of answers."""
-
-    def set_limits(self, setups: Sequence[ServoSetup]) -> None:
-        """Take other limits for the same servos."""
-
-
 class Polled(Protocol):
     """What reads all servos of a poll list."""
 
@@ -72,7 +66,7 @@ class Polled(Protocol):
 class SmartServoBus(PortBus):
     """A chain of smart servos in position mode; implements gazerig.drivers.types.ServoBus.
 
-    A family's own bus says how an answer becomes readings, and who looks after the servos.
+    A family's own bus says how an answer becomes feedback, and who looks after the servos.
 
     Args:
         port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
@@ -88,7 +82,7 @@ class SmartServoBus(PortBus):
     _line: Line
     _supervisor: SmartSupervising
     _reader: Polled
-    _readings: Limited
+    _feedback: FeedbackColumns
 
     def __init__(
         self,
@@ -111,6 +105,7 @@ class SmartServoBus(PortBus):
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
         self._goals = family.goals(self._ids)
+        self._nothing = Feedback.of_none(len(self._ids))
         self._log = EventLog()
         self._line = Line(
             port,
@@ -153,8 +148,8 @@ class SmartServoBus(PortBus):
         return None
 
     @abstractmethod
-    def _read(self, now_s: float) -> list[ServoReading | None]:
-        """Read all servos while the port is there."""
+    def _read(self, now_s: float) -> None:
+        """Read all servos into the feedback's columns while the port is there."""
 
     def _send(self, goals: Sequence[int]) -> None:
         """Send goals, each within its limits."""
@@ -193,26 +188,26 @@ class SmartServoBus(PortBus):
             raise
         self._opened = True
 
-    def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
-        """Read all servos in one exchange; None where no fresh answer came.
+    def read(self, now_s: float) -> Feedback:
+        """Read all servos in one exchange.
 
         A servo that keeps silent is left out of the exchange and asked alone now and
         then, so whatever is wrong, a read takes a bounded time. While the port is gone all
-        is None, and the port is tried again now and then.
+        are missing, and the port is tried again now and then.
 
         Raises:
             BusLost: port or servos have been gone for longer than ``give_up_s``.
         """
         if not self._reachable(now_s):
-            return (None,) * len(self._ids)
+            return self._nothing
         try:
-            readings = tuple(self._read(now_s))
+            self._read(now_s)
         except BusLost as lost:
             self._lose(lost)
-            return (None,) * len(self._ids)
+            return self._nothing
         if self._roll.troubled:
             self._mind_silence(now_s)
-        return readings
+        return self._feedback.feedback()
 
     def engage(self) -> tuple[int, ...]:
         """Set every goal to the present position (clipped to its limits), then torque on.
@@ -267,7 +262,7 @@ class SmartServoBus(PortBus):
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in self._setups)
         self._by_id.update({setup.id: setup for setup in self._setups})
         self._provisioning.set_target(self._setups)
-        self._readings.set_limits(self._setups)
+        self._feedback.set_limits(self._setups)
 
     def faults(self) -> tuple[str, ...]:
         """Name every fault that servos suffer from now, e.g. "neck_yaw (servo 7): overload"."""

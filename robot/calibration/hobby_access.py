@@ -13,7 +13,7 @@ from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.bus import Pca9685Bus
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
+from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.robot.calibration.joint_access import Stopped
 from gazerig.robot.guardian.guarded_bus import GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
@@ -66,6 +66,7 @@ class OneHobby:
         self._maestro = isinstance(params, MaestroParams)
         self._bus: ServoBus = bus if guardian is None else GuardedBus(bus, 1, guardian, 0)
         self._goal = self._pulse = 0
+        self._on = False
         self._said: list[str] = []
 
     @property
@@ -85,8 +86,8 @@ class OneHobby:
             SetupError: the board or the channel does not answer.
         """
         self._bus.open()
-        reading = self._read()
-        return reading.position_steps / US_STEPS if reading.torque else None
+        self._read()
+        return self._pulse / US_STEPS if self._on else None
 
     def begin(self, place_us: float) -> float:
         """Hold it at the pulse that it gets, or begin with this one; gives the pulse in us.
@@ -116,9 +117,9 @@ class OneHobby:
         if why is not None:
             raise Stopped(why)
         self._clock.sleep_until(self._clock.now_s() + PERIOD_S)
-        reading = self._read()
+        at = self._read()
         self._bus.write([self._goal])
-        return abs(reading.position_steps - self._goal) <= NEAR_STEPS
+        return abs(at - self._goal) <= NEAR_STEPS
 
     def arrive(self) -> float:
         """Lead it to where it was sent; gives the pulse in us that it gets in the end.
@@ -126,7 +127,7 @@ class OneHobby:
         Raises:
             BusLost, gazerig.robot.calibration.joint_access.Stopped: see ``look``.
         """
-        way = abs(self._goal - self._read().position_steps) / US_STEPS
+        way = abs(self._goal - self._read()) / US_STEPS
         end_s = self._clock.now_s() + way / SPEED_US_S + PATIENCE_S
         while not self.look():
             if self._clock.now_s() > end_s:
@@ -164,20 +165,20 @@ class OneHobby:
         low, high = self._setup.min_steps, self._setup.max_steps
         return min(max(round(place_us * US_STEPS), low), high)
 
-    def _read(self) -> ServoReading:
-        """Ask the board until it answers.
+    def _read(self) -> int:
+        """Ask the board until it answers; return the pulse that it gives now, in steps.
 
         Raises:
             BusLost: it does not answer any more.
         """
         end_s = self._clock.now_s() + SILENT_S
         while True:
-            (reading,) = self._bus.read(self._clock.now_s())
-            if reading is not None:
-                self._pulse = reading.position_steps
-                if reading.rearmed:
-                    self._begin_anew(reading.position_steps)
-                return reading
+            feedback = self._bus.read(self._clock.now_s())
+            if not feedback.missing:
+                self._pulse, self._on = int(feedback.position_steps[0]), feedback.torque[0]
+                if feedback.rearmed[0]:
+                    self._begin_anew(self._pulse)
+                return self._pulse
             if self._clock.now_s() > end_s:
                 raise BusLost(f"{self.who}: the board does not answer: check its cable and power")
             self._clock.sleep_until(self._clock.now_s() + PERIOD_S)

@@ -1,11 +1,10 @@
 """Joints to servos and back: the only place that knows what a step means at a joint."""
 
 from collections.abc import Mapping, Sequence
-from math import inf
 
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.slow_entry import ENTRY_DEG_S
-from gazerig.drivers.types import ServoBus, ServoReading, ServoSetup
+from gazerig.drivers.types import Feedback, ServoBus, ServoSetup
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointAngles, JointState, in_order
@@ -52,10 +51,13 @@ class Body:
         self._set_up = tuple(joints[name] for name in self.names)
         self._take(self._set_up)
         # Before the first answer: the centre, of an age that says so.
-        self._last = [
-            ServoReading(round(linkage.steps(0.0)), 0.0, 0.0, -inf, False, measured=f.measured)
-            for linkage, f in zip(self._linkages, (j.facts for j in self._joints), strict=True)
-        ]
+        self._nothing = Feedback.of_none(len(self.names))
+        self._last = self._nothing._replace(
+            position_steps=tuple([round(linkage.steps(0.0)) for linkage in self._linkages]),
+            velocity_steps_s=(0.0,) * len(self.names),
+            load=(0.0,) * len(self.names),
+            measured=tuple([joint.facts.measured for joint in self._joints]),
+        )
 
     def _take(self, joints: tuple[JointParams, ...]) -> None:
         self._joints = joints
@@ -109,31 +111,28 @@ class Body:
                 go of; after that the bus may stay away for as long as it likes.
         """
         try:
-            readings = self.bus.read(t_s)
+            feedback = self.bus.read(t_s)
         except BusLost:
             if not self._let_go:
                 raise
-            readings = (None,) * len(self.names)
-        missing: tuple[str, ...] = ()
-        for i, reading in enumerate(readings):
-            if reading is None:
-                missing = (*missing, self.names[i])
-            else:
-                self._last[i] = reading
-        columns = zip(*self._last, strict=True)
-        steps, speeds, _, at_s, _, torque, fault, load, warm, volts, _, measured = columns
+            feedback = self._nothing
+        if feedback.missing:
+            feedback = feedback.filled(self._last)
+        self._last = feedback
+        steps = feedback.position_steps
+        speeds = zip(feedback.velocity_steps_s, self._to_rate, steps, strict=True)
         return JointState(
-            tuple([angle(s) for angle, s in zip(self._to_rad, steps, strict=True)]),
-            tuple([v * k(s) for v, k, s in zip(speeds, self._to_rate, steps, strict=True)]),
-            at_s,
-            missing,
-            torque,
-            fault,
-            load,
-            warm,
-            volts,
-            tuple([reading is not None and reading.rearmed for reading in readings]),
-            measured,
+            self.angles(steps),
+            tuple([v * rate(s) for v, rate, s in speeds]),
+            feedback.at_s,
+            tuple([self.names[i] for i in feedback.missing]),
+            feedback.torque,
+            feedback.fault,
+            feedback.load,
+            feedback.temperature_c,
+            feedback.voltage_v,
+            feedback.rearmed,
+            feedback.measured,
         )
 
     def write(self, command_rad: JointAngles) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from gazerig.drivers.errors import DriverError
-from gazerig.drivers.types import BusHealth, ServoBus, ServoReading, ServoSetup
+from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoSetup
 from gazerig.robot.guardian.guardian import Guardian
 
 RETRY_S = 1.0
@@ -15,7 +15,7 @@ class GuardedBus:
 
     Every read and write is a sign of life. A loop that hung and wakes again finds the torque
     off: it switches it off once more, confirmed, then takes hold where the joints are, as
-    after a restart of the servos, and their readings are marked ``rearmed``.
+    after a restart of the servos, and their answers are marked ``rearmed``.
 
     Args:
         bus: of servos without a watchdog.
@@ -27,7 +27,7 @@ class GuardedBus:
     def __init__(self, bus: ServoBus, count: int, guardian: Guardian, plan: int) -> None:
         self._bus, self._guardian, self._plan = bus, guardian, plan
         self._beat = guardian.beat
-        self._silent: tuple[ServoReading | None, ...] = (None,) * count
+        self._silent = Feedback.of_none(count)
         self._holding = self._lost_hold = False
         self._retry_s = 0.0
         self._rearmed: set[int] = set()
@@ -46,8 +46,8 @@ class GuardedBus:
             self._guardian.leave(self._plan)
             raise
 
-    def read(self, now_s: float) -> tuple[ServoReading | None, ...]:
-        """Read all servos; None of all while the guardian is letting go of them.
+    def read(self, now_s: float) -> Feedback:
+        """Read all servos; all are missing while the guardian is letting go of them.
 
         Raises:
             BusLost: no servo has answered for longer than the bus waits.
@@ -58,8 +58,8 @@ class GuardedBus:
             if self._guardian.releasing(self._plan):
                 return self._silent
             self._take_hold_again(now_s)
-        readings = self._bus.read(now_s)
-        return self._marked(readings) if self._rearmed else readings
+        feedback = self._bus.read(now_s)
+        return self._marked(feedback) if self._rearmed else feedback
 
     def engage(self) -> tuple[int, ...]:
         """Switch torque on where the joints are, under the guardian's eyes.
@@ -140,14 +140,12 @@ class GuardedBus:
             self._events.append(f"torque stays off: {error}")
             return
         self._lost_hold = False
-        self._rearmed = set(range(len(self._silent)))
+        self._rearmed = set(self._silent.missing)
         self._events.append("torque on again where the joints are: going on slowly")
 
-    def _marked(self, readings: tuple[ServoReading | None, ...]) -> tuple[ServoReading | None, ...]:
-        """Return readings of which the first after torque-on says so."""
-        marked = list(readings)
-        for i in [i for i in self._rearmed if readings[i] is not None]:
-            self._rearmed.discard(i)
-            reading = readings[i]
-            marked[i] = reading._replace(rearmed=True) if reading is not None else None
-        return tuple(marked)
+    def _marked(self, feedback: Feedback) -> Feedback:
+        """Return feedback in which the first answer of a servo after torque-on says so."""
+        here = self._rearmed.difference(feedback.missing)
+        self._rearmed -= here
+        rearmed = [anew or i in here for i, anew in enumerate(feedback.rearmed)]
+        return feedback._replace(rearmed=tuple(rearmed))

@@ -10,9 +10,10 @@ import argparse
 import os
 import random
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
+from math import isfinite
 from statistics import fmean, median
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from rustypot import Xl330PyController
 
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import Feedback, ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
@@ -67,9 +68,9 @@ def ours(path: str, baud: int, **chosen: object) -> Iterator[Cycle]:
     bus.engage()
 
     def cycle(k: int) -> int:
-        readings = bus.read(time.monotonic())
+        feedback = bus.read(time.monotonic())
         bus.write([2048 + k % 8] * len(IDS))
-        return len(IDS) - readings.count(None)
+        return len(IDS) - len(feedback.missing)
 
     try:
         yield cycle
@@ -265,9 +266,9 @@ def _line_cycles(bus: DynamixelBus, now: list[float], cycles: int) -> tuple[floa
     """Run cycles in simulated time; gives the mean time and the mean number of values."""
     began, values = now[0], 0
     for k in range(cycles):
-        readings = bus.read(now[0])
+        feedback = bus.read(now[0])
         bus.write([2048 + k % 8] * len(IDS))
-        values += len(IDS) - readings.count(None)
+        values += len(IDS) - len(feedback.missing)
     return (now[0] - began) / cycles, values / cycles
 
 
@@ -283,13 +284,13 @@ def unplug(times: int) -> None:
         bus.open()
         bus.engage()
         for _ in range(times):
-            _cycles(bus, lambda readings: False, 0.3)
+            _cycles(bus, lambda told: False, 0.3)
             bus.events()
             server.command("unplug")
-            notices.append(_cycles(bus, lambda readings: "lost" in " ".join(bus.events()), 5.0))
-            _cycles(bus, lambda readings: False, 0.5)
+            notices.append(_cycles(bus, lambda told: "lost" in " ".join(bus.events()), 5.0))
+            _cycles(bus, lambda told: False, 0.5)
             server.command("plug")
-            returns.append(_cycles(bus, lambda r: all(x and x.torque for x in r), 5.0))
+            returns.append(_cycles(bus, lambda told: all(told.torque) and not told.missing, 5.0))
         bus.release()
         bus.close()
     table = Table("", "median ms", "worst ms", title=f"unplugged for 0.5 s, {times} times, 100 Hz")
@@ -298,13 +299,13 @@ def unplug(times: int) -> None:
     out.print(table)
 
 
-def _cycles(bus: DynamixelBus, done: Callable[[Sequence[object]], bool], most_s: float) -> float:
+def _cycles(bus: DynamixelBus, done: Callable[[Feedback], bool], most_s: float) -> float:
     """Run at 100 Hz until something is so; gives how long that took in ms."""
     start = time.perf_counter()
     while time.perf_counter() - start < most_s:
-        readings = bus.read(time.monotonic())
+        feedback = bus.read(time.monotonic())
         bus.write([2060] * len(IDS))
-        if done(readings):
+        if done(feedback):
             break
         time.sleep(0.01)
     return (time.perf_counter() - start) * 1e3
@@ -348,23 +349,22 @@ def dice(cycles: int) -> None:
         began = now[0]
         truth.clear()
         truth.append(chain.positions_steps())
-        readings = bus.read(now[0])
+        told = bus.read(now[0])
         truth.append(chain.positions_steps())
         longest = max(longest, now[0] - began)
-        for reading, *places in zip(readings, *truth, strict=True):
-            values += reading is not None
-            missing += reading is None
-            if reading is not None:
-                stale += not min(places) - 1 <= reading.position_steps <= max(places) + 1
+        missing += len(told.missing)
+        values += len(IDS) - len(told.missing)
+        for at, *places in zip(told.position_steps, *truth, strict=True):
+            stale += isfinite(at) and not min(places) - 1 <= at <= max(places) + 1
         bus.write([2048 + round(300 * ((k / 40 + i / 9) % 2 - 1)) for i in IDS])
     chain.faults.clear()
     for _ in range(300):
         now[0] += 0.01
-        readings = bus.read(now[0])
+        told = bus.read(now[0])
     table = Table(title=f"faults by the dice, {cycles} cycles at 100 Hz, simulated time")
     for head in ("injected", "values", "missing", "stale as fresh", "longest read", "well after"):
         table.add_column(head)
-    well = sum(x is not None and x.torque for x in readings)
+    well = sum(told.torque) - len(told.missing)
     row = (injected, values, missing, stale, f"{longest * 1e3:.0f} ms", f"{well} of 9")
     table.add_row(*map(str, row))
     out.print(table)

@@ -119,9 +119,9 @@ def ours(
     bus.engage()
 
     def tick(k: int) -> int:
-        readings = bus.read(now_s())
+        feedback = bus.read(now_s())
         bus.write([goal + k % 8 for goal in goals])
-        return len(goals) - readings.count(None)
+        return len(goals) - len(feedback.missing)
 
     try:
         yield tick

@@ -1,0 +1,34 @@
+"""Feedback of a bus servo by servo, as tests like to look at it; the product has columns."""
+
+from typing import NamedTuple
+
+from gazerig.drivers.types import Feedback
+
+
+class Row(NamedTuple):
+    """One servo's part of a ``Feedback``; its fields are those columns."""
+
+    position_steps: float
+    velocity_steps_s: float
+    load: float
+    at_s: float
+    temperature_c: float | None
+    voltage_v: float | None
+    torque: bool
+    fault: str
+    measured: bool
+    rearmed: bool
+
+
+def rows(feedback: Feedback) -> tuple[Row | None, ...]:
+    """Return one row a servo, None for one without a fresh answer."""
+    every = zip(*feedback[:-1], strict=True)
+    return tuple([None if i in feedback.missing else Row(*row) for i, row in enumerate(every)])
+
+
+def feedback_of(given: list[Row | None]) -> Feedback:
+    """Return the feedback of which these are the rows."""
+    none = Feedback.of_none(1)
+    blank = Row(*(column[0] for column in none[:-1]))
+    columns = zip(*[blank if row is None else row for row in given], strict=True)
+    return Feedback(*columns, tuple(i for i, row in enumerate(given) if row is None))
