@@ -93,7 +93,7 @@ def test_open_finds_all_and_nothing_moves(twin):
 def test_readings_are_fresh_in_order_and_say_whether_they_are_measured(here, held_here):
     here.run(held_here, 0.05)
     before_s = here.now_s()
-    readings = held_here.read(before_s)
+    readings = rows(held_here.read(before_s))
     assert here.near(here.seen(readings), starts(here))
     assert all(before_s <= r.at_s <= here.now_s() for r in readings)
     assert [r.measured for r in readings] == [here.on[p] not in BOARDS for p in range(here.count)]
