@@ -37,7 +37,7 @@ bench: $(VENV)/.installed-dev
 # A folder with the packages under their import names, for what does not see through an install.
 links:
 	@mkdir -p .links/gazerig
-	@ln -sf ../../api/__init__.py ../../api/py.typed .links/gazerig/
+	@ln -sf $(addprefix ../../,$(wildcard api/*.py api/py.typed)) .links/gazerig/
 	@for room in config drivers gaze robot sim_mock; do ln -sfn ../../$$room .links/gazerig/$$room; done
 
 # The documentation as a site, in site/; a link to nothing or a faulty docstring fails it.

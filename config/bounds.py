@@ -1,12 +1,6 @@
-"""Bounds beside the value: a Params dataclass becomes a strict pydantic model.
+"""The declarations of a Params dataclass (gazerig.params) as a strict pydantic model.
 
-A field's metadata may hold
-  low, high: inclusive bounds of a number, or of every number in a tuple or mapping
-  choices:   the values allowed, or those allowed for every item
-  length:    number of items of a tuple
-  unit:      e.g. "deg/s", "" for a bare number
-  says:      what it is, in one line
-and ``__post_init__`` may raise ValueError where two fields contradict each other.
+``__post_init__`` may raise ValueError where two fields contradict each other.
 """
 
 import dataclasses
@@ -30,6 +24,8 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from gazerig.params import Bounds, Declaration, declarations
+
 T = TypeVar("T")
 Step = str | int
 Form = Literal["number", "whole", "bool", "text", "choice", "list", "mapping", "params"]
@@ -37,7 +33,6 @@ Form = Literal["number", "whole", "bool", "text", "choice", "list", "mapping", "
 _PLAIN: dict[object, Form] = {float: "number", int: "whole", bool: "bool", str: "text"}
 _LONGEST_TEXT = 400  # characters; names and paths
 _TURNS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # left to right and back
-_KNOWN_METADATA = {"low", "high", "unit", "says", "choices", "length"}
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -47,7 +42,7 @@ class Shape:
     inner: shape of the items of a list or mapping
     params: the dataclass, for form "params"
     optional: null may stand here
-    low, high, choices, unit, says: the field's metadata; length: number of items of a list
+    low, high, choices, unit, says: as declared; length: number of items of a list, None if free
     """
 
     form: Form
@@ -87,7 +82,7 @@ def model_of(params: type) -> type[BaseModel]:
     """Build the strict pydantic model of a Params dataclass.
 
     Raises:
-        TypeError: a field has a type or metadata this module does not know.
+        TypeError: a field is declared in a way that this module does not know.
     """
     declared = {f.name: f for f in dataclasses.fields(params) if f.init}
     columns: dict[str, Any] = {}
@@ -121,53 +116,49 @@ def shapes_of(params: type) -> dict[str, Shape]:
     """Return the shape of every field of a Params dataclass, in the order declared.
 
     Raises:
-        TypeError: a field has a type or metadata this module does not know.
+        TypeError: a field is declared in a way that this module does not know.
     """
-    hints = typing.get_type_hints(params)
-    shapes: dict[str, Shape] = {}
-    for f in dataclasses.fields(params):
-        if not f.init:
-            continue
-        place = f"{params.__qualname__}.{f.name}"
-        if strange := set(f.metadata) - _KNOWN_METADATA:
-            raise TypeError(f"{place}: metadata {sorted(strange)} is not among {_KNOWN_METADATA}")
-        shapes[f.name] = _shape(hints[f.name], f.metadata, place)
-    return shapes
+    return {
+        name: _shape(declared, declared.kind, f"{params.__qualname__}.{name}")
+        for name, declared in declarations(params).items()
+    }
 
 
-def _shape(kind: Any, meta: Mapping[str, Any], place: str) -> Shape:
-    """Read one type annotation with its field's metadata."""
+def _shape(declared: Declaration, kind: Any, place: str) -> Shape:
+    """Return what may stand where a type is declared, or in a list or mapping of it."""
+    shape = _of_type(declared, kind, place)
+    return dataclasses.replace(shape, unit=declared.unit, says=declared.description)
+
+
+def _of_type(declared: Declaration, kind: Any, place: str) -> Shape:
+    """Read one type annotation of a declaration, its own or that of what it holds."""
     origin, args = typing.get_origin(kind), typing.get_args(kind)
+    inner = partial(_shape, declared, place=place)
     if origin in (typing.Union, types.UnionType) and len(args) == 2 and type(None) in args:
         kept = args[0] if args[1] is type(None) else args[1]
-        return dataclasses.replace(_shape(kept, meta, place), optional=True)
-    shape: Shape
+        return dataclasses.replace(inner(kept), optional=True)
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-        shape = Shape("params", params=kind)
-    elif origin is tuple and (len(set(args)) == 1 or args[1:] == (...,)):
-        length = meta.get("length") if args[-1] is ... else len(args)
-        items = {k: v for k, v in meta.items() if k != "length"}
-        shape = Shape("list", inner=_shape(args[0], items, place), length=length)
-    elif origin in (dict, Mapping) and args[0] is str:
-        shape = Shape("mapping", inner=_shape(args[1], meta, place))
-    elif origin is Literal:
-        shape = Shape("choice", choices=args)
-    elif kind in _PLAIN:
-        shape = _single(_PLAIN[kind], meta, place)
-    else:
-        raise TypeError(f"{place}: a configuration value cannot have the type {kind}")
-    return dataclasses.replace(shape, unit=meta.get("unit", ""), says=meta.get("says", ""))
+        return Shape("params", params=kind)
+    if origin is tuple and (len(set(args)) == 1 or args[1:] == (...,)):
+        return Shape("list", inner=inner(args[0]), length=None if args[-1] is ... else len(args))
+    if origin in (dict, Mapping) and args[0] is str:
+        return Shape("mapping", inner=inner(args[1]))
+    if origin is Literal or (declared.choices and kind in _PLAIN):
+        return Shape("choice", choices=declared.choices)
+    if kind in _PLAIN:
+        return _single(_PLAIN[kind], declared.bounds, place)
+    raise TypeError(f"{place}: a configuration value cannot have the type {kind}")
 
 
-def _single(form: Form, meta: Mapping[str, Any], place: str) -> Shape:
-    """Read the metadata of a single value."""
-    if "length" in meta:
-        raise TypeError(f"{place}: length is for tuples")
-    if form in ("bool", "text") and ("low" in meta or "high" in meta):
-        raise TypeError(f"{place}: low and high are for numbers")
-    if "choices" in meta:
-        return Shape("choice", choices=tuple(meta["choices"]))
-    return Shape(form, low=meta.get("low"), high=meta.get("high"))
+def _single(form: Form, bounds: Bounds | None, place: str) -> Shape:
+    """Return the shape of a single value; bounds are of its own type."""
+    if bounds is None:
+        return Shape(form)
+    if form not in ("number", "whole"):
+        raise TypeError(f"{place}: Bounds are for numbers")
+    if form == "number":
+        return Shape(form, low=float(bounds.low), high=float(bounds.high))
+    return Shape(form, low=int(bounds.low), high=int(bounds.high))
 
 
 def _annotation(shape: Shape) -> Any:
@@ -295,7 +286,7 @@ def _stand_in(shape: Shape, high: bool) -> Any:
     """Return a value from one end of what may stand at a place."""
     match shape:
         case Shape(form="number" | "whole"):
-            least = shape.low if shape.low is not None else (shape.high or 1.0) - 1.0
+            least = shape.low if shape.low is not None else 0.0
             end = (shape.high if shape.high is not None else least + 1.0) if high else least
             return int(end) if shape.form == "whole" else float(end)
         case Shape(form="bool"):

@@ -145,10 +145,6 @@ def _range(shape: Shape) -> str:
     unit = f" {shape.unit}" if shape.unit else ""
     if shape.low is not None and shape.high is not None:
         return f", {_number(shape.low)} to {_number(shape.high)}{unit}"
-    if shape.low is not None:
-        return f", {_number(shape.low)}{unit} or more"
-    if shape.high is not None:
-        return f", {_number(shape.high)}{unit} or less"
     return f" in{unit}" if unit else ""
 
 

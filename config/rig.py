@@ -6,6 +6,7 @@ Bounds stand with the values, in the rooms; the rules between sections in gazeri
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
+from typing import Annotated
 
 from gazerig.drivers.camera.oak_params import OakParams
 from gazerig.drivers.camera.params import CameraCareParams, WebcamParams
@@ -13,7 +14,7 @@ from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.servo_models import BUS_KINDS
+from gazerig.drivers.servo_models import BusKind
 from gazerig.drivers.vision.face_params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.attention import AttentionParams
@@ -29,6 +30,7 @@ from gazerig.gaze.pursuit import PursuitParams
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import ScanpathParams
 from gazerig.gaze.top_down import TopDownParams
+from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
@@ -42,42 +44,23 @@ from gazerig.robot.model.types import in_order
 class Ranges:
     """Ranges a style of gaze keeps to, inside those of the rig's joints."""
 
-    eye_yaw_deg: float = field(
-        metadata={"low": 1.0, "high": 90.0, "unit": "deg", "says": "eye range to each side"}
-    )
-    eye_pitch_deg: float = field(
-        metadata={"low": 1.0, "high": 90.0, "unit": "deg", "says": "eye range up and down"}
-    )
-    neck_yaw_deg: float = field(
-        metadata={"low": 0.0, "high": 180.0, "unit": "deg", "says": "head range to each side"}
-    )
+    eye_yaw_deg: Annotated[float, Bounds(1, 90), "eye range to each side"]
+    eye_pitch_deg: Annotated[float, Bounds(1, 90), "eye range up and down"]
+    neck_yaw_deg: Annotated[float, Bounds(0, 180), "head range to each side"]
 
 
 @dataclass(frozen=True)
 class BusConfig:
     """How the servos on one port are reached."""
 
-    port: str = field(metadata={"unit": "", "says": "serial port or I2C bus, e.g. /dev/ttyUSB0"})
-    kind: str = field(
-        default="dynamixel",
-        metadata={"choices": BUS_KINDS, "unit": "", "says": "what the servos on it speak"},
-    )
-    dynamixel: DynamixelParams = field(
-        default_factory=DynamixelParams,
-        metadata={"unit": "", "says": "Protocol 2.0 settings, for kind dynamixel"},
-    )
-    feetech: FeetechParams = field(
-        default_factory=FeetechParams,
-        metadata={"unit": "", "says": "Feetech STS settings, for kind feetech"},
-    )
-    maestro: MaestroParams = field(
-        default_factory=MaestroParams,
-        metadata={"unit": "", "says": "Pololu Maestro settings, for kind maestro"},
-    )
-    pca9685: Pca9685Params = field(
-        default_factory=Pca9685Params,
-        metadata={"unit": "", "says": "PCA9685 settings, for kind pca9685"},
-    )
+    # fmt: off
+    port: Annotated[str, "serial port or I2C bus, e.g. /dev/ttyUSB0"]
+    kind: Annotated[BusKind, "what the servos on it speak"] = "dynamixel"
+    dynamixel: Annotated[DynamixelParams, "Protocol 2.0 settings, for kind dynamixel"] = field(default_factory=DynamixelParams)
+    feetech: Annotated[FeetechParams, "Feetech STS settings, for kind feetech"] = field(default_factory=FeetechParams)
+    maestro: Annotated[MaestroParams, "Pololu Maestro settings, for kind maestro"] = field(default_factory=MaestroParams)
+    pca9685: Annotated[Pca9685Params, "PCA9685 settings, for kind pca9685"] = field(default_factory=Pca9685Params)
+    # fmt: on
 
     @property
     def baud(self) -> int:
@@ -100,44 +83,18 @@ class BusConfig:
 class LidJoints:
     """Lid joint angles at which the lids are shut and fully open."""
 
-    left_shut_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "left upper lid shut"}
-    )
-    left_open_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "left upper lid open"}
-    )
-    right_shut_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "right upper lid shut"}
-    )
-    right_open_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "right upper lid open"}
-    )
-    left_lower_shut_deg: float | None = field(
-        default=None,
-        metadata={
-            "low": -180.0,
-            "high": 180.0,
-            "unit": "deg",
-            "says": "left lower lid where it meets the upper one; null: there is none",
-        },
-    )
-    left_lower_open_deg: float | None = field(
-        default=None,
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "left lower lid open"},
-    )
-    right_lower_shut_deg: float | None = field(
-        default=None,
-        metadata={
-            "low": -180.0,
-            "high": 180.0,
-            "unit": "deg",
-            "says": "right lower lid where it meets the upper one; null: there is none",
-        },
-    )
-    right_lower_open_deg: float | None = field(
-        default=None,
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "right lower lid open"},
-    )
+    # fmt: off
+    left_shut_deg: Annotated[float, Bounds(-180, 180), "left upper lid shut"]
+    left_open_deg: Annotated[float, Bounds(-180, 180), "left upper lid open"]
+    right_shut_deg: Annotated[float, Bounds(-180, 180), "right upper lid shut"]
+    right_open_deg: Annotated[float, Bounds(-180, 180), "right upper lid open"]
+    left_lower_shut_deg: Annotated[float | None, Bounds(-180, 180),
+        "left lower lid where it meets the upper one; null: there is none"] = None
+    left_lower_open_deg: Annotated[float | None, Bounds(-180, 180), "left lower lid open"] = None
+    right_lower_shut_deg: Annotated[float | None, Bounds(-180, 180),
+        "right lower lid where it meets the upper one; null: there is none"] = None
+    right_lower_open_deg: Annotated[float | None, Bounds(-180, 180), "right lower lid open"] = None
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check that the lids can move.
@@ -169,101 +126,52 @@ class LidJoints:
 class GazeConfig:
     """The gaze models."""
 
-    field_of_view: FieldOfViewParams = field(
-        default_factory=FieldOfViewParams, metadata={"says": "what an eye can see"}
-    )
-    bottom_up: BottomUpParams = field(
-        default_factory=BottomUpParams, metadata={"says": "how motion pulls"}
-    )
-    top_down: TopDownParams = field(
-        default_factory=TopDownParams, metadata={"says": "what a behaviour looks at"}
-    )
-    attention: AttentionParams = field(
-        default_factory=AttentionParams, metadata={"says": "who wins"}
-    )
-    idle: IdleParams = field(default_factory=IdleParams, metadata={"says": "when nothing is there"})
-    aversion: AversionParams = field(
-        default_factory=AversionParams, metadata={"says": "looking away while talking"}
-    )
-    scanpath: ScanpathParams = field(
-        default_factory=ScanpathParams, metadata={"says": "the walk over a face"}
-    )
-    saccade: SaccadeParams = field(
-        default_factory=SaccadeParams, metadata={"says": "how the eyes jump"}
-    )
-    pursuit: PursuitParams = field(
-        default_factory=PursuitParams, metadata={"says": "how the eyes follow"}
-    )
-    head: HeadParams = field(default_factory=HeadParams, metadata={"says": "how the head joins"})
-    breathing: BreathingParams = field(
-        default_factory=BreathingParams, metadata={"says": "the head's slow sway"}
-    )
-    lids: LidParams = field(default_factory=LidParams, metadata={"says": "blinks"})
-    oculomotor: OculomotorParams = field(
-        default_factory=OculomotorParams, metadata={"says": "how it all fits together"}
-    )
+    # fmt: off
+    field_of_view: Annotated[FieldOfViewParams, "what an eye can see"] = field(default_factory=FieldOfViewParams)
+    bottom_up: Annotated[BottomUpParams, "how motion pulls"] = field(default_factory=BottomUpParams)
+    top_down: Annotated[TopDownParams, "what a behaviour looks at"] = field(default_factory=TopDownParams)
+    attention: Annotated[AttentionParams, "who wins"] = field(default_factory=AttentionParams)
+    idle: Annotated[IdleParams, "when nothing is there"] = field(default_factory=IdleParams)
+    aversion: Annotated[AversionParams, "looking away while talking"] = field(default_factory=AversionParams)
+    scanpath: Annotated[ScanpathParams, "the walk over a face"] = field(default_factory=ScanpathParams)
+    saccade: Annotated[SaccadeParams, "how the eyes jump"] = field(default_factory=SaccadeParams)
+    pursuit: Annotated[PursuitParams, "how the eyes follow"] = field(default_factory=PursuitParams)
+    head: Annotated[HeadParams, "how the head joins"] = field(default_factory=HeadParams)
+    breathing: Annotated[BreathingParams, "the head's slow sway"] = field(default_factory=BreathingParams)
+    lids: Annotated[LidParams, "blinks"] = field(default_factory=LidParams)
+    oculomotor: Annotated[OculomotorParams, "how it all fits together"] = field(default_factory=OculomotorParams)
+    # fmt: on
 
 
 @dataclass(frozen=True)
 class Rig:
     """One head: its wires, its build, its limits and its manners."""
 
-    name: str = field(metadata={"unit": "", "says": "name of the rig"})
-    profile: str = field(
-        metadata={"unit": "", "says": "name of a shipped profile or path of a YAML file"}
-    )
-    ranges: Ranges = field(metadata={"says": "how far eyes and head go; the profile says"})
-    bus: BusConfig = field(metadata={"says": "servo bus"})
-    buses: Mapping[str, BusConfig] = field(
-        default_factory=dict,
-        kw_only=True,
-        metadata={"says": "further servo buses by name, for joints whose bus is that name"},
-    )
-    geometry: GeometryParams = field(metadata={"says": "measures of the head"})
-    joints: Mapping[str, JointParams] = field(metadata={"says": "one entry a joint"})
-    lid_joints: LidJoints = field(metadata={"says": "lid angles"})
-    park_deg: Mapping[str, float] = field(
-        metadata={
-            "low": -180.0,
-            "high": 180.0,
-            "unit": "deg",
-            "says": "pose before torque goes off; joints left out go to 0",
-        }
-    )
-    camera: CameraParams = field(
-        default_factory=CameraParams, metadata={"says": "where the camera sits"}
-    )
-    webcam: WebcamParams = field(
-        default_factory=WebcamParams, metadata={"says": "what is asked of a webcam"}
-    )
-    oak: OakParams = field(
-        default_factory=OakParams, metadata={"says": "what is asked of an OAK-D"}
-    )
-    camera_care: CameraCareParams = field(
-        default_factory=CameraCareParams, metadata={"says": "a camera that went away"}
-    )
-    motion: MotionParams = field(
-        default_factory=MotionParams, metadata={"says": "how moving things are found"}
-    )
-    detector: FaceDetectorParams = field(
-        default_factory=FaceDetectorParams, metadata={"says": "how faces are found"}
-    )
-    face_parts_mm: Mapping[str, tuple[float, float, float]] = field(
-        default_factory=dict,
-        metadata={
-            "low": -300.0,
-            "high": 300.0,
-            "unit": "mm",
-            "says": "a person's own places of face parts (DN FL LE M N FR RE UP) from the nose "
-            "tip: out of the face, to the owner's left, up; those left out are an adult's",
-        },
-    )
-    tracks: TrackParams = field(
-        default_factory=TrackParams, metadata={"says": "how identities are kept"}
-    )
-    loop: LoopParams = field(default_factory=LoopParams, metadata={"says": "control loop"})
-    guard: GuardParams = field(default_factory=GuardParams, metadata={"says": "safety"})
-    gaze: GazeConfig = field(default_factory=GazeConfig, metadata={"says": "gaze models"})
+    # fmt: off
+    name: Annotated[str, "name of the rig"]
+    profile: Annotated[str, "name of a shipped profile or path of a YAML file"]
+    ranges: Annotated[Ranges, "how far eyes and head go; the profile says"]
+    bus: Annotated[BusConfig, "servo bus"]
+    buses: Annotated[Mapping[str, BusConfig],
+        "further servo buses by name, for joints whose bus is that name"] = field(default_factory=dict, kw_only=True)
+    geometry: Annotated[GeometryParams, "measures of the head"]
+    joints: Annotated[Mapping[str, JointParams], "one entry a joint"]
+    lid_joints: Annotated[LidJoints, "lid angles"]
+    park_deg: Annotated[Mapping[str, float], Bounds(-180, 180), "pose before torque goes off; joints left out go to 0"]
+    camera: Annotated[CameraParams, "where the camera sits"] = field(default_factory=CameraParams)
+    webcam: Annotated[WebcamParams, "what is asked of a webcam"] = field(default_factory=WebcamParams)
+    oak: Annotated[OakParams, "what is asked of an OAK-D"] = field(default_factory=OakParams)
+    camera_care: Annotated[CameraCareParams, "a camera that went away"] = field(default_factory=CameraCareParams)
+    motion: Annotated[MotionParams, "how moving things are found"] = field(default_factory=MotionParams)
+    detector: Annotated[FaceDetectorParams, "how faces are found"] = field(default_factory=FaceDetectorParams)
+    face_parts_mm: Annotated[Mapping[str, tuple[float, float, float]], Bounds(-300, 300),
+        "a person's own places of face parts (DN FL LE M N FR RE UP) from the nose tip: out of the face, to "
+        "the owner's left, up; those left out are an adult's"] = field(default_factory=dict)
+    tracks: Annotated[TrackParams, "how identities are kept"] = field(default_factory=TrackParams)
+    loop: Annotated[LoopParams, "control loop"] = field(default_factory=LoopParams)
+    guard: Annotated[GuardParams, "safety"] = field(default_factory=GuardParams)
+    gaze: Annotated[GazeConfig, "gaze models"] = field(default_factory=GazeConfig)
+    # fmt: on
 
     @property
     def names(self) -> tuple[str, ...]:

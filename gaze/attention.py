@@ -10,7 +10,7 @@ for boredom, and several people share the gaze.
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from gazerig.gaze.habituation import Habituation, HabituationParams
 from gazerig.gaze.idle import Idle
 from gazerig.gaze.top_down import TopDown, Wanted
 from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Pull, Target, Vec3
+from gazerig.params import Bounds
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _POINT = ("point", -1)
@@ -33,36 +34,12 @@ _SPEED_OVER_S = 0.2  # a speed of the head from positions farther apart says not
 class AttentionParams:
     """Hysteresis, and how old a picture may be."""
 
-    stay_factor: float = field(
-        default=1.2,
-        metadata={
-            "low": 1.0,
-            "high": 10.0,
-            "unit": "",
-            "says": "another body must pull this many times stronger to take over",
-        },
-    )
-    shortest_ms: float = field(
-        default=300.0,
-        metadata={
-            "low": 0.0,
-            "high": 10000.0,
-            "unit": "ms",
-            "says": "shortest time with one body",
-        },
-    )
-    stale_ms: float = field(
-        default=400.0,
-        metadata={
-            "low": 20.0,
-            "high": 10000.0,
-            "unit": "ms",
-            "says": "a picture older than this no longer tells what is there",
-        },
-    )
-    habituation: HabituationParams = field(
-        default_factory=HabituationParams, metadata={"says": "how interest wears off"}
-    )
+    # fmt: off
+    stay_factor: Annotated[float, Bounds(1, 10), "another body must pull this many times stronger to take over"] = 1.2
+    shortest_ms: Annotated[float, Bounds(0, 10000), "shortest time with one body"] = 300.0
+    stale_ms: Annotated[float, Bounds(20, 10000), "a picture older than this no longer tells what is there"] = 400.0
+    habituation: Annotated[HabituationParams, "how interest wears off"] = field(default_factory=HabituationParams)
+    # fmt: on
 
 
 class _Choice(NamedTuple):

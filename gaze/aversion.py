@@ -6,14 +6,15 @@ is what Lee, Badler & Badler 2002 (Eyes Alive) measured in talking and listening
 while thinking the gaze goes mostly up, for longer (Andrist et al. 2014).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import cos, exp, log, radians, sin, sqrt
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
 from gazerig.gaze.types import Target, Vec3
+from gazerig.params import Bounds
 
 AversionMode = Literal["none", "talk", "listen", "think"]
 MODES: tuple[AversionMode, ...] = ("none", "talk", "listen", "think")
@@ -26,79 +27,31 @@ _UP = 2
 _SCALE_DEG, _P_TOP, _P_MOST = 6.9, 15.7, 15.0
 
 
-def _time(mean_s: float, says: str) -> float:
-    """Declare a time in seconds."""
-    meta = {"low": 0.1, "high": 60.0, "unit": "s", "says": says}
-    value: float = field(default=mean_s, metadata=meta)
-    return value
-
-
 @dataclass(frozen=True)
 class AversionParams:
     """Times on the face and away from it, and how far away."""
 
-    talk_mutual_s: float = _time(3.13, "talking: mean time on the face")
-    talk_mutual_sd_s: float = _time(3.16, "its standard deviation")
-    talk_away_s: float = _time(0.93, "talking: mean time away")
-    talk_away_sd_s: float = _time(0.80, "its standard deviation")
-    listen_mutual_s: float = _time(7.92, "listening: mean time on the face")
-    listen_mutual_sd_s: float = _time(1.57, "its standard deviation")
-    listen_away_s: float = _time(0.43, "listening: mean time away")
-    listen_away_sd_s: float = _time(0.24, "its standard deviation")
-    think_mutual_s: float = _time(1.50, "thinking: mean time on the face")
-    think_mutual_sd_s: float = _time(0.80, "its standard deviation")
-    think_away_s: float = _time(3.54, "thinking: mean time away")
-    think_away_sd_s: float = _time(1.26, "its standard deviation")
-    longest_mutual_s: float = field(
-        default=14.5,
-        metadata={
-            "low": 0.5,
-            "high": 14.9,
-            "unit": "s",
-            "says": "no look at a face is longer; beyond 15 s it is a stare",
-        },
-    )
-    shortest_s: float = field(
-        default=0.2,
-        metadata={
-            "low": 0.05,
-            "high": 2.0,
-            "unit": "s",
-            "says": "no time on or away is shorter: eyes and servos must get there first",
-        },
-    )
-    least_deg: float = field(
-        default=5.0,
-        metadata={
-            "low": 0.0,
-            "high": 20.0,
-            "unit": "deg",
-            "says": "no nearer beside the face: half the gazes of the published law would still "
-            "be on it; 0 is that law",
-        },
-    )
-    talk_most_deg: float = field(
-        default=27.5,
-        metadata={
-            "low": 1.0,
-            "high": 60.0,
-            "unit": "deg",
-            "says": "farthest away while talking or thinking",
-        },
-    )
-    listen_most_deg: float = field(
-        default=22.7,
-        metadata={"low": 1.0, "high": 60.0, "unit": "deg", "says": "farthest while listening"},
-    )
-    think_up_share: float = field(
-        default=0.8,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "share of the looks away while thinking that go up; the others go anywhere",
-        },
-    )
+    # fmt: off
+    talk_mutual_s: Annotated[float, Bounds(0.1, 60), "talking: mean time on the face"] = 3.13
+    talk_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 3.16
+    talk_away_s: Annotated[float, Bounds(0.1, 60), "talking: mean time away"] = 0.93
+    talk_away_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 0.80
+    listen_mutual_s: Annotated[float, Bounds(0.1, 60), "listening: mean time on the face"] = 7.92
+    listen_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 1.57
+    listen_away_s: Annotated[float, Bounds(0.1, 60), "listening: mean time away"] = 0.43
+    listen_away_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 0.24
+    think_mutual_s: Annotated[float, Bounds(0.1, 60), "thinking: mean time on the face"] = 1.50
+    think_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 0.80
+    think_away_s: Annotated[float, Bounds(0.1, 60), "thinking: mean time away"] = 3.54
+    think_away_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 1.26
+    longest_mutual_s: Annotated[float, Bounds(0.5, 14.9), "no look at a face is longer; beyond 15 s it is a stare"] = 14.5
+    shortest_s: Annotated[float, Bounds(0.05, 2), "no time on or away is shorter: eyes and servos must get there first"] = 0.2
+    least_deg: Annotated[float, Bounds(0, 20),
+        "no nearer beside the face: half the gazes of the published law would still be on it; 0 is that law"] = 5.0
+    talk_most_deg: Annotated[float, Bounds(1, 60), "farthest away while talking or thinking"] = 27.5
+    listen_most_deg: Annotated[float, Bounds(1, 60), "farthest while listening"] = 22.7
+    think_up_share: Annotated[float, Bounds(0, 1), "share of the looks away while thinking that go up; the others go anywhere"] = 0.8
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check the order of the limits.

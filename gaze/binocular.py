@@ -10,144 +10,44 @@ eyes; radians inside, degrees and milliseconds in the parameters.
 """
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import radians
-from typing import NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from gazerig.gaze.angles import clip
 from gazerig.gaze.channels import Conjugate, Leak, Vergence
 from gazerig.gaze.vestibular import Canals, distance_m, translational_rad_s
+from gazerig.params import Bounds
 
 
 @dataclass(frozen=True)
 class BinocularParams:
     """Gains, delays and ranges."""
 
-    delay_ms: float = field(
-        default=100.0,
-        metadata={"low": 0.0, "high": 500.0, "unit": "ms", "says": "delay tau_c of seeing"},
-    )
-    smooth_ms: float = field(
-        default=40.0,
-        metadata={"low": 0.1, "high": 500.0, "unit": "ms", "says": "smoothing Tf of what is seen"},
-    )
-    velocity_gain: float = field(
-        default=0.95,
-        metadata={
-            "low": 0.0,
-            "high": 1.2,
-            "unit": "",
-            "says": "share Gp of the target's speed that is taken over at once",
-        },
-    )
-    max_speed_deg_s: float = field(
-        default=60.0,
-        metadata={"low": 1.0, "high": 200.0, "unit": "deg/s", "says": "fastest pursuit v_max"},
-    )
-    reject_deg_s: float = field(
-        default=100.0,
-        metadata={
-            "low": 1.0,
-            "high": 1000.0,
-            "unit": "deg/s",
-            "says": "faster than this is a jump of the target and not a motion, v_rej",
-        },
-    )
-    gain_1_s: float = field(
-        default=8.0,
-        metadata={"low": 0.0, "high": 50.0, "unit": "1/s", "says": "conjugate gain Kc"},
-    )
-    max_error_deg: float = field(
-        default=5.0,
-        metadata={
-            "low": 0.1,
-            "high": 180.0,
-            "unit": "deg",
-            "says": "largest error e_max that counts; larger ones are saccades",
-        },
-    )
-    lead_ms: float = field(
-        default=0.0,
-        metadata={"low": 0.0, "high": 100.0, "unit": "ms", "says": "lead h on a moving target"},
-    )
-    vergence_delay_ms: float = field(
-        default=160.0,
-        metadata={"low": 0.0, "high": 500.0, "unit": "ms", "says": "delay tau_d of vergence"},
-    )
-    converge_1_s: float = field(
-        default=4.0,
-        metadata={"low": 0.0, "high": 50.0, "unit": "1/s", "says": "vergence gain Kd"},
-    )
-    diverge_1_s: float = field(
-        default=3.0,
-        metadata={"low": 0.0, "high": 50.0, "unit": "1/s", "says": "gain Kdiv when diverging"},
-    )
-    max_vergence_deg: float = field(
-        default=20.0,
-        metadata={"low": 1.0, "high": 60.0, "unit": "deg", "says": "largest vergence"},
-    )
-    hold_s: float = field(
-        default=0.0,
-        metadata={
-            "low": 0.0,
-            "high": 600.0,
-            "unit": "s",
-            "says": "time constant T_N of gaze holding; 0 holds for ever, 25 in the dark",
-        },
-    )
-    fade_ms: float = field(
-        default=300.0,
-        metadata={
-            "low": 1.0,
-            "high": 5000.0,
-            "unit": "ms",
-            "says": "decay of the eye's speed when the target is lost",
-        },
-    )
-    vor_gain: float = field(
-        default=1.0,
-        metadata={"low": 0.0, "high": 1.5, "unit": "", "says": "gain of the reflex; people .95"},
-    )
-    vor_delay_ms: float = field(
-        default=10.0,
-        metadata={"low": 0.0, "high": 100.0, "unit": "ms", "says": "delay tau_vor of the reflex"},
-    )
-    storage_s: float = field(
-        default=16.0,
-        metadata={
-            "low": 0.0,
-            "high": 600.0,
-            "unit": "s",
-            "says": "velocity storage T_vs; 0 with a perfect gyroscope",
-        },
-    )
-    servo_lead_ms: float = field(
-        default=0.0,
-        metadata={"low": 0.0, "high": 30.0, "unit": "ms", "says": "lead for the servos' own lag"},
-    )
-    interocular_mm: float = field(
-        default=61.9,
-        metadata={"low": 10.0, "high": 500.0, "unit": "mm", "says": "between the eye centres"},
-    )
-    eye_limit_deg: float = field(
-        default=55.0,
-        metadata={"low": 1.0, "high": 90.0, "unit": "deg", "says": "eye range to each side"},
-    )
-    covered: str = field(
-        default="copy",
-        metadata={
-            "choices": ("copy", "cross"),
-            "unit": "",
-            "says": "a covered eye goes all the way with the other, or by the crossed path only",
-        },
-    )
-    efference: bool = field(
-        default=True,
-        metadata={
-            "unit": "",
-            "says": "know where the eyes were; without it only delayed errors steer",
-        },
-    )
+    # fmt: off
+    delay_ms: Annotated[float, Bounds(0, 500), "delay tau_c of seeing"] = 100.0
+    smooth_ms: Annotated[float, Bounds(0.1, 500), "smoothing Tf of what is seen"] = 40.0
+    velocity_gain: Annotated[float, Bounds(0, 1.2), "share Gp of the target's speed that is taken over at once"] = 0.95
+    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest pursuit v_max"] = 60.0
+    reject_deg_s: Annotated[float, Bounds(1, 1000), "faster than this is a jump of the target and not a motion, v_rej"] = 100.0
+    gain_1_s: Annotated[float, Bounds(0, 50), "conjugate gain Kc"] = 8.0
+    max_error_deg: Annotated[float, Bounds(0.1, 180), "largest error e_max that counts; larger ones are saccades"] = 5.0
+    lead_ms: Annotated[float, Bounds(0, 100), "lead h on a moving target"] = 0.0
+    vergence_delay_ms: Annotated[float, Bounds(0, 500), "delay tau_d of vergence"] = 160.0
+    converge_1_s: Annotated[float, Bounds(0, 50), "vergence gain Kd"] = 4.0
+    diverge_1_s: Annotated[float, Bounds(0, 50), "gain Kdiv when diverging"] = 3.0
+    max_vergence_deg: Annotated[float, Bounds(1, 60), "largest vergence"] = 20.0
+    hold_s: Annotated[float, Bounds(0, 600), "time constant T_N of gaze holding; 0 holds for ever, 25 in the dark"] = 0.0
+    fade_ms: Annotated[float, Bounds(1, 5000), "decay of the eye's speed when the target is lost"] = 300.0
+    vor_gain: Annotated[float, Bounds(0, 1.5), "gain of the reflex; people .95"] = 1.0
+    vor_delay_ms: Annotated[float, Bounds(0, 100), "delay tau_vor of the reflex"] = 10.0
+    storage_s: Annotated[float, Bounds(0, 600), "velocity storage T_vs; 0 with a perfect gyroscope"] = 16.0
+    servo_lead_ms: Annotated[float, Bounds(0, 30), "lead for the servos' own lag"] = 0.0
+    interocular_mm: Annotated[float, Bounds(10, 500), "between the eye centres"] = 61.9
+    eye_limit_deg: Annotated[float, Bounds(1, 90), "eye range to each side"] = 55.0
+    covered: Annotated[Literal["copy", "cross"], "a covered eye goes all the way with the other, or by the crossed path only"] = "copy"
+    efference: Annotated[bool, "know where the eyes were; without it only delayed errors steer"] = True
+    # fmt: on
 
 
 class HeadMotion(NamedTuple):

@@ -17,15 +17,16 @@ What has just come into view pulls besides, by a term that decays: the paper's b
 All bodies are computed at once; what is remembered of each is a row of an array.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import exp
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.field_of_view import BLOCK, columns
 from gazerig.gaze.types import Bodies, Floats, Vec3
+from gazerig.params import Bounds
 
 Ids = NDArray[np.int64]
 
@@ -41,62 +42,15 @@ _AHEAD: Vec3 = (1.0, 0.0, 0.0)
 class BottomUpParams:
     """Form and weights of eq 1, and the pull of what is new."""
 
-    form: Literal["retinal", "literal"] = field(
-        default="retinal",
-        metadata={
-            "unit": "",
-            "says": "retinal: as the eye sees it; literal: eq 1 as printed, without the weights",
-        },
-    )
-    slide_rad_s: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.01,
-            "high": 20.0,
-            "unit": "rad/s",
-            "says": "sideways motion, seen from the eye, that pulls with 1",
-        },
-    )
-    loom_1_s: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.01,
-            "high": 20.0,
-            "unit": "1/s",
-            "says": "growth or shrinkage, in parts of the distance, that pulls with 1",
-        },
-    )
-    spin_rad_s: float = field(
-        default=3.0,
-        metadata={
-            "low": 0.01,
-            "high": 100.0,
-            "unit": "rad/s",
-            "says": "rotation about the line of view that pulls with 1",
-        },
-    )
-    smoothing_s: float = field(
-        default=0.1,
-        metadata={"low": 0.0, "high": 2.0, "unit": "s", "says": "time constant of the low-pass"},
-    )
-    onset_pull: float = field(
-        default=1.0,
-        metadata={
-            "low": 0.0,
-            "high": 10.0,
-            "unit": "",
-            "says": "pull of what has just come into view; 0 for none",
-        },
-    )
-    onset_s: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.02,
-            "high": 10.0,
-            "unit": "s",
-            "says": "time constant with which that pull is gone",
-        },
-    )
+    # fmt: off
+    form: Annotated[Literal["retinal", "literal"], "retinal: as the eye sees it; literal: eq 1 as printed, without the weights"] = "retinal"
+    slide_rad_s: Annotated[float, Bounds(0.01, 20), "sideways motion, seen from the eye, that pulls with 1"] = 0.5
+    loom_1_s: Annotated[float, Bounds(0.01, 20), "growth or shrinkage, in parts of the distance, that pulls with 1"] = 0.5
+    spin_rad_s: Annotated[float, Bounds(0.01, 100), "rotation about the line of view that pulls with 1"] = 3.0
+    smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass"] = 0.1
+    onset_pull: Annotated[float, Bounds(0, 10), "pull of what has just come into view; 0 for none"] = 1.0
+    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which that pull is gone"] = 0.5
+    # fmt: on
 
 
 class Terms(NamedTuple):

@@ -5,11 +5,13 @@ judged more alive. The sway is added to what the head model wishes, and as the e
 take whatever the head does not, they compensate it and the gaze stays where it is.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import cos, pi, radians, sin
+from typing import Annotated
 
 from gazerig.gaze.saccade import min_jerk
 from gazerig.gaze.types import Angles3
+from gazerig.params import Bounds
 
 _STILL: Angles3 = (0.0, 0.0, 0.0)
 _GLIDE_S = 1.0  # time in which a breath that is retuned falls into its new depth
@@ -19,28 +21,11 @@ _GLIDE_S = 1.0  # time in which a breath that is retuned falls into its new dept
 class BreathingParams:
     """Depth and pace."""
 
-    pitch_deg: float = field(
-        default=0.6,
-        metadata={
-            "low": 0.0,
-            "high": 5.0,
-            "unit": "deg",
-            "says": "how far the head nods up and down with the breath; 0 is not at all",
-        },
-    )
-    roll_deg: float = field(
-        default=0.0,
-        metadata={
-            "low": 0.0,
-            "high": 5.0,
-            "unit": "deg",
-            "says": "how far it rolls to each side, a quarter of a breath later",
-        },
-    )
-    rate_hz: float = field(
-        default=0.25,
-        metadata={"low": 0.02, "high": 1.0, "unit": "Hz", "says": "breaths in a second"},
-    )
+    # fmt: off
+    pitch_deg: Annotated[float, Bounds(0, 5), "how far the head nods up and down with the breath; 0 is not at all"] = 0.6
+    roll_deg: Annotated[float, Bounds(0, 5), "how far it rolls to each side, a quarter of a breath later"] = 0.0
+    rate_hz: Annotated[float, Bounds(0.02, 1), "breaths in a second"] = 0.25
+    # fmt: on
 
 
 class Breathing:

@@ -7,13 +7,15 @@ The paper's rule also sees what stands behind something else, and the robot's ow
 fist: one's own body is therefore left out, and what is hidden may be.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.angles import compose, direction, rotate, rotation
 from gazerig.gaze.types import Angles2, Bodies, Floats, GazeState, Mat3, Vec3
+from gazerig.params import Bounds
 
 BLOCK = 8192
 """Bodies computed at once: their intermediate results stay in the processor's cache."""
@@ -25,32 +27,14 @@ _PAIRS_AT_ONCE = 1_000_000
 class FieldOfViewParams:
     """Limits of one eye's field, from its line of sight, and what is not seen inside it."""
 
-    temporal_deg: float = field(
-        default=100.0,
-        metadata={"low": 5.0, "high": 120.0, "unit": "deg", "says": "towards the temple"},
-    )
-    nasal_deg: float = field(
-        default=60.0,
-        metadata={"low": 5.0, "high": 120.0, "unit": "deg", "says": "towards the nose"},
-    )
-    up_deg: float = field(
-        default=60.0, metadata={"low": 5.0, "high": 90.0, "unit": "deg", "says": "upwards"}
-    )
-    down_deg: float = field(
-        default=75.0, metadata={"low": 5.0, "high": 90.0, "unit": "deg", "says": "downwards"}
-    )
-    occlusion: bool = field(
-        default=False,
-        metadata={
-            "unit": "",
-            "says": "whether a body behind another one is hidden; costs time with the square "
-            "of the number of bodies",
-        },
-    )
-    own_kinds: tuple[str, ...] = field(
-        default=("own",),
-        metadata={"unit": "", "says": "kinds of bodies that are one's own and never looked at"},
-    )
+    # fmt: off
+    temporal_deg: Annotated[float, Bounds(5, 120), "towards the temple"] = 100.0
+    nasal_deg: Annotated[float, Bounds(5, 120), "towards the nose"] = 60.0
+    up_deg: Annotated[float, Bounds(5, 90), "upwards"] = 60.0
+    down_deg: Annotated[float, Bounds(5, 90), "downwards"] = 75.0
+    occlusion: Annotated[bool, "whether a body behind another one is hidden; costs time with the square of the number of bodies"] = False
+    own_kinds: Annotated[tuple[str, ...], "kinds of bodies that are one's own and never looked at"] = ("own",)
+    # fmt: on
 
 
 class FieldOfView:

@@ -9,74 +9,29 @@ Inhibition of return: for a moment the gaze avoids the place it has just left, a
 Ruesch et al. 2008 (a Gaussian about that place that decays).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import radians
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.types import Floats, Vec3
+from gazerig.params import Bounds
 
 
 @dataclass(frozen=True)
 class HabituationParams:
     """Rates of interest, and the place that is avoided."""
 
-    fall_1_s: float = field(
-        default=0.2,
-        metadata={
-            "low": 0.0,
-            "high": 10.0,
-            "unit": "1/s",
-            "says": "how fast interest in what is looked at falls from 1; 0 for never",
-        },
-    )
-    rise_1_s: float = field(
-        default=1.0,
-        metadata={
-            "low": 0.01,
-            "high": 10.0,
-            "unit": "1/s",
-            "says": "how fast it recovers in what is not looked at",
-        },
-    )
-    rule_floor: float = field(
-        default=0.6,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "interest kept in what a rule points at; lower: the gaze changes sooner "
-            "between several people",
-        },
-    )
-    return_strength: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "how strongly the place just left is avoided; 0 for not at all",
-        },
-    )
-    return_sigma_deg: float = field(
-        default=4.0,
-        metadata={
-            "low": 0.1,
-            "high": 45.0,
-            "unit": "deg",
-            "says": "standard deviation of that place",
-        },
-    )
-    return_s: float = field(
-        default=1.5,
-        metadata={
-            "low": 0.05,
-            "high": 60.0,
-            "unit": "s",
-            "says": "time constant with which that is over",
-        },
-    )
+    # fmt: off
+    fall_1_s: Annotated[float, Bounds(0, 10), "how fast interest in what is looked at falls from 1; 0 for never"] = 0.2
+    rise_1_s: Annotated[float, Bounds(0.01, 10), "how fast it recovers in what is not looked at"] = 1.0
+    rule_floor: Annotated[float, Bounds(0, 1),
+        "interest kept in what a rule points at; lower: the gaze changes sooner between several people"] = 0.6
+    return_strength: Annotated[float, Bounds(0, 1), "how strongly the place just left is avoided; 0 for not at all"] = 0.5
+    return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that place"] = 4.0
+    return_s: Annotated[float, Bounds(0.05, 60), "time constant with which that is over"] = 1.5
+    # fmt: on
 
 
 class _Left(NamedTuple):

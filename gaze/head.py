@@ -9,147 +9,41 @@ for the head to turn further the more attention there is). Motion: minimum jerk
 makes no step.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import degrees, exp, hypot, radians
+from typing import Annotated, Literal
 
 from gazerig.gaze.angles import angle_between, direction, shortened, yaw_pitch
 from gazerig.gaze.quintic import Quintic
 from gazerig.gaze.types import Angles2, Angles3, Target
+from gazerig.params import Bounds
 
 
 @dataclass(frozen=True)
 class HeadParams:
     """Constants of eqs 7 and 8 and of the start rule."""
 
-    largest_offset_deg: float = field(
-        default=30.0,
-        metadata={
-            "low": 0.0,
-            "high": 90.0,
-            "unit": "deg",
-            "says": "how far short of the target the least interested head stops; also the "
-            "trigger; both are lowered to the eye's limit less eye_margin_deg",
-        },
-    )
-    eye_margin_deg: float = field(
-        default=2.0,
-        metadata={"low": 0.0, "high": 30.0, "unit": "deg", "says": "kept free at the eye limit"},
-    )
-    pull_least: float = field(
-        default=0.2,
-        metadata={
-            "low": 0.0,
-            "high": 10.0,
-            "unit": "",
-            "says": "attention A1 at which the head moves least",
-        },
-    )
-    pull_most: float = field(
-        default=1.0,
-        metadata={
-            "low": 0.0,
-            "high": 10.0,
-            "unit": "",
-            "says": "attention A2 at which the head moves most",
-        },
-    )
-    goal_by: str = field(
-        default="attention",
-        metadata={
-            "choices": ("attention", "align", "stahl"),
-            "unit": "",
-            "says": "head's share by the amount of attention (eq 7), a fixed alignment, or "
-            "0.77 of what lies beyond 17.9 deg (Stahl 1999)",
-        },
-    )
-    align: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "with goal_by align: 0 stops as short as may be, 1 faces the target",
-        },
-    )
-    literal_reach: bool = field(
-        default=False,
-        metadata={
-            "unit": "",
-            "says": "keep trigger and offset whatever the eyes can reach, as printed",
-        },
-    )
-    lead_ms: float = field(
-        default=0.0,
-        metadata={
-            "low": 0.0,
-            "high": 100.0,
-            "unit": "ms",
-            "says": "head before eyes for top-down targets that it turns to",
-        },
-    )
-    start_delay_ms: float = field(
-        default=20.0,
-        metadata={
-            "low": 0.0,
-            "high": 1000.0,
-            "unit": "ms",
-            "says": "head after eyes for bottom-up targets",
-        },
-    )
-    base_speed_deg_s: float = field(
-        default=70.0,
-        metadata={
-            "low": 5.0,
-            "high": 500.0,
-            "unit": "deg/s",
-            "says": "V0; the peak speed is (4/3 A/50 + 0.4) V0 for A degrees",
-        },
-    )
-    shortest_move_ms: float = field(
-        default=300.0,
-        metadata={
-            "low": 20.0,
-            "high": 5000.0,
-            "unit": "ms",
-            "says": "shortest head movement; small ones would be twitches otherwise",
-        },
-    )
-    replan_deg: float = field(
-        default=1.0,
-        metadata={
-            "low": 0.05,
-            "high": 20.0,
-            "unit": "deg",
-            "says": "change of the goal that makes a moving head plan anew",
-        },
-    )
-    recentre_after_ms: float = field(
-        default=800.0,
-        metadata={
-            "low": 0.0,
-            "high": 60000.0,
-            "unit": "ms",
-            "says": "an eye held aside this long is relieved by the head",
-        },
-    )
-    comfort_deg: float = field(
-        default=8.0,
-        metadata={
-            "low": 0.0,
-            "high": 90.0,
-            "unit": "deg",
-            "says": "eccentricity at which the eye is at ease",
-        },
-    )
-    recentre_speed_deg_s: float = field(
-        default=30.0,
-        metadata={
-            "low": 1.0,
-            "high": 200.0,
-            "unit": "deg/s",
-            "says": "peak speed of that slow relief",
-        },
-    )
+    # fmt: off
+    largest_offset_deg: Annotated[float, Bounds(0, 90),
+        "how far short of the target the least interested head stops; also the trigger; both are lowered to the eye's limit less "
+        "eye_margin_deg"] = 30.0
+    eye_margin_deg: Annotated[float, Bounds(0, 30), "kept free at the eye limit"] = 2.0
+    pull_least: Annotated[float, Bounds(0, 10), "attention A1 at which the head moves least"] = 0.2
+    pull_most: Annotated[float, Bounds(0, 10), "attention A2 at which the head moves most"] = 1.0
+    goal_by: Annotated[Literal["attention", "align", "stahl"],
+        "head's share by the amount of attention (eq 7), a fixed alignment, or 0.77 of what lies beyond 17.9 deg (Stahl "
+        "1999)"] = "attention"
+    align: Annotated[float, Bounds(0, 1), "with goal_by align: 0 stops as short as may be, 1 faces the target"] = 0.5
+    literal_reach: Annotated[bool, "keep trigger and offset whatever the eyes can reach, as printed"] = False
+    lead_ms: Annotated[float, Bounds(0, 100), "head before eyes for top-down targets that it turns to"] = 0.0
+    start_delay_ms: Annotated[float, Bounds(0, 1000), "head after eyes for bottom-up targets"] = 20.0
+    base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0; the peak speed is (4/3 A/50 + 0.4) V0 for A degrees"] = 70.0
+    shortest_move_ms: Annotated[float, Bounds(20, 5000), "shortest head movement; small ones would be twitches otherwise"] = 300.0
+    replan_deg: Annotated[float, Bounds(0.05, 20), "change of the goal that makes a moving head plan anew"] = 1.0
+    recentre_after_ms: Annotated[float, Bounds(0, 60000), "an eye held aside this long is relieved by the head"] = 800.0
+    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity at which the eye is at ease"] = 8.0
+    recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of that slow relief"] = 30.0
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check the order of the two amounts of attention.

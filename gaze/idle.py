@@ -11,13 +11,15 @@ where kind or id changes, so every glance is a shift of gaze. The resting point 
 with id -1. Directions are seen from a point above the neck base at the resting height.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import exp, hypot, log, radians, sqrt
+from typing import Annotated
 
 import numpy as np
 
 from gazerig.gaze.angles import add, direction, norm, scale, sub, wrap, yaw_pitch
 from gazerig.gaze.types import Angles2, Target, Vec3
+from gazerig.params import Bounds
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make no more than 3 to 4 a second
@@ -27,138 +29,26 @@ _SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make no more tha
 class IdleParams:
     """Times, ranges and the resting point."""
 
-    hold_ms: float = field(
-        default=1000.0,
-        metadata={
-            "low": 0.0,
-            "high": 60000.0,
-            "unit": "ms",
-            "says": "time for which the gaze stays where a lost target was",
-        },
-    )
-    rest_distance_m: float = field(
-        default=1.5,
-        metadata={"low": 0.3, "high": 20.0, "unit": "m", "says": "distance of the resting point"},
-    )
-    rest_height_m: float = field(
-        default=0.2,
-        metadata={
-            "low": -1.0,
-            "high": 3.0,
-            "unit": "m",
-            "says": "height of the resting point above the neck base",
-        },
-    )
-    rest_pull: float = field(
-        default=0.2,
-        metadata={"low": 0.0, "high": 10.0, "unit": "", "says": "pull of the resting point"},
-    )
-    coast_ms: float = field(
-        default=200.0,
-        metadata={
-            "low": 0.0,
-            "high": 2000.0,
-            "unit": "ms",
-            "says": "for this long at most a lost target is taken to have moved on",
-        },
-    )
-    search_ms: float = field(
-        default=3000.0,
-        metadata={
-            "low": 0.0,
-            "high": 60000.0,
-            "unit": "ms",
-            "says": "time of searching for a lost target after that; 0 is not at all",
-        },
-    )
-    search_fixation_ms: float = field(
-        default=600.0,
-        metadata={
-            "low": 100.0,
-            "high": 10000.0,
-            "unit": "ms",
-            "says": "mean time with one place of the search",
-        },
-    )
-    search_aside_deg: float = field(
-        default=18.0,
-        metadata={
-            "low": 0.0,
-            "high": 90.0,
-            "unit": "deg",
-            "says": "how far towards the side it left to",
-        },
-    )
-    search_spread_deg: float = field(
-        default=8.0,
-        metadata={
-            "low": 0.0,
-            "high": 45.0,
-            "unit": "deg",
-            "says": "standard deviation of the places of the search, sideways",
-        },
-    )
-    leaving_deg_s: float = field(
-        default=4.0,
-        metadata={
-            "low": 0.1,
-            "high": 100.0,
-            "unit": "deg/s",
-            "says": "slower targets did not leave to any side",
-        },
-    )
-    reach_deg: float = field(
-        default=70.0,
-        metadata={
-            "low": 5.0,
-            "high": 180.0,
-            "unit": "deg",
-            "says": "no farther to the side does it search, unless the target was there",
-        },
-    )
-    rest_ms: float = field(
-        default=3000.0,
-        metadata={
-            "low": 200.0,
-            "high": 600000.0,
-            "unit": "ms",
-            "says": "mean time at rest between glances around",
-        },
-    )
-    glance_ms: float = field(
-        default=1200.0,
-        metadata={"low": 200.0, "high": 60000.0, "unit": "ms", "says": "mean time of a glance"},
-    )
-    spread: float = field(
-        default=0.6,
-        metadata={
-            "low": 0.0,
-            "high": 3.0,
-            "unit": "",
-            "says": "of all these times: standard deviation over mean",
-        },
-    )
-    again_share: float = field(
-        default=0.35,
-        metadata={
-            "low": 0.0,
-            "high": 0.95,
-            "unit": "",
-            "says": "share of glances that another one follows, without rest between",
-        },
-    )
-    glance_least_deg: float = field(
-        default=8.0,
-        metadata={"low": 0.0, "high": 90.0, "unit": "deg", "says": "nearest glance to the side"},
-    )
-    glance_yaw_deg: float = field(
-        default=35.0,
-        metadata={"low": 0.0, "high": 90.0, "unit": "deg", "says": "farthest glance to the side"},
-    )
-    glance_pitch_deg: float = field(
-        default=12.0,
-        metadata={"low": 0.0, "high": 60.0, "unit": "deg", "says": "highest and lowest glance"},
-    )
+    # fmt: off
+    hold_ms: Annotated[float, Bounds(0, 60000), "time for which the gaze stays where a lost target was"] = 1000.0
+    rest_distance_m: Annotated[float, Bounds(0.3, 20), "distance of the resting point"] = 1.5
+    rest_height_m: Annotated[float, Bounds(-1, 3), "height of the resting point above the neck base"] = 0.2
+    rest_pull: Annotated[float, Bounds(0, 10), "pull of the resting point"] = 0.2
+    coast_ms: Annotated[float, Bounds(0, 2000), "for this long at most a lost target is taken to have moved on"] = 200.0
+    search_ms: Annotated[float, Bounds(0, 60000), "time of searching for a lost target after that; 0 is not at all"] = 3000.0
+    search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean time with one place of the search"] = 600.0
+    search_aside_deg: Annotated[float, Bounds(0, 90), "how far towards the side it left to"] = 18.0
+    search_spread_deg: Annotated[float, Bounds(0, 45), "standard deviation of the places of the search, sideways"] = 8.0
+    leaving_deg_s: Annotated[float, Bounds(0.1, 100), "slower targets did not leave to any side"] = 4.0
+    reach_deg: Annotated[float, Bounds(5, 180), "no farther to the side does it search, unless the target was there"] = 70.0
+    rest_ms: Annotated[float, Bounds(200, 600_000), "mean time at rest between glances around"] = 3000.0
+    glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 1200.0
+    spread: Annotated[float, Bounds(0, 3), "of all these times: standard deviation over mean"] = 0.6
+    again_share: Annotated[float, Bounds(0, 0.95), "share of glances that another one follows, without rest between"] = 0.35
+    glance_least_deg: Annotated[float, Bounds(0, 90), "nearest glance to the side"] = 8.0
+    glance_yaw_deg: Annotated[float, Bounds(0, 90), "farthest glance to the side"] = 35.0
+    glance_pitch_deg: Annotated[float, Bounds(0, 60), "highest and lowest glance"] = 12.0
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check the range of the glances.

@@ -17,210 +17,44 @@ What sleepiness does to the lower lid nobody seems to have measured; the muscle 
 tires with the others, so it rises by little.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from gazerig.params import Bounds
 
 
 @dataclass(frozen=True)
 class LidParams:
     """Rates, shapes and what the lids do at rest; lids without a name are the upper ones."""
 
-    blinks_per_min: float = field(
-        default=17.0,
-        metadata={
-            "low": 0.0,
-            "high": 60.0,
-            "unit": "1/min",
-            "says": "spontaneous blinks at rest; 0 is never",
-        },
-    )
-    conversation_per_min: float = field(
-        default=26.0,
-        metadata={
-            "low": 0.0,
-            "high": 60.0,
-            "unit": "1/min",
-            "says": "spontaneous blinks in conversation; 0 is never",
-        },
-    )
-    interval_law: str = field(
-        default="lognormal",
-        metadata={
-            "choices": ("lognormal", "exponential", "fixed"),
-            "unit": "",
-            "says": "law of the intervals; all three keep the mean, fixed has no spread",
-        },
-    )
-    interval_cv: float = field(
-        default=0.8,
-        metadata={
-            "low": 0.05,
-            "high": 3.0,
-            "unit": "",
-            "says": "spread of log-normal intervals: standard deviation over mean",
-        },
-    )
-    shortest_interval_ms: float = field(
-        default=1000.0,
-        metadata={
-            "low": 400.0,
-            "high": 10000.0,
-            "unit": "ms",
-            "says": "pause after a blink before a spontaneous one",
-        },
-    )
-    double_share: float = field(
-        default=0.0,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "share of blinks with a second one right after them",
-        },
-    )
-    double_gap_ms: float = field(
-        default=100.0,
-        metadata={"low": 0.0, "high": 500.0, "unit": "ms", "says": "pause between those two"},
-    )
-    incomplete_share: float = field(
-        default=0.12,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "share of blinks that shut the lid by 0.70 to 0.85 only",
-        },
-    )
-    close_ms: float = field(
-        default=75.0,
-        metadata={"low": 30.0, "high": 500.0, "unit": "ms", "says": "time of closing"},
-    )
-    hold_ms: float = field(
-        default=35.0,
-        metadata={"low": 0.0, "high": 1000.0, "unit": "ms", "says": "time shut"},
-    )
-    open_ms: float = field(
-        default=175.0,
-        metadata={"low": 50.0, "high": 1500.0, "unit": "ms", "says": "time of opening"},
-    )
-    wink_hold_ms: float = field(
-        default=200.0,
-        metadata={"low": 0.0, "high": 3000.0, "unit": "ms", "says": "time shut in a wink"},
-    )
-    rest_opening: float = field(
-        default=0.75,
-        metadata={"low": 0.1, "high": 1.0, "unit": "", "says": "opening with level gaze"},
-    )
-    follow_per_deg: float = field(
-        default=0.0222,
-        metadata={
-            "low": 0.0,
-            "high": 0.1,
-            "unit": "1/deg",
-            "says": "change of the opening as the gaze sinks; gain 1 is one over the lid's travel",
-        },
-    )
-    follow_up_share: float = field(
-        default=0.85,
-        metadata={
-            "low": 0.0,
-            "high": 1.5,
-            "unit": "",
-            "says": "the same above level gaze, in parts of the change below it",
-        },
-    )
-    lower_rest_opening: float = field(
-        default=0.8,
-        metadata={
-            "low": 0.1,
-            "high": 1.0,
-            "unit": "",
-            "says": "opening of the lower lids with level gaze",
-        },
-    )
-    lower_follow_per_deg: float = field(
-        default=0.008,
-        metadata={
-            "low": 0.0,
-            "high": 0.1,
-            "unit": "1/deg",
-            "says": "shutting of the lower lids as the gaze rises, opening as it sinks",
-        },
-    )
-    lower_close_share: float = field(
-        default=1.0,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "part of its way that a lower lid goes in a blink; 1 meets the upper lid",
-        },
-    )
-    evoked_middle_deg: float = field(
-        default=17.0,
-        metadata={
-            "low": 1.0,
-            "high": 180.0,
-            "unit": "deg",
-            "says": "gaze shift that brings a blink every second time",
-        },
-    )
-    evoked_steepness_1_deg: float = field(
-        default=0.217,
-        metadata={"low": 0.0, "high": 5.0, "unit": "1/deg", "says": "slope of that probability"},
-    )
-    evoked_pause_ms: float = field(
-        default=600.0,
-        metadata={
-            "low": 0.0,
-            "high": 10000.0,
-            "unit": "ms",
-            "says": "from the onset of a blink to the next that a gaze shift may bring",
-        },
-    )
-    evoked_literal: bool = field(
-        default=False,
-        metadata={
-            "unit": "",
-            "says": "a blink with every shift beyond evoked_literal_deg instead of the dice",
-        },
-    )
-    evoked_literal_deg: float = field(
-        default=20.0,
-        metadata={
-            "low": 0.0,
-            "high": 180.0,
-            "unit": "deg",
-            "says": "a large saccade of Nakamoto & Tsuruno 3.6",
-        },
-    )
-    sleepy_level: float = field(
-        default=0.0,
-        metadata={"low": 0.0, "high": 1.0, "unit": "", "says": "sleepiness at the start"},
-    )
-    sleepy_droop: float = field(
-        default=0.65,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "part of the opening that full sleepiness takes away",
-        },
-    )
-    lower_sleepy_rise: float = field(
-        default=0.1,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "part of a lower lid's opening that full sleepiness takes away",
-        },
-    )
-    sleepy_slowness: float = field(
-        default=2.0,
-        metadata={
-            "low": 0.0,
-            "high": 5.0,
-            "unit": "",
-            "says": "full sleepiness makes a blink this many times its length longer",
-        },
-    )
+    # fmt: off
+    blinks_per_min: Annotated[float, Bounds(0, 60), "spontaneous blinks at rest; 0 is never"] = 17.0
+    conversation_per_min: Annotated[float, Bounds(0, 60), "spontaneous blinks in conversation; 0 is never"] = 26.0
+    interval_law: Annotated[Literal["lognormal", "exponential", "fixed"],
+        "law of the intervals; all three keep the mean, fixed has no spread"] = "lognormal"
+    interval_cv: Annotated[float, Bounds(0.05, 3), "spread of log-normal intervals: standard deviation over mean"] = 0.8
+    shortest_interval_ms: Annotated[float, Bounds(400, 10000), "pause after a blink before a spontaneous one"] = 1000.0
+    double_share: Annotated[float, Bounds(0, 1), "share of blinks with a second one right after them"] = 0.0
+    double_gap_ms: Annotated[float, Bounds(0, 500), "pause between those two"] = 100.0
+    incomplete_share: Annotated[float, Bounds(0, 1), "share of blinks that shut the lid by 0.70 to 0.85 only"] = 0.12
+    close_ms: Annotated[float, Bounds(30, 500), "time of closing"] = 75.0
+    hold_ms: Annotated[float, Bounds(0, 1000), "time shut"] = 35.0
+    open_ms: Annotated[float, Bounds(50, 1500), "time of opening"] = 175.0
+    wink_hold_ms: Annotated[float, Bounds(0, 3000), "time shut in a wink"] = 200.0
+    rest_opening: Annotated[float, Bounds(0.1, 1), "opening with level gaze"] = 0.75
+    follow_per_deg: Annotated[float, Bounds(0, 0.1),
+        "change of the opening as the gaze sinks; gain 1 is one over the lid's travel"] = 0.0222
+    follow_up_share: Annotated[float, Bounds(0, 1.5), "the same above level gaze, in parts of the change below it"] = 0.85
+    lower_rest_opening: Annotated[float, Bounds(0.1, 1), "opening of the lower lids with level gaze"] = 0.8
+    lower_follow_per_deg: Annotated[float, Bounds(0, 0.1), "shutting of the lower lids as the gaze rises, opening as it sinks"] = 0.008
+    lower_close_share: Annotated[float, Bounds(0, 1), "part of its way that a lower lid goes in a blink; 1 meets the upper lid"] = 1.0
+    evoked_middle_deg: Annotated[float, Bounds(1, 180), "gaze shift that brings a blink every second time"] = 17.0
+    evoked_steepness_1_deg: Annotated[float, Bounds(0, 5), "slope of that probability"] = 0.217
+    evoked_pause_ms: Annotated[float, Bounds(0, 10000), "from the onset of a blink to the next that a gaze shift may bring"] = 600.0
+    evoked_literal: Annotated[bool, "a blink with every shift beyond evoked_literal_deg instead of the dice"] = False
+    evoked_literal_deg: Annotated[float, Bounds(0, 180), "a large saccade of Nakamoto & Tsuruno 3.6"] = 20.0
+    sleepy_level: Annotated[float, Bounds(0, 1), "sleepiness at the start"] = 0.0
+    sleepy_droop: Annotated[float, Bounds(0, 1), "part of the opening that full sleepiness takes away"] = 0.65
+    lower_sleepy_rise: Annotated[float, Bounds(0, 1), "part of a lower lid's opening that full sleepiness takes away"] = 0.1
+    sleepy_slowness: Annotated[float, Bounds(0, 5), "full sleepiness makes a blink this many times its length longer"] = 2.0
+    # fmt: on

@@ -5,9 +5,9 @@ whatever the head does during or after a gaze shift, planned or pushed, is compe
 exactly (the vestibulo-ocular reflex), and vergence comes from each eye's own geometry.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import exp
-from typing import NamedTuple, Protocol
+from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from gazerig.gaze.types import (
     Target,
     Vec3,
 )
+from gazerig.params import Bounds
 
 _AT_END = "at the end of its range"
 _MOVING_M_S = 0.05
@@ -41,60 +42,14 @@ _MOVING_M_S = 0.05
 class OculomotorParams(ShiftParams):
     """When to jump, how to bridge delays, and how exactly to land."""
 
-    extrapolate_ms: float = field(
-        default=200.0,
-        metadata={
-            "low": 0.0,
-            "high": 2000.0,
-            "unit": "ms",
-            "says": "longest time for which a target is moved on by its own velocity",
-        },
-    )
-    fade_ms: float = field(
-        default=300.0,
-        metadata={
-            "low": 1.0,
-            "high": 5000.0,
-            "unit": "ms",
-            "says": "decay of that velocity when there is no news for longer",
-        },
-    )
-    eye_lag_ms: float = field(
-        default=15.0,
-        metadata={
-            "low": 0.0,
-            "high": 200.0,
-            "unit": "ms",
-            "says": "time from command to motion of an eye; the head's motion in it is foreseen",
-        },
-    )
-    nearest_m: float = field(
-        default=0.2,
-        metadata={
-            "low": 0.05,
-            "high": 2.0,
-            "unit": "m",
-            "says": "no nearer point is converged on (0.2 m is 17.6 deg of vergence)",
-        },
-    )
-    landing_along: float = field(
-        default=0.0,
-        metadata={
-            "low": 0.0,
-            "high": 0.2,
-            "unit": "",
-            "says": "scatter of the landing along the way, share of the amplitude; people .03-.05",
-        },
-    )
-    landing_across: float = field(
-        default=0.0,
-        metadata={
-            "low": 0.0,
-            "high": 0.2,
-            "unit": "",
-            "says": "scatter of the landing across the way, share of the amplitude; people .02",
-        },
-    )
+    # fmt: off
+    extrapolate_ms: Annotated[float, Bounds(0, 2000), "longest time for which a target is moved on by its own velocity"] = 200.0
+    fade_ms: Annotated[float, Bounds(1, 5000), "decay of that velocity when there is no news for longer"] = 300.0
+    eye_lag_ms: Annotated[float, Bounds(0, 200), "time from command to motion of an eye; the head's motion in it is foreseen"] = 15.0
+    nearest_m: Annotated[float, Bounds(0.05, 2), "no nearer point is converged on (0.2 m is 17.6 deg of vergence)"] = 0.2
+    landing_along: Annotated[float, Bounds(0, 0.2), "scatter of the landing along the way, share of the amplitude; people .03-.05"] = 0.0
+    landing_across: Annotated[float, Bounds(0, 0.2), "scatter of the landing across the way, share of the amplitude; people .02"] = 0.0
+    # fmt: on
 
 
 class Sway(Protocol):

@@ -12,12 +12,13 @@ human pursuit reaches, and closes the error at the rate Kc; the nearness closes 
 at Kd, or at the slower Kdiv where it recedes. Larger errors of direction are saccades.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import exp, radians
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from gazerig.gaze.angles import add, norm, scale, sub, unit
 from gazerig.gaze.types import Vec3
+from gazerig.params import Bounds
 
 _FARTHEST_1_M = 0.01
 """Nearness below which the lines of sight are as good as parallel (100 m)."""
@@ -29,64 +30,15 @@ _NEAREST_1_M = 20.0
 class PursuitParams:
     """Gains and limits of the following."""
 
-    gain_1_s: float = field(
-        default=8.0,
-        metadata={"low": 0.0, "high": 50.0, "unit": "1/s", "says": "rate Kc closing the error"},
-    )
-    velocity_gain: float = field(
-        default=0.95,
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "share Gp of the target's speed taken over at once; people .95",
-        },
-    )
-    vergence_gain_1_s: float = field(
-        default=4.0,
-        metadata={
-            "low": 0.0,
-            "high": 50.0,
-            "unit": "1/s",
-            "says": "rate Kd closing the error in depth",
-        },
-    )
-    divergence_gain_1_s: float = field(
-        default=3.0,
-        metadata={
-            "low": 0.0,
-            "high": 50.0,
-            "unit": "1/s",
-            "says": "rate Kdiv closing it where the target is farther than the gaze",
-        },
-    )
-    max_speed_deg_s: float = field(
-        default=60.0,
-        metadata={
-            "low": 1.0,
-            "high": 200.0,
-            "unit": "deg/s",
-            "says": "fastest smooth following; human pursuit saturates near 63 deg/s",
-        },
-    )
-    reject_deg_s: float = field(
-        default=100.0,
-        metadata={
-            "low": 1.0,
-            "high": 1000.0,
-            "unit": "deg/s",
-            "says": "a target said to be faster than this has jumped, and is not followed",
-        },
-    )
-    max_error_deg: float = field(
-        default=5.0,
-        metadata={
-            "low": 0.1,
-            "high": 90.0,
-            "unit": "deg",
-            "says": "largest error that smooth following closes at its rate",
-        },
-    )
+    # fmt: off
+    gain_1_s: Annotated[float, Bounds(0, 50), "rate Kc closing the error"] = 8.0
+    velocity_gain: Annotated[float, Bounds(0, 1), "share Gp of the target's speed taken over at once; people .95"] = 0.95
+    vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd closing the error in depth"] = 4.0
+    divergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kdiv closing it where the target is farther than the gaze"] = 3.0
+    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth following; human pursuit saturates near 63 deg/s"] = 60.0
+    reject_deg_s: Annotated[float, Bounds(1, 1000), "a target said to be faster than this has jumped, and is not followed"] = 100.0
+    max_error_deg: Annotated[float, Bounds(0.1, 90), "largest error that smooth following closes at its rate"] = 5.0
+    # fmt: on
 
 
 class Slip(NamedTuple):

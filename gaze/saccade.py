@@ -7,9 +7,11 @@ in each frame. All are closed forms of the time: a late tick lands on the curve 
 of stretching it. Radians and seconds inside; parameters in degrees and milliseconds.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import degrees, exp, log, radians
-from typing import Protocol
+from typing import Annotated, Literal, Protocol
+
+from gazerig.params import Bounds
 
 MIN_JERK_PEAK = 1.875
 """Peak over mean speed of a minimum-jerk movement."""
@@ -23,86 +25,18 @@ _LITERAL_REST_RAD = radians(0.05)
 class SaccadeParams:
     """Profile, speed cap L, shortest duration T, and the constants of the other profiles."""
 
-    profile: str = field(
-        default="min_jerk",
-        metadata={
-            "choices": ("min_jerk", "main_sequence", "literal_frame"),
-            "unit": "",
-            "says": "how an eye jumps: eqs 2-6, as people do, or 0.8 of the way each frame",
-        },
-    )
-    max_speed_deg_s: float = field(
-        default=500.0,
-        metadata={
-            "low": 10.0,
-            "high": 1000.0,
-            "unit": "deg/s",
-            "says": "fastest eye speed L; the paper's 8.7266 rad/s is 500 deg/s",
-        },
-    )
-    shortest_ms: float = field(
-        default=50.0,
-        metadata={
-            "low": 10.0,
-            "high": 1000.0,
-            "unit": "ms",
-            "says": "shortest saccade T of the profile min_jerk",
-        },
-    )
-    human_base_ms: float = field(
-        default=21.0,
-        metadata={
-            "low": 1.0,
-            "high": 200.0,
-            "unit": "ms",
-            "says": "duration of a human saccade of no size",
-        },
-    )
-    human_per_deg_ms: float = field(
-        default=2.2,
-        metadata={
-            "low": 0.1,
-            "high": 20.0,
-            "unit": "ms/deg",
-            "says": "how much longer a human saccade is for each degree",
-        },
-    )
-    human_peak_over_mean: float = field(
-        default=1.65,
-        metadata={
-            "low": 1.2,
-            "high": 1.875,
-            "unit": "",
-            "says": "peak over mean speed of a human saccade below the cap",
-        },
-    )
-    device_floor_ms: float = field(
-        default=20.0,
-        metadata={
-            "low": 1.0,
-            "high": 500.0,
-            "unit": "ms",
-            "says": "shortest saccade the device can make with the profile main_sequence",
-        },
-    )
-    frame_share: float = field(
-        default=0.8,
-        metadata={
-            "low": 0.05,
-            "high": 0.99,
-            "unit": "",
-            "says": "share of the remaining way per frame of the profile literal_frame",
-        },
-    )
-    frame_ms: float = field(
-        default=11.1,
-        metadata={
-            "low": 1.0,
-            "high": 200.0,
-            "unit": "ms",
-            "says": "length of such a frame; the authors' display showed 90 a second",
-        },
-    )
+    # fmt: off
+    profile: Annotated[Literal["min_jerk", "main_sequence", "literal_frame"],
+        "how an eye jumps: eqs 2-6, as people do, or 0.8 of the way each frame"] = "min_jerk"
+    max_speed_deg_s: Annotated[float, Bounds(10, 1000), "fastest eye speed L; the paper's 8.7266 rad/s is 500 deg/s"] = 500.0
+    shortest_ms: Annotated[float, Bounds(10, 1000), "shortest saccade T of the profile min_jerk"] = 50.0
+    human_base_ms: Annotated[float, Bounds(1, 200), "duration of a human saccade of no size"] = 21.0
+    human_per_deg_ms: Annotated[float, Bounds(0.1, 20), "how much longer a human saccade is for each degree"] = 2.2
+    human_peak_over_mean: Annotated[float, Bounds(1.2, 1.875), "peak over mean speed of a human saccade below the cap"] = 1.65
+    device_floor_ms: Annotated[float, Bounds(1, 500), "shortest saccade the device can make with the profile main_sequence"] = 20.0
+    frame_share: Annotated[float, Bounds(0.05, 0.99), "share of the remaining way per frame of the profile literal_frame"] = 0.8
+    frame_ms: Annotated[float, Bounds(1, 200), "length of such a frame; the authors' display showed 90 a second"] = 11.1
+    # fmt: on
 
 
 class Profile(Protocol):

@@ -10,89 +10,29 @@ and that is closed smoothly. No error brings a saccade sooner after the last tha
 refractory time, and none starts while another is in flight.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf, radians
+from typing import Annotated
 
 from gazerig.gaze.angles import dot, norm
 from gazerig.gaze.pursuit import Slip
+from gazerig.params import Bounds
 
 
 @dataclass(frozen=True)
 class ShiftParams:
     """Thresholds and times of that rule."""
 
-    saccade_deg: float = field(
-        default=2.0,
-        metadata={
-            "low": 0.1,
-            "high": 30.0,
-            "unit": "deg",
-            "says": "error that is closed by a saccade instead of smooth following",
-        },
-    )
-    smallest_shift_deg: float = field(
-        default=0.3,
-        metadata={
-            "low": 0.0,
-            "high": 10.0,
-            "unit": "deg",
-            "says": "a new target nearer than this needs no saccade",
-        },
-    )
-    refractory_ms: float = field(
-        default=150.0,
-        metadata={
-            "low": 0.0,
-            "high": 2000.0,
-            "unit": "ms",
-            "says": "pause before an error alone may bring the next saccade",
-        },
-    )
-    latency_ms: float = field(
-        default=0.0,
-        metadata={
-            "low": 0.0,
-            "high": 1000.0,
-            "unit": "ms",
-            "says": "from a new target to the saccade; people 200",
-        },
-    )
-    crossing_least_ms: float = field(
-        default=40.0,
-        metadata={
-            "low": 0.0,
-            "high": 1000.0,
-            "unit": "ms",
-            "says": "an eye that crosses the target later than this ...",
-        },
-    )
-    crossing_most_ms: float = field(
-        default=180.0,
-        metadata={
-            "low": 0.0,
-            "high": 1000.0,
-            "unit": "ms",
-            "says": "... and sooner than this needs no saccade",
-        },
-    )
-    correct_deg: float = field(
-        default=1.0,
-        metadata={
-            "low": 0.1,
-            "high": 30.0,
-            "unit": "deg",
-            "says": "error after a scattered landing that is corrected by a small saccade",
-        },
-    )
-    correct_after_ms: float = field(
-        default=200.0,
-        metadata={
-            "low": 0.0,
-            "high": 1000.0,
-            "unit": "ms",
-            "says": "from landing to that correction; people 150 to 250",
-        },
-    )
+    # fmt: off
+    saccade_deg: Annotated[float, Bounds(0.1, 30), "error that is closed by a saccade instead of smooth following"] = 2.0
+    smallest_shift_deg: Annotated[float, Bounds(0, 10), "a new target nearer than this needs no saccade"] = 0.3
+    refractory_ms: Annotated[float, Bounds(0, 2000), "pause before an error alone may bring the next saccade"] = 150.0
+    latency_ms: Annotated[float, Bounds(0, 1000), "from a new target to the saccade; people 200"] = 0.0
+    crossing_least_ms: Annotated[float, Bounds(0, 1000), "an eye that crosses the target later than this ..."] = 40.0
+    crossing_most_ms: Annotated[float, Bounds(0, 1000), "... and sooner than this needs no saccade"] = 180.0
+    correct_deg: Annotated[float, Bounds(0.1, 30), "error after a scattered landing that is corrected by a small saccade"] = 1.0
+    correct_after_ms: Annotated[float, Bounds(0, 1000), "from landing to that correction; people 150 to 250"] = 200.0
+    # fmt: on
 
 
 class ShiftRule:

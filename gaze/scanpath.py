@@ -6,7 +6,8 @@ a face target is replaced here; the head is told to turn to the face's centre an
 part (3.5).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,7 @@ from gazerig.gaze.scanpath_models import (
     SimpleCycle,
 )
 from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
+from gazerig.params import Bounds, Choices
 
 _OTHER_SIDE = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}
 # A measured and rounded row may miss 1 by this and still count as a row that sums to 1.
@@ -31,24 +33,13 @@ _ROUNDING = 0.005
 class Walk:
     """A measured walk: the transition matrix as printed, and dwell statistics."""
 
-    order: tuple[str, ...] = field(
-        metadata={"unit": "", "says": "face parts in the order of rows and columns"}
-    )
-    matrix: tuple[tuple[float, ...], ...] = field(
-        metadata={
-            "low": 0.0,
-            "high": 1.0,
-            "unit": "",
-            "says": "transition probabilities, rows from, columns to, as printed",
-        }
-    )
-    dwell_mean_s: tuple[float, ...] = field(
-        metadata={"low": 0.001, "high": 60.0, "unit": "s", "says": "mean dwell per part"}
-    )
-    dwell_sd_s: tuple[float, ...] = field(
-        metadata={"low": 0.0, "high": 60.0, "unit": "s", "says": "its standard deviation"}
-    )
-    start: str = field(default="FR", metadata={"choices": PARTS, "unit": "", "says": "first part"})
+    # fmt: off
+    order: Annotated[tuple[str, ...], "face parts in the order of rows and columns"]
+    matrix: Annotated[tuple[tuple[float, ...], ...], Bounds(0, 1), "transition probabilities, rows from, columns to, as printed"]
+    dwell_mean_s: Annotated[tuple[float, ...], Bounds(0.001, 60), "mean dwell per part"]
+    dwell_sd_s: Annotated[tuple[float, ...], Bounds(0, 60), "its standard deviation"]
+    start: Annotated[str, Choices(*PARTS), "first part"] = "FR"
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check the shapes.
@@ -85,94 +76,23 @@ def row_sums_note(walk: Walk) -> str | None:
 class ScanpathParams:
     """Which way this robot looks at a face, and how it takes the walk."""
 
-    model: str = field(
-        default="markov",
-        metadata={
-            "choices": ("markov", "simple", "face_tracking", "random"),
-            "unit": "",
-            "says": "measured walk, or one of the three it is compared with",
-        },
-    )
-    walk: str = field(
-        default="nakamoto_tsuruno",
-        metadata={"unit": "", "says": "name of a shipped walk or path of a YAML file"},
-    )
-    start: str = field(
-        default="as_walk",
-        metadata={
-            "choices": ("as_walk", *PARTS),
-            "unit": "",
-            "says": "part at which a face is entered, named as in the walk",
-        },
-    )
-    viewers_left: bool = field(
-        default=False,
-        metadata={
-            "unit": "",
-            "says": "left and right in walk and round are the viewer's, not the owner's",
-        },
-    )
-    diagonal: str = field(
-        default="refixation",
-        metadata={
-            "choices": ("refixation", "whole_visit"),
-            "unit": "",
-            "says": "a part drawn again: another dwell, or part of the visit whose dwell it is",
-        },
-    )
-    dwell_law: str = field(
-        default="lognormal",
-        metadata={"choices": LAWS, "unit": "", "says": "law of the dwell times"},
-    )
-    shortest_dwell_ms: float = field(
-        default=120.0,
-        metadata={
-            "low": 0.0,
-            "high": 2000.0,
-            "unit": "ms",
-            "says": "floor of a dwell: a servo cannot show shorter ones",
-        },
-    )
-    tempo: float = field(
-        default=1.0,
-        metadata={
-            "low": 0.1,
-            "high": 10.0,
-            "unit": "",
-            "says": "dwell times are divided by it: 2 wanders twice as fast",
-        },
-    )
-    simple_order: tuple[str, ...] = field(
-        default=("N", "RE", "LE"),
-        metadata={"choices": PARTS, "unit": "", "says": "round of the simple model"},
-    )
-    simple_dwell_ms: tuple[float, ...] = field(
-        default=(459.42, 408.21, 408.21),
-        metadata={
-            "low": 1.0,
-            "high": 60000.0,
-            "unit": "ms",
-            "says": "time on each part of the simple model's round",
-        },
-    )
-    random_angle_deg: float = field(
-        default=20.0,
-        metadata={
-            "low": 0.0,
-            "high": 60.0,
-            "unit": "deg",
-            "says": "largest yaw and pitch of the random model about the direction to the face",
-        },
-    )
-    random_longest_ms: float = field(
-        default=3000.0,
-        metadata={
-            "low": 10.0,
-            "high": 60000.0,
-            "unit": "ms",
-            "says": "longest interval between jumps of the random model",
-        },
-    )
+    # fmt: off
+    model: Annotated[Literal["markov", "simple", "face_tracking", "random"],
+        "measured walk, or one of the three it is compared with"] = "markov"
+    walk: Annotated[str, "name of a shipped walk or path of a YAML file"] = "nakamoto_tsuruno"
+    start: Annotated[str, Choices("as_walk", *PARTS), "part at which a face is entered, named as in the walk"] = "as_walk"
+    viewers_left: Annotated[bool, "left and right in walk and round are the viewer's, not the owner's"] = False
+    diagonal: Annotated[Literal["refixation", "whole_visit"],
+        "a part drawn again: another dwell, or part of the visit whose dwell it is"] = "refixation"
+    dwell_law: Annotated[str, Choices(*LAWS), "law of the dwell times"] = "lognormal"
+    shortest_dwell_ms: Annotated[float, Bounds(0, 2000), "floor of a dwell: a servo cannot show shorter ones"] = 120.0
+    tempo: Annotated[float, Bounds(0.1, 10), "dwell times are divided by it: 2 wanders twice as fast"] = 1.0
+    simple_order: Annotated[tuple[str, ...], Choices(*PARTS), "round of the simple model"] = ("N", "RE", "LE")
+    simple_dwell_ms: Annotated[tuple[float, ...], Bounds(1, 60000),
+        "time on each part of the simple model's round"] = (459.42, 408.21, 408.21)
+    random_angle_deg: Annotated[float, Bounds(0, 60), "largest yaw and pitch of the random model about the direction to the face"] = 20.0
+    random_longest_ms: Annotated[float, Bounds(10, 60000), "longest interval between jumps of the random model"] = 3000.0
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check the simple model's round.

@@ -7,13 +7,14 @@ Intervals are percentiles over resampled recordings (Efron's bootstrap).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isfinite
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
+from gazerig.params import Bounds, Choices
 
 SMOOTHINGS = ("none", "laplace", "bootstrap")
 
@@ -41,58 +42,15 @@ class Interval(NamedTuple):
 class FitParams:
     """How a walk is fitted."""
 
-    smoothing: str = field(
-        default="laplace",
-        metadata={
-            "choices": SMOOTHINGS,
-            "unit": "",
-            "says": "plain shares, shares after adding pseudo_count, or mean over resamples",
-        },
-    )
-    pseudo_count: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.001,
-            "high": 10.0,
-            "unit": "",
-            "says": "added to every count by laplace smoothing",
-        },
-    )
-    confidence: float = field(
-        default=0.95,
-        metadata={"low": 0.5, "high": 0.999, "unit": "", "says": "level of the intervals"},
-    )
-    resamples: int = field(
-        default=1000,
-        metadata={"low": 100, "high": 100000, "unit": "", "says": "resampled recordings"},
-    )
-    fewest: int = field(
-        default=50,
-        metadata={
-            "low": 2,
-            "high": 100000,
-            "unit": "",
-            "says": "fixations on the face below which nothing is fitted",
-        },
-    )
-    longest_gap_s: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.01,
-            "high": 60.0,
-            "unit": "s",
-            "says": "fixations further apart are no transition: what lay between is unknown",
-        },
-    )
-    fewest_dwells: int = field(
-        default=5,
-        metadata={
-            "low": 2,
-            "high": 1000,
-            "unit": "",
-            "says": "a part with fewer fixations gets mean and SD of all parts together",
-        },
-    )
+    # fmt: off
+    smoothing: Annotated[str, Choices(*SMOOTHINGS), "plain shares, shares after adding pseudo_count, or mean over resamples"] = "laplace"
+    pseudo_count: Annotated[float, Bounds(0.001, 10), "added to every count by laplace smoothing"] = 0.5
+    confidence: Annotated[float, Bounds(0.5, 0.999), "level of the intervals"] = 0.95
+    resamples: Annotated[int, Bounds(100, 100000), "resampled recordings"] = 1000
+    fewest: Annotated[int, Bounds(2, 100000), "fixations on the face below which nothing is fitted"] = 50
+    longest_gap_s: Annotated[float, Bounds(0.01, 60), "fixations further apart are no transition: what lay between is unknown"] = 0.5
+    fewest_dwells: Annotated[int, Bounds(2, 1000), "a part with fewer fixations gets mean and SD of all parts together"] = 5
+    # fmt: on
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,13 @@ several bodies are of the wanted kind, each is wanted, the nearer the more.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import compress
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Bodies, Floats, Vec3
+from gazerig.params import Bounds
 
 _BY_ID = "id:"
 _POINT = "point"
@@ -24,30 +25,13 @@ _POINT = "point"
 class Rule:
     """One behaviour's rule."""
 
-    look_at: str = field(
-        metadata={
-            "unit": "",
-            "says": 'kind of body to look at, e.g. "face" or "hand"; "id:7" for the body '
-            'with that id; "point" for the place point_world_m',
-        }
-    )
-    pull: float = field(
-        metadata={
-            "low": 0.0,
-            "high": 10.0,
-            "unit": "",
-            "says": "its constant amount of attention (A_attack, A_guard, A_face)",
-        }
-    )
-    point_world_m: tuple[float, float, float] | None = field(
-        default=None,
-        metadata={
-            "low": -100.0,
-            "high": 100.0,
-            "unit": "m",
-            "says": "place to look at: ahead, left and above of the neck base",
-        },
-    )
+    # fmt: off
+    look_at: Annotated[str,
+        'kind of body to look at, e.g. "face" or "hand"; "id:7" for the body with that id; "point" for the place point_world_m']
+    pull: Annotated[float, Bounds(0, 10), "its constant amount of attention (A_attack, A_guard, A_face)"]
+    point_world_m: Annotated[tuple[float, float, float] | None, Bounds(-100, 100),
+        "place to look at: ahead, left and above of the neck base"] = None
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check that it says one thing.
@@ -78,31 +62,12 @@ def _shipped_rules() -> dict[str, Rule]:
 class TopDownParams:
     """The rule set and the behaviour in force at the start."""
 
-    behaviour: str = field(
-        default="wait", metadata={"unit": "", "says": "behaviour in force at the start"}
-    )
-    rules: Mapping[str, Rule] = field(
-        default_factory=_shipped_rules,
-        metadata={"unit": "", "says": "behaviour -> what to look at and with what pull"},
-    )
-    stay_with_person: float = field(
-        default=1.25,
-        metadata={
-            "low": 1.0,
-            "high": 10.0,
-            "unit": "",
-            "says": "the one looked at last counts as this many times nearer than the others",
-        },
-    )
-    nearness: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.0,
-            "high": 4.0,
-            "unit": "",
-            "says": "how much less the farther of several pull: the power of the distance",
-        },
-    )
+    # fmt: off
+    behaviour: Annotated[str, "behaviour in force at the start"] = "wait"
+    rules: Annotated[Mapping[str, Rule], "behaviour -> what to look at and with what pull"] = field(default_factory=_shipped_rules)
+    stay_with_person: Annotated[float, Bounds(1, 10), "the one looked at last counts as this many times nearer than the others"] = 1.25
+    nearness: Annotated[float, Bounds(0, 4), "how much less the farther of several pull: the power of the distance"] = 0.5
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check the start behaviour.

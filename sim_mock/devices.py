@@ -1,7 +1,7 @@
 """What can be emulated, as plain data that travels to another process, and how it is built."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
@@ -9,6 +9,7 @@ from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import BRIDGE_BAUD
 from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
+from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -29,15 +30,14 @@ CASES: dict[BusKind, Mapping[str, str]] = {
 }
 """What can be chosen of each kind, and the values as they are typed."""
 
-_BOARD = {f.name: f.metadata for f in fields(MaestroParams)}
 BAUDS: dict[BusKind, tuple[int, ...]] = {
     "dynamixel": DYNAMIXEL_BAUDS,
     "feetech": FEETECH_BAUDS,
-    "maestro": _BOARD["baud"]["choices"],
+    "maestro": choices_of(MaestroParams, "baud"),
     "pca9685": (BRIDGE_BAUD,),
 }
 """Bit/s that each kind can be set to."""
-CHANNELS: tuple[int, ...] = _BOARD["channels"]["choices"]
+CHANNELS: tuple[int, ...] = choices_of(MaestroParams, "channels")
 """Sizes of a Maestro."""
 
 

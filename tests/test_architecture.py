@@ -91,7 +91,8 @@ def package(folder: Path) -> Path:
     """Lay out the package ``gazerig`` in a folder, by links."""
     top = folder / "gazerig"
     top.mkdir()
-    (top / "__init__.py").symlink_to(ROOT / "api" / "__init__.py")
+    for file in (ROOT / "api").glob("*.py"):
+        (top / file.name).symlink_to(file)
     for room in ROOMS:
         (top / room).symlink_to(ROOT / room)
     return top
@@ -136,11 +137,16 @@ def test_every_room_of_the_robot_has_its_storey() -> None:
 
 
 def test_gaze_stands_on_numpy_alone() -> None:
-    standard = set(sys.stdlib_module_names) | {"numpy", "gaze"}
+    standard = set(sys.stdlib_module_names) | {"numpy", "gaze", "params"}
     for module, path in modules():
         if module.startswith("gaze."):
             packages = {wanted.split(".")[0] for wanted in imports(path)}
             assert packages <= standard, f"{module}: {packages - standard}"
+
+
+def test_the_declaration_of_parameters_stands_on_the_standard_library_alone() -> None:
+    packages = {wanted.split(".")[0] for wanted in imports(ROOT / "api" / "params.py")}
+    assert packages <= set(sys.stdlib_module_names)
 
 
 def test_package_files_hold_a_docstring_and_nothing_else() -> None:

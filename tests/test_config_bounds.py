@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import pytest
 
 from gazerig.config.bounds import filled, judge, model_of
 from gazerig.config.export import DIALECT, complaint, json_schema
+from gazerig.params import Bounds, Choices
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,10 +18,8 @@ class Lid:
     More words that are no headline.
     """
 
-    shut_ms: float = field(
-        default=90.0, metadata={"low": 40, "high": 200.0, "unit": "ms", "says": "time to shut"}
-    )
-    open_ms: float = field(default=150.0, metadata={"low": 40.0, "unit": "ms"})
+    shut_ms: Annotated[float, Bounds(40, 200), "time to shut"] = 90.0
+    open_ms: Annotated[float, Bounds(40, 1e9)] = 150.0
     blinks: bool = True
 
     def __post_init__(self) -> None:
@@ -30,19 +29,19 @@ class Lid:
 
 @dataclass(frozen=True, slots=True)
 class Eye:
-    id: int = field(metadata={"low": 0, "high": 252, "says": "servo id"})
+    id: Annotated[int, Bounds(0, 252), "servo id"]
     name: str = "eye"
     lid: Lid = Lid()
     spare: Lid | None = None
     lids: Mapping[str, Lid] = field(default_factory=dict)
-    kind: str = field(default="gamma", metadata={"choices": ("gamma", "lognormal")})
+    kind: Annotated[str, Choices("gamma", "lognormal")] = "gamma"
     side: Literal["left", "right"] = "left"
-    baud: int = field(default=57_600, metadata={"choices": (57_600, 1_000_000), "says": "bits/s"})
+    baud: Annotated[Literal[57_600, 1_000_000], "speed of the line"] = 57_600
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    matrix: tuple[tuple[float, ...], ...] = field(default=(), metadata={"low": 0, "high": 1})
-    pair: tuple[int, ...] = field(default=(1, 2), metadata={"length": 2, "high": 9})
+    matrix: Annotated[tuple[tuple[float, ...], ...], Bounds(0, 1)] = ()
+    pair: Annotated[tuple[int, int], Bounds(-9, 9)] = (1, 2)
     tags: tuple[str, ...] = ()
-    gains: dict[str, float] = field(default_factory=dict, metadata={"low": -1.0, "high": 1.0})
+    gains: Annotated[dict[str, float], Bounds(-1, 1)] = field(default_factory=dict)
 
 
 def refused(data: dict[str, Any]) -> list[str]:
@@ -103,7 +102,7 @@ def test_the_value_is_the_dataclass_with_floats_tuples_and_its_own_defaults() ->
         ({"baud": 57_600.0}, "baud: 57600.0 is a number, wanted one of 57600, 1000000"),
         ({"offset_m": (1, 2)}, "offset_m: has length 2, wanted 3"),
         ({"offset_m": (1, 2, 3, 4)}, "offset_m: has length 4, wanted 3"),
-        ({"offset_m": 1}, "offset_m: 1 is a whole number, wanted a list of 3, each a number"),
+        ({"offset_m": 1}, "offset_m: 1 is a whole number, wanted a list of 3, each a number in m"),
         ({"pair": (1,)}, "pair: has length 1, wanted 2"),
         ({"pair": (1, 10)}, "pair.1: 10 is above 9"),
         ({"matrix": ((0, 1), (0, 1.5))}, "matrix.1.1: 1.5 is above 1"),
@@ -114,7 +113,10 @@ def test_the_value_is_the_dataclass_with_floats_tuples_and_its_own_defaults() ->
         ({"gains": ()}, "gains: is a list, wanted a mapping, each key with a number, -1 to 1"),
         ({"lid": {"shut_ms": 39}}, "lid.shut_ms: 39 is below 40 (unit ms)"),
         ({"lid": {"shut_ms": float("inf")}}, "lid.shut_ms: inf is not a finite number"),
-        ({"lid": {"open_ms": "1 s"}}, "lid.open_ms: '1 s' is text, wanted a number, 40 ms or more"),
+        (
+            {"lid": {"open_ms": "1 s"}},
+            "lid.open_ms: '1 s' is text, wanted a number, 40 to 1000000000 ms",
+        ),
         ({"lid": {"blinks": "no"}}, "lid.blinks: 'no' is text, wanted true or false"),
         ({"lid": {"blinks": 1}}, "lid.blinks: 1 is a whole number, wanted true or false"),
         ({"lid": None}, "lid: is empty, wanted a mapping with the keys shut_ms, open_ms, blinks"),
@@ -155,10 +157,10 @@ def test_a_long_value_is_cut_in_the_message() -> None:
 def test_a_default_outside_its_own_bounds_is_found() -> None:
     @dataclass(frozen=True)
     class Slip:
-        rate_hz: float = field(default=500.0, metadata={"high": 200.0})
+        rate_hz: Annotated[float, Bounds(0, 200)] = 500.0
 
     _, errors = judge(Slip, {})
-    assert [complaint(Slip, error).rule for error in errors] == ["500.0 is above 200"]
+    assert [complaint(Slip, error).rule for error in errors] == ["500.0 is above 200 (unit Hz)"]
 
 
 @dataclass(frozen=True)
@@ -177,22 +179,22 @@ class BadKey:
 
 
 @dataclass(frozen=True)
-class BadMetadata:
-    x: float = field(default=1.0, metadata={"hihg": 2.0})
+class BadNote:
+    x: Annotated[float, {"hihg": 2.0}] = 1.0
+
+
+@dataclass(frozen=True)
+class TwoDescriptions:
+    x: Annotated[float, "this", "that"] = 1.0
 
 
 @dataclass(frozen=True)
 class BoundedText:
-    x: str = field(default="", metadata={"low": 1})
-
-
-@dataclass(frozen=True)
-class LongNumber:
-    x: float = field(default=1.0, metadata={"length": 1})
+    x: Annotated[str, Bounds(1, 2)] = ""
 
 
 @pytest.mark.parametrize(
-    "params", [BadType, MixedTuple, BadKey, BadMetadata, BoundedText, LongNumber]
+    "params", [BadType, MixedTuple, BadKey, BadNote, TwoDescriptions, BoundedText]
 )
 def test_a_declaration_that_cannot_be_checked_is_refused(params: type) -> None:
     with pytest.raises(TypeError, match=rf"{params.__name__}\.x: "):

@@ -5,19 +5,20 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.load import ConfigError, load, read_yaml, shipped, shipped_names
+from gazerig.params import Bounds
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    id: int = field(metadata={"low": 0, "high": 252})
-    max_speed_deg_s: float = field(default=300.0, metadata={"low": 1.0, "high": 2000.0})
+    id: Annotated[int, Bounds(0, 252)]
+    max_speed_deg_s: Annotated[float, Bounds(1, 2000)] = 300.0
     low_deg: float = -30.0
     high_deg: float = 30.0
 
@@ -28,7 +29,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    fps: int = field(default=30, metadata={"low": 1, "high": 120})
+    fps: Annotated[int, Bounds(1, 120)] = 30
     face: bool = True
 
 
@@ -38,8 +39,8 @@ class Rig:
     joints: Mapping[str, Joint]
     camera: Camera = Camera()
     spare: Camera | None = None
-    dwell: str = field(default="gamma", metadata={"choices": ("gamma", "lognormal")})
-    gains: dict[str, float] = field(default_factory=dict, metadata={"low": 0.0})
+    dwell: Literal["gamma", "lognormal"] = "gamma"
+    gains: Annotated[dict[str, float], Bounds(0, 1e308)] = field(default_factory=dict)
     matrix: tuple[tuple[float, ...], ...] = ()
     baud: int = 57_600
 

@@ -4,18 +4,18 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Literal
 
 import pytest
 
 from gazerig.config.load import ConfigError, Fault, load
+from gazerig.params import Bounds, Unit
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    id: int = field(metadata={"low": 0, "high": 252, "says": "servo id"})
-    max_speed_deg_s: float = field(
-        default=300.0, metadata={"low": 1.0, "high": 2000.0, "unit": "deg/s"}
-    )
+    id: Annotated[int, Bounds(0, 252), "servo id"]
+    max_speed_deg_s: Annotated[float, Bounds(1, 2000)] = 300.0
     low_deg: float = -30.0
     high_deg: float = 30.0
 
@@ -26,7 +26,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    fps: int = field(default=30, metadata={"low": 1, "high": 120, "unit": "Hz"})
+    fps: Annotated[int, Bounds(1, 120), Unit("Hz")] = 30
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     face: bool = True
 
@@ -37,8 +37,8 @@ class Rig:
     joints: Mapping[str, Joint]
     camera: Camera = Camera()
     spare: Camera | None = None
-    dwell: str = field(default="gamma", metadata={"choices": ("gamma", "lognormal")})
-    gains: dict[str, float] = field(default_factory=dict, metadata={"low": 0.0})
+    dwell: Literal["gamma", "lognormal"] = "gamma"
+    gains: Annotated[dict[str, float], Bounds(0, 1000)] = field(default_factory=dict)
     matrix: tuple[tuple[float, ...], ...] = ()
     baud: int = 57_600
 
@@ -165,7 +165,7 @@ def test_words_that_look_like_something_else_are_text(tmp_path: Path, word: str)
         ),
         ("max_speed_deg_s: 500", "low_deg: 30", "5: joints.pan: low_deg must be below high_deg"),
         ("-1e-2]", "-1e-2, 3]", "9: camera.offset_m: has length 4, wanted 3"),
-        ("0.5", "\n   x", "10: camera.offset_m.1: 'x' is text, wanted a number"),
+        ("0.5", "\n   x", "10: camera.offset_m.1: 'x' is text, wanted a number in m"),
         ("id: 2", "id: 1", "6: joints.pan.id: id 1 is also that of neck"),
         ("neck", "nekc", "3: joints: there is no neck"),
         ("offset_m: [0, 0.5, -1e-2]", "fps: 2", "9: camera.fps: too slow to follow a face"),
@@ -222,7 +222,7 @@ rig.yaml:3: joints.pan.max_sped_deg_s: unknown key 'max_sped_deg_s'; did you mea
 'max_speed_deg_s'? allowed: id, max_speed_deg_s, low_deg, high_deg
 rig.yaml:4: joints.tilt.max_speed_deg_s: 9000.0 is above 2000 (unit deg/s)
 rig.yaml:5: joints.roll.id: '6' is text, wanted a whole number, 0 to 252; take the quotes away
-rig.yaml:5: joints.roll.low_deg: True is a truth value, wanted a number
+rig.yaml:5: joints.roll.low_deg: True is a truth value, wanted a number in deg
 rig.yaml:6: joints.lid_left.id: missing; wanted a whole number, 0 to 252 (servo id)
 rig.yaml:7: joints.lid_right: low_deg must be below high_deg
 rig.yaml:8: joints.lid_right.id: id 5 is also that of tilt
@@ -237,7 +237,7 @@ rig.yaml:18: gains.x: -1 is below 0
 rig.yaml:18: gains.y: inf is not a finite number
 rig.yaml:19: matrix.0.1: 'x' is text, wanted a number
 rig.yaml:20: matrix.2: 3 is a whole number, wanted a list, each a number
-rig.yaml:21: baud: '57600' is text, wanted a whole number; take the quotes away
+rig.yaml:21: baud: '57600' is text, wanted a whole number in bit/s; take the quotes away
 rig.yaml:22: colour: unknown key 'colour'; allowed: name, joints, camera, spare, dwell, gains, \
 matrix, baud"""
 

@@ -5,6 +5,7 @@ import string
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -14,28 +15,25 @@ from gazerig.config.load import ConfigError, load, read_yaml, shipped
 from gazerig.config.save import Change, copy_shipped, propose, rig_file, save, save_rig
 from gazerig.config.save_text import Unchangeable, edited, written
 from gazerig.config.schema import Rig, load_rig
+from gazerig.params import Bounds, Unit
 
 NOW = datetime(2026, 1, 31, 23, 59, 58)
 
 
 @dataclass(frozen=True)
 class Joint:
-    id: int = field(default=1, metadata={"low": 0, "high": 252, "unit": "", "says": "servo id"})
-    zero_step: int = field(
-        default=2048, metadata={"low": 0, "high": 4095, "unit": "steps", "says": "at 0 deg"}
-    )
-    min_deg: float = field(
-        default=-30.0, metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "lowest"}
-    )
-    gains: tuple[int, int, int] | None = field(default=None, metadata={"says": "P, I and D"})
-    note: str = field(default="", metadata={"says": " ".join(["long"] * 30)})
+    id: Annotated[int, Bounds(0, 252), "servo id"] = 1
+    zero_step: Annotated[int, Bounds(0, 4095), Unit("steps"), "at 0 deg"] = 2048
+    min_deg: Annotated[float, Bounds(-180, 180), "lowest"] = -30.0
+    gains: Annotated[tuple[int, int, int] | None, "P, I and D"] = None
+    note: Annotated[str, " ".join(["long"] * 30)] = ""
 
 
 @dataclass(frozen=True)
 class Head:
     name: str = "a"
-    joints: dict[str, Joint] = field(default_factory=dict, metadata={"says": "one entry a joint"})
-    spare: Joint = field(default_factory=Joint, metadata={"says": "one on the shelf"})
+    joints: Annotated[dict[str, Joint], "one entry a joint"] = field(default_factory=dict)
+    spare: Annotated[Joint, "one on the shelf"] = field(default_factory=Joint)
 
 
 SMALL = """\

@@ -1,6 +1,5 @@
 """Whatever the parameters and whatever happens, lids stay between shut and open and never jump."""
 
-from dataclasses import fields
 from math import radians
 from typing import NamedTuple
 
@@ -10,6 +9,7 @@ from hypothesis import strategies as st
 
 from gazerig.gaze.blink_profile import closure
 from gazerig.gaze.lids import LidParams, Lids
+from gazerig.params import declarations
 
 DT = 0.005
 STEEPEST = 1.875  # slope of minimum jerk at its middle
@@ -30,13 +30,13 @@ OPENING = steepest_opening()
 def admissible() -> st.SearchStrategy[LidParams]:
     """Draw any parameters that a file may hold."""
     ranges: dict[str, st.SearchStrategy[float | str | bool]] = {}
-    for item in fields(LidParams):
-        if "choices" in item.metadata:
-            ranges[item.name] = st.sampled_from(item.metadata["choices"])
-        elif isinstance(item.default, bool):
-            ranges[item.name] = st.booleans()
+    for name, item in declarations(LidParams).items():
+        if item.choices:
+            ranges[name] = st.sampled_from(item.choices)
+        elif item.bounds is None:
+            ranges[name] = st.booleans()
         else:
-            ranges[item.name] = st.floats(item.metadata["low"], item.metadata["high"])
+            ranges[name] = st.floats(item.bounds.low, item.bounds.high)
     return st.builds(LidParams, **ranges)
 
 

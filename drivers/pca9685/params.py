@@ -1,8 +1,10 @@
 """How to reach PCA9685 boards: what a rig file may choose."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 from gazerig.drivers.pca9685.registers import CHANNELS, MOST_PRESCALE, prescale_of
+from gazerig.params import Bounds
 
 BRIDGE_BAUD = 115_200
 """Rate of the serial line of a bridge; that of an I2C bus is set in the system."""
@@ -15,99 +17,22 @@ RESERVED = (0x70, *range(0x78, 0x80))
 class Pca9685Params:
     """How to reach the boards of one I2C bus."""
 
-    address: int = field(
-        default=0x40,
-        metadata={
-            "low": 0x40,
-            "high": 0x77,
-            "unit": "",
-            "says": "Address of the board; 0x40 unless its jumpers are closed.",
-        },
-    )
-    further_addresses: tuple[int, ...] = field(
-        default=(),
-        metadata={
-            "low": 0x40,
-            "high": 0x77,
-            "unit": "",
-            "says": "More boards on the same bus; the first channel of the second is id 16.",
-        },
-    )
-    frequency_hz: float = field(
-        default=50.0,
-        metadata={
-            "low": 40.0,
-            "high": 330.0,
-            "unit": "Hz",
-            "says": "Pulses in a second; analogue servos take 50, many digital ones more.",
-        },
-    )
-    oscillator_hz: float = field(
-        default=25e6,
-        metadata={
-            "low": 22e6,
-            "high": 28e6,
-            "unit": "Hz",
-            "says": "The board's own clock. It differs from board to board by some percent, and "
-            "pulses with it: measure one (gazerig setup).",
-        },
-    )
-    min_pulse_us: float = field(
-        default=500.0,
-        metadata={
-            "low": 100.0,
-            "high": 3000.0,
-            "unit": "us",
-            "says": "No shorter pulse is ever sent.",
-        },
-    )
-    max_pulse_us: float = field(
-        default=2500.0,
-        metadata={
-            "low": 100.0,
-            "high": 3000.0,
-            "unit": "us",
-            "says": "No longer pulse is ever sent.",
-        },
-    )
-    reply_timeout_ms: float = field(
-        default=20.0,
-        metadata={
-            "low": 1.0,
-            "high": 200.0,
-            "unit": "ms",
-            "says": "Patience for an answer beyond the time its bytes take, behind a bridge.",
-        },
-    )
-    watch_ms: float = field(
-        default=0.0,
-        metadata={
-            "low": 0.0,
-            "high": 50.0,
-            "unit": "ms",
-            "says": "Look at the board so often; 0: in every read. More saves time on a slow bus, "
-            "but restarts are noticed later.",
-        },
-    )
-    stagger_ms: float = field(
-        default=100.0,
-        metadata={
-            "low": 0.0,
-            "high": 1000.0,
-            "unit": "ms",
-            "says": "Servos without pulses start so long after one another: all at once pull a "
-            "weak supply down.",
-        },
-    )
-    give_up_s: float = field(
-        default=60.0,
-        metadata={
-            "low": 0.5,
-            "high": 3600.0,
-            "unit": "s",
-            "says": "Wait so long for a bus or board that is gone to come back.",
-        },
-    )
+    # fmt: off
+    address: Annotated[int, Bounds(0x40, 0x77), "Address of the board; 0x40 unless its jumpers are closed."] = 0x40
+    further_addresses: Annotated[tuple[int, ...], Bounds(0x40, 0x77),
+        "More boards on the same bus; the first channel of the second is id 16."] = ()
+    frequency_hz: Annotated[float, Bounds(40, 330), "Pulses in a second; analogue servos take 50, many digital ones more."] = 50.0
+    oscillator_hz: Annotated[float, Bounds(22_000_000, 28_000_000),
+        "The board's own clock. It differs from board to board by some percent, and pulses with it: measure one (gazerig setup)."] = 25e6
+    min_pulse_us: Annotated[float, Bounds(100, 3000), "No shorter pulse is ever sent."] = 500.0
+    max_pulse_us: Annotated[float, Bounds(100, 3000), "No longer pulse is ever sent."] = 2500.0
+    reply_timeout_ms: Annotated[float, Bounds(1, 200), "Patience for an answer beyond the time its bytes take, behind a bridge."] = 20.0
+    watch_ms: Annotated[float, Bounds(0, 50),
+        "Look at the board so often; 0: in every read. More saves time on a slow bus, but restarts are noticed later."] = 0.0
+    stagger_ms: Annotated[float, Bounds(0, 1000),
+        "Servos without pulses start so long after one another: all at once pull a weak supply down."] = 100.0
+    give_up_s: Annotated[float, Bounds(0.5, 3600), "Wait so long for a bus or board that is gone to come back."] = 60.0
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check that the values fit each other.

@@ -4,40 +4,33 @@ Fixations are found by dispersion (I-DT, Salvucci & Goldberg 2000) as pymovement
 wants samples without losses and at one rate, so it is given one unbroken stretch at a time.
 """
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.scanpath_fit import Fixation
 from gazerig.gaze.types import PARTS, Floats
+from gazerig.params import Bounds
 from gazerig.robot.analysis.eye_tracker_csv import FixationTable, Samples
 
 Box = tuple[float, float, float, float]
 """x0, y0, x1, y1 with x0 < x1 and y0 < y1."""
 
 
-def _box(says: str) -> Box | None:
-    made: Box | None = field(
-        default=None,
-        metadata={"low": -1e6, "high": 1e6, "unit": "", "says": f"x0, y0, x1, y1 of the {says}"},
-    )
-    return made
-
-
 @dataclass(frozen=True)
 class PartBoxes:
     """Where the parts lie in the recording's own coordinates; parts left out are never seen."""
 
-    DN: Box | None = _box("chin")
-    FL: Box | None = _box("left side")
-    LE: Box | None = _box("left eye")
-    M: Box | None = _box("mouth")
-    N: Box | None = _box("nose")
-    FR: Box | None = _box("right side")
-    RE: Box | None = _box("right eye")
-    UP: Box | None = _box("forehead")
+    DN: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the chin"] = None
+    FL: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the left side"] = None
+    LE: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the left eye"] = None
+    M: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the mouth"] = None
+    N: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the nose"] = None
+    FR: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the right side"] = None
+    RE: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the right eye"] = None
+    UP: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the forehead"] = None
 
     def __post_init__(self) -> None:
         """Check that there are boxes, and that each has a width and a height.
@@ -71,28 +64,11 @@ class PartBoxes:
 class FixationParams:
     """What counts as a fixation."""
 
-    shortest_ms: float = field(
-        default=60.0,
-        metadata={"low": 10.0, "high": 1000.0, "unit": "ms", "says": "shortest fixation"},
-    )
-    dispersion: float = field(
-        default=0.5,
-        metadata={
-            "low": 0.05,
-            "high": 5.0,
-            "unit": "",
-            "says": "largest width plus height of a fixation, over a part's usual shorter side",
-        },
-    )
-    longest_loss_ms: float = field(
-        default=75.0,
-        metadata={
-            "low": 0.0,
-            "high": 1000.0,
-            "unit": "ms",
-            "says": "a fixation may go on over a loss of the eye no longer than this",
-        },
-    )
+    # fmt: off
+    shortest_ms: Annotated[float, Bounds(10, 1000), "shortest fixation"] = 60.0
+    dispersion: Annotated[float, Bounds(0.05, 5), "largest width plus height of a fixation, over a part's usual shorter side"] = 0.5
+    longest_loss_ms: Annotated[float, Bounds(0, 1000), "a fixation may go on over a loss of the eye no longer than this"] = 75.0
+    # fmt: on
 
 
 class _Found(NamedTuple):

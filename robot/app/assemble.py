@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import radians
 from typing import NamedTuple, TypeVar
 
@@ -29,6 +29,7 @@ from gazerig.gaze.saccade import Saccade, SaccadeParams
 from gazerig.gaze.scanpath import Scanpath, ScanpathParams, row_sums_note
 from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import Angles3, Mat3, Vec3
+from gazerig.params import choices_of
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus
 from gazerig.robot.app.camera_factory import HeadPose, real_camera, scene_camera
 from gazerig.robot.app.emulation import emulated_lines, place_of
@@ -345,8 +346,7 @@ def chosen(params: P, key: str, value: str, option: str) -> P:
     Raises:
         SetupError: the value is none of the choices.
     """
-    (declared,) = (f for f in fields(params) if f.name == key)
-    choices = declared.metadata["choices"]
+    choices = choices_of(type(params), key)
     if value not in choices:
         raise SetupError(f"{option} {value}: unknown; there is {', '.join(choices)}")
     return replace(params, **{key: value})  # type: ignore[arg-type]

@@ -37,7 +37,7 @@ from gazerig.robot.app.rig_limits import (
 )
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.commands import Tune, Value
-from gazerig.robot.model.frames import CameraMount, CameraParams
+from gazerig.robot.model.frames import CameraMount, CameraParams, MountedOn
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
@@ -77,7 +77,7 @@ class Placed(NamedTuple):
     """Where the camera is taken to sit, which may be standing still though the rig's does not."""
 
     camera: Callable[[Rig], CameraParams]
-    mount: str
+    mount: MountedOn
 
 
 class _Ready(NamedTuple):

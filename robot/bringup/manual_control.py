@@ -17,11 +17,13 @@ s), and the next call goes on from there.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import degrees, isfinite, radians, sqrt
+from typing import Annotated
 
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.quintic import Quintic
+from gazerig.params import Bounds
 from gazerig.robot.bringup.move_result import Moved, Notes, Step, outcome, standing
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.command_choices import refuse_out_of_range
@@ -41,36 +43,13 @@ _PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
 class JogParams:
     """How slowly to move, and when a goal counts as reached."""
 
-    speed_deg_s: float = field(
-        default=20.0,
-        metadata={
-            "low": 0.5,
-            "high": 200.0,
-            "unit": "deg/s",
-            "says": "top speed on the way; the guard's gentle speed holds as well",
-        },
-    )
-    accel_deg_s2: float = field(
-        default=100.0,
-        metadata={"low": 5.0, "high": 5000.0, "unit": "deg/s2", "says": "top acceleration"},
-    )
-    rate_hz: float = field(
-        default=100.0,
-        metadata={"low": 20.0, "high": 500.0, "unit": "Hz", "says": "goals a second"},
-    )
-    near_deg: float = field(
-        default=2.0,
-        metadata={"low": 0.1, "high": 20.0, "unit": "deg", "says": "nearer is arrived"},
-    )
-    patience_s: float = field(
-        default=2.0,
-        metadata={
-            "low": 0.1,
-            "high": 30.0,
-            "unit": "s",
-            "says": "time to come near after the way is over",
-        },
-    )
+    # fmt: off
+    speed_deg_s: Annotated[float, Bounds(0.5, 200), "top speed on the way; the guard's gentle speed holds as well"] = 20.0
+    accel_deg_s2: Annotated[float, Bounds(5, 5000), "top acceleration"] = 100.0
+    rate_hz: Annotated[float, Bounds(20, 500), "goals a second"] = 100.0
+    near_deg: Annotated[float, Bounds(0.1, 20), "nearer is arrived"] = 2.0
+    patience_s: Annotated[float, Bounds(0.1, 30), "time to come near after the way is over"] = 2.0
+    # fmt: on
 
 
 Wish = Callable[[JointState, float, float], JointAngles]

@@ -5,12 +5,13 @@ the edges of the picture: many views of a board held the same way fit well and t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import asin, degrees, hypot
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from gazerig.params import Bounds
 from gazerig.robot.calibration.charuco_pose import board_poses
 from gazerig.robot.model.charuco_board import SeenBoard
 from gazerig.robot.model.intrinsics import Intrinsics
@@ -20,47 +21,15 @@ from gazerig.robot.model.intrinsics import Intrinsics
 class ViewParams:
     """How many views, and how different."""
 
-    least_views: int = field(
-        default=12, metadata={"low": 4, "high": 200, "unit": "", "says": "fewer are refused"}
-    )
-    most_views: int = field(
-        default=60, metadata={"low": 4, "high": 500, "unit": "", "says": "more are not kept"}
-    )
-    edge_share: float = field(
-        default=0.12,
-        metadata={
-            "low": 0.01,
-            "high": 0.4,
-            "unit": "",
-            "says": "a corner nearer to an edge, as a share of the picture, has reached it",
-        },
-    )
-    least_tilt_deg: float = field(
-        default=15.0,
-        metadata={"low": 2.0, "high": 60.0, "unit": "deg", "says": "counts as tilted"},
-    )
-    near_share: float = field(
-        default=0.4,
-        metadata={
-            "low": 0.05,
-            "high": 1.0,
-            "unit": "",
-            "says": "the board is near where its corners span this share of width or height",
-        },
-    )
-    new_share: float = field(
-        default=0.07,
-        metadata={
-            "low": 0.0,
-            "high": 0.5,
-            "unit": "",
-            "says": "a view is new if the board has moved or grown by this share of the picture",
-        },
-    )
-    new_tilt_deg: float = field(
-        default=8.0,
-        metadata={"low": 0.0, "high": 60.0, "unit": "deg", "says": "or tilted by this angle"},
-    )
+    # fmt: off
+    least_views: Annotated[int, Bounds(4, 200), "fewer are refused"] = 12
+    most_views: Annotated[int, Bounds(4, 500), "more are not kept"] = 60
+    edge_share: Annotated[float, Bounds(0.01, 0.4), "a corner nearer to an edge, as a share of the picture, has reached it"] = 0.12
+    least_tilt_deg: Annotated[float, Bounds(2, 60), "counts as tilted"] = 15.0
+    near_share: Annotated[float, Bounds(0.05, 1), "the board is near where its corners span this share of width or height"] = 0.4
+    new_share: Annotated[float, Bounds(0, 0.5), "a view is new if the board has moved or grown by this share of the picture"] = 0.07
+    new_tilt_deg: Annotated[float, Bounds(0, 60), "or tilted by this angle"] = 8.0
+    # fmt: on
 
 
 class Held(NamedTuple):

@@ -7,13 +7,14 @@ what is ours is the refusal of views and results that are not worth writing down
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import atan2, degrees, inf
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.errors import SetupError
+from gazerig.params import Bounds
 from gazerig.robot.calibration.board_coverage import ViewCollector, ViewParams
 from gazerig.robot.model.charuco_board import SeenBoard
 from gazerig.robot.model.frames import LensParams
@@ -39,37 +40,14 @@ class CameraCalibrationRefused(SetupError):
 class LensCalibrationParams:
     """What is good enough."""
 
-    most_error_px: float = field(
-        default=0.7,
-        metadata={
-            "low": 0.05,
-            "high": 20.0,
-            "unit": "px",
-            "says": "root mean square reprojection error above which the result is refused, in "
-            "pictures 640 px wide",
-        },
-    )
-    most_focal_error_percent: float = field(
-        default=0.2,
-        metadata={
-            "low": 0.01,
-            "high": 20.0,
-            "unit": "%",
-            "says": "standard deviation of the focal length above which the result is refused",
-        },
-    )
-    outlier_ratio: float = field(
-        default=2.5,
-        metadata={
-            "low": 1.2,
-            "high": 100.0,
-            "unit": "",
-            "says": "a view so many times worse than the usual one is dropped",
-        },
-    )
-    views: ViewParams = field(
-        default_factory=ViewParams, metadata={"unit": "", "says": "how many views, how different"}
-    )
+    # fmt: off
+    most_error_px: Annotated[float, Bounds(0.05, 20),
+        "root mean square reprojection error above which the result is refused, in pictures 640 px wide"] = 0.7
+    most_focal_error_percent: Annotated[float, Bounds(0.01, 20),
+        "standard deviation of the focal length above which the result is refused"] = 0.2
+    outlier_ratio: Annotated[float, Bounds(1.2, 100), "a view so many times worse than the usual one is dropped"] = 2.5
+    views: Annotated[ViewParams, "how many views, how different"] = field(default_factory=ViewParams)
+    # fmt: on
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,15 +5,16 @@ pictures and moves the head.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import atan, degrees, radians
-from typing import NamedTuple, Protocol
+from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry
+from gazerig.params import Bounds
 from gazerig.robot.calibration.board_coverage import Coverage, ViewCollector
 from gazerig.robot.calibration.camera_calibration import (
     CameraCalibrationRefused,
@@ -41,40 +42,14 @@ _PATTERN = (
 class NeckStepParams:
     """How the head looks at the board from several sides."""
 
-    yaw_deg: float = field(
-        default=18.0,
-        metadata={"low": 2.0, "high": 60.0, "unit": "deg", "says": "farthest to each side"},
-    )
-    pitch_deg: float = field(
-        default=11.0,
-        metadata={"low": 2.0, "high": 60.0, "unit": "deg", "says": "farthest up and down"},
-    )
-    roll_deg: float = field(
-        default=12.0,
-        metadata={"low": 0.0, "high": 60.0, "unit": "deg", "says": "farthest roll to each side"},
-    )
-    pictures: int = field(
-        default=3,
-        metadata={"low": 1, "high": 50, "unit": "", "says": "pictures averaged at each angle"},
-    )
-    still_deg: float = field(
-        default=0.2,
-        metadata={
-            "low": 0.01,
-            "high": 5.0,
-            "unit": "deg",
-            "says": "a head that moved more while the picture was taken makes it useless",
-        },
-    )
-    patience_s: float = field(
-        default=4.0,
-        metadata={
-            "low": 0.1,
-            "high": 60.0,
-            "unit": "s",
-            "says": "time for the pictures at each angle",
-        },
-    )
+    # fmt: off
+    yaw_deg: Annotated[float, Bounds(2, 60), "farthest to each side"] = 18.0
+    pitch_deg: Annotated[float, Bounds(2, 60), "farthest up and down"] = 11.0
+    roll_deg: Annotated[float, Bounds(0, 60), "farthest roll to each side"] = 12.0
+    pictures: Annotated[int, Bounds(1, 50), "pictures averaged at each angle"] = 3
+    still_deg: Annotated[float, Bounds(0.01, 5), "a head that moved more while the picture was taken makes it useless"] = 0.2
+    patience_s: Annotated[float, Bounds(0.1, 60), "time for the pictures at each angle"] = 4.0
+    # fmt: on
 
 
 class LensStep(NamedTuple):

@@ -7,10 +7,11 @@ both are treated alike, gently and for half a second at the longest.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, Literal, NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
+from gazerig.params import Bounds
 
 STEPS_PER_DEG = STEPS_PER_TURN / 360.0
 
@@ -25,73 +26,16 @@ BACK_OFF_EXCHANGES = 25
 class StopSearchParams:
     """How gently to look for a stop; angles are those of the servo."""
 
-    speed_deg_s: float = field(
-        default=15.0,
-        metadata={"low": 1.0, "high": 60.0, "unit": "deg/s", "says": "speed of the search"},
-    )
-    strength: float = field(
-        default=0.3,
-        metadata={
-            "low": 0.05,
-            "high": 1.0,
-            "unit": "",
-            "says": "the servo's Goal PWM as a share of its limit, so of its stall torque",
-        },
-    )
-    lead_deg: float = field(
-        default=8.0,
-        metadata={
-            "low": 1.0,
-            "high": 30.0,
-            "unit": "deg",
-            "says": "the goal is never farther ahead of the joint",
-        },
-    )
-    progress_deg: float = field(
-        default=0.3,
-        metadata={
-            "low": 0.1,
-            "high": 5.0,
-            "unit": "deg",
-            "says": "a smaller advance counts as standing still",
-        },
-    )
-    touch_share: float = field(
-        default=0.15,
-        metadata={
-            "low": 0.01,
-            "high": 1.0,
-            "unit": "",
-            "says": "share of the stall current that, standing still, is a push",
-        },
-    )
-    touch_ms: float = field(
-        default=200.0,
-        metadata={
-            "low": 20.0,
-            "high": 500.0,
-            "unit": "ms",
-            "says": "standing still under such a current for so long is a stop",
-        },
-    )
-    longest_push_ms: float = field(
-        default=450.0,
-        metadata={
-            "low": 50.0,
-            "high": 500.0,
-            "unit": "ms",
-            "says": "standing still for so long is a stop whatever the current",
-        },
-    )
-    back_off_deg: float = field(
-        default=3.0,
-        metadata={
-            "low": 0.5,
-            "high": 20.0,
-            "unit": "deg",
-            "says": "so far the joint goes back from its stop",
-        },
-    )
+    # fmt: off
+    speed_deg_s: Annotated[float, Bounds(1, 60), "speed of the search"] = 15.0
+    strength: Annotated[float, Bounds(0.05, 1), "the servo's Goal PWM as a share of its limit, so of its stall torque"] = 0.3
+    lead_deg: Annotated[float, Bounds(1, 30), "the goal is never farther ahead of the joint"] = 8.0
+    progress_deg: Annotated[float, Bounds(0.1, 5), "a smaller advance counts as standing still"] = 0.3
+    touch_share: Annotated[float, Bounds(0.01, 1), "share of the stall current that, standing still, is a push"] = 0.15
+    touch_ms: Annotated[float, Bounds(20, 500), "standing still under such a current for so long is a stop"] = 200.0
+    longest_push_ms: Annotated[float, Bounds(50, 500), "standing still for so long is a stop whatever the current"] = 450.0
+    back_off_deg: Annotated[float, Bounds(0.5, 20), "so far the joint goes back from its stop"] = 3.0
+    # fmt: on
 
 
 class Stop(NamedTuple):

@@ -9,15 +9,16 @@ Frames as in gazerig.robot.model.frames; the board's as in gazerig.robot.model.c
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import degrees, inf, radians
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.params import Bounds
 from gazerig.robot.calibration.camera_calibration import CameraCalibrationRefused
 from gazerig.robot.calibration.charuco_pose import board_poses
 from gazerig.robot.calibration.hand_eye_solver import Fit, Pose, Sights, refined, start
@@ -48,84 +49,20 @@ _BEST_JOINT_DEG = 0.02
 class HandEyeParams:
     """What is good enough."""
 
-    least_views: int = field(
-        default=8, metadata={"low": 3, "high": 200, "unit": "", "says": "fewer are refused"}
-    )
-    least_turn_deg: float = field(
-        default=4.0,
-        metadata={
-            "low": 0.5,
-            "high": 60.0,
-            "unit": "deg",
-            "says": "root mean square turn of the head from view to view that is needed about "
-            "a second axis",
-        },
-    )
-    most_error_px: float = field(
-        default=5.0,
-        metadata={
-            "low": 0.1,
-            "high": 50.0,
-            "unit": "px",
-            "says": "root mean square reprojection error above which the result is refused, in "
-            "pictures 640 px wide",
-        },
-    )
-    most_position_std_mm: float = field(
-        default=5.0,
-        metadata={
-            "low": 0.1,
-            "high": 100.0,
-            "unit": "mm",
-            "says": "standard deviation of the place above which the result is refused",
-        },
-    )
-    most_angle_std_deg: float = field(
-        default=0.6,
-        metadata={
-            "low": 0.01,
-            "high": 20.0,
-            "unit": "deg",
-            "says": "standard deviation of the direction above which the result is refused",
-        },
-    )
-    joint_error_deg: float = field(
-        default=0.15,
-        metadata={
-            "low": 0.001,
-            "high": 5.0,
-            "unit": "deg",
-            "says": "how far a neck joint usually is from where it says: steps, play",
-        },
-    )
-    lens_error_percent: float = field(
-        default=0.15,
-        metadata={
-            "low": 0.0001,
-            "high": 10.0,
-            "unit": "%",
-            "says": "how far the calibrated focal length usually is from the true one",
-        },
-    )
-    centre_error_px: float = field(
-        default=1.0,
-        metadata={
-            "low": 0.0001,
-            "high": 100.0,
-            "unit": "px",
-            "says": "how far the calibrated centre usually is from the true one, in pictures "
-            "640 px wide",
-        },
-    )
-    outlier_ratio: float = field(
-        default=3.0,
-        metadata={
-            "low": 1.2,
-            "high": 100.0,
-            "unit": "",
-            "says": "a view so many times worse than the usual one is dropped",
-        },
-    )
+    # fmt: off
+    least_views: Annotated[int, Bounds(3, 200), "fewer are refused"] = 8
+    least_turn_deg: Annotated[float, Bounds(0.5, 60),
+        "root mean square turn of the head from view to view that is needed about a second axis"] = 4.0
+    most_error_px: Annotated[float, Bounds(0.1, 50),
+        "root mean square reprojection error above which the result is refused, in pictures 640 px wide"] = 5.0
+    most_position_std_mm: Annotated[float, Bounds(0.1, 100), "standard deviation of the place above which the result is refused"] = 5.0
+    most_angle_std_deg: Annotated[float, Bounds(0.01, 20), "standard deviation of the direction above which the result is refused"] = 0.6
+    joint_error_deg: Annotated[float, Bounds(0.001, 5), "how far a neck joint usually is from where it says: steps, play"] = 0.15
+    lens_error_percent: Annotated[float, Bounds(0.0001, 10), "how far the calibrated focal length usually is from the true one"] = 0.15
+    centre_error_px: Annotated[float, Bounds(0.0001, 100),
+        "how far the calibrated centre usually is from the true one, in pictures 640 px wide"] = 1.0
+    outlier_ratio: Annotated[float, Bounds(1.2, 100), "a view so many times worse than the usual one is dropped"] = 3.0
+    # fmt: on
 
 
 class NeckView(NamedTuple):

@@ -6,14 +6,15 @@ ChArUco Boards"). Board frame: origin at its upper left corner, x right, y down,
 the board, metres. Pixels have their centres at whole numbers.
 """
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.types import Picture
+from gazerig.params import Bounds
 
 Floats = NDArray[np.float64]
 
@@ -28,20 +29,10 @@ LEAST_CORNERS = 6
 class BoardParams:
     """Measures of the board. As it is, it fits on A4 and on Letter, laid crosswise."""
 
-    columns: int = field(
-        default=7, metadata={"low": 3, "high": 20, "unit": "", "says": "squares from left to right"}
-    )
-    rows: int = field(
-        default=5, metadata={"low": 3, "high": 20, "unit": "", "says": "squares from top to bottom"}
-    )
-    square_mm: float = field(
-        default=36.0,
-        metadata={"low": 2.0, "high": 500.0, "unit": "mm", "says": "side of a square"},
-    )
-    marker_mm: float = field(
-        default=27.0,
-        metadata={"low": 1.0, "high": 500.0, "unit": "mm", "says": "side of a marker"},
-    )
+    columns: Annotated[int, Bounds(3, 20), "squares from left to right"] = 7
+    rows: Annotated[int, Bounds(3, 20), "squares from top to bottom"] = 5
+    square_mm: Annotated[float, Bounds(2, 500), "side of a square"] = 36.0
+    marker_mm: Annotated[float, Bounds(1, 500), "side of a marker"] = 27.0
 
     def __post_init__(self) -> None:
         """Check that the markers fit and that there are enough of them.

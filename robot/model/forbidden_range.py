@@ -1,10 +1,11 @@
 """Ranges of two joints that may not be taken together: a lid and a frame, chin and chest."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import degrees, radians
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+from gazerig.params import Bounds, Choices
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JOINTS
 
@@ -13,20 +14,12 @@ from gazerig.robot.model.types import JOINTS
 class CollisionParams:
     """Two joints that touch when both are in these ranges."""
 
-    first: str = field(metadata={"choices": JOINTS, "unit": "", "says": "a joint"})
-    first_min_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "from this angle"}
-    )
-    first_max_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "to this one"}
-    )
-    second: str = field(metadata={"choices": JOINTS, "unit": "", "says": "the other joint"})
-    second_min_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "from this angle"}
-    )
-    second_max_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "to this one"}
-    )
+    first: Annotated[str, Choices(*JOINTS), "a joint"]
+    first_min_deg: Annotated[float, Bounds(-180, 180), "from this angle"]
+    first_max_deg: Annotated[float, Bounds(-180, 180), "to this one"]
+    second: Annotated[str, Choices(*JOINTS), "the other joint"]
+    second_min_deg: Annotated[float, Bounds(-180, 180), "from this angle"]
+    second_max_deg: Annotated[float, Bounds(-180, 180), "to this one"]
 
     def __post_init__(self) -> None:
         """Check that these are two ranges of two joints.

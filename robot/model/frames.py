@@ -7,104 +7,51 @@ throws targets off by the head's motion in between, so poses are remembered.
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import degrees, inf, radians
+from typing import Annotated, Literal
 
 from gazerig.gaze.angles import add, angles_of, compose, rotate, rotation
 from gazerig.gaze.types import Angles3, HeadGeometry, Mat3, Vec3
+from gazerig.params import Bounds
 
 _OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 """Maps camera optical axes (x right, y down, z forward) to x forward, y left, z up."""
 
 
-_FOCAL = {"low": 10.0, "high": 100_000.0, "unit": "px"}
-_CENTRE = {"low": -10_000.0, "high": 20_000.0, "unit": "px"}
+MountedOn = Literal["head", "base"]
 
 
 @dataclass(frozen=True)
 class LensParams:
     """A lens as measured, on pictures of one size."""
 
-    width_px: int = field(
-        metadata={"low": 16, "high": 16384, "unit": "px", "says": "width of those pictures"}
-    )
-    height_px: int = field(
-        metadata={"low": 16, "high": 16384, "unit": "px", "says": "height of those pictures"}
-    )
-    fx_px: float = field(metadata={**_FOCAL, "says": "focal length in pixel widths"})
-    fy_px: float = field(metadata={**_FOCAL, "says": "focal length in pixel heights"})
-    cx_px: float = field(
-        metadata={**_CENTRE, "says": "where the optical axis meets the picture, from the left"}
-    )
-    cy_px: float = field(
-        metadata={**_CENTRE, "says": "where the optical axis meets the picture, from the top"}
-    )
-    distortion: tuple[float, float, float, float, float] = field(
-        default=(0.0, 0.0, 0.0, 0.0, 0.0),
-        metadata={
-            "low": -100.0,
-            "high": 100.0,
-            "unit": "",
-            "says": "k1 k2 p1 p2 k3 as in the OpenCV manual; zeros for a lens without",
-        },
-    )
+    # fmt: off
+    width_px: Annotated[int, Bounds(16, 16384), "width of those pictures"]
+    height_px: Annotated[int, Bounds(16, 16384), "height of those pictures"]
+    fx_px: Annotated[float, Bounds(10, 100_000), "focal length in pixel widths"]
+    fy_px: Annotated[float, Bounds(10, 100_000), "focal length in pixel heights"]
+    cx_px: Annotated[float, Bounds(-10000, 20000), "where the optical axis meets the picture, from the left"]
+    cy_px: Annotated[float, Bounds(-10000, 20000), "where the optical axis meets the picture, from the top"]
+    distortion: Annotated[tuple[float, float, float, float, float], Bounds(-100, 100),
+        "k1 k2 p1 p2 k3 as in the OpenCV manual; zeros for a lens without"] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    # fmt: on
 
 
 @dataclass(frozen=True)
 class CameraParams:
     """Where the camera sits and what it covers."""
 
-    mount: str = field(
-        default="head",
-        metadata={
-            "choices": ("head", "base"),
-            "unit": "",
-            "says": "head: it turns with the head; base: it stands still",
-        },
-    )
-    position_mm: tuple[float, float, float] = field(
-        default=(20.0, 0.0, 45.0),
-        metadata={
-            "low": -2000.0,
-            "high": 2000.0,
-            "unit": "mm",
-            "says": "lens, ahead, left and above of the point between the eyes (head) or of "
-            "the neck base (base)",
-        },
-    )
-    yaw_deg: float = field(
-        default=0.0,
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "lens turned left"},
-    )
-    pitch_deg: float = field(
-        default=0.0,
-        metadata={"low": -90.0, "high": 90.0, "unit": "deg", "says": "lens turned up"},
-    )
-    horizontal_field_deg: float = field(
-        default=69.0,
-        metadata={
-            "low": 10.0,
-            "high": 150.0,
-            "unit": "deg",
-            "says": "horizontal field of view of the lens",
-        },
-    )
-    roll_deg: float = field(
-        default=0.0,
-        metadata={
-            "low": -180.0,
-            "high": 180.0,
-            "unit": "deg",
-            "says": "lens rolled, its right side down",
-        },
-    )
-    lens: LensParams | None = field(
-        default=None,
-        metadata={
-            "unit": "",
-            "says": "the lens as measured; left out, the field of view stands for it",
-        },
-    )
+    # fmt: off
+    mount: Annotated[MountedOn, "head: it turns with the head; base: it stands still"] = "head"
+    position_mm: Annotated[tuple[float, float, float], Bounds(-2000, 2000),
+        "lens, ahead, left and above of the point between the eyes (head) or of the neck base (base)"] = (20.0, 0.0, 45.0)
+    yaw_deg: Annotated[float, Bounds(-180, 180), "lens turned left"] = 0.0
+    pitch_deg: Annotated[float, Bounds(-90, 90), "lens turned up"] = 0.0
+    horizontal_field_deg: Annotated[float, Bounds(10, 150), "horizontal field of view of the lens"] = 69.0
+    roll_deg: Annotated[float, Bounds(-180, 180), "lens rolled, its right side down"] = 0.0
+    lens: Annotated[LensParams | None, "the lens as measured; left out, the field of view stands for it"] = None
+    # fmt: on
 
 
 class PoseHistory:

@@ -1,11 +1,13 @@
 """One joint of a rig: its servo, how it is built in, and its limits."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import ceil, floor, pi, radians
+from typing import Annotated, Literal
 
 from gazerig.drivers.servo_models import SERVOS, ServoFacts
 from gazerig.drivers.slow_entry import ENTRY_DEG_S
 from gazerig.drivers.types import ServoSetup
+from gazerig.params import Bounds, Unit
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.transmission import Curve, Linkage, Straight
 
@@ -14,103 +16,28 @@ from gazerig.robot.model.transmission import Curve, Linkage, Straight
 class JointParams:
     """One joint: its servo, how it is built in, and its limits."""
 
-    id: int = field(
-        metadata={"low": 0, "high": 252, "unit": "", "says": "servo id; on a Maestro its channel"}
-    )
-    model: str = field(
-        metadata={"unit": "", "says": 'servo model, e.g. "xl330-m077", "sts3215" or "hobby"'}
-    )
-    min_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "lowest joint angle"}
-    )
-    max_deg: float = field(
-        metadata={"low": -180.0, "high": 180.0, "unit": "deg", "says": "highest joint angle"}
-    )
-    max_speed_deg_s: float = field(
-        metadata={"low": 1.0, "high": 2000.0, "unit": "deg/s", "says": "top speed of the joint"}
-    )
-    max_accel_deg_s2: float = field(
-        metadata={
-            "low": 10.0,
-            "high": 200000.0,
-            "unit": "deg/s2",
-            "says": "top acceleration of the joint",
-        }
-    )
-    sign: int = field(
-        default=1,
-        metadata={
-            "choices": (1, -1),
-            "unit": "",
-            "says": "1 where more steps turn the joint left, up, open or right ear down; else -1",
-        },
-    )
-    ratio: float = field(
-        default=1.0,
-        metadata={
-            "low": 0.05,
-            "high": 50.0,
-            "unit": "",
-            "says": "turns of the servo for one turn of the joint",
-        },
-    )
-    zero_step: int | None = field(
-        default=None,
-        metadata={
-            "low": 0,
-            "high": 4095,
-            "unit": "steps or us",
-            "says": "servo position at 0 deg, the pulse width in us of a hobby servo; null: "
-            "the middle, 2048 or 1500",
-        },
-    )
-    linkage: tuple[tuple[float, float], ...] = field(
-        default=(),
-        metadata={
-            "low": -180.0,
-            "high": 4095.0,
-            "unit": "deg, steps or us",
-            "says": "measured places of a push rod, each [joint angle, servo position]; they "
-            "take the place of sign, ratio and zero_step",
-        },
-    )
-    bus: str = field(
-        default="",
-        metadata={"unit": "", "says": "name of its bus under buses; empty: the one under bus"},
-    )
-    servo_deg_s: float | None = field(
-        default=None,
-        metadata={
-            "low": 10.0,
-            "high": 5000.0,
-            "unit": "deg/s",
-            "says": "how fast a hobby servo turns its own shaft (0.12 s for 60 deg is 500): its "
-            "place is reckoned with it, as it tells none; null: as fast as max_speed_deg_s",
-        },
-    )
-    gains: tuple[int, int, int] | None = field(
-        default=None,
-        metadata={
-            "low": 0,
-            "high": 16383,
-            "unit": "",
-            "says": "the servo's Position P, I and D Gain; null: left as they are",
-        },
-    )
-    strength: float | None = field(
-        default=None,
-        metadata={
-            "low": 0.05,
-            "high": 1.0,
-            "unit": "",
-            "says": "share of its full drive that the servo may use (PWM Limit), which bounds "
-            "force and top speed alike; null: left as it is",
-        },
-    )
-    firmware_min: int = field(
-        default=0,
-        metadata={"low": 0, "high": 255, "unit": "", "says": "oldest servo firmware that will do"},
-    )
+    # fmt: off
+    id: Annotated[int, Bounds(0, 252), "servo id; on a Maestro its channel"]
+    model: Annotated[str, 'servo model, e.g. "xl330-m077", "sts3215" or "hobby"']
+    min_deg: Annotated[float, Bounds(-180, 180), "lowest joint angle"]
+    max_deg: Annotated[float, Bounds(-180, 180), "highest joint angle"]
+    max_speed_deg_s: Annotated[float, Bounds(1, 2000), "top speed of the joint"]
+    max_accel_deg_s2: Annotated[float, Bounds(10, 200_000), "top acceleration of the joint"]
+    sign: Annotated[Literal[1, -1], "1 where more steps turn the joint left, up, open or right ear down; else -1"] = 1
+    ratio: Annotated[float, Bounds(0.05, 50), "turns of the servo for one turn of the joint"] = 1.0
+    zero_step: Annotated[int | None, Bounds(0, 4095), Unit("steps or us"),
+        "servo position at 0 deg, the pulse width in us of a hobby servo; null: the middle, 2048 or 1500"] = None
+    linkage: Annotated[tuple[tuple[float, float], ...], Bounds(-180, 4095), Unit("deg, steps or us"),
+        "measured places of a push rod, each [joint angle, servo position]; they take the place of sign, ratio and zero_step"] = ()
+    bus: Annotated[str, "name of its bus under buses; empty: the one under bus"] = ""
+    servo_deg_s: Annotated[float | None, Bounds(10, 5000),
+        "how fast a hobby servo turns its own shaft (0.12 s for 60 deg is 500): its place is reckoned with it, as it tells none; "
+        "null: as fast as max_speed_deg_s"] = None
+    gains: Annotated[tuple[int, int, int] | None, Bounds(0, 16383), "the servo's Position P, I and D Gain; null: left as they are"] = None
+    strength: Annotated[float | None, Bounds(0.05, 1),
+        "share of its full drive that the servo may use (PWM Limit), which bounds force and top speed alike; null: left as it is"] = None
+    firmware_min: Annotated[int, Bounds(0, 255), "oldest servo firmware that will do"] = 0
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Check that the limits fit each other and the servo's one turn.

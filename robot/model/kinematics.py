@@ -8,11 +8,13 @@ in gaze.types; the world's origin is the neck base on the yaw axis.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import asin, atan2, hypot, pi
+from typing import Annotated
 
 from gazerig.gaze.angles import add, rotate, rotate_back, rotation, sub, yaw_pitch
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
+from gazerig.params import Bounds
 from gazerig.robot.model.types import JOINTS, JointAngles, JointState, in_order
 
 
@@ -20,39 +22,12 @@ from gazerig.robot.model.types import JOINTS, JointAngles, JointState, in_order
 class GeometryParams:
     """Measures of the rig, in millimetres, with the neck level and straight."""
 
-    pitch_axis_height_mm: float = field(
-        metadata={
-            "low": 0.0,
-            "high": 2000.0,
-            "unit": "mm",
-            "says": "neck pitch and roll axes above the neck base",
-        }
-    )
-    eyes_ahead_mm: float = field(
-        metadata={
-            "low": -500.0,
-            "high": 500.0,
-            "unit": "mm",
-            "says": "eye centres ahead of the pitch axis",
-        }
-    )
-    eyes_above_mm: float = field(
-        metadata={
-            "low": -500.0,
-            "high": 1000.0,
-            "unit": "mm",
-            "says": "eye centres above the pitch axis",
-        }
-    )
-    interocular_mm: float = field(
-        default=61.9,
-        metadata={
-            "low": 10.0,
-            "high": 500.0,
-            "unit": "mm",
-            "says": "between the eye centres (Mitake et al., table 1: 61.9)",
-        },
-    )
+    # fmt: off
+    pitch_axis_height_mm: Annotated[float, Bounds(0, 2000), "neck pitch and roll axes above the neck base"]
+    eyes_ahead_mm: Annotated[float, Bounds(-500, 500), "eye centres ahead of the pitch axis"]
+    eyes_above_mm: Annotated[float, Bounds(-500, 1000), "eye centres above the pitch axis"]
+    interocular_mm: Annotated[float, Bounds(10, 500), "between the eye centres (Mitake et al., table 1: 61.9)"] = 61.9
+    # fmt: on
 
 
 LidEnds = tuple[float, float]

@@ -1,22 +1,14 @@
 """The rate of the control loop."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
+
+from gazerig.params import Bounds
 
 
 @dataclass(frozen=True)
 class LoopParams:
     """The control rate."""
 
-    rate_hz: float = field(
-        default=200.0,
-        metadata={"low": 20.0, "high": 1000.0, "unit": "Hz", "says": "control rate"},
-    )
-    park_s: float = field(
-        default=4.0,
-        metadata={
-            "low": 0.0,
-            "high": 30.0,
-            "unit": "s",
-            "says": "longest time for parking before torque goes off",
-        },
-    )
+    rate_hz: Annotated[float, Bounds(20, 1000), "control rate"] = 200.0
+    park_s: Annotated[float, Bounds(0, 30), "longest time for parking before torque goes off"] = 4.0

@@ -5,9 +5,10 @@ off to one side, pixels have noise. Not modelled: motion blur, rolling shutter, 
 paper that is not flat.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from math import radians
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.types import Picture
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.params import Bounds
 from gazerig.robot.model.charuco_board import CharucoBoard
 from gazerig.robot.model.intrinsics import Intrinsics, rays
 
@@ -31,13 +33,13 @@ _WALL = 90.0
 class BoardCameraParams:
     """How good the pictures are."""
 
-    width_px: int = field(default=640, metadata={"low": 64, "high": 4096, "unit": "px"})
-    height_px: int = field(default=400, metadata={"low": 64, "high": 4096, "unit": "px"})
-    blur_px: float = field(default=0.7, metadata={"low": 0.0, "high": 10.0, "unit": "px"})
-    noise_grey: float = field(default=3.0, metadata={"low": 0.0, "high": 60.0, "unit": ""})
-    white: float = field(default=225.0, metadata={"low": 10.0, "high": 255.0, "unit": ""})
-    black: float = field(default=28.0, metadata={"low": 0.0, "high": 200.0, "unit": ""})
-    falloff: float = field(default=0.25, metadata={"low": 0.0, "high": 0.9, "unit": ""})
+    width_px: Annotated[int, Bounds(64, 4096)] = 640
+    height_px: Annotated[int, Bounds(64, 4096)] = 400
+    blur_px: Annotated[float, Bounds(0, 10)] = 0.7
+    noise_grey: Annotated[float, Bounds(0, 60)] = 3.0
+    white: Annotated[float, Bounds(10, 255)] = 225.0
+    black: Annotated[float, Bounds(0, 200)] = 28.0
+    falloff: Annotated[float, Bounds(0, 0.9)] = 0.25
 
 
 class BoardCamera:

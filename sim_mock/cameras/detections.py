@@ -7,14 +7,16 @@ now and then nothing. Not modelled: motion blur, light, occlusion, false detecti
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import radians
+from typing import Annotated
 
 import numpy as np
 
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.params import Bounds
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.intrinsics import intrinsics_of_view, project
@@ -30,16 +32,14 @@ _FACE_BOX_M = 0.17
 class SceneCameraParams:
     """How good the camera and its detector are."""
 
-    width_px: int = field(default=640, metadata={"low": 32, "high": 4096, "unit": "px"})
-    height_px: int = field(default=400, metadata={"low": 32, "high": 4096, "unit": "px"})
-    horizontal_field_deg: float = field(
-        default=69.0, metadata={"low": 10.0, "high": 150.0, "unit": "deg"}
-    )
-    rate_hz: float = field(default=30.0, metadata={"low": 1.0, "high": 240.0, "unit": "Hz"})
-    latency_ms: float = field(default=60.0, metadata={"low": 0.0, "high": 1000.0, "unit": "ms"})
-    landmark_noise_px: float = field(default=0.5, metadata={"low": 0.0, "high": 20.0, "unit": "px"})
-    depth_noise_mm: float = field(default=5.0, metadata={"low": 0.0, "high": 500.0, "unit": "mm"})
-    missed_share: float = field(default=0.03, metadata={"low": 0.0, "high": 1.0, "unit": ""})
+    width_px: Annotated[int, Bounds(32, 4096)] = 640
+    height_px: Annotated[int, Bounds(32, 4096)] = 400
+    horizontal_field_deg: Annotated[float, Bounds(10, 150)] = 69.0
+    rate_hz: Annotated[float, Bounds(1, 240)] = 30.0
+    latency_ms: Annotated[float, Bounds(0, 1000)] = 60.0
+    landmark_noise_px: Annotated[float, Bounds(0, 20)] = 0.5
+    depth_noise_mm: Annotated[float, Bounds(0, 500)] = 5.0
+    missed_share: Annotated[float, Bounds(0, 1)] = 0.03
 
 
 class SceneCamera:

@@ -9,9 +9,9 @@ distortion, rolling shutter, light, the smear of things that move themselves.
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import hypot, radians
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gazerig.drivers.types import Detections, FaceDetector, MovingBlob, Picture
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view
 from gazerig.sim_mock.cameras.canvas import Picture3d
@@ -58,18 +59,16 @@ FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
 class PixelCameraParams:
     """How good the camera is."""
 
-    width_px: int = field(default=640, metadata={"low": 32, "high": 4096, "unit": "px"})
-    height_px: int = field(default=400, metadata={"low": 32, "high": 4096, "unit": "px"})
-    horizontal_field_deg: float = field(
-        default=69.0, metadata={"low": 10.0, "high": 150.0, "unit": "deg"}
-    )
-    rate_hz: float = field(default=30.0, metadata={"low": 1.0, "high": 240.0, "unit": "Hz"})
-    latency_ms: float = field(default=60.0, metadata={"low": 0.0, "high": 1000.0, "unit": "ms"})
-    exposure_ms: float = field(default=8.0, metadata={"low": 0.0, "high": 100.0, "unit": "ms"})
-    noise_grey: float = field(default=3.0, metadata={"low": 0.0, "high": 60.0, "unit": ""})
-    depth: bool = field(default=False, metadata={"unit": "", "says": "it measures depth, too"})
-    depth_noise_1_m: float = field(default=0.004, metadata={"low": 0.0, "high": 0.2, "unit": "1/m"})
-    room_seed: int = field(default=0, metadata={"low": 0, "high": 1 << 30, "unit": ""})
+    width_px: Annotated[int, Bounds(32, 4096)] = 640
+    height_px: Annotated[int, Bounds(32, 4096)] = 400
+    horizontal_field_deg: Annotated[float, Bounds(10, 150)] = 69.0
+    rate_hz: Annotated[float, Bounds(1, 240)] = 30.0
+    latency_ms: Annotated[float, Bounds(0, 1000)] = 60.0
+    exposure_ms: Annotated[float, Bounds(0, 100)] = 8.0
+    noise_grey: Annotated[float, Bounds(0, 60)] = 3.0
+    depth: Annotated[bool, "it measures depth, too"] = False
+    depth_noise_1_m: Annotated[float, Bounds(0, 0.2)] = 0.004
+    room_seed: Annotated[int, Bounds(0, 1 << 30)] = 0
 
 
 class PixelCamera:
