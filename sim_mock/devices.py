@@ -11,10 +11,8 @@ from gazerig.drivers.pca9685.params import BRIDGE_BAUD
 from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
 from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
-from gazerig.sim_mock.dynamixel.chain import build_dynamixel
-from gazerig.sim_mock.feetech.chain import COMMANDS as FEETECH
-from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
+from gazerig.sim_mock.feetech.chain import FeetechChain, build_feetech
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.maestro import settings as maestro_settings
 from gazerig.sim_mock.maestro.board import build_board
@@ -23,8 +21,8 @@ from gazerig.sim_mock.pca9685.faults import CASES as PCA9685_CASES
 from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 CASES: dict[BusKind, Mapping[str, str]] = {
-    "dynamixel": DYNAMIXEL.cases,
-    "feetech": FEETECH.cases,
+    "dynamixel": DynamixelChain.commands.cases,
+    "feetech": FeetechChain.commands.cases,
     "maestro": maestro_settings.cases(),
     "pca9685": PCA9685_CASES,
 }
@@ -120,7 +118,7 @@ def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
     if isinstance(what, Pca9685Line):
         return build_bridge(what.addresses, now_s, what.oscillator_hz, seed, what.servos)
     if isinstance(what, FeetechLine):
-        return build_feetech(what.servos, now_s, what.baud, seed)
+        return build_feetech(what.servos, now_s, what.baud, seed=seed)
     return build_dynamixel(what.servos, now_s, baud=what.baud, seed=seed)
 
 

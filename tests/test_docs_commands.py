@@ -17,10 +17,12 @@ from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, each_of_pape
 
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.remote.client import RunningRig
-from gazerig.sim_mock.dynamixel.chain import COMMANDS as DYNAMIXEL
-from gazerig.sim_mock.feetech.chain import COMMANDS as STS
+from gazerig.sim_mock.dynamixel.chain import DynamixelChain
+from gazerig.sim_mock.feetech.chain import FeetechChain
 from gazerig.sim_mock.maestro.faults import COMMANDS as MAESTRO
 from gazerig.sim_mock.pty.client import PtyBus
+
+DYNAMIXEL, FEETECH = DynamixelChain.commands, FeetechChain.commands
 
 STANDS_FOR = {"NAME": "neck_yaw", "FILE": "a.mcap", "KEY": "seed"}
 """What to try where a paper has a word in capitals; 1 for all others."""
@@ -127,10 +129,10 @@ def test_make_and_pip_have_what_the_papers_ask_for() -> None:
 def test_the_emulators_commands_are_those_of_its_page() -> None:
     page = EMULATOR.read_text(encoding="utf-8")
     told = set(re.findall(r"`([a-z-]+)(?: [^`]*)?`", page.split("## Fault commands")[1]))
-    for commands in (DYNAMIXEL, STS, MAESTRO):
+    for commands in (DYNAMIXEL, FEETECH, MAESTRO):
         assert not set(commands.verbs) - told
         assert not set(commands.cases) - told
-    verbs = {verb for commands in (DYNAMIXEL, STS, MAESTRO) for verb in commands.verbs}
+    verbs = {verb for commands in (DYNAMIXEL, FEETECH, MAESTRO) for verb in commands.verbs}
     rows = page.split("| command | what it does |")[1].split("\n\n")[0].splitlines()
     for row in rows[2:]:
         for verb in re.findall(r"`([a-z-]+)", row.split("|")[1]):
@@ -141,7 +143,7 @@ def test_the_emulators_commands_are_those_of_its_page() -> None:
     ("title", "device"),
     [
         ("## Where documents", DYNAMIXEL),
-        ("Feetech STS servos:", STS),
+        ("Feetech STS servos:", FEETECH),
         ("Pololu Maestro, as", MAESTRO),
     ],
     ids=["dynamixel", "feetech", "maestro"],

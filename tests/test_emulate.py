@@ -299,7 +299,7 @@ def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monke
         (("--servos", "1:xl330-m077", "--baud", "12"), "--baud 12: servos know 9600"),
         (("--servos", "1:xl330-m077", "--set", "bad-crc"), "not CASE=VALUE"),
         (("--servos", "1:xl330-m077", "--set", "bad-crc=no"), "it can be silent, reply"),
-        (("--servos", "1:xl330-m077", "--baud", "4500000"), "xl330-m077 does not know it"),
+        (("--servos", "1:xl330-m077", "--baud", "4500000"), "xl330-m077 knows 9600, 57600"),
         (("--servos", "1:xl330-m077", "--link", "/nowhere/x"), "/nowhere/x: No such file"),
         (("--servos", "1:xl330-m077", "--link", "README.md"), "something else has this name"),
     ],

@@ -17,20 +17,20 @@ GOAL, GOAL_SPEED, MODE = 42, 46, 33
 
 @pytest.fixture
 def lived_ms(monkeypatch):
-    """Count the milliseconds that shafts live through, and the looks of protections."""
+    """Count the milliseconds that shafts live through, and the checks of protections."""
     count = [0]
-    run, look = Shaft.run, Protection.look
+    run, check = Shaft.run, Protection.check
 
     def counted(shaft, ticks):
         count[0] += 0 if shaft.quiet else ticks
         run(shaft, ticks)
 
-    def looked(protection, *words):
+    def checked(protection, *words):
         count[0] += 1
-        return look(protection, *words)
+        return check(protection, *words)
 
     monkeypatch.setattr(Shaft, "run", counted)
-    monkeypatch.setattr(Protection, "look", looked)
+    monkeypatch.setattr(Protection, "check", checked)
     return count
 
 

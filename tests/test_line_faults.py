@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.sim_mock.dynamixel.chain import COMMANDS, build_dynamixel
+from gazerig.sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
 
@@ -400,7 +400,8 @@ def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
 
 def test_help_explains_every_command(world):
     text = world.faults.command("help")
-    assert all(COMMANDS.usage(name) in text for name in COMMANDS.verbs)
+    commands = DynamixelChain.commands
+    assert all(commands.usage(name) in text for name in commands.verbs)
     assert world.faults.command("help lose").startswith("lose ID [count N]")
 
 
@@ -414,7 +415,7 @@ def test_methods_do_what_commands_do():
 
 
 _WORDS = st.sampled_from(
-    [*COMMANDS.verbs, "help", "1", "2", "3", "0", "-1", "5", "on", "off", "all"]
+    [*DynamixelChain.commands.verbs, "help", "1", "2", "3", "0", "-1", "5", "on", "off", "all"]
 )
 
 

@@ -22,8 +22,8 @@ from sts_bench import (
 
 from gazerig.drivers.feetech import memory_table as feetech_table
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.feetech import memory as sts_memory
 from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.feetech.tables import STS
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 FACTORY = {
@@ -96,8 +96,7 @@ def test_what_is_no_register_reads_0(length, address):
 
 def test_registers_lie_where_the_drivers_table_has_them():
     theirs = {(r.address, r.size, r.sign) for r in feetech_table.REGISTERS.values()}
-    table = sts_memory.STS
-    own = (*table.eeprom, *table.factory, *table.ram, *table.fixed)
+    own = (*STS.kept, *STS.ram, *STS.fixed)
     ours = {(r.address, r.size, r.sign) for r in own}
     live = {at for at, _, _ in theirs} & set(range(56, 71))
     assert {row for row in theirs if row[0] not in live} <= ours

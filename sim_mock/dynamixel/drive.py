@@ -1,10 +1,7 @@
-"""The drive of an emulated servo: modes, goals and origin between registers and shaft.
+"""Modes, goals and origin of an emulated Dynamixel servo, between its registers and its shaft.
 
-Reads the control table and never refuses anything: what may be written is decided in
-gazerig.sim_mock.dynamixel.servo. The registers' position is ``side * shaft.x + shift``.
+The registers' position is ``side * shaft.x + shift``.
 """
-
-from typing import NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import (
     ACCELERATION_UNIT_STEPS_S2,
@@ -33,8 +30,9 @@ from gazerig.sim_mock.dynamixel.modes import (
     VELOCITY,
     loop_of,
 )
-from gazerig.sim_mock.smart_servo.motor import LIMP, Shaft, flicker
-from gazerig.sim_mock.smart_servo.physics import Physics, Quirks
+from gazerig.sim_mock.smart_servo.drive import Drive
+from gazerig.sim_mock.smart_servo.motor import LIMP, flicker
+from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
 
 TRIPPED = 255
@@ -51,41 +49,23 @@ _SPEED_UNIT = VELOCITY_UNIT_STEPS_S / 1000.0
 _RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
 
 
-class Noise(NamedTuple):
-    """Seed and largest flicker of current and velocity, in register units."""
+class DynamixelDrive(Drive):
+    """What turns the shaft of a Dynamixel servo.
 
-    seed: int
-    current: int
-    velocity: int
-
-
-class Drive:
-    """What turns the shaft.
-
-    torque: whether it is switched on
-    mode: operating mode
-    follows: whether a goal position is followed at once
+    Attributes:
+        follows: whether a goal position is followed at once.
     """
 
-    def __init__(
-        self,
-        memory: DynamixelMemory,
-        model: Model,
-        physics: Physics,
-        quirks: Quirks,
-        start_steps: float,
-        seed: int,
-    ) -> None:
-        self.memory = memory
-        self.model = model
-        self.shaft = Shaft(model, physics, start_steps)
-        self._quirks = quirks
-        self._noise = Noise(seed, physics.noise_current, physics.noise_velocity)
+    memory: DynamixelMemory
+
+    def __init__(self, memory: DynamixelMemory, model: Model, spec: ServoSpec) -> None:
+        self._model = model
+        self._quirks = Quirks(*spec.quirks)
         unit = model.current_unit_ma
         # Models without a current sensor report load in 0.1 %.
         self._current_full = model.stall_current_a * 1000.0 / unit if unit else 1000.0
         self._most = LARGEST if unit else 1000
-        self.boot()
+        super().__init__(memory, model, spec)
 
     def boot(self) -> None:
         """Begin without torque, within one turn, with goals where a mode begins."""
@@ -188,14 +168,10 @@ class Drive:
 
     def _start(self) -> None:
         """Let the profile begin where the shaft is, and follow the goal there is."""
-        shaft = self.shaft
-        if self.mode == VELOCITY:
-            shaft.start(SpeedProfile(shaft.x, shaft.v))
-        else:
-            shaft.start(Profile(shaft.x))
+        self._lead_from_here(self.mode == VELOCITY)
         self._wrap_by_itself()
         if self._quirks.goal_at_torque_on:
-            self.memory.set("goal_position", round(self.position_steps))
+            self._set_goal_here()
         self.settle()
         if self.mode in POSITION_MODES:
             self.aim(self.memory.get("goal_position"))
@@ -214,7 +190,7 @@ class Drive:
         self.mode = mode
         for name in ("profile_acceleration", "profile_velocity"):
             self.memory.set(name, 0)
-        for name, gain in zip(GAINS, self.model.gains, strict=True):
+        for name, gain in zip(GAINS, self._model.gains, strict=True):
             self.memory.set(name, gain)
         for name in ("feedforward_1st_gain", "feedforward_2nd_gain"):
             self.memory.set(name, 0)
@@ -231,7 +207,7 @@ class Drive:
             if self.memory.has(name):
                 limit = self.memory.get(name.replace("goal_", "") + "_limit")
                 self.memory.set(name, 0 if DRIVEN_BY.get(self.mode) == name else limit)
-        self.memory.set("goal_position", round(self.position_steps))
+        self._set_goal_here()
 
     # --- origin
 
@@ -264,7 +240,7 @@ class Drive:
             return False
         turns = int(self.position_steps // STEPS_PER_TURN)
         self._shift -= turns * STEPS_PER_TURN
-        self.memory.set("goal_position", round(self.position_steps))
+        self._set_goal_here()
         return True
 
     def turn(self, steps: float) -> None:
@@ -279,5 +255,5 @@ class Drive:
         timed = get("firmware_version") >= BY_TIME_SINCE
         self._by_time = timed and bool(get("drive_mode") & BY_TIME)
         halted = self.memory.bytes[_WATCHDOG_AT] == TRIPPED
-        loop = loop_of(get, self.model, self._side) if self.torque else LIMP
+        loop = loop_of(get, self._model, self._side) if self.torque else LIMP
         self.shaft.drive(loop._replace(bias=0.0) if halted else loop)

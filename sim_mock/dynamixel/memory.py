@@ -16,6 +16,7 @@ from gazerig.drivers.dynamixel.control_table import (
     registers_of,
 )
 from gazerig.sim_mock.dynamixel.live_registers import PROFILED
+from gazerig.sim_mock.smart_servo.memory import ServoMemory
 
 # Numbers of the status error byte (Protocol 2.0).
 RESULT_FAIL = 1
@@ -36,21 +37,20 @@ class Gather(NamedTuple):
     profiled: bool
 
 
-class DynamixelMemory:
+class DynamixelMemory(ServoMemory[Register]):
     """One servo's control table."""
 
     def __init__(self, model: Model, firmware: int) -> None:
         blocks = indirect_blocks(model, firmware)
         registers = registers_of(model) + tuple(_window_registers(blocks))
+        size = max(register.address + register.size for register in registers)
+        super().__init__(registers, size)
         self._by_address = {register.address: register for register in registers}
-        self._by_name = {register.name: register for register in registers}
         self._layouts: dict[tuple[int, int], tuple[Register, ...] | int] = {}
         self._windows = [(b.data_base, b.data_base + b.entries, b.address_base) for b in blocks]
         self._window_low = min(low for low, _, _ in self._windows)
         self._pointers_low = min(pointers for _, _, pointers in self._windows)
         self._gathers: dict[tuple[int, int], Gather] = {}
-        size = max(register.address + register.size for register in registers)
-        self.bytes = bytearray(size)
         self._defined = bytearray(size)
         for register in registers:
             end = register.address + register.size
@@ -63,23 +63,9 @@ class DynamixelMemory:
             if register.initial is not None and chosen(register):
                 self.put(register, register.initial)
 
-    def get(self, name: str) -> int:
-        """Return a register's value."""
-        register = self._by_name[name]
-        end = register.address + register.size
-        return int.from_bytes(self.bytes[register.address : end], "little", signed=register.signed)
-
-    def set(self, name: str, value: int) -> None:
-        """Set a register whatever its access."""
-        self.put(self._by_name[name], value)
-
-    def has(self, name: str) -> bool:
-        """True if this model has a register."""
-        return name in self._by_name
-
-    def named(self, name: str) -> Register:
-        """Return a register by its name."""
-        return self._by_name[name]
+    def power_up(self) -> None:
+        """Set the start values of the RAM area."""
+        self.restore(lambda register: not in_eeprom(register))
 
     def writable(self) -> Iterator[Register]:
         """Return the registers that may be written; through a window one writes to others."""
@@ -88,12 +74,17 @@ class DynamixelMemory:
                 yield register
 
     def put(self, register: Register, value: int) -> None:
-        """Store a value, two's complement where it is negative."""
-        size = register.size
-        raw = (value & ((1 << 8 * size) - 1)).to_bytes(size, "little")
-        self.bytes[register.address : register.address + size] = raw
+        """Store a value."""
+        super().put(register, value)
         if register.address >= self._pointers_low:
             self._gathers.clear()
+
+    def _decode(self, register: Register, data: bytes | bytearray) -> int:
+        return int.from_bytes(data, "little", signed=register.signed)
+
+    def _encode(self, register: Register, value: int) -> bytes:
+        """Return two's complement where the value is negative."""
+        return (value & ((1 << 8 * register.size) - 1)).to_bytes(register.size, "little")
 
     def read(self, address: int, length: int) -> bytes | None:
         """Return bytes as they are on the wire, None where an address is not defined."""

@@ -30,20 +30,6 @@ def status(servo_id: int, error: int, params: bytes) -> bytes:
     return packet + CRC.pack(umts(packet))
 
 
-def plain_pieces(answers: Sequence[Answer]) -> list[Piece]:
-    """Send each answer as a status of its own."""
-    return [
-        Piece(a[0], status(a[0], a[1], a[2]) if a[5] is None else _mixed(a), a[3], a[4])
-        for a in answers
-    ]
-
-
-def _mixed(answer: Answer) -> bytes:
-    """Build the status of servos that answer under one id at the same time."""
-    own = status(answer.servo_id, answer.error, answer.params)
-    return own if answer.twin is None else merge(own, _mixed(answer.twin))
-
-
 def fast_pieces(answers: Sequence[Answer], length: int) -> list[Piece]:
     """Send answers as blocks of one packet whose length field says ``length``.
 

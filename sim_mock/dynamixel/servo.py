@@ -6,18 +6,20 @@ What it does not do: play inside the gear, a blinking LED, the RC, S.Bus and iBu
 register 13.
 """
 
+import struct
+from typing import ClassVar
+
 from gazerig.drivers.dynamixel.control_table import (
     BACKUP_SINCE,
     BAUD_RATES,
     FAST_READ_SINCE,
     HARDWARE_ERRORS,
     MODELS,
-    RETURN_DELAY_UNIT_S,
     SHADOW_OFF,
     Model,
 )
 from gazerig.sim_mock.dynamixel.backup import Backup
-from gazerig.sim_mock.dynamixel.drive import TRIPPED, Drive
+from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
 from gazerig.sim_mock.dynamixel.live_registers import LIVE_AT, SENSED, SENSED_AT, put, put_sensed
 from gazerig.sim_mock.dynamixel.memory import (
     ACCESS,
@@ -29,13 +31,11 @@ from gazerig.sim_mock.dynamixel.memory import (
 )
 from gazerig.sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
 from gazerig.sim_mock.dynamixel.write_rules import GOALS, Rules
-from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec, checked
-from gazerig.sim_mock.smart_servo.protection import Limits
+from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.servo import SmartServo
 
 ALERT = 0x80
 WATCHDOG_UNIT_MS = 20
-BITS = {name: bit for bit, name in HARDWARE_ERRORS.items()}
 
 STARTS_WITH_TORQUE, RESTORES_RAM = 1, 2
 """Bits of Startup Configuration (60)."""
@@ -44,66 +44,65 @@ KEPT_BY_RESET: dict[int, tuple[str, ...]] = {0xFF: (), 1: ("id",), 2: ("id", "ba
 """What each option of Factory Reset leaves alone."""
 
 _GOAL_AT, _GOAL_SIZE = 116, 4
+_IDENTITY = struct.Struct("<HB")
 
 
 class DynamixelServo(SmartServo):
-    """One servo on the chain.
+    """One Dynamixel servo on the chain.
 
     Raises:
         ValueError: the spec's physics cannot exist.
     """
 
     restart_ms = 400
+    unreadable = ACCESS
+    none_registered = INSTRUCTION_ERROR
+    read_level, answer_level = 1, 2
+    error_bits: ClassVar = {name: 1 << bit for bit, name in HARDWARE_ERRORS.items()}
     model: Model
     memory: DynamixelMemory
-    drive: Drive
+    drive: DynamixelDrive
 
     def __init__(self, spec: ServoSpec, now_ms: int) -> None:
         self.model = MODELS[spec.model]
-        self.quirks = Quirks(*spec.quirks)
+        self.mute_reboot = Quirks(*spec.quirks).mute_reboot
         self.memory = DynamixelMemory(self.model, spec.firmware)
         self.memory.set("firmware_version", spec.firmware)
         self.memory.set("id", spec.id)
-        self._physics = checked(Physics(*spec.physics))
-        seed = spec.id if spec.seed is None else spec.seed
-        start = float(spec.start_steps)
-        self.drive = Drive(self.memory, self.model, self._physics, self.quirks, start, seed)
-        super().__init__(spec, self._physics, self._limits(), now_ms)
+        self.baud_rates = BAUD_RATES[: (self.memory.named("baud_rate").high or 0) + 1]
+        self.drive = DynamixelDrive(self.memory, self.model, spec)
         self._rules = Rules(self.memory, self.model, self.drive)
-        self.id = spec.id
         self.fast_reads = spec.firmware >= FAST_READ_SINCE[self.model.family]
         self._new = spec.firmware >= BACKUP_SINCE[self.model.family]
         self._backup = Backup()
-        self._boot()
+        super().__init__(spec, now_ms)
 
-    def _limits(self) -> Limits:
-        """Return what it bears; when a load is too much stands in no register."""
-        get, physics = self.memory.get, self._physics
-        return Limits(
-            get("temperature_limit"),
-            get("max_voltage_limit"),
-            get("min_voltage_limit"),
-            physics.overload_share,
-            physics.overload_s,
-        )
+    def _load_limits(self) -> tuple[float, ...]:
+        """Return when a load is too much: no register says so."""
+        return self._physics.overload_share, self._physics.overload_s
+
+    def identity(self) -> bytes:
+        """Return model number and firmware."""
+        return _IDENTITY.pack(self.model.number, self.firmware)
 
     def _boot(self) -> None:
-        """Return the RAM area its start values, torque off unless it is to start with it."""
-        memory = self.memory
-        memory.restore(lambda register: not in_eeprom(register))
-        self._watchdog_ms = 0
-        self.errors = 0
-        self._pending = None
-        self.protection.restart()
-        memory.set("backup_ready", self._backup.ready)
-        self.drive.boot()
-        startup = memory.get("startup_configuration") if self._new else 0
+        """Begin as after power-on, torque off unless it is to start with it."""
+        super()._boot()
+        self.memory.set("backup_ready", self._backup.ready)
+        startup = self.memory.get("startup_configuration") if self._new else 0
         if startup & RESTORES_RAM:
-            self._backup.recall(memory, eeprom=False)
-        self._remember()
+            self._backup.recall(self.memory, eeprom=False)
+            self._settle()
         if startup & STARTS_WITH_TORQUE:
-            memory.set("torque_enable", 1)
+            self.memory.set("torque_enable", 1)
             self._switch(True)
+
+    def _settle(self) -> None:
+        """Apply settings that have changed."""
+        shadow = self.memory.get("secondary_id")
+        self.shadow_id = None if shadow >= SHADOW_OFF else shadow
+        super()._settle()
+        self._rules.settle()
 
     def _protect_from(self, bits: int) -> None:
         """Latch what is wrong."""
@@ -176,11 +175,9 @@ class DynamixelServo(SmartServo):
             drive.change_mode(value)
         elif name in ("homing_offset", "drive_mode"):
             drive.shift_origin()
-        elif name == "id":
-            self.id = value
         elif name in GOALS:
             self._command(name, value)
-        self._remember()
+        self._settle()
 
     def _command(self, name: str, value: int) -> None:
         """Follow a new goal, where the mode is driven by it."""
@@ -201,38 +198,12 @@ class DynamixelServo(SmartServo):
         else:
             self.drive.switch(on)
 
-    def _remember(self) -> None:
-        """Keep what is asked often as plain numbers, and tell the drive its settings."""
-        get = self.memory.get
-        self._calm = False
-        self.status_level = get("status_return_level")
-        self.answers_reads = self.status_level >= 1
-        shadow = get("secondary_id")
-        self.shadow_id = None if shadow >= SHADOW_OFF else shadow
-        self.protection.limits = self._limits()
-        self._rules.settle()
-        self.drive.settle()
-        self._announce()
-
     # --- instructions
 
     def register(self, address: int, data: bytes) -> int:
-        """Keep a write for Action; return the error number."""
+        """Keep a write for Action, if it would be permitted now; return the error number."""
         fields = self._rules.permitted(address, data)
-        if isinstance(fields, int):
-            return fields
-        self._pending = (address, data)
-        self.memory.set("registered_instruction", 1)
-        return 0
-
-    def action(self) -> int:
-        """Carry out the kept write; return the error number."""
-        if self._pending is None:
-            return INSTRUCTION_ERROR
-        address, data = self._pending
-        self._pending = None
-        self.memory.set("registered_instruction", 0)
-        return self.write(address, data)
+        return fields if isinstance(fields, int) else super().register(address, data)
 
     def factory_reset(self, option: int) -> int:
         """Put the EEPROM back (0xFF all, 1 all but id, 2 all but id and baud), then restart."""
@@ -242,7 +213,6 @@ class DynamixelServo(SmartServo):
         if self.torque:
             return ACCESS
         self.memory.restore(lambda register: in_eeprom(register) and register.name not in kept)
-        self.id = self.memory.get("id")
         self.restart()
         return 0
 
@@ -271,24 +241,12 @@ class DynamixelServo(SmartServo):
         if self.torque or not self._backup.ready:
             return RESULT_FAIL
         self._backup.recall(self.memory, eeprom=True)
-        self.id = self.memory.get("id")
         self.restart()
         self._backup.recall(self.memory, eeprom=False)
-        self._remember()
+        self._settle()
         return 0
 
     # --- errors
-
-    def fail(self, error: str) -> str:
-        """Latch a hardware error by name, as the servo's own protection would.
-
-        Raises:
-            ValueError: there is no such error.
-        """
-        if error not in BITS:
-            raise ValueError(f"hardware error {error!r}: there is {', '.join(BITS)}")
-        self._latch(1 << BITS[error])
-        return f"has latched: {error}"
 
     def _latch(self, bits: int) -> None:
         """Set bits of Hardware Error Status; those of Shutdown take the torque."""
@@ -302,15 +260,3 @@ class DynamixelServo(SmartServo):
     def error_flag(self) -> int:
         """Return the alert bit as it stands on every status."""
         return ALERT if self.errors else 0
-
-    # --- for the line
-
-    @property
-    def baud(self) -> int:
-        """Return bit/s by register 8; a new one acts after the status of its write has gone out."""
-        return BAUD_RATES[self.memory.get("baud_rate")]
-
-    @property
-    def return_delay_s(self) -> float:
-        """Return the pause before a status, by register 9."""
-        return self.memory.get("return_delay_time") * RETURN_DELAY_UNIT_S

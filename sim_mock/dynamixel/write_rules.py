@@ -1,7 +1,7 @@
 """What an emulated servo lets be written now: EEPROM lock, modes, limits, tripped watchdog."""
 
 from gazerig.drivers.dynamixel.control_table import EEPROM_END, Model, Register
-from gazerig.sim_mock.dynamixel.drive import TRIPPED, Drive
+from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
 from gazerig.sim_mock.dynamixel.memory import (
     ACCESS,
     DATA_LIMIT,
@@ -22,7 +22,7 @@ class Rules:
     goal_range: positions that a goal may have now
     """
 
-    def __init__(self, memory: DynamixelMemory, model: Model, drive: Drive) -> None:
+    def __init__(self, memory: DynamixelMemory, model: Model, drive: DynamixelDrive) -> None:
         self._memory = memory
         self._modes = modes_of(model)
         self._drive = drive

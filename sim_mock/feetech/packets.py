@@ -7,9 +7,6 @@ among parameters. Numbers with a sign are sign and magnitude. Source: Feetech, c
 protocol of the STS/SMS series.
 """
 
-from collections.abc import Sequence
-
-from gazerig.sim_mock.replies import Answer, Piece, merge
 from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
 
 HEADER = b"\xff\xff"
@@ -25,17 +22,6 @@ def status(servo_id: int, error: int, params: bytes) -> bytes:
     """Build a status packet."""
     body = bytes((servo_id, (len(params) + 2) & 0xFF, error)) + params
     return HEADER + body + bytes((checksum(body),))
-
-
-def pieces(answers: Sequence[Answer]) -> list[Piece]:
-    """Send each answer as a status of its own."""
-    return [Piece(a.servo_id, _mixed(a), a.delay_s, a.late_s) for a in answers]
-
-
-def _mixed(answer: Answer) -> bytes:
-    """Build the status of servos that answer under one id at the same time."""
-    own = status(answer.servo_id, answer.error, answer.params)
-    return own if answer.twin is None else merge(own, _mixed(answer.twin))
 
 
 def signed(raw: int, bit: int) -> int:

@@ -6,20 +6,20 @@ LED, backup (09).
 """
 
 import struct
+from typing import ClassVar
 
 from gazerig.drivers.feetech.memory_table import (
     EEPROM_END,
-    RETURN_DELAY_UNIT_S,
     SET_MIDDLE,
     FeetechModel,
 )
+from gazerig.sim_mock.feetech.drive import CURRENT_UNIT_A, GOALS_AT, FeetechDrive
 from gazerig.sim_mock.feetech.memory import FeetechMemory
-from gazerig.sim_mock.feetech.motor import CURRENT_UNIT_A, GOALS_AT, FeetechDrive
 from gazerig.sim_mock.feetech.packets import unsigned
 from gazerig.sim_mock.feetech.quirks import FeetechQuirks
-from gazerig.sim_mock.feetech.series import series_of
-from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec, checked
-from gazerig.sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE, Limits
+from gazerig.sim_mock.feetech.tables import model_and_table
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE
 from gazerig.sim_mock.smart_servo.servo import SmartServo
 
 MIDDLE = 2048
@@ -38,7 +38,7 @@ _SENSED = {"little": struct.Struct("<HHHBBBBBHH"), "big": struct.Struct(">HHHBBB
 
 
 class FeetechServo(SmartServo):
-    """One servo on the chain.
+    """One Feetech servo on the chain.
 
     The spec's ``firmware`` is the number behind 3; its ``quirks`` are those of Dynamixel
     servos and mean nothing here, nor do ``overload_share`` and ``overload_s`` of its physics:
@@ -49,27 +49,23 @@ class FeetechServo(SmartServo):
     """
 
     restart_ms = 800
+    error_bits: ClassVar = {"overload": OVERLOAD, "encoder": ANGLE, "overheating": HEAT}
     model: FeetechModel
     memory: FeetechMemory
     drive: FeetechDrive
 
-    def __init__(self, spec: ServoSpec, now_ms: int, quirks: FeetechQuirks) -> None:
-        self.model, self.table = series_of(spec.model)
-        physics = checked(Physics(*spec.physics))
+    def __init__(self, spec: ServoSpec, now_ms: int) -> None:
+        self.model, self.table = model_and_table(spec.model)
+        self.baud_rates = self.table.baud_rates
         self.memory = FeetechMemory(self.model, spec.id, spec.firmware, self.table)
-        seed = spec.id if spec.seed is None else spec.seed
-        self.drive = FeetechDrive(self.memory, self.model, physics, float(spec.start_steps), seed)
-        super().__init__(spec, physics, self._limits(), now_ms)
-        self.adopt(quirks)
-        self._boot()
+        self.drive = FeetechDrive(self.memory, self.model, spec)
+        self.adopt(FeetechQuirks())
+        super().__init__(spec, now_ms)
 
-    def _limits(self) -> Limits:
+    def _load_limits(self) -> tuple[float, ...]:
         """Return what it bears by its registers."""
         get = self.memory.get
-        return Limits(
-            get("temperature_limit"),
-            get("max_voltage"),
-            get("min_voltage"),
+        return (
             get("overload_torque") / 100.0,
             get("protection_time") * TIME_UNIT_S,
             get("protection_current") * CURRENT_UNIT_A,
@@ -79,16 +75,15 @@ class FeetechServo(SmartServo):
     def adopt(self, quirks: FeetechQuirks) -> None:
         """Do from now on what these quirks say."""
         self.quirks = quirks
+        self.mute_reboot = quirks.reboot == "mute"
         self.drive.timed(quirks.goal_time == "obey")
 
-    def _boot(self) -> None:
-        """Begin as after power-on: what was kept, and no torque."""
-        self.memory.power_up()
-        self._pending = None
-        self.errors = 0
-        self.protection.restart()
-        self.drive.boot()
-        self._remember()
+    def _settle(self) -> None:
+        """Apply settings that have changed."""
+        super()._settle()
+        self.answers_groups = self.table.sync_read
+        self.drive.follow()
+        self._protect()
 
     def _protect_from(self, bits: int) -> None:
         """Flag voltage and heat as long as they are wrong, all else until something ends it."""
@@ -101,9 +96,9 @@ class FeetechServo(SmartServo):
         """Do what Unload Conditions say: an overload lowers the torque, all else takes it."""
         drive = self.drive
         self._pushed = self.shaft.u
-        wrong = self.errors & self.memory.get("unload_conditions")
+        wrong = self.errors & self.memory.get("unloading_condition")
         if wrong & ~OVERLOAD and drive.torque:
-            self.memory.set("torque", 0)
+            self.memory.set("torque_enable", 0)
             drive.switch(0, False)
         drive.most = self.memory.get("protective_torque") / 100.0 if wrong & OVERLOAD else 1.0
         drive.tune()
@@ -156,9 +151,9 @@ class FeetechServo(SmartServo):
         if not written:
             return 0
         if written[0] < EEPROM_END or written[-1] >= FACTORY_AT:
-            self._remember()
+            self._settle()
         if TORQUE_AT in written:
-            self._switch(memory.get("torque"))
+            self._switch(memory.get("torque_enable"))
         if written[0] < LIMIT_END and written[-1] >= GOALS_AT:
             self.drive.tune()
             self._command(GOAL_AT in written, goal)
@@ -170,7 +165,7 @@ class FeetechServo(SmartServo):
         if self.errors & OVERLOAD and memory.bytes[GOAL_AT:GOAL_END] != goal_before:
             self._goal_after_overload()
         if new_goal and not drive.torque and self.quirks.goal == "torque-on":
-            memory.set("torque", 1)
+            memory.set("torque_enable", 1)
             self._switch(1)
         drive.follow(new_goal)
 
@@ -185,15 +180,15 @@ class FeetechServo(SmartServo):
         """Switch the torque, or make the present position the middle."""
         drive = self.drive
         if value == SET_MIDDLE:
-            self.memory.set("torque", int(drive.torque))
+            self.memory.set("torque_enable", int(drive.torque))
             drive.calibrate(MIDDLE)
             return
         self._end(CURRENT)
         if value == 0 and self.quirks.overload_ends != "restart":
             self._end_overload()
-        unload = self.memory.get("unload_conditions")
+        unload = self.memory.get("unloading_condition")
         if self.errors & unload & ~OVERLOAD:
-            self.memory.set("torque", 0)
+            self.memory.set("torque_enable", 0)
             value = 0
         drive.switch(value, self.quirks.torque_on == "present")
         self._calm = False
@@ -208,27 +203,7 @@ class FeetechServo(SmartServo):
         self.errors &= ~bit
         self.protection.restart()
 
-    def _remember(self) -> None:
-        """Take over settings that have changed."""
-        self._calm = False
-        self.id = self.memory.get("id")
-        self.protection.limits = self._limits()
-        self.drive.settle()
-        self.drive.follow()
-        self._protect()
-        self._announce()
-
-    # --- instructions
-
-    def register(self, address: int, data: bytes) -> None:
-        """Keep a write for Action; a later one takes its place."""
-        self._pending = (address, data)
-
-    def action(self) -> None:
-        """Carry out the kept write, if there is one."""
-        if self._pending is not None:
-            (address, data), self._pending = self._pending, None
-            self.write(address, data)
+    # --- from outside
 
     def factory_reset(self, new_id: int | None = None) -> None:
         """Put the EEPROM as it left the factory, all but the id, and restart."""
@@ -237,40 +212,16 @@ class FeetechServo(SmartServo):
             self.memory.keep("id", new_id)
         self.restart()
 
-    # --- for the line
-
-    @property
-    def answers_all(self) -> bool:
-        """True if it answers more than ping and reads, by register 8."""
-        return self.memory.get("status_level") != 0
-
-    @property
-    def baud(self) -> int:
-        """Return bit/s by register 6; a new one acts after the status of its write has gone out."""
-        return self.table.baud_rates[self.memory.get("baud_rate")]
-
-    @property
-    def return_delay_s(self) -> float:
-        """Return the pause before a status, by register 7."""
-        return self.memory.get("return_delay") * RETURN_DELAY_UNIT_S
-
-    # --- from outside
-
     def fail(self, error: str) -> str:
         """Let its overload protection act, its motor be too hot or its angle sensor break.
 
         Raises:
             ValueError: there is no such error.
         """
-        if error == "overheating":
-            self.temperature_c = self.memory.get("temperature_limit") + TOO_HOT_C
-            return f"has {self.temperature_c:g} degC"
-        bits = {"overload": OVERLOAD, "encoder": ANGLE}
-        if error not in bits:
-            raise ValueError(f"error {error!r}: there is {', '.join(bits)}, overheating")
-        self.errors |= bits[error]
-        self._protect()
-        return f"protects itself: {error}"
+        if error != "overheating":
+            return super().fail(error)
+        self.temperature_c = self.memory.get("temperature_limit") + TOO_HOT_C
+        return f"has {self.temperature_c:g} degC"
 
     def reset_all(self) -> int:
         """Be as from the factory, id 1."""

@@ -4,16 +4,23 @@ Where documents and devices are silent or differ, the choice is one of ``ChainQu
 client whose baud rate is not a servo's neither hears it nor is heard.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, Generic, TypeVar
 
 from gazerig.sim_mock.device import Reply
 from gazerig.sim_mock.faults.active import NOBODY
-from gazerig.sim_mock.replies import BROADCAST, Answer, Piece
+from gazerig.sim_mock.faults.grammar import Commands
+from gazerig.sim_mock.replies import BROADCAST, Answer, Piece, merge
 from gazerig.sim_mock.smart_servo.addresses import Addresses, hears
 from gazerig.sim_mock.smart_servo.faults import ServoFaults
-from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
+from gazerig.sim_mock.smart_servo.framing import (
+    PING,
+    SYNC_READ,
+    SYNC_WRITE,
+    Framing,
+    Instruction,
+)
+from gazerig.sim_mock.smart_servo.instructions import GroupRead, GroupWrite, InstructionSet
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, decided
 from gazerig.sim_mock.smart_servo.servo import SmartServo
@@ -21,27 +28,30 @@ from gazerig.sim_mock.smart_servo.servo import SmartServo
 TWIN_AWAY_STEPS = 257
 """A second servo with a taken id stands so far from the first, so that they differ."""
 
-Wanted = tuple[int, int, int]
-"""id, address, length of one servo's part of a group read."""
-
 S = TypeVar("S", bound=SmartServo)
 Q = TypeVar("Q", bound=ChainQuirks)
 
 
-class ServoChain(ABC, Generic[S, Q]):
+class ServoChain(Generic[S, Q]):
     """Servos on one bus.
+
+    A make of servos says in class attributes what they are, which choices there are, how packets
+    begin and are found and built, what can be told to a servo and what can befall it.
 
     Args:
         servos: any order; servos with one id answer at the same time.
         now_s: the chain's clock.
-        quirks: what servos do where documents and devices differ.
+        quirks: what servos do where documents and devices differ; None: the first of each case.
         heed_baud: only a client at a servo's baud rate is heard; else every client is.
-        framing: packets of this make of servos.
-        faults: faults of this make of servos.
+        seed: of the random numbers that faults draw.
     """
 
-    unreadable = 0
-    """Error number of a read that touches what is not there."""
+    servo_type: type[S]
+    quirks_type: type[Q]
+    framing_type: type[Framing]
+    header: bytes
+    instructions: InstructionSet[S]
+    commands: Commands
     eeprom_end = 0
     """Writes below are not for those who listen under a secondary id."""
 
@@ -49,24 +59,28 @@ class ServoChain(ABC, Generic[S, Q]):
         self,
         servos: Iterable[S],
         now_s: Callable[[], float],
-        quirks: Q,
-        framing: type[Framing],
-        faults: Callable[[Any], ServoFaults],
+        quirks: Q | None = None,
         heed_baud: bool = False,
+        seed: int = 0,
     ) -> None:
         self.servos = tuple(servos)
         self.now_s = now_s
-        self.quirks = quirks
+        self.quirks = quirks or self.quirks_type()
         self.heed_baud = heed_baud
-        self.faults = faults(self)
+        self.faults = ServoFaults(self, self.commands, seed, self.header)
         self._wire = self.faults.wire
         self._now_s = now_s()
         self._now_ms = self._fed_ms = whole_ms(self._now_s)
-        self._framing = framing(quirks.packet_gap_s, self._now_s)
+        self._framing = self.framing_type(self.quirks.packet_gap_s, self._now_s)
         self._client_baud: int | None = None
-        self._groups: dict[int, Callable[[bytes], list[Piece]]] = {}
+        self._groups: dict[int, Callable[[bytes], list[Piece]]] = {
+            PING: lambda params: self._out(self._ping_all()),
+            SYNC_READ: lambda params: self._plain(self.instructions.sync_rows(params)),
+            SYNC_WRITE: lambda params: self._write_all(self.instructions.sync_writes(params)),
+        }
         for servo in self.servos:
             servo.on_address = self._readdressed
+        self._adopt(self.quirks)
         self.refresh()
 
     # --- who is there
@@ -107,11 +121,13 @@ class ServoChain(ABC, Generic[S, Q]):
         """Put a second servo with a taken id on the bus, a little turned from the first."""
         first, now_ms = self.here(servo_id), whole_ms(self.now_s())
         start = (first.position_steps + TWIN_AWAY_STEPS) % 4096
-        twin = self._twin_of(
-            first, ServoSpec(servo_id, first.model.name, start, first.firmware), now_ms
-        )
+        spec = ServoSpec(servo_id, first.model.name, start, first.firmware)
+        twin = self.servo_type(spec, now_ms)
+        for name in ("baud_rate", "return_delay_time"):
+            twin.memory.keep(name, first.memory.get(name))
         twin.on_address = self._readdressed
         self.servos = (*self.servos, twin)
+        self._adopt(self.quirks)
         self.refresh()
 
     def choose(self, case: str, value: str) -> None:
@@ -139,21 +155,10 @@ class ServoChain(ABC, Generic[S, Q]):
 
     # --- what a make of servos adds
 
-    @abstractmethod
-    def _twin_of(self, first: S, spec: ServoSpec, now_ms: int) -> S:
-        """Return a second servo with the line settings of the first."""
-
-    @abstractmethod
-    def _carry_out(self, servo: S, code: int, params: bytes) -> tuple[int, bytes] | None:
-        """Let an awake servo carry out an instruction; error number and data, None for nothing."""
-
-    @abstractmethod
-    def _answers(self, servo: S, code: int) -> bool:
-        """True if a servo answers an instruction to it alone."""
-
-    @abstractmethod
-    def _pieces(self, answers: Sequence[Answer]) -> list[Piece]:
-        """Send each answer as a status of its own."""
+    @staticmethod
+    def status(servo_id: int, error: int, params: bytes) -> bytes:
+        """Build a status packet."""
+        raise NotImplementedError
 
     def _adopt(self, quirks: Q) -> None:
         """Do from now on what these quirks say."""
@@ -217,6 +222,15 @@ class ServoChain(ABC, Generic[S, Q]):
         spoilt = self._pieces(self._wire.spoil_answers(answers, False, self._now_s))
         return self._wire.spoil_pieces(spoilt, False, self._now_s)
 
+    def _pieces(self, answers: Iterable[Answer]) -> list[Piece]:
+        """Send each answer as a status of its own."""
+        return [Piece(a[0], self._packet(a), a[3], a[4]) for a in answers]
+
+    def _packet(self, answer: Answer) -> bytes:
+        """Build the status of a servo, or of several that answer under one id at the same time."""
+        own = self.status(answer[0], answer[1], answer[2])
+        return own if answer.twin is None else merge(own, self._packet(answer.twin))
+
     def _silent(self, servo_id: int) -> bool:
         """True if a fault keeps this servo from answering."""
         return self._wire.any and self._wire.take("lose", servo_id, self._now_s) is not None
@@ -241,13 +255,18 @@ class ServoChain(ABC, Generic[S, Q]):
         if not servo.advance(self._now_ms, self._fed_ms):
             return None
         # Flags, id and delay as they were before: an answer leaves under the old settings.
-        answers, flag, servo_id = self._answers(servo, code), servo.error_flag, servo.id
-        said = self._carry_out(servo, code, params)
+        answers, flag, servo_id = servo.answers(code), servo.error_flag, servo.id
+        said = self.instructions.carry_out(servo, code, params)
         if said is None or not answers:
             return None
         return Answer(servo_id, said[0] | flag, said[1], self._delay_s[servo_id])
 
     # --- groups
+
+    def _ping_all(self) -> list[Answer]:
+        """Return the answers to a ping to all, in the order of the ids."""
+        answers = (self._answer_all(servo_id, PING, b"") for servo_id in sorted(self._by_id))
+        return [answer for answer in answers if answer is not None]
 
     def _part(self, servo_id: int, address: int, length: int) -> Answer | None:
         """Return a servo's part of a group read, None where it is silent."""
@@ -258,14 +277,14 @@ class ServoChain(ABC, Generic[S, Q]):
         return None if answer is None or self._silent(servo_id) else answer
 
     def _seen(self, servo: S, address: int, length: int) -> Answer | None:
-        if not servo.advance(self._now_ms, self._fed_ms) or not servo.answers_reads:
+        if not servo.advance(self._now_ms, self._fed_ms) or not servo.answers_groups:
             return None
         data, servo_id, flag = servo.read(address, length), servo.id, servo.error_flag
         if data is None:
-            return Answer(servo_id, flag | self.unreadable, b"", self._delay_s[servo_id])
+            return Answer(servo_id, flag | servo.unreadable, b"", self._delay_s[servo_id])
         return Answer(servo_id, flag, data, self._delay_s[servo_id])
 
-    def _plain(self, rows: Iterable[Wanted]) -> list[Piece]:
+    def _plain(self, rows: Iterable[GroupRead]) -> list[Piece]:
         """Answer a group read with one status a servo, in the order asked."""
         answers, late_s, policy = list[Answer](), 0.0, self.quirks.after_missing
         for servo_id, address, length in rows:
@@ -279,7 +298,7 @@ class ServoChain(ABC, Generic[S, Q]):
                 late_s += self.quirks.slot_timeout_s
         return self._out(answers)
 
-    def _write_all(self, writes: Iterable[tuple[int, int, bytes]]) -> list[Piece]:
+    def _write_all(self, writes: Iterable[GroupWrite]) -> list[Piece]:
         """Carry out a group write; no servo answers."""
         if self._wire.any and self._wire.take("lose_writes", None, self._now_s):
             return []
@@ -294,6 +313,39 @@ class ServoChain(ABC, Generic[S, Q]):
                     if other.advance(self._now_ms, self._fed_ms):
                         other.write(address, data)
         return []
+
+
+C = TypeVar("C", bound=ServoChain[Any, Any])
+
+
+def build_chain(
+    chain: type[C],
+    specs: Iterable[ServoSpec | tuple[int, str, float]],
+    now_s: Callable[[], float],
+    baud: int | None = None,
+    quirks: ChainQuirks | None = None,
+    seed: int = 0,
+) -> C:
+    """Build servos and their bus.
+
+    Args:
+        chain: that of a make.
+        specs: a plain tuple is (id, model, start position in steps).
+        now_s: the clock.
+        baud: the servos are set to it, all else as from the factory, and only clients at their
+            rate are heard; without one every client is.
+        quirks: what servos do where documents and devices differ.
+        seed: of the random numbers that faults draw.
+
+    Raises:
+        ValueError: there is no such model, or it does not know this baud rate.
+    """
+    now_ms = whole_ms(now_s())
+    servos = [chain.servo_type(ServoSpec(*spec), now_ms) for spec in specs]
+    if baud is not None:
+        for servo in servos:
+            servo.set_baud(baud)
+    return chain(servos, now_s, quirks, baud is not None, seed)
 
 
 def _both(one: Answer | None, other: Answer | None) -> Answer | None:

@@ -3,6 +3,10 @@
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
+PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, REBOOT = 1, 2, 3, 4, 5, 6, 8
+SYNC_READ, SYNC_WRITE = 0x82, 0x83
+"""Codes of the instructions that all makes have."""
+
 
 class Instruction(NamedTuple):
     """A packet found.

@@ -10,10 +10,11 @@ is read does not depend on how often it is read.
 from math import inf, pi, sin
 from typing import NamedTuple, Protocol
 
-from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
 from gazerig.sim_mock.smart_servo.physics import Physics
 from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
 
+STEPS_PER_TURN = 4096
+"""Resolution of the encoder on the shaft; a make may count otherwise in its registers."""
 STEPS_PER_RAD = STEPS_PER_TURN / (2.0 * pi)
 MS_S = 0.001
 SAG_MOST = 0.5

@@ -1,6 +1,6 @@
 """What an emulated servo watches over: temperature, load, current, input voltage.
 
-Looked at every 20 ms of its own time, so the result does not depend on how often it is
+Checked every 20 ms of its own time, so the result does not depend on how often it is
 asked. A heavy load is torque, not duty: a motor at full speed has all the duty and no load.
 """
 
@@ -10,8 +10,8 @@ from typing import NamedTuple
 from gazerig.sim_mock.smart_servo.motor import Motor
 from gazerig.sim_mock.smart_servo.physics import Physics
 
-LOOK_MS = 20
-LOOK_S = LOOK_MS / 1000.0
+CHECK_MS = 20
+CHECK_S = CHECK_MS / 1000.0
 
 VOLTAGE, HEAT, CURRENT, OVERLOAD = 1, 4, 8, 32
 """Bits of what is wrong, as they stand in the registers of the servos that know them."""
@@ -34,12 +34,12 @@ class Limits(NamedTuple):
     current_s: float = inf
 
 
-def warmed(now_c: float, final_c: float, thermal_s: float, looks: int) -> float:
-    """Return the temperature of a motor after some looks; up to a minute as one by one."""
-    share = LOOK_S / thermal_s
-    if looks * LOOK_S > 60.0:
-        return final_c + (now_c - final_c) * (1.0 - share) ** looks
-    for _ in range(looks):
+def warmed(now_c: float, final_c: float, thermal_s: float, checks: int) -> float:
+    """Return the temperature of a motor after some checks; up to a minute as one by one."""
+    share = CHECK_S / thermal_s
+    if checks * CHECK_S > 60.0:
+        return final_c + (now_c - final_c) * (1.0 - share) ** checks
+    for _ in range(checks):
         now_c += (final_c - now_c) * share
     return now_c
 
@@ -56,30 +56,30 @@ class Protection:
         self.limits = limits
         self.ambient_c = physics.ambient_c
         self.temperature_c = physics.ambient_c
-        self._heavy_looks = self._strong_looks = 0
+        self._heavy_checks = self._strong_checks = 0
 
     def restart(self) -> None:
         """Forget load and current; the heat stays."""
-        self._heavy_looks = self._strong_looks = 0
+        self._heavy_checks = self._strong_checks = 0
 
-    def look(self, effort: float, volts: float, looks: int = 1) -> int:
+    def check(self, effort: float, volts: float, checks: int = 1) -> int:
         """Return the bits of what is wrong after 20 ms more at this torque and voltage (shares).
 
-        looks: go on by so many times 20 ms at once
+        checks: go on by so many times 20 ms at once
         """
         physics, limits = self._physics, self.limits
         target = self.ambient_c + physics.stall_rise_c * effort * effort
-        self.temperature_c = warmed(self.temperature_c, target, physics.thermal_s, looks)
+        self.temperature_c = warmed(self.temperature_c, target, physics.thermal_s, checks)
         effort = abs(effort)
         heavy = effort > 0.0 and effort >= limits.overload_share * volts - 1e-11
-        self._heavy_looks = self._heavy_looks + looks if heavy else 0
+        self._heavy_checks = self._heavy_checks + checks if heavy else 0
         strong = effort * self._model.stall_current_a > limits.current_a
-        self._strong_looks = self._strong_looks + looks if strong else 0
+        self._strong_checks = self._strong_checks + checks if strong else 0
         tenths = volts * self._model.rated_v * 10.0
         bits = 0
-        if heavy and self._heavy_looks * LOOK_S >= limits.overload_s:
+        if heavy and self._heavy_checks * CHECK_S >= limits.overload_s:
             bits |= OVERLOAD
-        if strong and self._strong_looks * LOOK_S >= limits.current_s:
+        if strong and self._strong_checks * CHECK_S >= limits.current_s:
             bits |= CURRENT
         if self.temperature_c > limits.hottest_c:
             bits |= HEAT
@@ -89,8 +89,8 @@ class Protection:
 
     @property
     def steady(self) -> bool:
-        """True if looking again changes nothing but what the motor does."""
-        return not self._heavy_looks and not self._strong_looks
+        """True if checking again changes nothing but what the motor does."""
+        return not self._heavy_checks and not self._strong_checks
 
     def browned_out(self, volts: float) -> bool:
         """True if the voltage (a share) is too low for the servo to run."""

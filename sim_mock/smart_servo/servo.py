@@ -1,19 +1,24 @@
-"""What every emulated smart servo is: a memory and a motor that live when looked at.
+"""What every emulated smart servo is: registers and a motor that are brought up to date on demand.
 
-``advance`` brings it up to a time, nothing runs by itself. A make of servo adds what its
+``advance`` brings a servo up to a time, nothing runs by itself. A make of servo adds what its
 registers do when they are written and read, and what follows from an error.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Protocol
 
-from gazerig.sim_mock.smart_servo.motor import Motor, Shaft, long_pause
-from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
-from gazerig.sim_mock.smart_servo.protection import LOOK_MS, Limits, Protection
+from gazerig.sim_mock.smart_servo.drive import Drive
+from gazerig.sim_mock.smart_servo.framing import PING, READ, REBOOT
+from gazerig.sim_mock.smart_servo.memory import ServoMemory
+from gazerig.sim_mock.smart_servo.motor import Motor, long_pause
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec, checked
+from gazerig.sim_mock.smart_servo.protection import CHECK_MS, Limits, Protection
+
+RETURN_DELAY_UNIT_S = 2e-6
 
 
-class Model(Motor, Protocol):
+class ServoModel(Motor, Protocol):
     """What must be known of a model of servo."""
 
     @property
@@ -22,62 +27,88 @@ class Model(Motor, Protocol):
         ...
 
 
-class Drive(Protocol):
-    """What turns the shaft by the registers."""
-
-    torque: bool
-    shaft: Shaft
-
-    @property
-    def position_steps(self) -> float:
-        """Return the true position of the shaft in the registers' terms, finer than they are."""
-        ...
-
-    def turn(self, steps: float) -> None:
-        """Turn the joint by hand, in the registers' direction."""
-        ...
-
-
-class Memory(Protocol):
-    """The registers as numbers."""
-
-    def get(self, name: str) -> int:
-        """Return a register's value."""
-        ...
-
-
 class SmartServo(ABC):
     """One servo on the chain. Its clock counts the chain's whole milliseconds.
 
-    id: what it is spoken to by
-    errors: bits of what is wrong, as in the register that tells them
-    model, memory, drive: set by a make before this class's constructor
-    on_address: called when id, baud rate or return delay are other than before
+    A make sets ``model``, ``memory``, ``drive`` and ``baud_rates`` before this class's constructor.
+
+    Attributes:
+        id: what it is spoken to by.
+        errors: bits of what is wrong, as in the register that tells them.
+        baud_rates: bit/s by the value of their register.
+        on_address: called when id, baud rate or return delay are other than before.
+
+    Raises:
+        ValueError: the spec's physics cannot exist.
     """
 
     restart_ms: int
     """So long it is deaf while it restarts."""
-    model: Model
-    memory: Memory
+    unreadable = 0
+    """Error number of a read that touches what is not there."""
+    none_registered = 0
+    """Error number of an Action when no write waits for one."""
+    read_level = 0
+    answer_level = 1
+    """Status Return Levels from which it answers reads, and everything else."""
+    mute_reboot = False
+    """Whether it restarts without an answer."""
+    error_bits: ClassVar[Mapping[str, int]]
+    """Bits of the errors that can be made to arise, by name."""
+    model: ServoModel
+    memory: ServoMemory[Any]
     drive: Drive
+    baud_rates: tuple[int, ...]
     id: int
-    answers_reads = True
-    """Whether it answers more than a ping."""
+    answers_groups = True
+    """Whether it answers its part of a group read."""
     shadow_id: int | None = None
     """An id under which it carries out writes to RAM and never answers."""
 
-    def __init__(self, spec: ServoSpec, physics: Physics, limits: Limits, now_ms: int) -> None:
+    def __init__(self, spec: ServoSpec, now_ms: int) -> None:
+        self._physics = checked(Physics(*spec.physics))
         self.firmware = spec.firmware
         self.shaft = self.drive.shaft
-        self.protection = Protection(self.model, physics, limits)
-        self.errors = 0
+        self.protection = Protection(self.model, self._physics, self._limits())
         self.on_address: Callable[[], None] = lambda: None
         self._address: object = None
-        self._pending: tuple[int, bytes] | None = None
-        self._calm = False
-        self._watchdog_ms = 0
         self._ms = self._booted_ms = self._deaf_until_ms = now_ms
-        self._look_ms = now_ms + LOOK_MS
+        self._check_ms = now_ms + CHECK_MS
+        self._boot()
+
+    def _boot(self) -> None:
+        """Begin as after power-on."""
+        self.memory.power_up()
+        self._pending: tuple[int, bytes] | None = None
+        self._watchdog_ms = 0
+        self.errors = 0
+        self.protection.restart()
+        self.drive.boot()
+        self._settle()
+
+    def _settle(self) -> None:
+        """Apply settings that have changed."""
+        get = self.memory.get
+        self._calm = False
+        self.id = get("id")
+        self.status_level = get("status_return_level")
+        self.answers_groups = self.status_level >= self.read_level
+        self.protection.limits = self._limits()
+        self.drive.settle()
+        address = self.id, self.baud, self.return_delay_s, self.shadow_id
+        if address != self._address:
+            self._address = address
+            self.on_address()
+
+    def _limits(self) -> Limits:
+        """Return what it bears by its registers."""
+        get = self.memory.get
+        return Limits(
+            get("temperature_limit"),
+            get("max_voltage_limit"),
+            get("min_voltage_limit"),
+            *self._load_limits(),
+        )
 
     # --- time
 
@@ -90,7 +121,7 @@ class SmartServo(ABC):
         if ahead > 0:
             if self._watchdog_ms and self.torque and now_ms >= fed_ms + self._watchdog_ms:
                 self._trip(max(0, fed_ms + self._watchdog_ms - self._ms))
-            if self.shaft.quiet and now_ms < self._look_ms:
+            if self.shaft.quiet and now_ms < self._check_ms:
                 self._ms = now_ms
             else:
                 self._move(now_ms)
@@ -98,33 +129,33 @@ class SmartServo(ABC):
 
     def _move(self, until_ms: int) -> None:
         """Move on; a long pause is passed at once, so that whoever asks then is answered."""
-        pause_at_ms, pause_ms = long_pause(self._ms, until_ms, LOOK_MS)
-        self._live_on(pause_at_ms)
+        pause_at_ms, pause_ms = long_pause(self._ms, until_ms, CHECK_MS)
+        self._run_until(pause_at_ms)
         if pause_ms:
             self.shaft.skip(pause_ms)
             self._ms += pause_ms
-            self._look_ms += pause_ms - LOOK_MS
-            self._look(pause_ms // LOOK_MS)
-            self._live_on(until_ms)
+            self._check_ms += pause_ms - CHECK_MS
+            self._check(pause_ms // CHECK_MS)
+            self._run_until(until_ms)
 
-    def _live_on(self, until_ms: int) -> None:
-        """Move on, and look at heat, load and voltage every 20 ms of its own time."""
+    def _run_until(self, until_ms: int) -> None:
+        """Move on, and check heat, load and voltage every 20 ms of its own time."""
         shaft = self.shaft
         while self._ms < until_ms:
-            stop = min(until_ms, self._look_ms)
+            stop = min(until_ms, self._check_ms)
             shaft.run(stop - self._ms)
             self._ms = stop
-            if stop == self._look_ms:
-                self._look()
-                if self._calm and shaft.quiet and until_ms > self._look_ms:
-                    self._look_ms += (until_ms - self._look_ms) // LOOK_MS * LOOK_MS
+            if stop == self._check_ms:
+                self._check()
+                if self._calm and shaft.quiet and until_ms > self._check_ms:
+                    self._check_ms += (until_ms - self._check_ms) // CHECK_MS * CHECK_MS
 
-    def _look(self, looks: int = 1) -> None:
+    def _check(self, checks: int = 1) -> None:
         """Watch over itself: protect itself, restart where the voltage is gone."""
-        self._look_ms += LOOK_MS
+        self._check_ms += CHECK_MS
         shaft, protection = self.shaft, self.protection
         before_c = protection.temperature_c
-        bits = protection.look(shaft.effort, shaft.volts, looks)
+        bits = protection.check(shaft.effort, shaft.volts, checks)
         self._calm = protection.temperature_c == before_c and protection.steady
         self._protect_from(bits)
         if protection.browned_out(shaft.volts):
@@ -141,19 +172,47 @@ class SmartServo(ABC):
         raise NotImplementedError
 
     @abstractmethod
-    def _boot(self) -> None:
-        """Begin as after power-on."""
-
-    @abstractmethod
     def _protect_from(self, bits: int) -> None:
         """Do what follows from what its protection finds wrong now."""
 
-    def _announce(self) -> None:
-        """Tell the chain where it listens or answers otherwise than before."""
-        address = self.id, self.baud, self.return_delay_s, self.shadow_id
-        if address != self._address:
-            self._address = address
-            self.on_address()
+    @abstractmethod
+    def _load_limits(self) -> tuple[float, ...]:
+        """Return the overload's share and time, and where it has them the current's."""
+
+    # --- instructions
+
+    def answers(self, code: int) -> bool:
+        """True if it answers an instruction to it alone."""
+        if code == REBOOT and self.mute_reboot:
+            return False
+        needed = 0 if code == PING else self.read_level if code == READ else self.answer_level
+        return self.status_level >= needed
+
+    def identity(self) -> bytes:
+        """Return what a ping is answered with."""
+        return b""
+
+    @abstractmethod
+    def read(self, address: int, length: int) -> bytes | None:
+        """Return bytes of the memory, None where an address is not defined."""
+
+    @abstractmethod
+    def write(self, address: int, data: bytes) -> int:
+        """Write bytes as an instruction does; return the error number, 0 when done."""
+
+    def register(self, address: int, data: bytes) -> int:
+        """Keep a write for Action; a later one replaces it. Return the error number."""
+        self._pending = (address, data)
+        self.memory.set("registered_instruction", 1)
+        return 0
+
+    def action(self) -> int:
+        """Carry out the kept write; return the error number."""
+        if self._pending is None:
+            return self.none_registered
+        (address, data), self._pending = self._pending, None
+        self.memory.set("registered_instruction", 0)
+        return self.write(address, data)
 
     # --- for the line
 
@@ -163,22 +222,26 @@ class SmartServo(ABC):
         """What stands in the error byte of every status."""
 
     @property
-    @abstractmethod
     def baud(self) -> int:
         """Bit/s by its register; a new one acts after the status of its write has gone out."""
+        return self.baud_rates[self.memory.get("baud_rate")]
 
     @property
-    @abstractmethod
     def return_delay_s(self) -> float:
         """The pause before a status, by its register."""
+        return self.memory.get("return_delay_time") * RETURN_DELAY_UNIT_S
 
-    @abstractmethod
-    def read(self, address: int, length: int) -> bytes | None:
-        """Return bytes of the memory, None where an address is not defined."""
+    def set_baud(self, baud: int) -> None:
+        """Set its baud rate for good.
 
-    @abstractmethod
-    def write(self, address: int, data: bytes) -> int:
-        """Write bytes as an instruction does; return the error number, 0 when done."""
+        Raises:
+            ValueError: it does not know this rate.
+        """
+        if baud not in self.baud_rates:
+            known = ", ".join(map(str, self.baud_rates))
+            raise ValueError(f"baud {baud}: {self.model.name} knows {known}")
+        self.memory.keep("baud_rate", self.baud_rates.index(baud))
+        self._settle()
 
     # --- from outside
 
@@ -210,13 +273,16 @@ class SmartServo(ABC):
         """Voltage at the servo, in 0.1 V."""
         return round(self.shaft.volts * self.model.rated_v * 10.0)
 
-    @abstractmethod
     def fail(self, error: str) -> str:
         """Let an error arise by name, as the servo's own protection would; return what it does.
 
         Raises:
             ValueError: there is no such error.
         """
+        if error not in self.error_bits:
+            raise ValueError(f"error {error!r}: there is {', '.join(self.error_bits)}")
+        self._protect_from(self.errors | self.error_bits[error])
+        return f"protects itself: {error}"
 
     @abstractmethod
     def reset_all(self) -> int:

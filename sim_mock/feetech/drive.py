@@ -1,6 +1,6 @@
-"""What turns the shaft of an emulated STS servo: modes, goals and origin between registers and it.
+"""Modes, goals and origin of an emulated Feetech servo, between its registers and its shaft.
 
-Reads the memory and never refuses anything. The registers' position is ``shaft.x + shift``;
+The registers' position is ``shaft.x + shift``;
 where turns are not counted it is told within one turn. Shaft and motor are those of
 gazerig.sim_mock.smart_servo.motor. What no document tells of the controller is assumed, so that a
 servo with factory gains needs all its duty at 50 steps of error and does not overshoot:
@@ -18,10 +18,12 @@ from gazerig.drivers.feetech.memory_table import (
 )
 from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
 from gazerig.drivers.feetech.memory_table import TORQUE_FULL as FULL
-from gazerig.sim_mock.feetech.memory import PWM, SERVO, STEP, WHEEL, FeetechMemory
-from gazerig.sim_mock.feetech.packets import signed, unsigned
-from gazerig.sim_mock.smart_servo.motor import LIMP, Loop, Shaft, flicker
-from gazerig.sim_mock.smart_servo.physics import Physics
+from gazerig.sim_mock.feetech.memory import FeetechMemory
+from gazerig.sim_mock.feetech.packets import signed
+from gazerig.sim_mock.feetech.tables import PWM, SERVO, STEP, WHEEL
+from gazerig.sim_mock.smart_servo.drive import Drive
+from gazerig.sim_mock.smart_servo.motor import LIMP, Loop, flicker
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
 
 CURRENT_UNIT_A = CURRENT_UNIT_MA / 1000.0
@@ -54,31 +56,24 @@ class Sensed(NamedTuple):
     current: int
 
 
-class FeetechDrive:
-    """What turns the shaft.
+class FeetechDrive(Drive):
+    """What turns the shaft of a Feetech servo.
 
-    torque: whether it is switched on
-    most: share of the duty that a protection leaves
+    Attributes:
+        most: share of the duty that a protection leaves.
     """
 
-    def __init__(
-        self,
-        memory: FeetechMemory,
-        model: FeetechModel,
-        physics: Physics,
-        start_steps: float,
-        seed: int,
-    ) -> None:
-        self.memory = memory
-        self._goals = GOALS[memory.table.order]
-        self._scale = memory.table.turn_steps / TURN
-        self._last = memory.table.last_step
-        self.shaft = Shaft(model, physics, start_steps / self._scale)
+    memory: FeetechMemory
+
+    def __init__(self, memory: FeetechMemory, model: FeetechModel, spec: ServoSpec) -> None:
+        table = memory.table
+        self._goals = GOALS[table.order]
+        self._scale = table.turn_steps / TURN
+        self._last = table.last_step
         self._top = model.no_load_rpm / 60.0 * TURN / 1000.0
         self._current_full = model.stall_current_a / CURRENT_UNIT_A
-        self._noise = seed, physics.noise_current, physics.noise_velocity
         self._timed = True
-        self.boot()
+        super().__init__(memory, model, spec, self._scale)
 
     def boot(self) -> None:
         """Begin without torque, within one turn."""
@@ -86,7 +81,7 @@ class FeetechDrive:
         self.most = 1.0
         self.mode = self._wanted_mode()
         self._asked: tuple[int, ...] = ()
-        self._offset = self.memory.get("offset")
+        self._offset = self.memory.get("position_offset")
         self.shaft.let_go()
         self._locate()
         self.settle()
@@ -134,14 +129,14 @@ class FeetechDrive:
     def settle(self) -> None:
         """Take over what the registers say now."""
         get = self.memory.get
-        phase, low, high = get("phase"), get("min_angle"), get("max_angle")
+        phase, low, high = get("phase"), get("min_position_limit"), get("max_position_limit")
         endless = low == 0 and high == 0
         self.counts_turns = self._last is None and (endless or bool(phase & COUNTS_TURNS))
         self._range = None if endless else (min(low, high), max(low, high))
         self._speed_unit = 1 if phase & FINE_SPEED else COARSE_STEPS_S
         self._stops_at_zero = not phase & ZERO_IS_FASTEST
         self._threshold = get("moving_threshold")
-        offset = get("offset")
+        offset = get("position_offset")
         if offset != self._offset:
             self._shift += self._offset - offset
             self._offset = offset
@@ -154,9 +149,9 @@ class FeetechDrive:
     def _wanted_mode(self) -> int:
         """Return the mode of its register, or of its limits where a series has none."""
         get = self.memory.get
-        if self._last is not None and get("min_angle") == get("max_angle") == 0:
+        if self._last is not None and get("min_position_limit") == get("max_position_limit") == 0:
             return PWM
-        return get("mode")
+        return get("operating_mode")
 
     def tune(self) -> None:
         """Take over gains, torque limit and, in mode PWM, the duty."""
@@ -169,21 +164,21 @@ class FeetechDrive:
             return Loop(bias=signed(get("goal_time"), 10) / FULL, u_most=most)
         if self.mode == WHEEL:
             damping, sum_up = (
-                SPEED_P_SHARE * get("speed_p_gain"),
-                SPEED_I_SHARE * get("speed_i_gain"),
+                SPEED_P_SHARE * get("velocity_p_gain"),
+                SPEED_I_SHARE * get("velocity_i_gain"),
             )
             return Loop(d=damping, vi=sum_up, u_most=most)
         return Loop(
-            p=P_SHARE * get("p_gain"),
-            i=I_SHARE * get("i_gain"),
-            d=D_SHARE * get("d_gain"),
+            p=P_SHARE * get("position_p_gain"),
+            i=I_SHARE * get("position_i_gain"),
+            d=D_SHARE * get("position_d_gain"),
             u_most=most,
         )
 
     def _change_mode(self, mode: int) -> None:
         """Begin a mode where the shaft is."""
         self.mode = mode
-        self._goal_here()
+        self._set_goal_here()
         if self.torque:
             self._begin()
 
@@ -197,7 +192,7 @@ class FeetechDrive:
             if not self.counts_turns:
                 self._locate()
             if from_here:
-                self._goal_here()
+                self._set_goal_here()
             self._begin()
         elif was and not self.torque:
             self.shaft.let_go()
@@ -205,10 +200,8 @@ class FeetechDrive:
 
     def _begin(self) -> None:
         """Let a profile begin where the shaft is."""
-        shaft = self.shaft
         self._asked = ()
-        wheel = self.mode == WHEEL
-        shaft.start(SpeedProfile(shaft.x, shaft.v) if wheel else Profile(shaft.x))
+        self._lead_from_here(self.mode == WHEEL)
         self.tune()
         if self.mode != STEP:
             self.follow()
@@ -257,11 +250,6 @@ class FeetechDrive:
             profile.by_velocity(to, min(cruise or self._top, self._top), ramp * RAMP_UNIT)
         self.shaft.wake()
 
-    def _goal_here(self) -> None:
-        """Make the goal position the present one."""
-        here = round(self.position_steps)
-        self.memory.set("goal_position", unsigned(here, 15))
-
     # --- origin
 
     def _locate(self) -> None:
@@ -274,14 +262,14 @@ class FeetechDrive:
         if self._last is not None:
             return
         offset = (round(self.shaft.x) - to + TURN // 2) % TURN - TURN // 2
-        self.memory.keep("offset", unsigned(offset, 11))
+        self.memory.keep("position_offset", offset)
         self.settle()
-        self._goal_here()
+        self._set_goal_here()
 
     def forget_turns(self) -> None:
         """Begin to count turns anew; under torque it stays where it is."""
         self._locate()
-        self._goal_here()
+        self._set_goal_here()
         if self.torque:
             self._begin()
 

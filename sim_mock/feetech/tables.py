@@ -1,0 +1,190 @@
+"""Registers and models of the Feetech servos that can be emulated: series STS and SCS.
+
+SCS servos speak the same packets with the high byte of two first. Their position comes from a
+potentiometer of 1024 steps over less than a turn; with both angle limits 0 they are driven by the
+duty in Goal Time (44). They answer no sync read and have no offset, torque limit or current.
+
+Sources: Feetech, memory table of the STS series and SCSCL of its SDK (addresses); rustypot's table
+of the SCS0009. Start values marked [A] are assumed, [R] are those that owners read out.
+"""
+
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
+
+from gazerig.drivers.feetech.memory_table import BAUD_RATES, HIGHEST_ID, MODELS, FeetechModel
+
+SERVO, WHEEL, PWM, STEP = 0, 1, 2, 3
+"""Operating modes (33)."""
+
+
+class Register(NamedTuple):
+    """One register; ``sign``: the bit its sign stands in, None where it has none."""
+
+    name: str
+    address: int
+    size: int = 1
+    initial: int = 0
+    sign: int | None = None
+
+
+def _with(registers: tuple[Register, ...], **initial: int) -> tuple[Register, ...]:
+    """Return registers with other start values."""
+    return tuple(r._replace(initial=initial.get(r.name, r.initial)) for r in registers)
+
+
+_KEPT = (
+    Register("id", 5, initial=1),
+    Register("baud_rate", 6),
+    Register("return_delay_time", 7, initial=250),  # [R]; 2 us
+    Register("status_return_level", 8, initial=1),
+    Register("min_position_limit", 9, 2),
+    Register("max_position_limit", 11, 2, 4095),
+    Register("temperature_limit", 13, initial=70),
+    Register("max_voltage_limit", 14, initial=80),
+    Register("min_voltage_limit", 15, initial=40),
+    Register("max_torque", 16, 2, 1000),
+    Register("phase", 18, initial=12),  # [R]: speeds in steps/s, speed 0 is the highest
+    Register("unloading_condition", 19, initial=0x2C),  # [R]: overheat, overcurrent, overload
+    Register("led_alarm_condition", 20, initial=0x2F),  # [R]
+    Register("position_p_gain", 21, initial=32),  # [R]
+    Register("position_d_gain", 22, initial=32),  # [R]
+    Register("position_i_gain", 23),
+    Register("minimum_startup_force", 24, 2, 16),  # [R]
+    Register("cw_dead_zone", 26, initial=1),
+    Register("ccw_dead_zone", 27, initial=1),
+)
+_STS_KEPT = (
+    *_KEPT,
+    Register("protection_current", 28, 2, 500),  # [R]; 6.5 mA
+    Register("angular_resolution", 30, initial=1),
+    Register("position_offset", 31, 2, sign=11),
+    Register("operating_mode", 33),
+    Register("protective_torque", 34, initial=20),
+    Register("protection_time", 35, initial=200),
+    Register("overload_torque", 36, initial=80),
+    Register("velocity_p_gain", 37, initial=10),  # [R]
+    Register("overcurrent_time", 38, initial=200),
+    Register("velocity_i_gain", 39, initial=200),  # [A]
+    # Set in the factory.
+    Register("moving_threshold", 80, initial=1),  # [A]
+    Register("dts", 81),
+    Register("velocity_unit_factor", 82, initial=1),
+    Register("hts", 83),
+    Register("max_velocity_limit", 84),  # 50 steps/s, as the model is
+    Register("max_acceleration", 85, initial=254),  # [R]
+    Register("acceleration_factor", 86, initial=1),
+)
+_SCS_KEPT = (
+    # What STS servos have there is assumed of these, too [A].
+    *_with(_KEPT, max_position_limit=1023, unloading_condition=0x24, led_alarm_condition=0x25),
+    Register("protective_torque", 37, initial=20),
+    Register("protection_time", 38, initial=200),
+    Register("overload_torque", 39, initial=80),
+    Register("pwm_step", 78),
+    Register("moving_threshold", 79, initial=1),  # [A]
+    Register("dts", 80),
+    Register("min_velocity_limit", 81),
+    Register("max_velocity_limit", 82),  # 50 steps/s, as the model is
+)
+_RAM = (
+    Register("torque_enable", 40),
+    Register("acceleration", 41),
+    Register("goal_position", 42, 2, sign=15),
+    Register("goal_time", 44, 2),  # where a duty drives the motor the duty, its sign in bit 10
+    Register("goal_speed", 46, 2, sign=15),
+)
+_FIXED = (
+    Register("firmware_major", 0, initial=3),
+    Register("firmware_minor", 1),
+    Register("endianness", 2),
+    Register("model_number", 3, 2),
+    Register("registered_instruction", 64),
+)
+_ABSENT_FROM_SCS = (
+    Register("protection_current", 256, 2, 0xFFFF),
+    Register("position_offset", 258, 2),
+    Register("operating_mode", 260),
+    Register("overcurrent_time", 261, initial=255),
+    Register("torque_limit", 262, 2, 1000),
+    Register("velocity_p_gain", 264, initial=10),
+    Register("velocity_i_gain", 265, initial=200),
+)
+
+
+class Table(NamedTuple):
+    """The registers of one series of servos.
+
+    kept: kept without power; ram: given start values; fixed: never written
+    absent: what a series lacks and its motor goes by all the same; beyond what can be read
+    order: which byte of two comes first
+    lock_at: the register that keeps what is written from being kept
+    highest: largest value that exists, by address
+    turn_steps: steps of the position a whole turn would have
+    last_step: where the sensor of the position ends, None where it goes round
+    sync_read: its servos answer a sync read
+    baud_rates: bit/s by the value of their register
+    """
+
+    kept: tuple[Register, ...]
+    ram: tuple[Register, ...]
+    lock_at: int
+    highest: Mapping[int, int]
+    fixed: tuple[Register, ...] = _FIXED
+    absent: tuple[Register, ...] = ()
+    order: Literal["little", "big"] = "little"
+    turn_steps: float = 4096.0
+    last_step: int | None = None
+    sync_read: bool = True
+    baud_rates: tuple[int, ...] = BAUD_RATES
+
+
+STS = Table(
+    kept=_STS_KEPT,
+    ram=(*_RAM, Register("torque_limit", 48, 2), Register("lock", 55, initial=1)),
+    lock_at=55,
+    highest={5: HIGHEST_ID, 6: len(BAUD_RATES) - 1, 33: STEP},
+)
+
+_SCS_STEPS = 1024
+_SCS_BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 57_600, 38_400, 19_200)
+
+
+def _scs(
+    name: str, number: int, travel_deg: float, stall_nm: float, stall_a: float, rpm: float
+) -> tuple[FeetechModel, Table]:
+    """Return a model that is rated at 6 V, and its registers."""
+    turn_steps = _SCS_STEPS * 360.0 / travel_deg
+    model = FeetechModel(name, number, round(turn_steps), 70, 40, 80, stall_nm, 6.0, stall_a, rpm)
+    table = Table(
+        kept=_SCS_KEPT,
+        ram=(*_RAM, Register("lock", 48, initial=1)),
+        lock_at=48,
+        highest={5: HIGHEST_ID, 6: len(_SCS_BAUD_RATES) - 1},
+        absent=_ABSENT_FROM_SCS,
+        order="big",
+        turn_steps=turn_steps,
+        last_step=_SCS_STEPS - 1,
+        sync_read=False,
+        baud_rates=_SCS_BAUD_RATES,
+    )
+    return model, table
+
+
+SCS = {
+    "scs0009": _scs("scs0009", 1284, 300.0, 0.226, 1.0, 100.0),
+    # Number and stall current of the SCS15 are assumed [A].
+    "scs15": _scs("scs15", 1295, 200.0, 1.47, 2.0, 62.5),
+}
+
+
+def model_and_table(model: str) -> tuple[FeetechModel, Table]:
+    """Return a model and the registers of its series.
+
+    Raises:
+        ValueError: there is no such model.
+    """
+    if model in SCS:
+        return SCS[model]
+    if model not in MODELS:
+        raise ValueError(f"model {model!r}: Feetech servos are {', '.join((*MODELS, *SCS))}")
+    return MODELS[model], STS

@@ -1,0 +1,91 @@
+"""The instructions that all makes have, as one servo carries them out, and those of groups."""
+
+import struct
+from collections.abc import Callable, Mapping
+from typing import Generic, Literal, TypeVar
+
+from gazerig.sim_mock.smart_servo.framing import ACTION, PING, READ, REBOOT, REG_WRITE, WRITE
+from gazerig.sim_mock.smart_servo.servo import SmartServo
+
+Result = tuple[int, bytes]
+"""Error number and parameters of an answer."""
+
+GroupRead = tuple[int, int, int]
+"""Id, address, length of one servo's part of a group read."""
+
+GroupWrite = tuple[int, int, bytes]
+"""Id, address, data of one servo's part of a group write."""
+
+S = TypeVar("S", bound=SmartServo)
+
+
+class InstructionSet(Generic[S]):
+    """What one make of servos can be told.
+
+    Args:
+        address_bytes: so many bytes an address has in a packet; a length has as many.
+        misunderstood: the result of what is no instruction; None: silence.
+        own: instructions of this make, by code.
+    """
+
+    def __init__(
+        self,
+        address_bytes: Literal[1, 2],
+        misunderstood: Result | None,
+        own: Mapping[int, Callable[[S, bytes], Result | None]],
+    ) -> None:
+        self._address_bytes = address_bytes
+        self._span = struct.Struct("<HH" if address_bytes == 2 else "<BB")
+        self._misunderstood = misunderstood
+        self._actions: dict[int, Callable[[S, bytes], Result | None]] = {
+            PING: lambda servo, params: (0, servo.identity()),
+            READ: self._read,
+            WRITE: lambda servo, params: self._write(servo.write, params),
+            REG_WRITE: lambda servo, params: self._write(servo.register, params),
+            ACTION: lambda servo, params: (servo.action(), b""),
+            REBOOT: _reboot,
+            **own,
+        }
+
+    def carry_out(self, servo: S, code: int, params: bytes) -> Result | None:
+        """Let a servo that is awake carry out an instruction; None: it says nothing to it."""
+        action = self._actions.get(code)
+        return self._misunderstood if action is None else action(servo, params)
+
+    def sync_rows(self, params: bytes) -> list[GroupRead]:
+        """Read the parameters of a sync read."""
+        if len(params) <= self._span.size:
+            return []
+        address, length = self._span.unpack_from(params)
+        return [(servo_id, address, length) for servo_id in params[self._span.size :]]
+
+    def sync_writes(self, params: bytes) -> list[GroupWrite]:
+        """Read the parameters of a sync write; nothing where they do not add up."""
+        rows = params[self._span.size :]
+        if len(params) < self._span.size:
+            return []
+        address, length = self._span.unpack_from(params)
+        if len(rows) % (1 + length):
+            return []
+        pairs = struct.iter_unpack(f"<B{length}s", rows)
+        return [(servo_id, address, data) for servo_id, data in pairs]
+
+    def address_of(self, params: bytes) -> int:
+        """Return the address that a write begins with."""
+        return int.from_bytes(params[: self._address_bytes], "little")
+
+    def _read(self, servo: S, params: bytes) -> Result | None:
+        if len(params) != self._span.size:
+            return self._misunderstood
+        data = servo.read(*self._span.unpack(params))
+        return (servo.unreadable, b"") if data is None else (0, data)
+
+    def _write(self, take: Callable[[int, bytes], int], params: bytes) -> Result | None:
+        if len(params) < self._address_bytes:
+            return self._misunderstood
+        return take(self.address_of(params), params[self._address_bytes :]), b""
+
+
+def _reboot(servo: SmartServo, params: bytes) -> Result:
+    servo.restart()
+    return 0, b""
