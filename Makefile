@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 OTHER_SDK := dynamixel-sdk==3.8.4
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: run test check docs bench links figures clean
+.PHONY: run test check coverage docs package bench links figures clean
 
 run: $(VENV)/.installed
 	$(BIN)/gazerig run --mock
@@ -20,6 +20,14 @@ check: $(VENV)/.installed-dev links
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	PYTHONPATH=.links $(BIN)/lint-imports --no-logo
+
+# How much of the source the tests reach, line by line and branch by branch; too little fails it.
+coverage: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --cov --cov-report=term:skip-covered
+
+# Wheel and sdist in dist/, each installed into a fresh environment and run there.
+package: $(VENV)/.installed-dev
+	.ci/package $(BIN)/python
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_run.py
@@ -48,7 +56,7 @@ figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/make_figures.py
 
 clean:
-	rm -rf $(VENV) .links build site *.egg-info
+	rm -rf $(VENV) .links build dist site *.egg-info
 
 # $(call install,WHAT) makes the environment and installs WHAT into it.
 define install
