@@ -2,7 +2,6 @@
 
 import re
 import tomllib
-from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +51,7 @@ def covered(package: str, path: Path) -> bool:
     """Return whether a pattern of the package or of one above it names the file."""
     while True:
         folder = source_folders()[package]
-        within = path.relative_to(folder).as_posix()
-        if any(fnmatch(within, pattern) for pattern in DATA.get(package, [])):
+        if any(path in folder.glob(pattern) for pattern in DATA.get(package, [])):
             return True
         if package in FOLDERS:
             return False
