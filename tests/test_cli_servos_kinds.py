@@ -3,11 +3,13 @@
 import contextlib
 import json
 import re
+from pathlib import Path
 
 import pytest
 from mixed_rig import mixed_text
 from typer.testing import CliRunner
 
+from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.list_ports import Host, SerialPort
 from gazerig.drivers.serial.port import BlockingPort
@@ -213,7 +215,7 @@ def test_setup_of_a_maestro_that_does_not_answer():
     with PtyBus() as bus:
         path = bus.start_device(MaestroLine(), choices={"mode": "mute"})
         code, _, err = gazerig("setup", "maker", "--port", path, "--yes", "--joint", "eyes_pan")
-        assert code == 2 and "no Maestro answers as the YAML says" in err
+        assert code == 2 and "no Maestro answers: on USB take the first of its two ports" in err
 
 
 def test_setup_of_a_board_that_is_too_small(monkeypatch):
@@ -226,6 +228,43 @@ def test_setup_of_a_board_that_is_too_small(monkeypatch):
         monkeypatch.setattr("gazerig.robot.cli.setup_maestro.USB_CHANNELS", {"1ffb:0089": 2})
         code, _, err = gazerig("setup", "maker", "--port", path, "--yes")
         assert code == 2 and "has channels 0..1, not those of left_upper_lid (channel 2)" in err
+
+
+@pytest.fixture
+def on_pca9685(tmp_path):
+    """Return the path of the maker's rig with a PCA9685 in place of its Maestro."""
+    text = shipped("rigs", "maker").read_text(encoding="utf-8")
+    start, end = text.index("bus:  #"), text.index("geometry:")
+    section = "bus:\n  port: /dev/i2c-1\n  kind: pca9685  # mine\n\n"
+    path = tmp_path / "mine.yaml"
+    path.write_text(text[:start] + section + text[end:], encoding="utf-8")
+    return str(path)
+
+
+def test_setup_of_a_pca9685_measures_its_clock_and_moves_one_channel_after_another(on_pca9685):
+    with served(on_pca9685) as (port, _, command):
+        command("set oscillator-mhz 25.44")
+        code, _, err = gazerig(
+            "setup", on_pca9685, "--port", port, "--joint", "eyes_pan", "--joint", "left_upper_lid",
+            # what the meter shows, at last; write it; move; another moved; move; that is it; skip
+            answers="about 50\n5.09 Hz\n50.9 hz\ny\ny\nn\ny\ny\nn\n",
+        )  # fmt: skip
+        assert code == 0 and "eyes_pan: channel 0 of board 0x40" in err
+        assert "channel 15, where no joint is, gives 1500 us at 50 Hz" in err
+        assert "'about 50': type the frequency or the pulse" in err
+        assert "would be a clock of 2.54 MHz" in err and "about 50.0 Hz" in err
+        assert "its clock has 25.435 MHz: pulses were 1.7 % too short" in err
+        assert "plug its servo into channel 0" in err and "skipped: left_upper_lid" in err
+        status = json.loads(command("status"))["servos"]
+        assert not any(one["target"] for one in status)
+        assert abs(status[0]["place"] - 6000) < 80 and status[2]["place"] == 5920
+    text = Path(on_pca9685).read_text(encoding="utf-8")
+    assert "# mine" in text and load_rig(on_pca9685).bus.pca9685.oscillator_hz == 25_435_000
+
+
+def test_setup_of_a_pca9685_with_yes_measures_nothing(on_pca9685):
+    code, _, err = gazerig("setup", on_pca9685, "--mock", "--yes", "--joint", "eyes_pan")
+    assert code == 0 and "--yes has no meter" in err and "done: 1 of 1" in err
 
 
 def test_setup_goes_through_all_buses(mixed):

@@ -96,6 +96,6 @@ def test_doctor_and_setup_as_typed(rig_file: str) -> None:
     done = CliRunner().invoke(cli_servos.app, ["doctor", rig_file, "--mock"])
     assert done.exit_code == 0, done.output
     assert "answers at 0x40; pulses on 0 of 6 channels" in done.output
-    done = CliRunner().invoke(cli_servos.app, ["setup", rig_file, "--mock"])
+    done = CliRunner().invoke(cli_servos.app, ["setup", rig_file, "--mock", "--yes"])
     assert done.exit_code == 0 and "board 0x40: jumpers none closed" in done.stderr
     assert "eyes_pan: channel 0 of board 0x40" in done.stderr

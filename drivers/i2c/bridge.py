@@ -4,7 +4,7 @@ All ports of servos carry bytes, so these carry I2C: a bridge on a serial line, 
 on a pseudo-terminal, and gazerig.drivers.i2c.port, which does with the kernel's buses what a
 bridge does with its own. S begins, then the address with its direction bit and a count, and of a
 write so many bytes; P ends. R, a register, P reads the bridge's own; register 0A tells how the last
-transfer ended. Source: NXP, SC18IM700 data sheet, section 7.1.
+transfer ended. Source: NXP, SC18IM700 data sheet, rev. 2 (10 August 2007).
 """
 
 from collections.abc import Iterator

@@ -7,24 +7,21 @@ goal that is not followed up stands. What a servo's id is: sixteen times its boa
 from collections import defaultdict
 from collections.abc import Sequence
 
-from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import BoardTexts, Seen, Timing
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.release import TRIES
 from gazerig.drivers.hobby_board.start import every_pulse
 from gazerig.drivers.i2c import bridge
 from gazerig.drivers.i2c.line import I2cLine
 from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.pca9685.probe import see_board
 from gazerig.drivers.pca9685.registers import (
     ALL_LED,
     AUTO_INCREMENT,
     AWAKE,
     BYTES,
     CHANNELS,
-    EXTCLK,
     FULL_OFF,
-    LED0,
     MODE1,
     MODE2,
     PRESCALE,
@@ -33,14 +30,12 @@ from gazerig.drivers.pca9685.registers import (
     START_S,
     TOTEM_POLE,
     US_STEPS,
+    Clock,
     counts_of,
     counts_within,
     output,
-    plausible,
-    prescale_of,
     pulse,
     runs,
-    steps_per_count,
 )
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoSetup
@@ -86,7 +81,7 @@ class Pca9685Board:
             unheard="check power, SDA, SCL and ground of its board",
             left_alone="the board goes on with its last pulses as long as it has power",
         )
-        self._prescale = prescale_of(params.frequency_hz, params.oscillator_hz)
+        self._clocks = params.clocks
         self._sent: dict[int, tuple[int, int]] = {}
         self._sent_s = 0.0
         self._looks = 0
@@ -124,8 +119,9 @@ class Pca9685Board:
             boards[address].append(channel)
         return boards
 
-    def _steps(self, counts: int, prescale: int) -> float:
-        return counts * steps_per_count(prescale, self.params.oscillator_hz)
+    def _clock(self, servo_id: int) -> Clock:
+        """Return the clock of a servo's board."""
+        return self._clocks[self._place(servo_id)[0]]
 
     # --- finding
 
@@ -138,60 +134,8 @@ class Pca9685Board:
         """
         self._sent.clear()
         for address in self._boards([setup.id for setup in setups]):
-            self._see_board(address)
+            see_board(self.line, address)
         return every_pulse(self, setups)
-
-    def _see_board(self, address: int) -> None:
-        """See that what answers at an address is a PCA9685.
-
-        Raises:
-            ServoMissing: it is not, or nothing answers.
-        """
-        where = f"{self.line.port.port_name}: "
-        tries = (self._registers(address) for _ in range(TRIES))
-        found = next((one for one in tries if one is not None), None)
-        if found is None and self.line.why == "bus stuck":
-            raise ServoMissing(
-                f"{where}the I2C bus is stuck, its data or clock line is held down: switch what "
-                "hangs on it off and on, check SDA and SCL for a short"
-            )
-        if found is None and self.line.why != "not acknowledged":
-            raise ServoMissing(
-                f"{where}nobody answers as an I2C bus ({self.line.why}): a PCA9685 is reached over "
-                "an I2C bus such as /dev/i2c-1: write it under bus.port"
-            )
-        if found is None:
-            raise ServoMissing(
-                f"{where}no PCA9685 answers at {address:#x}: has the board its logic supply (VCC, "
-                "not V+ alone)? check SDA, SCL and ground; its jumpers make the address"
-            )
-        first_six, outputs, prescale = found
-        if not plausible(first_six, outputs, prescale):
-            raise ServoMissing(
-                f"{where}what answers at {address:#x} is no PCA9685: another chip has this "
-                "address; close a jumper and write the new one under bus.pca9685.address"
-            )
-        if first_six[MODE1] & EXTCLK:
-            raise ServoMissing(
-                f"{where}the board at {address:#x} was set to an external clock: switch its logic "
-                "supply off and on"
-            )
-
-    def answers(self, address: int) -> bool:
-        """Return whether something at an address is by its registers a PCA9685."""
-        if self.line.ask([(bridge.read(address, MODE1, 1), 1)]) is None:
-            return False
-        found = self._registers(address)
-        return found is not None and plausible(*found)
-
-    def _registers(self, address: int) -> tuple[bytes, bytes, int] | None:
-        """Read all registers of a board one by one, which needs no setting of it."""
-        single = [*range(LED0), *range(LED0, LED0 + CHANNELS * BYTES), PRESCALE]
-        found = self.line.ask([(bridge.read(address, register, 1), 1) for register in single])
-        if found is None:
-            return None
-        flat = b"".join(found)
-        return flat[:LED0], flat[LED0:-1], flat[-1]
 
     # --- setting up
 
@@ -204,9 +148,9 @@ class Pca9685Board:
         if now is None:
             return False
         mode1, mode2, prescale = now
-        if (mode1, mode2, prescale) == (AWAKE, TOTEM_POLE, self._prescale):
+        if (mode1, mode2, prescale) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale):
             return True
-        if mode1 & (SLEEP | RESTART) or prescale != self._prescale:
+        if mode1 & (SLEEP | RESTART) or prescale != self._clocks[address].prescale:
             return self._set_up(address)
         return self.line.tell(
             bridge.write(address, MODE1, bytes((AWAKE,))),
@@ -232,7 +176,7 @@ class Pca9685Board:
         asleep = self.line.tell(
             bridge.write(address, ALL_LED + BYTES - 1, bytes((FULL_OFF,))),
             bridge.write(address, MODE1, bytes((SLEEP | AUTO_INCREMENT,))),
-            bridge.write(address, PRESCALE, bytes((self._prescale,))),
+            bridge.write(address, PRESCALE, bytes((self._clocks[address].prescale,))),
             bridge.write(address, MODE2, bytes((TOTEM_POLE,))),
             bridge.write(address, MODE1, bytes((AWAKE,))),
         )
@@ -241,7 +185,7 @@ class Pca9685Board:
         self.line.wait(self.line.port.now_s() + START_S)
         # What slept with pulses on holds them back until this; there are none now.
         self.line.tell(bridge.write(address, MODE1, bytes((RESTART | AWAKE,))))
-        return self._modes(address) == (AWAKE, TOTEM_POLE, self._prescale)
+        return self._modes(address) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale)
 
     def _forget(self, address: int) -> None:
         """Forget what was sent to a board."""
@@ -268,8 +212,9 @@ class Pca9685Board:
         found = self.line.ask(questions)
         if found is None:
             return None
-        prescale = found[2][0] if with_prescale else self._prescale
-        if found[0][0] == AWAKE and prescale == self._prescale:
+        usual = self._clocks[address].prescale
+        prescale = found[2][0] if with_prescale else usual
+        if found[0][0] == AWAKE and prescale == usual:
             return Seen(self._told(channel.id, counts_of(found[1]), prescale))
         return self._look_closer(channel)
 
@@ -279,17 +224,17 @@ class Pca9685Board:
         now, pulses = self._modes(address), self.pulses((channel.id,))
         if now is None or pulses is None:
             return None
-        well = now[0] & ~RESTART == AWAKE and now[2] == self._prescale
+        well = now[0] & ~RESTART == AWAKE and now[2] == self._clocks[address].prescale
         asleep = bool(now[0] & (SLEEP | RESTART))
         changed = () if well or asleep or not channel.held else ("settings changed",)
         return Seen(pulses[0], changed)
 
     def _told(self, servo_id: int, counts: int, prescale: int) -> int:
         """Return the pulse that counts make: as it was sent, where they are what was sent."""
-        sent = self._sent.get(servo_id)
-        if sent is not None and sent[0] == counts and prescale == self._prescale:
+        sent, clock = self._sent.get(servo_id), self._clock(servo_id)
+        if sent is not None and sent[0] == counts and prescale == clock.prescale:
             return sent[1]
-        return round(self._steps(counts, prescale))
+        return round(counts * clock._replace(prescale=prescale).grain_steps)
 
     def wake(self) -> tuple[str, ...] | None:
         """Ask the first board whether it is there."""
@@ -369,7 +314,7 @@ class Pca9685Board:
     def _due(self, channel: Channel) -> tuple[int, int]:
         """Return where a channel is on its way: in counts inside its limits, and in steps."""
         steps, setup = round(channel.ramp.pulse_steps), channel.setup
-        grain = self._steps(1, self._prescale)
+        grain = self._clock(channel.id).grain_steps
         return counts_within(steps, setup.min_steps, setup.max_steps, grain), steps
 
     def lead(self, channels: Sequence[Channel]) -> None:

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from gazerig.drivers.pca9685.registers import CHANNELS, MOST_PRESCALE, prescale_of
+from gazerig.drivers.hobby_board.params import BoardParams
+from gazerig.drivers.pca9685.registers import CHANNELS, MOST_PRESCALE, Clock, prescale_of
 from gazerig.params import Bounds
 
 BRIDGE_BAUD = 115_200
@@ -14,7 +15,7 @@ RESERVED = (0x70, *range(0x78, 0x80))
 
 
 @dataclass(frozen=True, slots=True)
-class Pca9685Params:
+class Pca9685Params(BoardParams):
     """How to reach the boards of one I2C bus."""
 
     # fmt: off
@@ -24,14 +25,10 @@ class Pca9685Params:
     frequency_hz: Annotated[float, Bounds(40, 330), "Pulses in a second; analogue servos take 50, many digital ones more."] = 50.0
     oscillator_hz: Annotated[float, Bounds(22_000_000, 28_000_000),
         "The board's own clock. It differs from board to board by some percent, and pulses with it: measure one (gazerig setup)."] = 25e6
+    further_oscillators_hz: Annotated[tuple[float, ...], Bounds(22_000_000, 28_000_000),
+        "Clocks of the further boards, in their order; oscillator_hz where none is."] = ()
     min_pulse_us: Annotated[float, Bounds(100, 3000), "No shorter pulse is ever sent."] = 500.0
     max_pulse_us: Annotated[float, Bounds(100, 3000), "No longer pulse is ever sent."] = 2500.0
-    reply_timeout_ms: Annotated[float, Bounds(1, 200), "Patience for an answer beyond the time its bytes take, behind a bridge."] = 20.0
-    watch_ms: Annotated[float, Bounds(0, 50),
-        "Look at the board so often; 0: in every read. More saves time on a slow bus, but restarts are noticed later."] = 0.0
-    stagger_ms: Annotated[float, Bounds(0, 1000),
-        "Servos without pulses start so long after one another: all at once pull a weak supply down."] = 100.0
-    give_up_s: Annotated[float, Bounds(0.5, 3600), "Wait so long for a bus or board that is gone to come back."] = 60.0
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -52,13 +49,25 @@ class Pca9685Params:
                 f"max_pulse_us {self.max_pulse_us:g} does not fit between pulses at "
                 f"{self.frequency_hz:g} Hz: lower frequency_hz"
             )
-        if prescale_of(self.frequency_hz, self.oscillator_hz) > MOST_PRESCALE:
+        if len(self.further_oscillators_hz) > len(self.further_addresses):
+            raise ValueError("further_oscillators_hz has more clocks than further_addresses boards")
+        if any(clock.prescale > MOST_PRESCALE for clock in self.clocks.values()):
             raise ValueError("frequency_hz is too low for this oscillator_hz")
 
     @property
     def addresses(self) -> tuple[int, ...]:
         """Return the addresses of all boards, in their order."""
         return (self.address, *self.further_addresses)
+
+    @property
+    def clocks(self) -> dict[int, Clock]:
+        """Return the clock of each board by its address."""
+        known = (self.oscillator_hz, *self.further_oscillators_hz)
+        rest = (self.oscillator_hz,) * (len(self.addresses) - len(known))
+        return {
+            address: Clock(hz, prescale_of(self.frequency_hz, hz))
+            for address, hz in zip(self.addresses, (*known, *rest), strict=True)
+        }
 
     @property
     def channels(self) -> int:

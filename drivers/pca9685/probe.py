@@ -1,11 +1,22 @@
-"""Which addresses of an I2C bus answer as a PCA9685 does: registers are read, none is written."""
+"""Whether a PCA9685 is at an address: registers are read one by one, none is written."""
 
-from gazerig.drivers.errors import PortError
-from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.i2c.bridge import read
+from gazerig.drivers.i2c.line import I2cLine
 from gazerig.drivers.pca9685.params import RESERVED, Pca9685Params
+from gazerig.drivers.pca9685.registers import (
+    BYTES,
+    CHANNELS,
+    EXTCLK,
+    LED0,
+    MODE1,
+    PRESCALE,
+    plausible,
+)
 from gazerig.drivers.serial.port import BusPort
 
 FIRST, LAST = 0x40, 0x77
+TRIES = 3
 
 
 def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
@@ -17,13 +28,67 @@ def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: name its port")
-    board = Pca9685Board(port, params)
+    line = I2cLine(port, params.baud, params.reply_timeout_ms)
     found = []
     for address in range(FIRST, LAST + 1):
         if address in RESERVED:
             continue
-        if board.answers(address):
-            found.append(address)
-        elif board.line.why and board.line.why != "not acknowledged":
+        if line.ask([(read(address, MODE1, 1), 1)]) is not None:
+            registers = _registers(line, address)
+            if registers is not None and plausible(*registers):
+                found.append(address)
+        elif line.why != "not acknowledged":
             break  # no I2C bus, or one that is stuck
     return tuple(found)
+
+
+def see_board(line: I2cLine, address: int) -> None:
+    """See that what answers at an address is a PCA9685.
+
+    Raises:
+        ServoMissing: it is not, or nothing answers.
+    """
+    where = f"{line.port.port_name}: "
+    tries = (_registers(line, address) for _ in range(TRIES))
+    found = next((one for one in tries if one is not None), None)
+    if found is None:
+        raise ServoMissing(f"{where}{_mute(line, address)}")
+    first_six, outputs, prescale = found
+    if not plausible(first_six, outputs, prescale):
+        raise ServoMissing(
+            f"{where}what answers at {address:#x} is no PCA9685: another chip has this "
+            "address; close a jumper and write the new one under bus.pca9685.address"
+        )
+    if first_six[MODE1] & EXTCLK:
+        raise ServoMissing(
+            f"{where}the board at {address:#x} was set to an external clock: switch its logic "
+            "supply off and on"
+        )
+
+
+def _mute(line: I2cLine, address: int) -> str:
+    """Say why nothing was read, and the cure."""
+    if line.why == "bus stuck":
+        return (
+            "the I2C bus is stuck, its data or clock line is held down: switch what "
+            "hangs on it off and on, check SDA and SCL for a short"
+        )
+    if line.why != "not acknowledged":
+        return (
+            f"nobody answers as an I2C bus ({line.why}): a PCA9685 is reached over "
+            "an I2C bus such as /dev/i2c-1: write it under bus.port"
+        )
+    return (
+        f"no PCA9685 answers at {address:#x}: has the board its logic supply (VCC, "
+        "not V+ alone)? check SDA, SCL and ground; its jumpers make the address"
+    )
+
+
+def _registers(line: I2cLine, address: int) -> tuple[bytes, bytes, int] | None:
+    """Read all registers of a board one by one, which needs no setting of it."""
+    single = [*range(LED0), *range(LED0, LED0 + CHANNELS * BYTES), PRESCALE]
+    found = line.ask([(read(address, register, 1), 1) for register in single])
+    if found is None:
+        return None
+    flat = b"".join(found)
+    return flat[:LED0], flat[LED0:-1], flat[-1]

@@ -1,10 +1,11 @@
 """Registers of a PCA9685 and what they hold; pure, nothing is sent here.
 
-Source: NXP, PCA9685 data sheet, rev. 4, section 7.3.
+Source: NXP, PCA9685 data sheet, rev. 4 (16 April 2015), section 7.3.
 """
 
 from collections.abc import Sequence
 from math import ceil, floor
+from typing import NamedTuple
 
 MODE1, MODE2 = 0x00, 0x01
 LED0, ALL_LED, PRESCALE = 0x06, 0xFA, 0xFE
@@ -17,13 +18,14 @@ AWAKE = AUTO_INCREMENT
 TOTEM_POLE = 0x04
 """MODE2: outputs drive both ways, and change at the stop condition, a pulse never in halves."""
 FULL_OFF = 0x10
-"""In the high byte of OFF: no pulses."""
+"""In the high byte of OFF: no pulses, whatever ON holds (7.3.3)."""
 OFF = bytes((0, 0, 0, FULL_OFF))
 
 CHANNELS, COUNTS = 16, 4096
 LEAST_PRESCALE, MOST_PRESCALE = 3, 255
 START_S = 0.001
-"""The oscillator is steady .5 ms after the end of sleep."""
+"""The oscillator is steady .5 ms after the end of sleep; before that a restart must not be asked
+for (7.3.1.1)."""
 
 US_STEPS = 4
 
@@ -33,9 +35,16 @@ def prescale_of(frequency_hz: float, oscillator_hz: float) -> int:
     return max(LEAST_PRESCALE, round(oscillator_hz / (COUNTS * frequency_hz)) - 1)
 
 
-def steps_per_count(prescale: int, oscillator_hz: float) -> float:
-    """Return quarter microseconds of one 4096th of the period."""
-    return (prescale + 1) / oscillator_hz * 1e6 * US_STEPS
+class Clock(NamedTuple):
+    """What makes the time of a board's pulses: its oscillator, and the prescaler behind it."""
+
+    oscillator_hz: float
+    prescale: int
+
+    @property
+    def grain_steps(self) -> float:
+        """Return quarter microseconds of one 4096th of the period."""
+        return (self.prescale + 1) / self.oscillator_hz * 1e6 * US_STEPS
 
 
 def output(channel: int) -> int:

@@ -1,17 +1,21 @@
-"""One channel of a Maestro led slowly from place to place, for a person to see which servo moves.
+"""One channel of a board led slowly from place to place, for a person to see which servo moves.
 
 A first pulse cannot be slowed down: a servo without pulses goes there at once, at its own
-speed. From then on the board leads it slowly. The pulses end with the walk, whatever
-happens.
+speed. From then on it is led slowly. The pulses end with the walk, whatever happens.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple
 
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.hobby_board.board import Board
+from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.hobby_board.hold import Outcome, take
 from gazerig.drivers.hobby_board.release import switch_off
-from gazerig.drivers.maestro.commands import MOST_INPUT, name_errors
-from gazerig.drivers.maestro.limits import SPEED_STEPS_S, speed_units
+from gazerig.drivers.hobby_board.start import every_pulse
+from gazerig.drivers.maestro.commands import name_errors
 from gazerig.drivers.maestro.line import Line
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
@@ -22,9 +26,11 @@ SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0
 SETTLE_S = 0.4
 """From the first pulse until a servo has arrived from anywhere."""
 
-LOOK_S = 0.05
+LOOK_S = 0.02
 FINE_STEPS = 2
 LATE_S = 1.0
+MOST_TRIES = 10
+"""A busy computer may keep answers waiting, and nobody is in a hurry here."""
 
 
 class Place(NamedTuple):
@@ -35,7 +41,7 @@ class Place(NamedTuple):
 
 
 def walk(
-    line: Line,
+    board: Board,
     setup: ServoSetup,
     places: Sequence[int],
     sleep_until: Callable[[float], None],
@@ -43,74 +49,105 @@ def walk(
 ) -> tuple[Place, ...]:
     """Lead a channel to places, the first at once, the others slowly; the pulses are off then.
 
-    places: quarter microseconds
+    Args:
+        board: its port is open.
+        setup: the servo; places outside its limits are not gone to.
+        places: quarter microseconds.
+        sleep_until: waits until a time of the port's clock.
+        speed_steps_s: speed between the places.
 
     Raises:
         ServoMissing: the board does not answer, or the channel is no servo's.
         ServoFault: the pulses do not end.
         BusLost: the port is gone.
     """
-    speech = line.speech
-    if 0 < _pulse(line, setup) <= MOST_INPUT:
-        raise ServoMissing(f"{servo_label(setup)} is an input: set it to Servo in Pololu's program")
-    units = speed_units(speed_steps_s)
-    line.send(speech.speed(setup.id, units) + speech.acceleration(setup.id, 0))
+    slow = setup._replace(
+        max_speed_steps_s=speed_steps_s, max_accel_steps_s2=None, rest_steps=places[0]
+    )
     gone: list[Place] = []
-    try:
+    with given(board, slow) as channel:
+        start = round(channel.ramp.pulse_steps)
         for nth, asked in enumerate(places):
-            start = _pulse(line, setup)
-            line.send(speech.target(setup.id, asked))
-            way_s = abs(asked - start) / (units * SPEED_STEPS_S) if start else SETTLE_S
-            gone.append(Place(asked, _arrived(line, setup, asked, way_s, sleep_until)))
+            channel.aim(channel.clip(asked), board.line.port.now_s())
+            board.send_goals([channel])
+            way_s = abs(asked - start) / speed_steps_s + SETTLE_S
+            start = _arrived(board, channel, asked, way_s, sleep_until)
+            gone.append(Place(asked, start))
             if not nth:
-                _settle(line, setup, sleep_until)
-    finally:
-        _end(line, setup)
+                _wait(board, channel, SETTLE_S, sleep_until)
     return tuple(gone)
 
 
+@contextmanager
+def given(board: Board, setup: ServoSetup) -> Iterator[Channel]:
+    """Let a channel give pulses: those that it gives, or its servo's rest; off at the end.
+
+    Raises:
+        ServoMissing: the board does not answer, or the channel is no servo's.
+        ServoFault: the pulses do not end.
+        BusLost: the port is gone.
+    """
+    log = EventLog()
+    (pulse,) = board.find([setup], log)
+    board.prepare(log)
+    channel = Channel(setup, board.timing.longest_lead_s)
+    try:
+        outcomes = (take(board, channel, pulse) for _ in range(MOST_TRIES))
+        if all(outcome is Outcome.MUTE for outcome in outcomes):
+            raise ServoMissing(
+                f"{board.line.port.port_name}: no answer about {servo_label(setup)}: check its "
+                "cable"
+            )
+        channel.hold()
+        yield channel
+    finally:
+        _end(board, setup)
+
+
 def _arrived(
-    line: Line,
-    setup: ServoSetup,
+    board: Board,
+    channel: Channel,
     asked: int,
     way_s: float,
     sleep_until: Callable[[float], None],
 ) -> int:
-    """Wait until the board's pulse is where it was sent, or its time is over; gives where it is."""
-    until_s = line.port.now_s() + way_s + LATE_S
+    """Lead a pulse until it is where it was sent, or its time is over; return where it is."""
+    until_s = board.line.port.now_s() + way_s + LATE_S
     while True:
-        sleep_until(line.port.now_s() + LOOK_S)
-        got = _pulse(line, setup)
-        if abs(got - asked) <= FINE_STEPS or line.port.now_s() >= until_s:
+        got = _led(board, channel, sleep_until)
+        if abs(got - asked) <= FINE_STEPS or board.line.port.now_s() >= until_s:
             return got
 
 
-def _settle(line: Line, setup: ServoSetup, sleep_until: Callable[[float], None]) -> None:
-    """Wait until a servo has arrived; the board is asked meanwhile, it may have a timeout."""
-    until_s = line.port.now_s() + SETTLE_S
-    while line.port.now_s() < until_s:
-        sleep_until(line.port.now_s() + LOOK_S)
-        _pulse(line, setup)
+def _wait(
+    board: Board, channel: Channel, for_s: float, sleep_until: Callable[[float], None]
+) -> None:
+    """Wait; the board is asked meanwhile, it may have a timeout."""
+    until_s = board.line.port.now_s() + for_s
+    while board.line.port.now_s() < until_s:
+        _led(board, channel, sleep_until)
 
 
-def _pulse(line: Line, setup: ServoSetup) -> int:
-    for _ in range(3):
-        found = line.pulses((setup.id,))
-        if found is not None:
-            return found[0]
-    raise ServoMissing(
-        f"{line.port.port_name}: no answer about {servo_label(setup)}: check its cable"
-    )
+def _led(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -> int:
+    """Wait a moment, lead a pulse on where the board does not, and return what it is."""
+    sleep_until(board.line.port.now_s() + LOOK_S)
+    channel.advance(board.line.port.now_s())
+    board.lead([channel])
+    for _ in range(MOST_TRIES - 1):
+        pulses = board.pulses((channel.id,))
+        if pulses is not None:
+            return pulses[0]
+    return every_pulse(board, [channel.setup])[0]
 
 
-def _end(line: Line, setup: ServoSetup) -> None:
+def _end(board: Board, setup: ServoSetup) -> None:
     """Stop the pulses and see that they have.
 
     Raises:
         ServoFault: nobody confirms it.
     """
     try:
-        left = switch_off(line, (setup.id,))
+        left = switch_off(board, (setup.id,))
         sure = not left.holding and not left.mute
     except BusLost:
         sure = False

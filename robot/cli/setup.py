@@ -8,7 +8,7 @@ import typer
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.servo_models import HOBBY_KINDS, servo_label
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.bringup import servo_setup as servo_setup
@@ -17,6 +17,7 @@ from gazerig.robot.bringup.servo_family import ServoKind
 from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, setups_on, wires
 from gazerig.robot.cli.progress import YesOption, progress, to_open, wipe
 from gazerig.robot.cli.setup_maestro import set_up_board, write_settings
+from gazerig.robot.cli.setup_pca9685 import set_up_boards
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -49,9 +50,7 @@ def setup(
             mine = [one for one in setups_on(model, bus) if one.name in wanted]
             if not mine:
                 continue
-            if model.bus_named(bus).kind == "pca9685":
-                left += _pca9685(model, rig, bus, mine)
-            elif model.bus_named(bus).kind == "maestro":
+            if model.bus_named(bus).kind in HOBBY_KINDS:
                 left += _board(model, rig, bus, mine, port, mock, yes, settings)
             else:
                 left += _chain(model, rig, bus, mine, port, mock, yes)
@@ -170,34 +169,18 @@ def _board(
     settings: Path | None,
 ) -> list[str]:
     """Say what to set on a board and try its channels; gives the joints that were skipped."""
-    say(f"{title}{_where(rig, bus)}: a Pololu Maestro; {len(setups)} of its channels to try.")
+    config = rig.bus_named(bus)
+    title_of = {"maestro": "a Pololu Maestro", "pca9685": "PCA9685"}[config.kind]
+    say(f"{title}{_where(rig, bus)}: {title_of}; {len(setups)} of its channels to try.")
     with (
         wires(rig, mock, port) as wired,
         to_open(wired.paths[bus]) as line,
     ):
         joints = {one.name: rig.joints[one.name] for one in setups}
+        every = setups_on(rig, bus)
+        if config.kind == "pca9685":
+            key = f"buses.{bus}.pca9685" if bus else "bus.pca9685"
+            return set_up_boards(line, config.pca9685, setups, joints, every, title, key, yes)
         if settings is not None:
-            every = setups_on(rig, bus)
-            write_settings(settings, rig.bus_named(bus).maestro, every, line.port_name)
-        return set_up_board(line, rig.bus_named(bus).maestro, setups, joints, yes)
-
-
-def _pca9685(rig: Rig, title: str, bus: str, setups: list[ServoSetup]) -> list[str]:
-    """Say what there is to set up on PCA9685 boards; returns the joints that are left to do.
-
-    A board keeps nothing without power: the program sets it up at every start.
-    """
-    params = rig.bus_named(bus).pca9685
-    say(f"{title}{_where(rig, bus)}: PCA9685; {len(setups)} of its channels.")
-    for address in params.addresses:
-        closed = [f"A{bit}" for bit in range(6) if address >> bit & 1]
-        say(f"   board {address:#x}: jumpers {', '.join(closed) or 'none'} closed")
-    for one in setups:
-        board, channel = divmod(one.id, 16)
-        say(f"   {one.name}: channel {channel} of board {params.addresses[board]:#x}")
-    say(
-        "   nothing else can be set; the board's own clock is some percent off: where angles are, "
-        "too, measure its frequency and correct bus.pca9685.oscillator_hz"
-    )
-    say("   which servo hangs on which channel is seen with gazerig jog JOINT 5")
-    return []
+            write_settings(settings, config.maestro, every, line.port_name)
+        return set_up_board(line, config.maestro, setups, joints, yes)

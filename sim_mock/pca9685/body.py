@@ -4,6 +4,8 @@ Time passes in whole steps of 10 ms; a servo hears a new pulse once a period of 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
+from operator import and_
 
 from gazerig.sim_mock.hobby_servo import HobbyServo
 from gazerig.sim_mock.pca9685.chip import CHANNELS, Chip
@@ -21,6 +23,10 @@ class NotAcknowledged(Exception):
 
 class BusStuck(Exception):
     """The lines do not go high: the adapter gives up."""
+
+
+def _wired_and(*bytes_at_once: int) -> int:
+    return reduce(and_, bytes_at_once)
 
 
 class Body:
@@ -60,22 +66,27 @@ class Body:
         self.advance()
         if self.stuck:
             raise BusStuck
-        if self.absent:
-            raise NotAcknowledged
         if self.foreign:
-            if address not in self.chips:
-                raise NotAcknowledged
+            self._addressed(address)
             return
         if address == GENERAL_CALL and data == SOFTWARE_RESET:
             for chip in self.chips.values():
                 chip.reset()
             return
-        heard = [chip for own, chip in self.chips.items() if address in (own, chip.all_call)]
-        if not heard:
-            raise NotAcknowledged
-        for chip in heard:
+        for chip in self._addressed(address):
             chip.write(data, self.now_s())
         self._settle()
+
+    def _addressed(self, address: int) -> list[Chip]:
+        """Return the chips that answer at an address.
+
+        Raises:
+            NotAcknowledged: there is none.
+        """
+        heard = [c for own, c in self.chips.items() if address in (own, *c.further_addresses)]
+        if self.absent or not heard:
+            raise NotAcknowledged
+        return heard
 
     def read(self, address: int, length: int) -> bytes:
         """Read up to a stop condition.
@@ -87,9 +98,11 @@ class Body:
         self.advance()
         if self.stuck:
             raise BusStuck
-        if self.absent or address not in self.chips:
-            raise NotAcknowledged
-        return bytes([STRANGE] * length) if self.foreign else self.chips[address].read(length)
+        heard = self._addressed(address)
+        if self.foreign:
+            return bytes([STRANGE] * length)
+        # Where several answer at once a 0 of any pulls the line down.
+        return bytes(map(_wired_and, *(chip.read(length) for chip in heard)))
 
     def restart(self) -> None:
         """Restart all boards as a dip of their supply makes it."""

@@ -3,7 +3,7 @@
 Commands are those of NXP's SC18IM700, a bridge from a serial line to I2C: S, the address with
 its direction bit, a count and, of a write, so many bytes; further S are further starts; P ends
 it. R, a register, P reads a register of the bridge's own: how the last transfer ended. Source:
-NXP, SC18IM700 data sheet, section 7.1.
+NXP, SC18IM700 data sheet, rev. 2 (10 August 2007).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,17 +1,21 @@
 """An emulated PCA9685, register by register: what it is sent, and which pulses it gives.
 
-Left out: the sub-addresses (kept, never answered), inverted and open-drain outputs (kept, no
-effect), the output enable pin (tied to ground), an external clock (there is none, so choosing
-it ends the pulses). Source: NXP, PCA9685 data sheet, rev. 4, section 7.3; [A] is assumed.
+Left out: inverted and open-drain outputs (kept, no effect), the output enable pin (tied to
+ground), an external clock (there is none, so choosing it ends the pulses), and that reserved
+registers are not acknowledged (here they take nothing). Source: NXP, PCA9685 data sheet, rev. 4
+(16 April 2015): 7.1.2 and 7.3.7 All Call, 7.3.1.1 restart, 7.3.3 full on and off, 7.5 power-on
+reset, 7.6 software reset, notes below table 4 on auto-increment and the prescaler; [A] is assumed.
 """
 
-MODE1, MODE2, ALLCALLADR = 0x00, 0x01, 0x05
+MODE1, MODE2, SUBADR1, ALLCALLADR = 0x00, 0x01, 0x02, 0x05
 LED0 = 0x06
 LAST_IN_TURN = 0x45
-"""Behind it auto-increment begins at 0 again."""
+"""Behind it, and behind the prescaler, auto-increment begins at 0 again."""
 ALL_LED, PRESCALE, TEST_MODE = 0xFA, 0xFE, 0xFF
 
 RESTART, EXTCLK, AI, SLEEP, ALLCALL = 0x80, 0x40, 0x20, 0x10, 0x01
+SUBADDRESSES = (0x08, 0x04, 0x02)
+"""Bits of MODE1 that let it answer at SUBADR1 to 3."""
 OCH = 0x08
 FULL = 0x10
 """In the high byte of ON or OFF: all the time; OFF goes before ON."""
@@ -54,11 +58,11 @@ class Chip:
     # --- the bus
 
     @property
-    def all_call(self) -> int | None:
-        """Return the second address that it answers writes at, None where it has none."""
-        if not self._registers[MODE1] & ALLCALL:
-            return None
-        return self._registers[ALLCALLADR] >> 1
+    def further_addresses(self) -> tuple[int, ...]:
+        """Return where it answers beside its own address: of several boards, and of all."""
+        bits = (*SUBADDRESSES, ALLCALL)
+        mode, named = self._registers[MODE1], self._registers[SUBADR1 : ALLCALLADR + 1]
+        return tuple(byte >> 1 for bit, byte in zip(bits, named, strict=True) if mode & bit)
 
     def write(self, data: bytes, now_s: float) -> None:
         """Take the bytes behind the address of one write, up to the stop condition."""
@@ -82,8 +86,8 @@ class Chip:
 
     def _step(self) -> None:
         if self._registers[MODE1] & AI:
-            after = 0 if self._pointer == LAST_IN_TURN else self._pointer + 1
-            self._pointer = after & 0xFF
+            last = self._pointer in (LAST_IN_TURN, PRESCALE)
+            self._pointer = 0 if last else self._pointer + 1 & 0xFF
 
     def _store(self, register: int, byte: int, now_s: float) -> None:
         if register == MODE1:
@@ -102,7 +106,8 @@ class Chip:
 
     def _set_mode(self, byte: int, now_s: float) -> None:
         before = self._registers[MODE1]
-        if byte & RESTART and not byte & SLEEP:
+        # Awake for .5 ms first: the same write that ends the sleep restarts nothing.
+        if byte & RESTART and not (byte | before) & SLEEP and now_s >= self._awake_s:
             self._held_back = False
         if byte & SLEEP and not before & SLEEP and self._gives_any():
             self._held_back = True

@@ -17,19 +17,21 @@ from gazerig.drivers.i2c.port import I2cPort
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.types import ServoSetup
 
-TICKS, CHANNELS, I2C_HZ = 2000, 6, 100_000.0
+TICKS, CHANNELS, I2C_HZ = 3000, 6, 100_000.0
 
 
 class Counted:
-    """A bus that counts transfers and the bytes on its wires, addresses among them."""
+    """A bus that counts transfers, bytes on its wires, addresses among them, and its own time."""
 
     def __init__(self, bus):
-        self.bus, self.fd, self.transfers, self.bytes = bus, None, 0, 0
+        self.bus, self.fd, self.transfers, self.bytes, self.spent_s = bus, None, 0, 0, 0.0
 
     def i2c_rdwr(self, *messages):
+        began = time.process_time()
         self.transfers += 1
         self.bytes += sum(1 + message.len for message in messages)
         self.bus.i2c_rdwr(*messages)
+        self.spent_s += time.process_time() - began
 
     def close(self):
         """Stay open."""
@@ -37,16 +39,17 @@ class Counted:
 
 def measured(name, bus, bench, tick):
     bus.transfers = bus.bytes = 0
-    spent_s = 0.0
+    bus.spent_s = spent_s = 0.0
     for k in range(TICKS):
         began = time.process_time()
         tick(5900 + k % 200)
         spent_s += time.process_time() - began
         bench.wait(0.01)
     wire_ms = bus.bytes / TICKS * 9.0 / I2C_HZ * 1e3
+    own_us = (spent_s - bus.spent_s) / TICKS * 1e6
     print(
-        f"{name:34} {bus.transfers / TICKS:5.1f} transfers {bus.bytes / TICKS:5.1f} bytes "
-        f"{wire_ms:4.1f} ms at 100 kHz {spent_s / TICKS * 1e3:6.3f} ms of processor"
+        f"{name:42} {bus.transfers / TICKS:5.1f} transfers {bus.bytes / TICKS:5.1f} bytes "
+        f"{wire_ms:4.1f} ms at 100 kHz {own_us:6.1f} us of processor"
     )
 
 
@@ -60,11 +63,12 @@ def ours():
     made.open()
     made.engage()
 
-    def tick(steps):
+    def both(steps):
         made.read(time.monotonic())
         made.write([steps] * CHANNELS)
 
-    measured("ours: goals, mode, one channel", bus, bench, tick)
+    measured("ours: goals", bus, bench, lambda steps: made.write([steps] * CHANNELS))
+    measured("ours: goals, mode, one channel read back", bus, bench, both)
 
 
 def adafruits():
@@ -78,11 +82,16 @@ def adafruits():
     board = adafruit_pca9685.PCA9685(CircuitPythonI2C(bus), address=0x40)
     board.frequency = 50
 
-    def tick(steps):
+    def goals(steps):
         for k in range(CHANNELS):
             board.channels[k].duty_cycle = round(steps / 4 / 20_000 * 0xFFFF)
 
-    measured("Adafruit's: goals alone", bus, bench, tick)
+    def both(steps):
+        board.mode1_reg, board.pwm_regs[0]
+        goals(steps)
+
+    measured("Adafruit's: goals", bus, bench, goals)
+    measured("Adafruit's: goals, mode, one channel read", bus, bench, both)
 
 
 if __name__ == "__main__":
