@@ -18,6 +18,9 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
+TWINS = ("in-process", pytest.param("pty", marks=pytest.mark.own_timeouts))
+"""A terminal's driver has time-outs in real time."""
+
 SPEED = 6000.0
 REBOOT = 8
 SPECS = (
@@ -68,7 +71,7 @@ def make_twin(kind: str, specs=SPECS) -> Iterator[Twin]:
         port.closePort()
 
 
-@pytest.fixture(params=["in-process", "pty"])
+@pytest.fixture(params=TWINS)
 def twin(request):
     yield from make_twin(request.param)
 
@@ -150,7 +153,7 @@ def test_open_names_servos_that_nobody_expects_beside_the_missing_ones(twin):
     assert "servo 7 (xc330-m288) belongs to no joint: left alone" in bus.events()
 
 
-@pytest.mark.parametrize("kind", ["in-process", "pty"])
+@pytest.mark.parametrize("kind", TWINS)
 def test_a_joint_outside_its_limits_comes_in_slowly(kind):
     specs = (ServoSpec(1, "xl330-m077", 900), ServoSpec(2, "xl330-m077", 3170))
     for twin in make_twin(kind, specs):

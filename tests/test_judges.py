@@ -16,6 +16,8 @@ import pytest
 
 from gazerig.sim_mock.pty.client import PtyBus
 
+pytestmark = pytest.mark.own_timeouts
+
 ROOT = Path(__file__).parents[1]
 OTHER_SDK = ROOT / ".venv" / "other-sdk"
 BAUD = 1_000_000

@@ -317,6 +317,7 @@ def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]) -> No
     wait_for(lambda: rig.newest.target.kind != "puppet", "the head being free")
 
 
+@pytest.mark.own_timeouts
 def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     person.click(saying("lead"))

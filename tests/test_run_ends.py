@@ -7,6 +7,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import pytest
 from command_line import GAZERIG
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
@@ -18,6 +19,9 @@ def rig_at(file: Path, rate_hz: float, give_up_s: float = 60.0) -> str:
     # The servo bus comes first in the file; a camera has the same key.
     assert desk.index("give_up_s: 60.0") < desk.index("geometry:")
     assert desk.count("rate_hz: 200.0  # Hz, 20") == 1
+    # A machine that does much else may keep answers waiting: that is no fault of a joint here.
+    assert desk.count("stale_joints_ms: 150.0") == 1
+    desk = desk.replace("stale_joints_ms: 150.0", "stale_joints_ms: 5000.0")
     desk = desk.replace("rate_hz: 200.0  # Hz, 20", f"rate_hz: {rate_hz}  # Hz, 20")
     file.write_text(desk.replace("give_up_s: 60.0", f"give_up_s: {give_up_s}", 1), encoding="utf-8")
     return str(file)
@@ -37,6 +41,7 @@ def begun(*words: str) -> "subprocess.Popen[str]":
     return process
 
 
+@pytest.mark.own_timeouts
 def test_signals_park_and_switch_torque_off(tmp_path: Path) -> None:
     rig = rig_at(tmp_path / "rig.yaml", 100.0)
     numbers = (signal.SIGINT, signal.SIGTERM)

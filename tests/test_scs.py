@@ -117,7 +117,7 @@ def test_its_own_baud_rates():
 # --- judged by a client that was written by others
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def client():
     rustypot = pytest.importorskip("rustypot", reason="rustypot is not installed")
     specs = (ServoSpec(1, "scs0009", 511), ServoSpec(2, "scs0009", 300))
@@ -136,13 +136,15 @@ def eventually(check, patience_s=20.0):
     return True
 
 
+@pytest.mark.own_timeouts
 def test_rustypot_finds_it_and_reads_every_register(client):
-    assert eventually(lambda: client.scan([1, 2, 3]) == FOUND)
+    assert client.scan([1, 2, 3]) == FOUND
     for register in client.registers():
         data, error = client.read_raw_data_with_error(1, register.addr, register.size)
         assert (len(data), error) == (register.size, 0), register.name
 
 
+@pytest.mark.own_timeouts
 def test_rustypot_moves_it(client):
     [present] = client.read_present_position(2)
     assert present == pytest.approx(math.radians(300.0) * (300 - 511) / 1024, abs=0.01)
