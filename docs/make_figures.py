@@ -27,8 +27,9 @@ from gazerig.gaze.lids import LidParams, Lids  # noqa: E402
 from gazerig.gaze.saccade import Saccade, SaccadeParams  # noqa: E402
 from gazerig.gaze.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
-from gazerig.robot.app.assemble import assemble, gaze_parts  # noqa: E402
-from gazerig.robot.app.options import Choice  # noqa: E402
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.options import RunOptions  # noqa: E402
 from gazerig.robot.control.loop import Tick, run  # noqa: E402
 from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
 from gazerig.sim_mock.true_gaze import (  # noqa: E402
@@ -226,7 +227,7 @@ def scanpath() -> None:
 def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"]) -> np.ndarray:
     """Run a drawn scene; give rows of time and degrees: person, gaze, facing, head, gaze off."""
     rig = load_rig("desk")
-    made = assemble(rig, Choice(True, True, 0, scene, pixels=True, placed_by=placed_by))
+    made = assemble(rig, RunOptions(True, True, 0, scene, pixels=True, placed_by=placed_by))
     assert made.scene is not None
     people, rows = made.scene.people, []
     kinematics, _ = gaze_parts(rig, 0)

@@ -16,8 +16,8 @@ from mcap.records import Chunk
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.cli.report import _recorded
 from gazerig.robot.control.loop import run
@@ -32,15 +32,14 @@ HEAD = 9
 
 def recorded(path: Path, seconds: float = 0.5) -> bytes:
     """Record a short run as ``gazerig run --fast --record`` does; return the file's bytes."""
-    made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=5, scene="visitor"))
-    rig = made.retuner.rig
+    options, rig = RunOptions(mock=True, fast=True, seed=5, scene="visitor"), load_rig("desk")
     info = RunInfo(
         rig="desk", profile=rig.profile, config_yaml=rig_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.walk), seed=5, rate_hz=made.loop.rate_hz,
+        walk_yaml=walk_text(rig.gaze.scanpath.walk), seed=5, rate_hz=rig.loop.rate_hz,
         started_utc="2026-01-31T23:59:59+00:00", scene="visitor", mock=True, fast=True,
     )  # fmt: skip
-    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
-    made.robot.body = recorder.tapped(made.robot.body)
+    recorder = Recorder(path, info, patient=True)
+    made = assemble(rig, options, Substitutes(body=recorder.recorded))
     recorder.open()
     made.robot.start(made.clock)
     stop = recorder.timed(lambda s: "seconds" if s >= seconds else None)

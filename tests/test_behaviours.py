@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.types import Camera
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.analysis.behaviour_score import Behaviours
-from gazerig.robot.app.assemble import Assembly, Choice, assemble
+from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.registry import scenes
@@ -128,10 +130,12 @@ class Lived:
         return [each for t_s, each in pairs if start_s <= t_s < end_s]
 
 
-def made_for(scene: str, seed: int = 0, rate_hz: float = 200.0) -> Assembly:
+def made_for(
+    scene: str, seed: int = 0, rate_hz: float = 200.0, substitutes: Substitutes = RIGS_OWN
+) -> Assembly:
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=rate_hz))
-    return assemble(rig, Choice(mock=True, fast=True, seed=seed, scene=scene))
+    return assemble(rig, RunOptions(mock=True, fast=True, seed=seed, scene=scene), substitutes)
 
 
 @pytest.fixture(scope="module", params=[0, 7])
@@ -163,7 +167,7 @@ def test_e46_a_without_the_pull_of_motion_no_fist_is_looked_at() -> None:
     rig = replace(
         rig, gaze=replace(rig.gaze, bottom_up=dull), loop=replace(rig.loop, rate_hz=100.0)
     )
-    made = assemble(rig, Choice(mock=True, fast=True, seed=0, scene="boxing"))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="boxing"))
     lived = Lived(made, scenes()["boxing"], 7.0)
     figures = lived.score.figures()
     assert (figures["punch"]["seen"], figures["punch"]["of"]) == (0, 2)
@@ -245,11 +249,14 @@ class Distracted:
 
 @pytest.mark.parametrize("way_m", [(0.0, 0.2, 0.0), (0.0, 0.0, 0.15)], ids=["aside", "up"])
 def test_e48_back_on_the_face_within_a_second_of_a_distraction(way_m: Vec3) -> None:
-    made = made_for("boxing", rate_hz=100.0)
     scene = Distracted(way_m)
-    made.robot.camera = SceneCamera(
-        SceneCameraParams(), scene, made.mount, made.poses.head_pose, np.random.default_rng(0)
-    )
+
+    def before(own: Camera) -> Camera:
+        assert isinstance(own, SceneCamera)
+        dice = np.random.default_rng(0)
+        return SceneCamera(SceneCameraParams(), scene, own._mount, own._head_pose, dice)
+
+    made = made_for("boxing", rate_hz=100.0, substitutes=Substitutes(camera=before))
     lived = Lived(made, scene, 17.0)
     figure = lived.score.figures()["return"]
     assert (figure["seen"], figure["of"]) == (5, 5)

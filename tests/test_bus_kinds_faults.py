@@ -16,9 +16,10 @@ from copied import copied
 from mixed_rig import mixed_text
 from struck_rigs import CASES, RIGS, Case, Machine, pair_of, quick, rig_of
 
-import gazerig.robot.app.assemble as assemble_module
+import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
 
 LEFT = {
@@ -153,15 +154,15 @@ STRUCK = {
 
 @pytest.mark.parametrize("kind", RIGS)
 def test_a_robot_that_looks_at_people_goes_on_looking(monkeypatch, kind):
-    devices, build = [], assemble_module.build
+    devices, build = [], run_bus.build
 
     def seen(*given):
         devices.append(build(*given))
         return devices[-1]
 
-    monkeypatch.setattr(assemble_module, "build", seen)
+    monkeypatch.setattr(run_bus, "build", seen)
     rig = rig_of(kind)
-    made = assemble_module.assemble(rig, Choice(mock=True, fast=True, seed=0, scene="visitor"))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
     clock, head = made.clock, made.robot
     head.start(clock)
     bounds, missed = limits(rig.joints), 0

@@ -27,7 +27,7 @@ from gazerig.config.save import copy_shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import Tuning
 from gazerig.robot.cli.entry_point import QUICK, is_quick
 from gazerig.robot.cli.entry_point import main as quick_main
@@ -53,14 +53,14 @@ def serve(path: Path) -> None:
     stop_latch.MIN_HOLD_S = stop_latch.MIN_RESUME_GAP_S = 0.0  # time is slow here
     over: list[str] = []
     signal.signal(signal.SIGTERM, lambda *_: over.append("SIGTERM"))
-    made = assemble(load_rig(str(path)), Choice(mock=True, fast=True, seed=0, scene="visitor"))
+    made = assemble(load_rig(str(path)), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
     robot = made.robot
 
     def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
     about = {"rig": str(path), "pid": os.getpid()}
-    tuning = Tuning(made.retuner, robot.order, str(path))
+    tuning = Tuning(made.live, robot.order, str(path))
     live = LiveControl(robot, tuning, (ConfigError,), made.clock, about, say)
 
     def watch(tick: Tick) -> None:

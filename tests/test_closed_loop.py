@@ -11,8 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble, gaze_parts
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.frames import NewestPose, PoseHistory
 from gazerig.sim_mock.cameras.rendered import PixelCameraParams
@@ -47,7 +48,7 @@ class Seen(NamedTuple):
 
 def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen:
     """Run a drawn scene and compare the measured gaze with the true place of the face part."""
-    made = assemble(RIG, Choice(True, True, 0, scene, pixels=True, placed_by=placed_by))
+    made = assemble(RIG, RunOptions(True, True, 0, scene, pixels=True, placed_by=placed_by))
     kinematics, _ = gaze_parts(RIG, 0)
     assert made.scene is not None
     people = made.scene.people

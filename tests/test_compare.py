@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.report import app
 from gazerig.robot.control.loop import run
 from gazerig.robot.recording.read import RunRecording
@@ -77,14 +77,14 @@ def test_chances_are_corrected_for_their_number() -> None:
 
 def record(path: Path, seconds: float, saccade: str) -> None:
     """Record a simulated run."""
-    made = assemble(load_rig("desk"), Choice(True, True, 0, "face-to-face", saccade=saccade))
-    rig = made.retuner.rig
+    made = assemble(load_rig("desk"), RunOptions(True, True, 0, "face-to-face", saccade=saccade))
+    rig = made.live.rig
     info = RunInfo(
         "desk", rig.profile, rig_text(rig), 0, 200.0, "2026-01-31T12:00:00+00:00",
         walk_yaml=walk_text(rig.gaze.scanpath.walk), scene="face-to-face", mock=True, fast=True,
         versions=versions(),
     )  # fmt: skip
-    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
+    recorder = Recorder(path, info, patient=True)
     recorder.open()
     made.robot.start(made.clock)
     run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, recorder.note)

@@ -20,7 +20,7 @@ from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
 from gazerig.robot.analysis.eye_tracker_csv import FixationTable, read_recording
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
@@ -37,7 +37,7 @@ ABOUT = About("desk", "face-to-face", RATE_HZ, "2026-01-01T00:00:00+00:00", "gaz
 
 def seen(scene: str, seconds: float) -> list[Tick]:
     """Run a simulated head and give its ticks."""
-    made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene=scene))
+    made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene=scene))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
     try:

@@ -9,9 +9,10 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import Bodies, Face, Percept, Target
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.calibration.face_calibration import begun, point_world_m
 from gazerig.robot.calibration.face_steering import AIMED_DEG, STALE_S, WAIT_S, FaceSteering
 from gazerig.robot.control.loop import Tick
@@ -88,8 +89,14 @@ def test_a_stale_picture_shows_nobody_and_keys_wait() -> None:
 
 
 @pytest.fixture
-def made() -> Iterator[Assembly]:
-    found = assemble(RIG, Choice(mock=True, fast=True, seed=1, scene="sits-still"))
+def steered() -> FaceSteering:
+    return FaceSteering(begun({}), TopDown(RIG.gaze.top_down), REST)
+
+
+@pytest.fixture
+def made(steered: FaceSteering) -> Iterator[Assembly]:
+    options = RunOptions(mock=True, fast=True, seed=1, scene="sits-still")
+    found = assemble(RIG, options, Substitutes(chooser=lambda own: steered))
     yield found
     found.close()
 
@@ -107,9 +114,9 @@ def ticks(made: Assembly, steered: FaceSteering, seconds: float) -> Tick:
     return tick
 
 
-def test_both_eyes_meet_the_true_place_of_the_part_on_the_face(made: Assembly) -> None:
-    steered = FaceSteering(begun({}), made.robot.attention.top_down, REST)
-    made.robot.attention = steered
+def test_both_eyes_meet_the_true_place_of_the_part_on_the_face(
+    made: Assembly, steered: FaceSteering
+) -> None:
     made.robot.start(made.clock)
     (person,) = SitsStill().people(0.0)
     yaw, pitch = person.face_yaw_pitch_rad
@@ -131,9 +138,7 @@ def test_both_eyes_meet_the_true_place_of_the_part_on_the_face(made: Assembly) -
         assert part in steered.state.chosen and steered.state.part != part
 
 
-def test_an_enter_waits_for_eyes_on_their_way(made: Assembly) -> None:
-    steered = FaceSteering(begun({}), made.robot.attention.top_down, REST)
-    made.robot.attention = steered
+def test_an_enter_waits_for_eyes_on_their_way(made: Assembly, steered: FaceSteering) -> None:
     made.robot.start(made.clock)
     ticks(made, steered, 1.5)
     for _ in range(12):
@@ -145,9 +150,9 @@ def test_an_enter_waits_for_eyes_on_their_way(made: Assembly) -> None:
     assert steered.state.part == "LE"
 
 
-def test_an_enter_is_dropped_with_a_reason_where_the_eyes_never_come(made: Assembly) -> None:
-    steered = FaceSteering(begun({}), made.robot.attention.top_down, REST)
-    made.robot.attention = steered
+def test_an_enter_is_dropped_with_a_reason_where_the_eyes_never_come(
+    made: Assembly, steered: FaceSteering
+) -> None:
     made.robot.start(made.clock)
     tick = ticks(made, steered, 1.0)
     steered.press("enter", tick.t_s)
@@ -158,9 +163,7 @@ def test_an_enter_is_dropped_with_a_reason_where_the_eyes_never_come(made: Assem
     assert why is not None and "not taken" in why and steered.state.part == "N"
 
 
-def test_eyes_in_a_saccade_are_not_on_the_part(made: Assembly) -> None:
-    steered = FaceSteering(begun({}), made.robot.attention.top_down, REST)
-    made.robot.attention = steered
+def test_eyes_in_a_saccade_are_not_on_the_part(made: Assembly, steered: FaceSteering) -> None:
     made.robot.start(made.clock)
     tick = ticks(made, steered, 1.5)
     steered.note(tick._replace(gaze=tick.gaze._replace(phase="fixate")))

@@ -19,7 +19,7 @@ from gazerig.gaze.angles import add, angle_between, norm, scale, sub
 from gazerig.gaze.types import Vec3
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 
@@ -52,7 +52,7 @@ def ticks() -> tuple[Assembly, list[Tick]]:
         loop=replace(rig.loop, rate_hz=100.0),
         detector=replace(rig.detector, min_face_px=60, work_width_px=128),
     )
-    made = assemble(rig, Choice(mock=True, fast=True, seed=0, video=FILM))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, video=FILM))
     seen: list[Tick] = []
     made.robot.start(made.clock)
     try:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.dynamixel.bus import DynamixelBus
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.assemble import gaze_parts
+from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.bringup.look_at import ends_reached, look_at
 from gazerig.robot.bringup.manual_control import JogParams, ManualControl, duration_s
 from gazerig.robot.bringup.move_result import Step

@@ -8,9 +8,9 @@ import pytest
 from mixed_rig import mixed_text
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.assemble import gaze_parts
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.emulation import emulated_lines, place_of
+from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.bringup.look_at import ends_reached, look_at, met
 from gazerig.robot.bringup.manual_control import JogParams, ManualControl

@@ -14,7 +14,8 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import PARTS
-from gazerig.robot.app.assemble import Assembly, Choice, assemble
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
@@ -30,7 +31,7 @@ from gazerig.sim_mock.scenes.visitor import Visitor
 
 
 def made(seed: int = 0) -> Assembly:
-    return assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=seed, scene="visitor"))
+    return assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=seed, scene="visitor"))
 
 
 def ticks(assembly: Assembly, seconds: float) -> list[Tick]:
@@ -58,7 +59,7 @@ def test_it_starts_slowly_from_where_the_joints_are() -> None:
 def test_every_goal_on_the_bus_is_inside_the_limits() -> None:
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
-    run_of = assemble(rig, Choice(mock=True, fast=True, seed=3, scene="visitor"))
+    run_of = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="visitor"))
     commands = np.array([tick.verdict.command_rad for tick in ticks(run_of, 30.0)])
     speeds = np.diff(commands, axis=0) / 0.010
     for i, name in enumerate(JOINTS):

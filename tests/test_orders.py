@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import (
@@ -58,7 +58,9 @@ class Running:
 
 @pytest.fixture
 def running() -> Iterator[Running]:
-    made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=3, scene="face-to-face"))
+    made = assemble(
+        load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face")
+    )
     made.robot.start(made.clock)
     try:
         running = Running(made)

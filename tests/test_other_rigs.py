@@ -9,13 +9,13 @@ from mixed_rig import mixed_text
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 
 
 def ran(rig: Rig, seconds: float, seed: int = 0) -> tuple[Assembly, list[Tick], tuple[str, ...]]:
     """Run a rig before a visitor; gives what ran, every tick, and what was said at the start."""
-    made = assemble(rig, Choice(mock=True, fast=True, seed=seed, scene="visitor"))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=seed, scene="visitor"))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
     said = made.robot.body.bus.events()
@@ -109,7 +109,7 @@ def test_same_seed_same_bytes(name: str, tmp_path: Path) -> None:
 def test_true_servos_keep_to_their_joints_ranges(tmp_path: Path) -> None:
     """What the emulated shafts do, not what anybody believes of them."""
     rig = rig_of("mixed", tmp_path)
-    made = assemble(rig, Choice(mock=True, fast=True, seed=1, scene="boxing"))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=1, scene="boxing"))
     from gazerig.robot.app.emulation import place_of
 
     ports = [share.bus._port for share in made.robot.body.bus._shares]  # type: ignore[attr-defined]

@@ -6,7 +6,6 @@ browser.
 
 import importlib.util
 import json
-import os
 import sys
 import threading
 from collections.abc import Iterator
@@ -21,18 +20,17 @@ import pytest
 from desk import JOINTS
 
 from gazerig.config.confined import Confined
-from gazerig.config.load import ConfigError, shipped
+from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import Tuning
-from gazerig.robot.app.run_observers import Audience, Told, Wished
+from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.dashboard.page_main import _HALF_WIDTH as HALF_WIDTH
 from gazerig.robot.dashboard.page_main import VIEWS
 from gazerig.robot.model.commands import Ask, LookAt, Renew, Stop
-from gazerig.robot.recording.run_info import RunInfo
 
 
 def load_browser() -> ModuleType:
@@ -55,22 +53,18 @@ TICK_S = 0.01
 PACE_S = 0.04  # real seconds a tick
 
 
-def no_recording() -> RunInfo:
-    raise AssertionError("nothing is recorded here")
-
-
 class Rig:
     """A simulated rig with a page, ticked by a thread."""
 
     def __init__(self, host: str = "127.0.0.1") -> None:
-        made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
+        made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
         self.made, self.robot = made, made.robot
-        self.tuning = Tuning(made.retuner, self.robot.order, "desk")
-        told = Told(self.tuning, (ConfigError,), {"rig": "desk", "pid": os.getpid()}, no_recording)
+        self.tuning = Tuning(made.live, self.robot.order, "desk")
         self.said: list[str] = []
-        wished = Wished(page=(host, free_port()))
         # Not fast: the page is for real time, of which these ticks are a slow imitation.
-        self.audience = Audience(made, wished, told, False, self.said.append, self.said.append)
+        options = RunOptions(page=f"{host}:{free_port()}")
+        say = self.said.append
+        self.audience = RunObservers(made, options, say, say, self.tuning)
         self.newest: Tick | None = None
         self.pace_s = PACE_S
         self.orders: list[object] = []

@@ -21,7 +21,7 @@ from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.serial.port_owner import refuse_owner
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pca9685.bridge import build_bridge
@@ -470,7 +470,7 @@ def test_the_makers_rig_runs_on_either_board_by_one_section(tmp_path):
     seen = {}
     for name in ("maker", str(file)):
         rig = load_rig(name)
-        made = assemble(rig, Choice(mock=True, fast=True, seed=3, scene="boxing"))
+        made = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="boxing"))
         clock, head, poses = made.clock, made.robot, []
         head.start(clock)
         for k in range(1, 501):

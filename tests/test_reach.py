@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.app.assemble import assemble, gaze_parts
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.reachability import look_reply
@@ -94,7 +95,7 @@ def test_a_rig_without_a_neck_says_so() -> None:
 
 
 def test_the_running_robot_replies_so_and_keeps_saying_it() -> None:
-    made = assemble(loaded("desk"), Choice(mock=True, fast=True, seed=3, scene="face-to-face"))
+    made = assemble(loaded("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face"))
     robot, ticks = made.robot, []
 
     def go(seconds: float) -> None:

@@ -22,7 +22,7 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Robot, Tick
 from gazerig.robot.model import lead, stop_latch
 from gazerig.robot.model.clock import RealClock
@@ -137,7 +137,7 @@ class Beat:
     """A simulated robot whose loop runs in a thread, slowly enough to leave the processor."""
 
     def __init__(self) -> None:
-        made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
+        made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
         self.robot: Robot = made.robot
         self.clock = made.clock
         self.pulse = Pulse(self.clock)
@@ -145,7 +145,7 @@ class Beat:
         self.hold = threading.Event()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run)
-        self.robot.tune = lambda tune, t_s: (f"tuned {len(tune.changes)}",)
+        self.robot._tune = lambda tune, t_s: (f"tuned {len(tune.changes)}",)
 
     def __enter__(self) -> "Beat":
         self.robot.start(self.clock)

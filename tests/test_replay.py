@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES
@@ -38,7 +38,9 @@ RATE_HZ = 200.0
 
 
 def ticks_of(seconds: float, asked: Sequence[tuple[float, Ask]] = ()) -> list[Tick]:
-    made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="face-to-face"))
+    made = assemble(
+        load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="face-to-face")
+    )
     ticks: list[Tick] = []
     left = list(asked)
 
@@ -441,10 +443,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "configs/desk.yaml", rig.profile, rig_text(rig), 0, RATE_HZ, "2026-01-01T00:00:00+00:00",
         scene="face-to-face", mock=True, fast=True, versions=versions(),
     )  # fmt: skip
-    made = assemble(rig, Choice(mock=True, fast=True, seed=0, scene="face-to-face"))
-    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
+    recorder = Recorder(path, info, patient=True)
     recorder.open()
-    made.robot.body = recorder.tapped(made.robot.body)
+    options = RunOptions(mock=True, fast=True, seed=0, scene="face-to-face")
+    made = assemble(rig, options, Substitutes(body=recorder.recorded))
     made.robot.start(made.clock)
     try:
         over = recorder.timed(lambda s: "seconds" if s > 2.0 else None)

@@ -18,7 +18,7 @@ from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.event_detector import Blink, Commanded, Fixation, Saccade
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.report import app, page_file
 from gazerig.robot.control.loop import run
 from gazerig.robot.report import face
@@ -42,7 +42,7 @@ EMPTY = Gathered(np.zeros((0, len(Row._fields))), (), (), ())
 
 def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> Gathered:
     """Gather a simulated run."""
-    made, gathering = assemble(rig, Choice(True, True, 0, scene, **choice)), Gathering()  # type: ignore[arg-type]
+    made, gathering = assemble(rig, RunOptions(True, True, 0, scene, **choice)), Gathering()  # type: ignore[arg-type]
     made.robot.start(made.clock)
     over: Callable[[float], str | None] = lambda s: "over" if s > seconds else None  # noqa: E731
     run(made.robot, made.clock, made.loop, over, gathering.note)

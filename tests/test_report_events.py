@@ -15,7 +15,7 @@ from gazerig.robot.analysis.blink_finder import BlinkFinder
 from gazerig.robot.analysis.event_detector import Blink, Fixation, GazeEvents, Saccade
 from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.report.gaze_trace import Gathered, Gathering
 
@@ -25,7 +25,7 @@ STEP_DEG = 360.0 / 4096.0
 
 @pytest.fixture(scope="module")
 def ticks() -> list[Tick]:
-    made = assemble(load_rig("desk"), Choice(True, True, 0, "face-to-face"))
+    made = assemble(load_rig("desk"), RunOptions(True, True, 0, "face-to-face"))
     seen: list[Tick] = []
     made.robot.start(made.clock)
     run(made.robot, made.clock, made.loop, lambda s: "over" if s > SECONDS else None, seen.append)

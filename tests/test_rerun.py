@@ -12,10 +12,9 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.types import BusHealth
 from gazerig.gaze.types import Percept
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import Rerun, recorded_rig, rerun
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.loop import Tick, run
@@ -51,19 +50,17 @@ def recorded(
     at: Callable[[int, Assembly], None] = lambda n, made: None,
 ) -> list[Tick]:
     """Record a simulated run as ``gazerig run --fast --record`` does; give its ticks."""
-    made = assemble(
-        load_rig("desk", character), Choice(mock=True, fast=True, seed=5, scene="visitor")
-    )
-    rig = made.retuner.rig
+    rig = load_rig("desk", character)
     info = RunInfo(
         rig="desk", profile=rig.profile, character=character, config_yaml=rig_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.walk), seed=5, rate_hz=made.loop.rate_hz,
+        walk_yaml=walk_text(rig.gaze.scanpath.walk), seed=5, rate_hz=rig.loop.rate_hz,
         started_utc="2026-01-31T12:00:00+00:00", scene="visitor", mock=True, fast=True,
     )  # fmt: skip
-    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
+    recorder = Recorder(path, info, patient=True)
     recorder.open()
+    options = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
+    made = assemble(rig, options, Substitutes(body=recorder.recorded))
     robot = made.robot
-    robot.body = recorder.tapped(robot.body)
     seen: list[Tick] = []
 
     def watch(tick: Tick) -> None:
@@ -105,7 +102,7 @@ class Again(NamedTuple):
 def again(once: Once, tmp_path_factory: pytest.TempPathFactory) -> Again:
     """The run done again with all as it was, and recorded itself."""
     path = tmp_path_factory.mktemp("again") / "again.mcap"
-    recorder = Recorder(path, once.recording.info, lambda: BusHealth(0, 0, {}), patient=True)
+    recorder = Recorder(path, once.recording.info, patient=True)
     recorder.open()
     seen: list[Tick] = []
 
@@ -259,7 +256,7 @@ def test_an_order_that_is_none_any_more_is_told(tmp_path: Path) -> None:
 
 
 def test_a_refused_resumption_is_refused_again() -> None:
-    made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
+    made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
     made.robot.start(made.clock)
     tick = made.robot.tick(0.005, 0.005)
     body = PlayedBody(made.robot.body)

@@ -17,7 +17,7 @@ from gazerig.config.knobs import NEXT_START, Knob, changed, knobs, value_of
 from gazerig.config.load import ConfigError, shipped, shipped_names
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Jog, Resume, Stop, Tune, Value, as_json, from_json
 
@@ -35,7 +35,7 @@ class Running(NamedTuple):
 
     @property
     def rig(self) -> Rig:
-        return self.made.retuner.rig
+        return self.made.live.rig
 
     def go(self, count: int, dt_s: float = DT_S) -> Tick:
         for _ in range(count):
@@ -45,11 +45,11 @@ class Running(NamedTuple):
 
     def tune(self, changes: dict[str, Value]) -> None:
         base = self.rig
-        self.made.robot.order(self.made.retuner.prepare(base, changed(base, changes)))
+        self.made.robot.order(self.made.live.prepare(base, changed(base, changes)))
 
 
 def started(scene: str = "visitor", rig: Rig = RIG) -> Running:
-    made = assemble(rig, Choice(mock=True, fast=True, seed=0, scene=scene))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene=scene))
     goals: list[list[int]] = []
     write = made.robot.body.bus.write
 
@@ -67,7 +67,7 @@ class Judge:
 
     def __init__(self, running: Running) -> None:
         self.running = running
-        self.guard = running.made.retuner.parts.guard
+        self.guard = running.made.live.parts.guard
         joints, speeds = running.made.robot.body._joints, self.guard._motion.speed
         self.steps = self._steps()
         self.speed = np.array(
@@ -260,13 +260,13 @@ OF_SIGHT = ("mount", "perception", "tracker", "kinematics", "head", "oculomotor"
 
 def parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]:
     """Return what some of the running parts, the loop and the parking go by."""
-    parts = made.retuner.parts
+    parts = made.live.parts
     held = inside({name: getattr(parts, name) for name in names}, "", {})
     return {**held, "park": made.park_rad, "loop": (made.loop.rate_hz, made.loop.park_s)}
 
 
 def fresh(rig: Rig) -> Assembly:
-    return assemble(rig, Choice(mock=True, fast=True, seed=0, scene="visitor"))
+    return assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
 
 
 IN_PICTURES = ("detector.", "motion.")
@@ -306,8 +306,8 @@ def test_every_live_knob_has_an_effect_on_the_running_parts(
 
 def put(made: Assembly, rig: Rig) -> tuple[str, ...]:
     """Put a rig in force at once."""
-    retuner = made.retuner
-    return retuner(retuner.prepare(retuner.rig, rig), 0.0)
+    live = made.live
+    return live(live.prepare(live.rig, rig), 0.0)
 
 
 @pytest.mark.parametrize(("section", "names"), SECTIONS)
@@ -324,7 +324,7 @@ def test_parts_retuned_go_by_what_new_parts_would_go_by(
                 continue
     made = fresh(RIG)
     put(made, other)
-    assert made.retuner.rig == other != RIG
+    assert made.live.rig == other != RIG
     got, wanted = parameters(made, names), parameters(fresh(other), names)
     assert {k: got[k] for k in got if got[k] != wanted.get(k)} == {}
     assert got.keys() == wanted.keys()
@@ -490,8 +490,8 @@ def test_another_rate_goes_on_from_the_last_slot() -> None:
 
 
 def test_what_looks_at_pictures_is_retuned_too() -> None:
-    made = assemble(RIG, Choice(True, True, 0, "visitor", pixels=True))
-    camera = made.retuner.parts.camera
+    made = assemble(RIG, RunOptions(True, True, 0, "visitor", pixels=True))
+    camera = made.live.parts.camera
     other = changed(RIG, {"detector.min_face_px": 60, "motion.max_blobs": 3})
     put(made, other)
     held = inside(vars(camera), "", {})

@@ -11,7 +11,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.multi_bus import MixedBus
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 
 
 @pytest.fixture
@@ -97,9 +97,9 @@ def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
 def test_one_bus_is_itself_and_several_are_one(mixed: Rig) -> None:
     from gazerig.robot.app.assemble import assemble
 
-    made = assemble(mixed, Choice(mock=True, fast=True, seed=0, scene="visitor"))
+    made = assemble(mixed, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
     assert isinstance(made.robot.body.bus, MixedBus)
-    alone = assemble(load_rig("maker"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
+    alone = assemble(load_rig("maker"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
     assert not isinstance(alone.robot.body.bus, MixedBus)
     made.close()
     alone.close()

@@ -22,11 +22,11 @@ from gazerig.config.load import load
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.types import BusHealth, Detections
+from gazerig.drivers.types import Detections
 from gazerig.gaze.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.main import app
 from gazerig.robot.cli.terminal import BAD_INPUT, FAULT, _writer
 from gazerig.robot.control.loop import Tick, run
@@ -45,19 +45,21 @@ from gazerig.robot.recording.writer_process import PIECE_BYTES
 STARTED = "2026-01-31T23:59:59.250000+00:00"
 
 
-def assembly() -> Assembly:
-    return assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=7, scene="visitor"))
+def assembly(recorder: Recorder | None = None) -> Assembly:
+    options = RunOptions(mock=True, fast=True, seed=7, scene="visitor")
+    recorded = Substitutes(body=recorder.recorded) if recorder is not None else RIGS_OWN
+    return assemble(load_rig("desk"), options, recorded)
 
 
-def info_for(made: Assembly, pictures_hz: float = 4.0) -> RunInfo:
-    rig = made.retuner.rig
+def info_for(pictures_hz: float = 4.0) -> RunInfo:
+    rig = load_rig("desk")
     return RunInfo(
         rig="desk",
         profile=rig.profile,
         config_yaml=rig_text(rig),
         walk_yaml=walk_text(rig.gaze.scanpath.walk),
         seed=7,
-        rate_hz=made.loop.rate_hz,
+        rate_hz=rig.loop.rate_hz,
         started_utc=STARTED,
         scene="visitor",
         eyes="scene visitor",
@@ -80,11 +82,10 @@ def record(
     path: Path, seconds: float, at: Callable[[int, Assembly], None] = lambda n, made: None
 ) -> Recorded:
     """Record a simulated run with a drawn picture in every tenth tick."""
-    made = assembly()
-    info = info_for(made)
-    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
+    info = info_for()
+    recorder = Recorder(path, info, patient=True)
     recorder.open()
-    made.robot.body = recorder.tapped(made.robot.body)
+    made = assembly(recorder)
     seen: list[Tick] = []
 
     def watch(tick: Tick) -> None:
@@ -234,7 +235,7 @@ def test_no_pictures_where_none_are_asked_for() -> None:
 def test_a_picture_larger_than_a_message_arrives_whole(tmp_path: Path) -> None:
     made = assembly()
     path = tmp_path / "large.mcap"
-    recorder = Recorder(path, info_for(made), made.robot.body.bus.health, patient=True)
+    recorder = Recorder(path, info_for(), patient=True)
     recorder.open()
     made.robot.start(made.clock)
     noise = np.random.default_rng(0).integers(0, 255, (900, 1200, 3), np.uint8)
@@ -414,25 +415,23 @@ def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path) ->
 
 
 def test_a_file_is_not_written_over_unasked(tmp_path: Path) -> None:
-    made = assembly()
     there = tmp_path / "there.mcap"
     there.write_text("precious")
     with pytest.raises(SetupError, match="is there already: choose another name or --force"):
-        refused = Recorder(there, info_for(made), made.robot.body.bus.health)
+        refused = Recorder(there, info_for())
         refused.open()
     refused.close()
     assert there.read_text() == "precious"
     with pytest.raises(SetupError, match="cannot write .*: choose a folder"):
-        Recorder(tmp_path / "no" / "r", info_for(made), made.robot.body.bus.health).open()
+        Recorder(tmp_path / "no" / "r", info_for()).open()
 
 
 # --- what goes wrong while it runs
 
 
 def test_a_run_that_never_began_leaves_no_file(tmp_path: Path) -> None:
-    made = assembly()
     path = tmp_path / "never.mcap"
-    recorder = Recorder(path, info_for(made), made.robot.body.bus.health)
+    recorder = Recorder(path, info_for())
     recorder.open()
     assert recorder.close("fault") == f"nothing was recorded: {path} is not made"
     assert not path.exists()
@@ -448,11 +447,10 @@ def small_disk() -> Iterator[None]:
 
 
 def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_path: Path) -> None:
-    made = assembly()
     path = tmp_path / "full.mcap"
-    recorder = Recorder(path, info_for(made), lambda: BusHealth(0, 0, {}), patient=True)
+    recorder = Recorder(path, info_for(), patient=True)
     recorder.open()
-    made.robot.body = recorder.tapped(made.robot.body)
+    made = assembly(recorder)
     made.robot.start(made.clock)
     said: list[str] = []
     goes_on = 0
@@ -487,13 +485,13 @@ def test_an_older_recording_stays_until_a_run_has_begun(tmp_path: Path) -> None:
     path = tmp_path / "older.mcap"
     path.write_bytes(b"older")
     path.chmod(0o600)
-    recorder = Recorder(path, info_for(assembly()), lambda: BusHealth(0, 0, {}), over=True)
+    recorder = Recorder(path, info_for(), over=True)
     recorder.open()
     assert path.read_bytes() == b"older"
     assert recorder.close("it could not start") == f"nothing was recorded: {path} is as it was"
     assert [one.name for one in tmp_path.iterdir()] == ["older.mcap"]
 
-    recorder = Recorder(path, info_for(assembly()), lambda: BusHealth(0, 0, {}), over=True)
+    recorder = Recorder(path, info_for(), over=True)
     recorder.open()
     recorder.begin()
     assert path.read_bytes() != b"older" and path.stat().st_mode & 0o777 == 0o600
@@ -511,11 +509,10 @@ def test_a_robot_that_cannot_start_leaves_an_older_recording(tmp_path: Path) -> 
 
 
 def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) -> None:
-    made = assembly()
     path = tmp_path / "late.mcap"
-    recorder = Recorder(path, info_for(made), lambda: BusHealth(0, 0, {}))
+    recorder = Recorder(path, info_for())
     recorder.open()
-    made.robot.body = recorder.tapped(made.robot.body)
+    made = assembly(recorder)
     made.robot.start(made.clock)
     process = recorder._link._process
     assert process is not None
@@ -536,11 +533,10 @@ def test_what_the_queue_cannot_hold_is_lost_and_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gazerig.robot.recording.writer_client.QUEUE_BYTES", 150_000)
-    made = assembly()
     path = tmp_path / "lost.mcap"
-    recorder = Recorder(path, info_for(made), lambda: BusHealth(0, 0, {}))
+    recorder = Recorder(path, info_for())
     recorder.open()
-    made.robot.body = recorder.tapped(made.robot.body)
+    made = assembly(recorder)
     made.robot.start(made.clock)
     process = recorder._link._process
     assert process is not None
@@ -559,10 +555,9 @@ def test_what_the_queue_cannot_hold_is_lost_and_counted(
 
 
 def test_a_writer_that_dies_is_told_once_and_the_run_goes_on(tmp_path: Path) -> None:
-    made = assembly()
-    recorder = Recorder(tmp_path / "dead.mcap", info_for(made), lambda: BusHealth(0, 0, {}))
+    recorder = Recorder(tmp_path / "dead.mcap", info_for())
     recorder.open()
-    made.robot.body = recorder.tapped(made.robot.body)
+    made = assembly(recorder)
     made.robot.start(made.clock)
     process = recorder._link._process
     assert process is not None

@@ -17,18 +17,18 @@ RIG = """
 import sys
 from pathlib import Path
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
 
-made = assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=0, scene="visitor"))
 info = RunInfo("desk", "robot", "a: 1", 0, 200.0, "2026-01-31T00:00:00+00:00")
-recorder = Recorder(Path(sys.argv[1]), info, made.robot.body.bus.health)
+recorder = Recorder(Path(sys.argv[1]), info)
 recorder.open()
 print(recorder._link._process.pid, flush=True)
-made.robot.body = recorder.tapped(made.robot.body)
+options = RunOptions(mock=True, fast=True, seed=0, scene="visitor")
+made = assemble(load_rig("desk"), options, Substitutes(body=recorder.recorded))
 made.robot.start(made.clock)
 wall = RealClock()
 start_s = wall.now_s()

@@ -1,5 +1,7 @@
 """What a person can mend, said in one line before a run begins; check and schema."""
 
+import dataclasses
+import inspect
 import json
 import os
 import re
@@ -7,6 +9,9 @@ from pathlib import Path
 
 import pytest
 from command_line import gazerig, typed
+
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.cli.run import run
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
@@ -78,3 +83,9 @@ def test_check_and_schema(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> 
         assert part in said
     lines = [line for line in said.splitlines() if line.startswith(f"{rig}:")]
     assert len(lines) >= 4 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)
+
+
+def test_every_option_of_run_is_a_field_of_the_options_of_a_run() -> None:
+    fields = {field.name for field in dataclasses.fields(RunOptions)}
+    assert set(inspect.signature(run).parameters) <= fields
+    assert fields - set(inspect.signature(run).parameters) == {"film_delay_s", "placed_by"}

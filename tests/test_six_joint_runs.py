@@ -20,8 +20,8 @@ from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.lid_opening import UPPER, openings
 from gazerig.robot.analysis.summary import Summary
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.loop import Tick, run
@@ -60,14 +60,14 @@ class Run(NamedTuple):
 
 def recorded(path: Path, rig: Rig, seconds: float) -> Run:
     """Record a simulated run; give its ticks too."""
-    made = assemble(rig, Choice(mock=True, fast=True, seed=5, scene="visitor"))
+    options = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
     info = RunInfo(
-        "a rig", rig.profile, rig_text(rig), 5, made.loop.rate_hz, STARTED,
+        "a rig", rig.profile, rig_text(rig), 5, rig.loop.rate_hz, STARTED,
         walk_yaml=walk_text(rig.gaze.scanpath.walk), scene="visitor", mock=True, fast=True,
     )  # fmt: skip
-    recorder = Recorder(path, info, made.robot.body.bus.health, patient=True)
+    recorder = Recorder(path, info, patient=True)
     recorder.open()
-    made.robot.body = recorder.tapped(made.robot.body)
+    made = assemble(rig, options, Substitutes(body=recorder.recorded))
     seen: list[Tick] = []
 
     def watch(tick: Tick) -> None:

@@ -12,8 +12,9 @@ from six_joints import SIX
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.angles import angle_between
 from gazerig.robot.analysis.event_detector import Blink, Fixation, GazeEvents, Saccade
-from gazerig.robot.app.assemble import Assembly, assemble, gaze_parts
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.dashboard.page_process import MESSAGE_BYTES, pack, unpack
 from gazerig.robot.dashboard.snapshot import Said, ShownRig, Snapshots, snapshot
@@ -27,7 +28,7 @@ TICKS_BETWEEN = 8
 def visit(name: str = "desk", last_s: float = 8.0) -> tuple[Rig, Assembly, tuple[Tick, ...]]:
     """Some seconds of a rig that talks with somebody."""
     rig = load_rig(name)
-    made = assemble(rig, Choice(mock=True, fast=True, seed=0, scene="face-to-face"))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="face-to-face"))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
     over: Callable[[float], str | None] = lambda s: "over" if s >= last_s else None  # noqa: E731

@@ -13,8 +13,8 @@ from gazerig.drivers.types import Camera, Detections
 from gazerig.gaze.angles import angle_between, sub
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app import assemble as assembling
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
@@ -87,8 +87,8 @@ def watched(scene: Passer, patch: pytest.MonkeyPatch) -> tuple[Rig, list[Tick]]:
     patch.setattr(assembling, "scenes", lambda: {scene.name: scene})
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
-    made: Assembly = assemble(rig, Choice(mock=True, fast=True, seed=3, scene=scene.name))
-    made.robot.camera = Unplugged(made.robot.camera)
+    options = RunOptions(mock=True, fast=True, seed=3, scene=scene.name)
+    made: Assembly = assemble(rig, options, Substitutes(camera=Unplugged))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
     try:

@@ -9,7 +9,7 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.robot.app import assemble as assembling
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.scenes.scene import Event, Person, Thing
 
@@ -51,7 +51,7 @@ def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]
         gaze=replace(rig.gaze, idle=idle),
         detector=replace(rig.detector, work_width_px=128),
     )
-    made = assemble(rig, Choice(mock=True, fast=True, seed=1, scene=room.name, pixels=True))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=1, scene=room.name, pixels=True))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
     try:

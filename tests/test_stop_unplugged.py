@@ -9,11 +9,11 @@ import pytest
 from bus_kinds import KINDS, Twin, in_process
 from mixed_rig import mixed_text
 
-import gazerig.robot.app.assemble as assemble_module
+import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import BusLost
 from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Resume, Stop
 from gazerig.sim_mock.device import Device
@@ -123,15 +123,15 @@ def machine(
 ) -> Iterator[Machine]:
     rig = _rig(request.param, tmp_path)
     devices: dict[str, Device] = {}
-    build: Callable[..., Device] = assemble_module.build
+    build: Callable[..., Device] = run_bus.build
 
     def kept(line: Any, now_s: Callable[[], float]) -> Device:
         device = build(line, now_s)
         devices[f"{len(devices)}"] = device
         return device
 
-    monkeypatch.setattr(assemble_module, "build", kept)
-    made = assemble(rig, Choice(mock=True, fast=True, seed=2, scene="face-to-face"))
+    monkeypatch.setattr(run_bus, "build", kept)
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=2, scene="face-to-face"))
     machine = Machine(made, devices)
     yield machine
     made.close()

@@ -13,12 +13,13 @@ from typing import Any
 import pytest
 from attack.ways_out import START, attack, bench
 
-import gazerig.robot.app.assemble as assemble_module
+import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, SetupError
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app import session
-from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.line_writer import LineWriter
 from gazerig.robot.cli.run import had_faults
 from gazerig.robot.control.interrupts import SAME_REQUEST_S, Interrupts
@@ -246,7 +247,7 @@ def devices(monkeypatch: pytest.MonkeyPatch) -> list[Device]:
         made.append(build(*words))
         return made[-1]
 
-    monkeypatch.setattr(assemble_module, "build", built)
+    monkeypatch.setattr(run_bus, "build", built)
     return made
 
 
@@ -262,11 +263,10 @@ def ran(
     seconds: float = 1.5,
     before: Callable[[Assembly], None] | None = None,
 ) -> dict[str, Any]:
-    wanted = session.Wanted(mock=True, fast=True, seconds=seconds)
-    made = assemble(load_rig(rig), wanted.choice())
+    composed = session.compose(RunOptions(True, True, rig=rig, seconds=seconds).checked())
     if before is not None:
-        before(made)
-    return session.run(made, wanted, lambda: None, said.append, lambda line: None)
+        before(composed.made)
+    return session.run(composed, lambda: None, said.append)
 
 
 @pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
@@ -308,10 +308,8 @@ def test_nobody_to_say_anything_to_ends_nothing(devices: list[Device]) -> None:
     def deaf(line: str) -> None:
         raise BrokenPipeError
 
-    wanted = session.Wanted(mock=True, fast=True, seconds=0.5)
-    figures = session.run(
-        assemble(load_rig("desk"), wanted.choice()), wanted, lambda: None, deaf, deaf
-    )
+    composed = session.compose(RunOptions(True, True, seconds=0.5).checked())
+    figures = session.run(composed, lambda: None, deaf, deaf)
     assert figures["stopped_by"] == "seconds" and on(devices[0]) == 0
 
 

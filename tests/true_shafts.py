@@ -13,12 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import gazerig.robot.app.assemble as assemble_module
+import gazerig.robot.app.assemble as assembling
+import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import Rig
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.emulation import emulated_lines, place_of
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.clock import SimulatedClock
@@ -161,10 +162,10 @@ def hardest(angles: NDArray[np.float64], over_ms: int) -> NDArray[np.float64]:
 
 
 @contextmanager
-def looked_at(rig: Rig, choice: Choice) -> Iterator[tuple[Assembly, Shafts]]:
+def looked_at(rig: Rig, choice: RunOptions) -> Iterator[tuple[Assembly, Shafts]]:
     """Assemble a rig whose true shafts are looked at."""
     shafts = Shafts(rig)
-    was = assemble_module.SimulatedClock, assemble_module.build
+    was = assembling.SimulatedClock, run_bus.build
 
     def built(line: object, now_s: Callable[[], float]) -> Device:
         device = build(line, now_s)  # type: ignore[arg-type]
@@ -173,11 +174,11 @@ def looked_at(rig: Rig, choice: Choice) -> Iterator[tuple[Assembly, Shafts]]:
         return device
 
     lines = emulated_lines(rig)
-    assemble_module.SimulatedClock, assemble_module.build = (lambda: shafts), built  # type: ignore
+    assembling.SimulatedClock, run_bus.build = (lambda: shafts), built  # type: ignore
     try:
         made = assemble(rig, choice)
     finally:
-        assemble_module.SimulatedClock, assemble_module.build = was  # type: ignore[misc]
+        assembling.SimulatedClock, run_bus.build = was  # type: ignore[misc]
     try:
         yield made, shafts
     finally:

@@ -21,7 +21,7 @@ from gazerig.drivers.vision.face_detector import face_detector
 from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import Intrinsics
@@ -37,7 +37,7 @@ HeadPose = Callable[[float], tuple[Mat3, Vec3]]
 
 def scene_camera(
     rig: Rig,
-    choice: Choice,
+    options: RunOptions,
     scene: Scene,
     mount: CameraMount,
     where: HeadPose,
@@ -45,7 +45,7 @@ def scene_camera(
 ) -> Camera:
     """Make a camera on a simulated scene: drawn and looked at, or what a detector would find."""
     field_deg = rig.camera.horizontal_field_deg
-    if not choice.pixels:
+    if not options.pixels:
         params = SceneCameraParams(horizontal_field_deg=field_deg)
         return SceneCamera(params, scene, mount, where, rng)
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
@@ -54,7 +54,7 @@ def scene_camera(
 
 
 def real_camera(
-    rig: Rig, choice: Choice, clock: Clock, placed: CameraParams, turns: PoseRing | None
+    rig: Rig, options: RunOptions, clock: Clock, placed: CameraParams, turns: PoseRing | None
 ) -> Camera:
     """Make the camera of a film, a recording, a webcam or an OAK-D.
 
@@ -67,9 +67,9 @@ def real_camera(
     detector = partial(face_detector, rig.detector)
     field_rad = radians(placed.horizontal_field_deg)
     motion = partial(motion_finder, rig.motion, placed.lens, field_rad, turns)
-    if choice.fast:
-        return FilmCamera(_film(choice), detector(), choice.film_delay_s, motion=motion())
-    parts = CameraParts(_source(rig, choice), detector, motion)
+    if options.fast:
+        return FilmCamera(_film(options), detector(), options.film_delay_s, motion=motion())
+    parts = CameraParts(_source(rig, options), detector, motion)
     return CameraProcess(parts, clock.now_s, rig.camera_care)
 
 
@@ -100,23 +100,23 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
     return "" if done else "the camera's process is busy and looks as before: set it once more"
 
 
-def _film(choice: Choice) -> VideoFile | CameraReplay:
-    return CameraReplay(choice.replay) if choice.replay is not None else VideoFile(_path(choice))
+def _film(options: RunOptions) -> VideoFile | CameraReplay:
+    return CameraReplay(options.replay) if options.replay is not None else VideoFile(_path(options))
 
 
-def _source(rig: Rig, choice: Choice) -> Callable[[], PictureSource]:
+def _source(rig: Rig, options: RunOptions) -> Callable[[], PictureSource]:
     """Return how to make the source, for the process that will use it."""
-    if choice.replay is not None:
-        return partial(CameraReplay, choice.replay)
-    if choice.video is not None:
-        return partial(VideoFile, choice.video)
-    if choice.oak:
+    if options.replay is not None:
+        return partial(CameraReplay, options.replay)
+    if options.video is not None:
+        return partial(VideoFile, options.video)
+    if options.oak:
         return partial(OakSource, rig.oak)
-    return partial(Webcam.of, choice.camera or 0, rig.webcam)
+    return partial(Webcam.of, options.camera or 0, rig.webcam)
 
 
-def _path(choice: Choice) -> str:
-    return str(choice.video)
+def _path(options: RunOptions) -> str:
+    return str(options.video)
 
 
 class _MotionOfDrawn:

@@ -48,7 +48,7 @@ from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.safety.guard import Guard
 
 
-class Parts(NamedTuple):
+class Components(NamedTuple):
     """The parts of a running robot that have parameters."""
 
     body: Body
@@ -73,7 +73,7 @@ class Parts(NamedTuple):
     lids: Lids
 
 
-class Placed(NamedTuple):
+class CameraPlacement(NamedTuple):
     """Where the camera is taken to sit, which may be standing still though the rig's does not."""
 
     camera: Callable[[Rig], CameraParams]
@@ -99,13 +99,13 @@ _ALIKE = (
 """Sections of the gaze whose part of the same name needs nothing but its own parameters."""
 
 
-class Retuner:
+class LiveParams:
     """Puts changes into the parts of a robot; a gazerig.robot.control.loop.Robot's ``tune``.
 
     rig: in force
     """
 
-    def __init__(self, parts: Parts, rig: Rig, placed: Placed) -> None:
+    def __init__(self, parts: Components, rig: Rig, placed: CameraPlacement) -> None:
         self.rig = rig
         self.parts = parts
         self._placed = placed

@@ -1,24 +1,42 @@
-"""What to run: wires or emulation, what to look at, which clock, which dice."""
+"""One run as it was asked for: the same value from the command line to the assembly."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from gazerig.drivers.errors import SetupError
+
+DEFAULT_SCENE = "visitor"
+
 
 @dataclass(frozen=True)
-class Choice:
-    """What to run.
+class RunOptions:
+    """What to run, what to look at, what watches and what is written; None where nothing was said.
 
-    Exactly one of scene, video, camera, oak and replay is set.
-    pixels: the scene is drawn and looked at by the real detectors
-    port: serial port instead of the rig's
-    placed_by: pictures are placed by the head's pose at their capture, or, for comparison
-        only, by the newest pose, which makes the head overshoot
+    Attributes:
+        mock: emulated servos instead of the rig's.
+        fast: simulated time.
+        seed: of all random generators.
+        scene, video, camera, oak, replay: what to look at; one of them (see ``checked``).
+        pixels: the scene is drawn and looked at by the real detectors.
+        scanpath, saccade: models instead of the rig's; rules: a rule set instead of the rig's.
+        port: serial port instead of the rig's.
+        film_delay_s: age of a film's frames in simulated time.
+        placed_by: detections are placed by the head's pose at capture, or, for comparison only,
+            by the newest pose, which makes the head overshoot.
+        rig, character, profile: by name or path.
+        behaviour, conversation: in force at the start.
+        seconds: how long to run.
+        page: HOST:PORT of the live page; no_page: without it.
+        heatmap: PNG to write; heatmap_face: picture of a face to lay it over.
+        record: file to record to; record_pictures: camera frames a second in it.
+        force: write over older files.
+        summary: file of the figures, "-" for standard output.
     """
 
-    mock: bool
-    fast: bool
-    seed: int
+    mock: bool = False
+    fast: bool = False
+    seed: int = 0
     scene: str | None = None
     video: Path | None = None
     camera: int | None = None
@@ -31,10 +49,24 @@ class Choice:
     port: str | None = None
     film_delay_s: float = 0.05
     placed_by: Literal["capture", "newest"] = "capture"
+    rig: str = "desk"
+    character: str | None = None
+    profile: str | None = None
+    behaviour: str | None = None
+    conversation: str | None = None
+    seconds: float | None = None
+    page: str | None = None
+    no_page: bool = False
+    heatmap: Path | None = None
+    heatmap_face: Path | None = None
+    record: Path | None = None
+    record_pictures: float = 2.0
+    force: bool = False
+    summary: str | None = None
 
     @property
-    def eyes(self) -> str | None:
-        """Say what a real or filmed camera is, None for a scene."""
+    def looks_through(self) -> str | None:
+        """Return what a real or filmed camera is, None for a scene."""
         if self.video is not None:
             return "a film"
         if self.replay is not None:
@@ -42,3 +74,97 @@ class Choice:
         if self.camera is not None:
             return "a webcam"
         return "an OAK-D" if self.oak else None
+
+    @property
+    def page_address(self) -> tuple[str, int] | None:
+        """Return where the live page is served, None without one.
+
+        Raises:
+            SetupError: ``page`` is no address.
+        """
+        if self.page is None:
+            return None
+        address = host_port(self.page)
+        return None if self.no_page or self.fast else address
+
+    @property
+    def written_at_the_end(self) -> tuple[Path, ...]:
+        """Return the files whose names must be free now, as nobody wants to run again."""
+        named = None if self.summary is None or self.summary == "-" else Path(self.summary)
+        return tuple(path for path in (self.heatmap, named) if path is not None)
+
+    @property
+    def choices(self) -> tuple[tuple[str, str], ...]:
+        """Return what is asked of the robot's menus at the start, as (menu, choice)."""
+        asked = (("behaviour", self.behaviour), ("conversation", self.conversation))
+        return tuple((menu, choice) for menu, choice in asked if choice is not None)
+
+    def checked(self) -> "RunOptions":
+        """Return the options with the scene that is looked at where nothing was said.
+
+        Raises:
+            SetupError: they do not fit together.
+        """
+        _ = self.page_address
+        asked = [
+            name
+            for name in ("scene", "video", "camera", "oak", "replay")
+            # By identity: webcam 0 is a choice.
+            if getattr(self, name) is not None and getattr(self, name) is not False
+        ]
+        if len(asked) > 1:
+            options = " and ".join(f"--{name}" for name in asked)
+            raise SetupError(f"{options} exclude each other: the head looks at one of them")
+        scene = self.scene
+        if not asked:
+            if not self.mock:
+                raise SetupError(
+                    "nothing to look at: give --oak, --camera N, --video FILE or --scene NAME"
+                )
+            scene = DEFAULT_SCENE
+        self._refuse_clashes(scene)
+        return replace(self, scene=scene)
+
+    def _refuse_clashes(self, scene: str | None) -> None:
+        """Refuse options that exclude each other.
+
+        Raises:
+            SetupError: with what they need.
+        """
+        clashes = (
+            (
+                self.port is not None and self.mock,
+                "--port and --mock exclude each other: --mock has a port of its own",
+            ),
+            (
+                self.fast and not self.mock,
+                "--fast needs --mock: real servos cannot be hurried",
+            ),
+            (
+                self.fast and (self.camera is not None or self.oak),
+                "--fast needs a scene, a film or a recording: a camera has real time",
+            ),
+            (
+                self.pixels and scene is None,
+                "--pixels draws a scene: it cannot be used with a film or a camera",
+            ),
+            (
+                self.fast and self.seconds is None and scene is None,
+                "--fast needs --seconds S with a film: it would never end",
+            ),
+        )
+        for clash, message in clashes:
+            if clash:
+                raise SetupError(message)
+
+
+def host_port(text: str) -> tuple[str, int]:
+    """Return host and port of HOST:PORT.
+
+    Raises:
+        SetupError: it is no address.
+    """
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise SetupError(f"--page {text}: not HOST:PORT, for example 127.0.0.1:8080")
+    return host, int(port)

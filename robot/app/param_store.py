@@ -35,7 +35,7 @@ from gazerig.config.rig_files import Layers, RigFiles, read_all, save_copy, save
 from gazerig.config.save import Change, Saved, rig_file
 from gazerig.config.save_text import Unchangeable, written
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.live_params import Retuner
+from gazerig.robot.app.live_params import LiveParams
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.reply import OrderTaker
 
@@ -71,7 +71,7 @@ class Tuning:
 
     def __init__(
         self,
-        retuner: Retuner,
+        live_params: LiveParams,
         order: OrderTaker,
         rig: str,
         character: str | None = None,
@@ -89,13 +89,13 @@ class Tuning:
         Raises:
             gazerig.config.load.ConfigError: the files have changed since, and are at fault now.
         """
-        self._retuner, self._order = retuner, order
+        self._live_params, self._order = live_params, order
         self._profile, self._now, self._elsewhere = profile, now, elsewhere
         self._changing = threading.Lock()
-        self._defaults = _defaults(retuner.rig)
+        self._defaults = _defaults(live_params.rig)
         # What the command line says otherwise stays in force whatever the files say.
         read, files = read_all(Layers(rig, character, profile))
-        whole, found = retuner.rig, values(retuner.rig)
+        whole, found = live_params.rig, values(live_params.rig)
         self._options = differences(read, whole)
         self._state = _State(whole, whole, rig, character, files, found, found, 0)
         self._knobs = knobs_of(whole, self._defaults)
@@ -262,7 +262,7 @@ class Tuning:
         before = self._state
         found = differences(before.rig, rig)
         if found:
-            self._order(self._retuner.prepare(before.rig, rig))
+            self._order(self._live_params.prepare(before.rig, rig))
         elif state == before:
             return ()
         self._state = state._replace(

@@ -17,10 +17,12 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.config.text import rig_text
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.analysis.summary import Summary
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import leave
+from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.recording.playback_devices import NoCamera, PlayedBody, PlayedPerception
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.tick_record import Measured, Moment
@@ -80,29 +82,44 @@ def rerun(
     with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
         with_rig = _rig(recording, rig, character, Path(folder))
         # The scene is not looked at: what it showed is in the recording.
-        choice = Choice(mock=True, fast=True, seed=recording.info.seed, scene="visitor")
-        made = assemble(with_rig, choice)
+        options = RunOptions(mock=True, fast=True, seed=recording.info.seed, scene="visitor")
+        again = _Again(with_rig, options, fed, note)
         try:
-            return _Again(made, fed, note).whole(recording)
+            return again.whole(recording)
         finally:
-            made.close()
+            again.close()
 
 
 class _Again:
     """One run being done again."""
 
-    def __init__(self, made: Assembly, joints: Joints, note: Callable[[Tick], None] | None) -> None:
-        self._made = made
+    def __init__(
+        self, rig: Rig, options: RunOptions, joints: Joints, note: Callable[[Tick], None] | None
+    ) -> None:
         self._joints = joints
         self._note = note
         self._compared = _Compared()
         self._notes: list[str] = []
-        self._body = PlayedBody(made.robot.body) if joints == "recorded" else None
-        self._perception = PlayedPerception(made.mount, made.horizontal_field_deg)
-        robot = made.robot
-        robot.perception, robot.camera = self._perception, NoCamera()
-        if self._body is not None:
-            robot.body = self._body
+        self._body: PlayedBody | None = None
+        camera = rig.camera
+        self._perception = PlayedPerception(CameraMount(camera), camera.horizontal_field_deg)
+        self._made = assemble(
+            rig,
+            options,
+            Substitutes(
+                body=self._played if joints == "recorded" else lambda own: own,
+                camera=lambda own: NoCamera(),
+                perception=lambda own: self._perception,
+            ),
+        )
+
+    def _played(self, own: Body) -> Body:
+        self._body = PlayedBody(own)
+        return self._body
+
+    def close(self) -> None:
+        """End what was started for it."""
+        self._made.close()
 
     def whole(self, recording: RunRecording) -> Rerun:
         """Do all of it and compare."""

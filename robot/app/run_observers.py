@@ -5,65 +5,33 @@ has its own thread or process, and is told of a tick in next to no time.
 """
 
 import contextlib
+import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
+from gazerig.config.load import ConfigError
 from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.param_store import Tuning
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.control.observers import Observers, left_out
 from gazerig.robot.dashboard.click_to_look import Picking
 from gazerig.robot.dashboard.page_process import Page
-from gazerig.robot.dashboard.param_feed import Fed, TuningFeed
+from gazerig.robot.dashboard.param_feed import TuningFeed
 from gazerig.robot.dashboard.publisher import InForce, Onlooker
-from gazerig.robot.dashboard.request_handler import Confined, PageHear
+from gazerig.robot.dashboard.request_handler import PageHear
 from gazerig.robot.dashboard.snapshot import Snapshots
 from gazerig.robot.model.commands import Order, Resume, Stop, Tune
 from gazerig.robot.model.reply import OrderTaker, Ticket
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunInfo
-from gazerig.robot.remote.live_server import FileTuning, LiveControl
+from gazerig.robot.remote.live_server import LiveControl
 
 _SWITCH_S = 0.0003
 
 STEER = "steer"
 """The menu of this name is the page's steps of a calibration (dashboard/control_tabs.py)."""
-
-
-class LiveTuning(FileTuning, Fed, Protocol):
-    """The parameters of the running rig, as gazerig.robot.app.param_store.Tuning has them."""
-
-    @property
-    def confined(self) -> Confined:
-        """Return what says which files a person at a browser may name."""
-        ...
-
-
-class Wished(NamedTuple):
-    """What shall watch, None or False where nothing shall.
-
-    page: host and port; status_line: on the terminal; record: a file to write; over: also
-    where it exists
-    """
-
-    page: tuple[str, int] | None = None
-    status_line: bool = False
-    record: Path | None = None
-    over: bool = False
-
-
-class Told(NamedTuple):
-    """What only the command line knows.
-
-    tuning: the parameters; refusals: what it raises where a value breaks a rule
-    about: what does not change, for other programs; info: for the recording
-    """
-
-    tuning: LiveTuning
-    refusals: tuple[type[Exception], ...]
-    about: dict[str, object]
-    info: Callable[[], RunInfo]
 
 
 class Steer(NamedTuple):
@@ -78,50 +46,58 @@ class Steer(NamedTuple):
     shown: Callable[[], str]
 
 
-class Audience:
-    """All of them, opened and closed together."""
+class RunObservers:
+    """All that watch a run or reach into it, opened and closed together."""
 
     def __init__(
         self,
         made: Assembly,
-        wished: Wished,
-        told: Told | None,
-        fast: bool,
+        options: RunOptions,
         say: Callable[[str], None],
-        status: Callable[[str], None],
+        status: Callable[[str], None] | None = None,
+        tuning: Tuning | None = None,
+        recorder: Recorder | None = None,
         steer: Steer | None = None,
     ) -> None:
         """Take the robot before it starts.
 
-        told: None where parameters cannot be changed from outside and nothing is recorded
-        fast: simulated time, in which nobody can watch
-        steer: who leads the head by buttons; then the page can otherwise only stop and resume
+        Args:
+            made: the robot and its surroundings.
+            options: where the page is, and whether time is simulated, in which nobody watches.
+            say: writes a line.
+            status: rewrites the status line; None: there is none.
+            tuning: the parameters; None where they cannot be changed from outside.
+            recorder: what records the run.
+            steer: who leads the head by buttons; then the page can otherwise only stop and resume.
         """
         self._steer = steer
-        self._made, self._fast, self._say = made, fast, say
-        self._tuning = told.tuning if told is not None else None
+        self._made, self._fast, self._say = made, options.fast, say
+        self._tuning, self._recorder = tuning, recorder
+        about = {"rig": options.rig, "pid": os.getpid()}
         self._live = (
-            LiveControl(made.robot, told.tuning, told.refusals, made.clock, told.about, say)
-            if told is not None and not fast
+            LiveControl(made.robot, tuning, (ConfigError,), made.clock, about, say)
+            if tuning is not None and not options.fast
             else None
         )
         self._picking = Picking(made.mount, made.poses, made.camera)
-        self._page = self._made_page(wished.page, told) if wished.page is not None else None
+        address = options.page_address
+        self._page = self._made_page(address) if address is not None else None
         self._snapshots = Snapshots(made.loop.rate_hz, made.shown())
-        self._onlooker = self._made_onlooker(status if wished.status_line else None)
-        self._recorder = self._made_recorder(wished, told)
+        self._onlooker = self._made_onlooker(status)
+        # In simulated time nobody can watch.
+        self._shown = not options.fast and (self._page is not None or status is not None)
         self._looking = False
         self._observers = Observers(say)
         self.join(self._observers)
 
-    def _made_page(self, address: tuple[str, int], told: Told | None) -> Page:
+    def _made_page(self, address: tuple[str, int]) -> Page:
         order, steer = self._made.robot.order, self._steer
         hear = PageHear(
             order if steer is None else only_stops(order),
             tuning=self._tuning,
             point=self._picking.point,
             steer=steer.press if steer is not None else None,
-            refusals=told.refusals if told is not None else (),
+            refusals=(ConfigError,) if self._tuning is not None else (),
             saved=self._live.saved if self._live is not None else None,
             depth=self._show_depth,
             confined=self._tuning.confined if self._tuning is not None else None,
@@ -144,19 +120,9 @@ class Audience:
             self._say,
         )
 
-    def _made_recorder(self, wished: Wished, told: Told | None) -> Recorder | None:
-        if wished.record is None or told is None:
-            return None
-        robot = self._made.robot
-        recorder = Recorder(
-            wished.record, told.info(), robot.body.bus.health, wished.over, patient=self._fast
-        )
-        robot.body = recorder.tapped(robot.body)
-        return recorder
-
     def join(self, observers: Observers) -> None:
         """Have all of them told of ticks; each is left out by itself where it fails."""
-        if not self._fast:
+        if self._shown:
             observers.add("page and status line", self._onlooker.note)
         if self._page is not None:
             observers.add("picking a point on the page", self._picking.note)
@@ -200,7 +166,7 @@ class Audience:
             if self._live is not None:
                 self._live.open()
         with self._spared("page and status line"):
-            if not self._fast:
+            if self._shown:
                 self._onlooker.start()
                 self._looking = True
 

@@ -2,19 +2,23 @@
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from gazerig.config.schema import Rig, load_rig
+from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.behaviour_score import Behaviours
 from gazerig.robot.analysis.gaze_on_face import FaceGaze
 from gazerig.robot.analysis.heatmap import heatmap
 from gazerig.robot.analysis.summary import Summary
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.options import Choice
-from gazerig.robot.app.run_observers import Audience, Told, Wished
+from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble, with_options
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.scripted_behaviour import Planner
 from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.interrupts import Interrupts
@@ -24,171 +28,177 @@ from gazerig.robot.control.loop import run as run_loop
 from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunInfo, versions
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What was asked for on the command line; None where nothing was said."""
+class Run(NamedTuple):
+    """A robot put together for one run, with what reaches into it and what records it."""
 
-    mock: bool = False
-    fast: bool = False
-    seed: int = 0
-    seconds: float | None = None
-    scene: str | None = None
-    video: Path | None = None
-    camera: int | None = None
-    oak: bool = False
-    replay: Path | None = None
-    pixels: bool = False
-    scanpath: str | None = None
-    saccade: str | None = None
-    rules: str | None = None
-    port: str | None = None
-    asked: tuple[tuple[str, str], ...] = ()
-    heatmap: Path | None = None
-    heatmap_face: Path | None = None
-    watched: Wished = Wished()
+    options: RunOptions
+    made: Assembly
+    tuning: Tuning
+    recorder: Recorder | None
 
-    def choice(self) -> Choice:
-        """Return what to assemble.
 
-        Raises:
-            SetupError: the options do not fit together.
-        """
-        asked = [
-            name
-            for name in ("scene", "video", "camera", "oak", "replay")
-            # By identity: webcam 0 is a choice.
-            if getattr(self, name) is not None and getattr(self, name) is not False
-        ]
-        if len(asked) > 1:
-            options = " and ".join(f"--{name}" for name in asked)
-            raise SetupError(f"{options} exclude each other: the head looks at one of them")
-        scene = self.scene
-        if not asked:
-            if not self.mock:
-                raise SetupError(
-                    "nothing to look at: give --oak, --camera N, --video FILE or --scene NAME"
-                )
-            scene = "visitor"
-        if self.port is not None and self.mock:
-            raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
-        if self.fast and not self.mock:
-            raise SetupError("--fast needs --mock: real servos cannot be hurried")
-        if self.fast and (self.camera is not None or self.oak):
-            raise SetupError("--fast needs a scene, a film or a recording: a camera has real time")
-        if self.pixels and scene is None:
-            raise SetupError("--pixels draws a scene: it cannot be used with a film or a camera")
-        if self.fast and self.seconds is None and scene is None:
-            raise SetupError("--fast needs --seconds S with a film: it would never end")
-        return Choice(
-            mock=self.mock,
-            fast=self.fast,
-            seed=self.seed,
-            scene=scene,
-            video=self.video,
-            camera=self.camera,
-            oak=self.oak,
-            replay=self.replay,
-            pixels=self.pixels,
-            scanpath=self.scanpath,
-            saccade=self.saccade,
-            rules=self.rules,
-            port=self.port,
-        )
+def compose(options: RunOptions) -> Run:
+    """Put one run together; nothing moves.
+
+    Raises:
+        gazerig.config.load.ConfigError: the rig, character, profile or walk is at fault.
+        SetupError: a film or model file cannot be used.
+    """
+    loaded = load_rig(options.rig, options.character, options.profile)
+    rig = with_options(loaded, options)
+    if options.record is None:
+        recorder, substitutes = None, RIGS_OWN
+    else:
+        info = run_info(rig, options)
+        recorder = Recorder(options.record, info, options.force, patient=options.fast)
+        substitutes = Substitutes(body=recorder.recorded)
+    made = assemble(rig, options, substitutes)
+    names = (options.rig, options.character, options.profile)
+    return Run(options, made, Tuning(made.live, made.robot.order, *names), recorder)
+
+
+def run_info(rig: Rig, options: RunOptions) -> RunInfo:
+    """Return what a recording says of its run."""
+    return RunInfo(
+        rig=options.rig,
+        profile=rig.profile,
+        character=options.character,
+        config_yaml=rig_text(rig),
+        walk_yaml=walk_text(rig.gaze.scanpath.walk),
+        seed=options.seed,
+        rate_hz=rig.loop.rate_hz,
+        started_utc=datetime.now(UTC).isoformat(),
+        scene=options.scene,
+        eyes=options.looks_through or f"scene {options.scene}",
+        mock=options.mock,
+        fast=options.fast,
+        pictures_hz=options.record_pictures,
+        versions=versions(),
+    )
 
 
 def run(
-    made: Assembly,
-    wanted: Wanted,
+    composed: Run,
     stopped: Callable[[], str | None],
     say: Callable[[str], None],
-    status: Callable[[str], None],
-    told: Told | None = None,
+    status: Callable[[str], None] | None = None,
 ) -> dict[str, object]:
-    """Run until the time is over, a signal comes or something fails; give the figures.
+    """Run until the time is over, a signal comes or something fails; return the figures.
 
-    stopped: gives the name of a signal that has come; say, status: write a line, and
-    rewrite the status line
-    told: what tuning and recording need, None where there is neither
+    Args:
+        composed: what to run.
+        stopped: returns the name of a signal that has come, None before.
+        say: writes a line.
+        status: rewrites the status line; None: there is none.
+
     Raises:
         SetupError: before anything moved.
     """
     try:
-        return _run(made, wanted, stopped, say, status, told)
+        return _Running(composed, stopped, say, status).whole()
     finally:
-        made.close()
+        composed.made.close()
 
 
-def _run(
-    made: Assembly,
-    wanted: Wanted,
-    stopped: Callable[[], str | None],
-    say: Callable[[str], None],
-    status: Callable[[str], None],
-    told: Told | None,
-) -> dict[str, object]:
-    robot, wall = made.robot, RealClock()
-    say = _never_raising(say)
-    audience = Audience(made, wanted.watched, told, wanted.fast, say, status)
-    summary = Summary()
-    faults = JointFaults(say)
-    scene = made.scene
-    score = Behaviours(scene.events(), scene.round_s) if scene is not None else None
-    face_gaze = FaceGaze() if wanted.heatmap is not None else None
-    observers = Observers(say)
-    observers.add("the summary", summary.note)
-    observers.add("the watch for faults", faults.note)
-    audience.join(observers)
-    _observe_scene(observers, made, score, face_gaze)
-    _ask_all(robot, wanted)
+class _Running:
+    """One run, with everything that watches it."""
 
-    def tell(tick: Tick) -> None:
-        for event in (*drawn_together(tick.events), *audience.events()):
-            say(f"{tick.t_s - start_s:.2f} s: {event}")
+    def __init__(
+        self,
+        composed: Run,
+        stopped: Callable[[], str | None],
+        say: Callable[[str], None],
+        status: Callable[[str], None] | None,
+    ) -> None:
+        options, made = composed.options, composed.made
+        self._options, self._made, self._stopped = options, made, stopped
+        self._say = say = _never_raising(say)
+        self._audience = RunObservers(
+            made, options, say, status, composed.tuning, composed.recorder
+        )
+        self._summary, self._faults = Summary(), JointFaults(say)
+        scene = made.scene
+        self._score = Behaviours(scene.events(), scene.round_s) if scene is not None else None
+        self._face_gaze = FaceGaze() if options.heatmap is not None else None
+        self._start_s = 0.0
+        self._observers = self._all_observers()
+        _ask_all(made.robot, options)
+        self._longest_s = _longest_s(made, options)
+        self._interrupts = Interrupts.of(stopped)
 
-    observers.add("the log", tell)
-    longest_s = _longest_s(made, wanted)
-    interrupts = Interrupts.of(stopped)
+    def _all_observers(self) -> Observers:
+        observers = Observers(self._say)
+        observers.add("the summary", self._summary.note)
+        observers.add("the watch for faults", self._faults.note)
+        self._audience.join(observers)
+        _observe_scene(observers, self._made, self._score, self._face_gaze)
+        observers.add("the log", self._log)
+        return observers
 
-    def stop(seconds: float) -> str | None:
-        over = longest_s is not None and seconds >= longest_s - 1e-9
-        return stopped() or interrupts() or ("seconds" if over else None)
+    def _log(self, tick: Tick) -> None:
+        """Say what has happened in a tick."""
+        for event in (*drawn_together(tick.events), *self._audience.events()):
+            self._say(f"{tick.t_s - self._start_s:.2f} s: {event}")
 
-    began_s = wall.now_s()
-    count = LoopCount(0, 0, "fault: unexpected error")
-    audience.open_files()
-    begun = False
-    try:
-        with interrupts, way_out(made, say, interrupts) as leaving:
-            leaving.switch_on(lambda: robot.start(made.clock, interrupts.refuse))
-            begun = True
-            start_s = made.clock.now_s()
-            for note in (*made.notes, *drawn_together(robot.body.bus.events())):
-                say(note)
-            audience.open()
-            count = run_loop(
-                robot, made.clock, lambda: made.loop, audience.timed(stop), observers.note
-            )
-            wall_s = wall.now_s() - began_s
-            leaving.cause = count.stopped_by
-    finally:
-        if begun:
-            audience.close(count)
-        else:
-            audience.give_up()
-    faults.close()
-    figures = _figures(made, summary, score, count, wall_s, faults)
-    unwritten = audience.unwritten()
-    if face_gaze is not None and wanted.heatmap is not None:
+    def _stop(self, seconds: float) -> str | None:
+        """Return why the run ends now, None while it goes on."""
+        over = self._longest_s is not None and seconds >= self._longest_s - 1e-9
+        return self._stopped() or self._interrupts() or ("seconds" if over else None)
+
+    def whole(self) -> dict[str, object]:
+        """Run from torque on to torque off; return the figures."""
+        wall, audience = RealClock(), self._audience
+        began_s = wall.now_s()
+        audience.open_files()
+        count = self._loop()
+        wall_s = wall.now_s() - began_s
+        self._faults.close()
+        figures = _figures(self._made, self._summary, self._score, count, wall_s, self._faults)
+        unwritten = audience.unwritten() or self._unwritten_heatmap()
+        if unwritten is not None:
+            figures["not_written"] = str(unwritten)
+        return figures
+
+    def _loop(self) -> LoopCount:
+        """Switch on, tick until the end, leave as every way out does; close what watches."""
+        made, audience, say = self._made, self._audience, self._say
+        count = LoopCount(0, 0, "fault: unexpected error")
+        begun = False
         try:
-            _draw_heatmap(face_gaze, wanted, wanted.heatmap, say)
+            with self._interrupts, way_out(made, say, self._interrupts) as leaving:
+                leaving.switch_on(lambda: made.robot.start(made.clock, self._interrupts.refuse))
+                begun = True
+                self._start_s = made.clock.now_s()
+                for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
+                    say(note)
+                audience.open()
+                count = run_loop(
+                    made.robot, made.clock, lambda: made.loop, audience.timed(self._stop),
+                    self._observers.note,
+                )  # fmt: skip
+                leaving.cause = count.stopped_by
+        finally:
+            if begun:
+                audience.close(count)
+            else:
+                audience.give_up()
+        return count
+
+    def _unwritten_heatmap(self) -> Path | None:
+        """Write the heat map where one is asked for; return its file where that failed."""
+        out = self._options.heatmap
+        if self._face_gaze is None or out is None:
+            return None
+        try:
+            _draw_heatmap(self._face_gaze, self._options, out, self._say)
         except SetupError as error:  # the figures of the run are still to be had
-            say(str(error))
-            unwritten = wanted.heatmap
-    if unwritten is not None:
-        figures["not_written"] = str(unwritten)
-    return figures
+            self._say(str(error))
+            return out
+        return None
 
 
 def _observe_scene(
@@ -213,31 +223,31 @@ def _never_raising(say: Callable[[str], None]) -> Callable[[str], None]:
     return tried
 
 
-def _longest_s(made: Assembly, wanted: Wanted) -> float | None:
+def _longest_s(made: Assembly, options: RunOptions) -> float | None:
     """Return how long to run: as asked, or one whole round of a scene in simulated time."""
-    if wanted.seconds is None and wanted.fast and made.scene is not None:
+    if options.seconds is None and options.fast and made.scene is not None:
         return made.scene.round_s + 1.0  # and how the round ends
-    return wanted.seconds
+    return options.seconds
 
 
-def _ask_all(robot: Robot, wanted: Wanted) -> None:
-    """Ask for what the command line wants in force at the start."""
+def _ask_all(robot: Robot, options: RunOptions) -> None:
+    """Ask for what is to be in force at the start."""
     try:
-        for menu, choice in wanted.asked:
+        for menu, choice in options.choices:
             robot.ask(menu, choice)
     except ValueError as error:
         raise SetupError(str(error)) from error
 
 
 def _draw_heatmap(
-    face_gaze: FaceGaze, wanted: Wanted, out: Path, say: Callable[[str], None]
+    face_gaze: FaceGaze, options: RunOptions, out: Path, say: Callable[[str], None]
 ) -> None:
     """Write the heat map, or say why there is none."""
     if not face_gaze.points_face_m:
         say(f"no heat map in {out}: no face was looked at")
         return
     points, seconds = np.array(face_gaze.points_face_m), np.array(face_gaze.seconds)
-    heatmap(points, seconds, out, wanted.heatmap_face, wanted.watched.over)
+    heatmap(points, seconds, out, options.heatmap_face, options.force)
     say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
 
 

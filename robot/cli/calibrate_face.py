@@ -15,10 +15,12 @@ from rich.table import Table
 from gazerig.config.save import copy_shipped, rig_file, save_rig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
+from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.run_observers import Audience, Steer, Wished
-from gazerig.robot.app.session import Wanted, way_out
+from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_observers import RunObservers, Steer
+from gazerig.robot.app.session import way_out
 from gazerig.robot.calibration.face_calibration import PART_WORDS, FaceCalibration, begun, changes
 from gazerig.robot.calibration.face_steering import FaceSteering
 from gazerig.robot.calibration.joint_access import Stopped
@@ -26,7 +28,6 @@ from gazerig.robot.cli.calibrate import refuse_unwritable
 from gazerig.robot.cli.key_input import BUTTONS, HELP, Keys, LineKeys, PageKeys, TerminalKeys
 from gazerig.robot.cli.ports import MockOption, PortOption
 from gazerig.robot.cli.prompts import Lines, TerminalPerson
-from gazerig.robot.cli.run import host_port
 from gazerig.robot.cli.terminal import (
     FAULT,
     RigArgument,
@@ -84,10 +85,9 @@ def calibrate_face(
         loaded = load_rig(rig)
         refuse_unwritable(rig, out)
         lines = Lines(answers)
-        address = host_port(page)
-        shows = None if no_page or answers is not None else address
         nothing = scene is None and video is None and camera is None and not oak
-        wanted = Wanted(
+        options = RunOptions(
+            rig=rig,
             mock=mock,
             # Nobody watches a script on an emulated rig: simulated time will do.
             fast=mock and answers is not None and camera is None and not oak,
@@ -97,10 +97,11 @@ def calibrate_face(
             camera=camera,
             oak=oak,
             port=port,
-        )
-        made = assemble(loaded, wanted.choice())
+            page=page,
+            no_page=no_page or answers is not None,
+        ).checked()
         try:
-            found = _steered(made, loaded, lines, answers is not None, stopped, shows)
+            found = _steered(options, loaded, lines, answers is not None, stopped)
             _write(rig, loaded, found, out, TerminalPerson(lines, stopped, yes))
         except Stopped as why:
             say(f"stopped by {why}: nothing written")
@@ -108,33 +109,28 @@ def calibrate_face(
 
 
 def _steered(
-    made: Assembly,
+    options: RunOptions,
     rig: Rig,
     lines: Lines,
     scripted: bool,
     stopped: Callable[[], str | None],
-    page: tuple[str, int] | None,
 ) -> FaceCalibration:
     """Let a person steer the gaze from part to part; the rig ends parked, torque off.
 
-    page: where one is served, None where there is none
     Raises:
         gazerig.robot.calibration.joint_access.Stopped: a signal or a fault ended it.
         DriverError: port, servos or camera are not as configured.
     """
     idle = rig.gaze.idle
-    steering = FaceSteering(
-        begun(rig.face_parts_mm),
-        made.robot.attention.top_down,
-        (idle.rest_distance_m, 0.0, idle.rest_height_m),
-        "eyes_pan" not in rig.joints,
-    )
-    made.robot.attention = steering
+    rest_m = (idle.rest_distance_m, 0.0, idle.rest_height_m)
+    begin = begun(rig.face_parts_mm)
+    steering = FaceSteering(begin, TopDown(rig.gaze.top_down), rest_m, "eyes_pan" not in rig.joints)
+    made = assemble(rig, options, Substitutes(chooser=lambda own: steering))
     # What comes through a pipe is a script, too: nobody is there to give up.
     scripted = scripted or not sys.stdin.isatty()
     keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
     steer = Steer(BUTTONS, keys.press, lambda: shown(steering))
-    audience = Audience(made, Wished(page=page), None, page is None, say, status, steer)
+    audience = RunObservers(made, options, say, steer=steer)
     door = StopDoor(
         made.robot.order,
         made.clock,
@@ -157,7 +153,7 @@ def _run(
     made: Assembly,
     sitting: "_Sitting",
     keys: Keys,
-    audience: Audience,
+    audience: RunObservers,
     door: StopDoor,
     interrupts: Interrupts,
 ) -> LoopCount:
@@ -188,7 +184,7 @@ class _Sitting:
         now_s: Callable[[], float],
         stopped: Callable[[], str | None],
         scripted: bool,
-        audience: Audience,
+        audience: RunObservers,
         door: StopDoor,
     ) -> None:
         self._steering, self._keys, self._now_s = steering, keys, now_s

@@ -116,7 +116,7 @@ def look_at_command(
         loaded = load_rig(rig)
         # Imports vision as well, so only this command does, and before the torque is on: in
         # that time the servos' watchdog would trip.
-        from gazerig.robot.app.assemble import gaze_parts
+        from gazerig.robot.app.gaze_models import gaze_parts
 
         kinematics, oculomotor = gaze_parts(loaded, seed)
     with _commanded(loaded, _Way(mock, port, yes, rig), 20.0, hold, not no_park) as control:

@@ -16,7 +16,7 @@ from rich.table import Table
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.run import host_port
+from gazerig.robot.app.options import host_port
 from gazerig.robot.cli.terminal import (
     FAULT,
     ForceOption,
@@ -212,7 +212,7 @@ def _built(config_yaml: str) -> "ShownRig | None":
     """Return how the recorded rig was built; None, with a word why, where nobody can tell."""
     from gazerig.config.load import ConfigError, load
     from gazerig.config.schema import Rig
-    from gazerig.robot.app.assemble import gaze_parts
+    from gazerig.robot.app.gaze_models import gaze_parts
     from gazerig.robot.dashboard.snapshot import ShownRig
     from gazerig.robot.model.frames import CameraMount
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from gazerig.config.schema import Rig
     from gazerig.gaze.scanpath import Walk
     from gazerig.robot.app.assemble import Assembly
-    from gazerig.robot.app.options import Choice
+    from gazerig.robot.app.options import RunOptions
     from gazerig.robot.recording.read import RunRecording
     from gazerig.robot.report.gaze_trace import Gathered, Gathering
     from gazerig.robot.report.run_header import About
@@ -87,11 +87,11 @@ def report(
             if file is not None:
                 about, run = _recorded(file, file.stem, tell)
             else:
-                from gazerig.robot.app.options import Choice
+                from gazerig.robot.app.options import RunOptions
 
-                choice = Choice(True, True, seed, scene, scanpath=scanpath, saccade=saccade)
+                options = RunOptions(True, True, seed, scene, scanpath=scanpath, saccade=saccade)
                 layers = _Layers(rig, character, profile)
-                about, run = _simulated(choice, layers, seconds, conversation, tell)
+                about, run = _simulated(options, layers, seconds, conversation, tell)
             made = report_of(run, about, target, tell, force)
         if words := banner(run.joints):
             say(words)
@@ -148,7 +148,7 @@ def _recorded(file: Path, name: str, tell: _Tell) -> "tuple[About, Gathered]":
 
 
 def _simulated(
-    choice: "Choice",
+    options: "RunOptions",
     layers: _Layers,
     seconds: float,
     conversation: str | None,
@@ -156,26 +156,22 @@ def _simulated(
 ) -> "tuple[About, Gathered]":
     """Run a scene in simulated time."""
     from gazerig.config.schema import load_rig, load_walk
-    from gazerig.robot.app.assemble import assemble, chosen
+    from gazerig.robot.app.assemble import assemble, with_options
     from gazerig.robot.report.gaze_trace import Gathering
 
     rig = load_rig(*layers)
-    made, gathering = assemble(rig, choice), Gathering()
+    made, gathering = assemble(rig, options), Gathering()
     _run(made, gathering, seconds, conversation, tell)
-    gaze = rig.gaze
-    if choice.scanpath is not None:
-        gaze = replace(gaze, scanpath=chosen(gaze.scanpath, "model", choice.scanpath, "--scanpath"))
-    if choice.saccade is not None:
-        gaze = replace(gaze, saccade=chosen(gaze.saccade, "profile", choice.saccade, "--saccade"))
+    rig = with_options(rig, options)
     given = zip(("rig", "character", "profile"), layers, strict=True)
     facts = (
         *((name, value) for name, value in given if value is not None),
-        ("scene", f"{choice.scene}, simulated"),
-        ("seed", str(choice.seed)),
+        ("scene", f"{options.scene}, simulated"),
+        ("seed", str(options.seed)),
     )
-    walk = load_walk(gaze.scanpath.walk)
-    name = " ".join(filter(None, (choice.scene, layers.character, layers.profile)))
-    return _described(name, facts, replace(rig, gaze=gaze), walk), gathering.gathered()
+    walk = load_walk(rig.gaze.scanpath.walk)
+    name = " ".join(filter(None, (options.scene, layers.character, layers.profile)))
+    return _described(name, facts, rig, walk), gathering.gathered()
 
 
 def _run(

@@ -1,29 +1,19 @@
 """The command run."""
 
 import json
-import os
 import sys
 from collections.abc import Callable, Mapping
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from gazerig.config.load import ConfigError
-from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text, walk_text
-from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing, write_file
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.examples import complete_scene, complete_shipped
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from gazerig.robot.control.joint_faults import JointFault
-
-if TYPE_CHECKING:
-    from gazerig.robot.app.assemble import Assembly
-    from gazerig.robot.app.options import Choice
-    from gazerig.robot.app.run_observers import Told
 
 app = typer.Typer()
 
@@ -120,87 +110,20 @@ def run(
     ] = None,
 ) -> None:
     """Run the head: gazerig run --mock, then open the page it names."""
+    options = RunOptions(**locals())  # what a person can ask for is a field of the same name
     with clear_errors(rig, port, mock):
+        options = options.checked()
+        refuse_existing(*options.written_at_the_end, force=force)
         # Vision and emulator are heavy; `check` and `--help` do without them.
         from gazerig.robot.app import session
-        from gazerig.robot.app.assemble import assemble
-        from gazerig.robot.app.run_observers import Wished
 
-        address = host_port(page)
-        refuse_existing(*_written_at_the_end(heatmap, summary), force=force)
-        wanted = session.Wanted(
-            mock=mock,
-            fast=fast,
-            seed=seed,
-            seconds=seconds,
-            scene=scene,
-            video=video,
-            camera=camera,
-            oak=oak,
-            replay=replay,
-            pixels=pixels,
-            scanpath=scanpath,
-            saccade=saccade,
-            rules=rules,
-            port=port,
-            asked=tuple(
-                (menu, choice)
-                for menu, choice in (("behaviour", behaviour), ("conversation", conversation))
-                if choice is not None
-            ),
-            heatmap=heatmap,
-            heatmap_face=heatmap_face,
-            watched=Wished(
-                page=None if no_page or fast else address,
-                status_line=not fast and sys.stderr.isatty(),
-                record=record,
-                over=force,
-            ),
-        )
-        choice = wanted.choice()
-        made = assemble(load_rig(rig, character, profile), choice)
-        told = _told(made, rig, character, profile, choice, record_pictures)
+        composed = session.compose(options)
+        shows = status if not fast and sys.stderr.isatty() else None
         with signals() as stopped:
-            figures = session.run(made, wanted, stopped, say, status, told)
+            figures = session.run(composed, stopped, say, shows)
         _write_summary(figures, summary, force)
     if had_faults(figures, say) or "not_written" in figures:
         raise typer.Exit(FAULT)
-
-
-def _told(
-    made: "Assembly",
-    rig: str,
-    character: str | None,
-    profile: str | None,
-    choice: "Choice",
-    pictures_hz: float,
-) -> "Told":
-    """Gather what tuning and recording must know of the command line."""
-    from gazerig.robot.app.param_store import Tuning
-    from gazerig.robot.app.run_observers import Told
-    from gazerig.robot.recording.run_info import RunInfo, versions
-
-    def info() -> RunInfo:
-        whole = made.retuner.rig
-        return RunInfo(
-            rig=rig,
-            profile=whole.profile,
-            character=character,
-            config_yaml=rig_text(whole),
-            walk_yaml=walk_text(whole.gaze.scanpath.walk),
-            seed=choice.seed,
-            rate_hz=whole.loop.rate_hz,
-            started_utc=datetime.now(UTC).isoformat(),
-            scene=choice.scene,
-            eyes=choice.eyes or f"scene {choice.scene}",
-            mock=choice.mock,
-            fast=choice.fast,
-            pictures_hz=pictures_hz,
-            versions=versions(),
-        )
-
-    tuning = Tuning(made.retuner, made.robot.order, rig, character, profile)
-    return Told(tuning, (ConfigError,), {"rig": rig, "pid": os.getpid()}, info)
 
 
 def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
@@ -213,24 +136,6 @@ def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
     if held:
         say(f"the run had faults: {'; '.join(held)}")
     return bool(held) or str(figures["stopped_by"]).startswith("fault")
-
-
-def host_port(text: str) -> tuple[str, int]:
-    """Read what is given as --page.
-
-    Raises:
-        SetupError: it is no address.
-    """
-    host, _, port = text.rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise SetupError(f"--page {text}: not HOST:PORT, for example 127.0.0.1:8080")
-    return host, int(port)
-
-
-def _written_at_the_end(heatmap: Path | None, summary: str | None) -> tuple[Path, ...]:
-    """Return the files whose names must be free now, as nobody wants to run again."""
-    named = None if summary is None or summary == "-" else Path(summary)
-    return tuple(path for path in (heatmap, named) if path is not None)
 
 
 def _write_summary(figures: dict[str, object], where: str | None, force: bool) -> None:

@@ -61,7 +61,24 @@ class Robot:
         oculomotor: Oculomotor,
         lids: Lids,
         guard: Guard,
+        tune: Callable[[Tune, float], tuple[str, ...]],
     ) -> None:
+        """Wire the parts.
+
+        Args:
+            body: the joints on their bus.
+            kinematics: joint angles to head pose and gaze, and back.
+            camera: what is looked through.
+            perception: detections to people and things in the world.
+            poses: where the head was when.
+            attention: chooses the target.
+            scanpath: which part of a face.
+            aversion: looking away in a conversation.
+            oculomotor: target to eyes, head and lids.
+            lids: their blinks can be asked for.
+            guard: between what is desired and the bus.
+            tune: puts changed parameters in force and says what was done.
+        """
         self.body = body
         self.camera = camera
         self.perception = perception
@@ -79,7 +96,7 @@ class Robot:
         self._last: JointAngles = ()
         # The models lead again: they begin where this tick finds head and eyes.
         self._takes_over = False
-        self.tune: Callable[[Tune, float], tuple[str, ...]] = _not_tunable
+        self._tune = tune
         self._told: list[str] = []
         self._stop = StopControl(self._told)
 
@@ -278,7 +295,7 @@ class Robot:
             case Resume():
                 return self._resume(order, t_s)
             case Tune():
-                self._told += self.tune(order, t_s)
+                self._told += self._tune(order, t_s)
         return Reply()
 
     def _look(self, order: LookAt, t_s: float) -> Reply:
@@ -317,11 +334,6 @@ class Robot:
         self._guard.reset(t_s, resumed)
         self._takes_over = True
         return Reply()
-
-
-def _not_tunable(order: Tune, t_s: float) -> tuple[str, ...]:
-    """Refuse: nobody has said how."""
-    return ("this robot's parameters cannot be changed while it runs",)
 
 
 def run(

@@ -38,18 +38,17 @@ class Recorder:
         self,
         path: Path,
         info: RunInfo,
-        health: Callable[[], BusHealth],
         over: bool = False,
         patient: bool = False,
     ) -> None:
         """Prepare a recording; nothing is touched yet.
 
-        health: gives the counts of the bus; over: an existing file is written over
+        over: an existing file is written over
         patient: wait for the writer where it is behind, as a run in simulated time may
         """
         self._path = path
         self._info = info
-        self._health = health
+        self._health: Callable[[], BusHealth] = _no_counts
         self._over = over
         self._link = WriterLink(patient)
         self._pictures = PictureEncoder(info.pictures_hz, at_once=patient)
@@ -95,8 +94,9 @@ class Recorder:
         os.replace(self._beside, target)
         self._beside = None
 
-    def tapped(self, body: Body) -> Body:
+    def recorded(self, body: Body) -> Body:
         """Return a body to take the place of a robot's, so that all it says is recorded."""
+        self._health = body.bus.health
         return BodyTap(body, self._heard.append)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
@@ -186,6 +186,10 @@ class Recorder:
     def _post_pictures(self) -> None:
         for picture in self._pictures.taken():
             self._link.post(writer.PICTURE, picture)
+
+
+def _no_counts() -> BusHealth:
+    return BusHealth(0, 0, {})
 
 
 def _created(path: Path, over: bool) -> int:

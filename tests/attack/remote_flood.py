@@ -12,7 +12,7 @@ import tempfile
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import Tuning
 from gazerig.robot.control.loop import run
 from gazerig.robot.model.clock import RealClock
@@ -45,9 +45,9 @@ while True:
 
 def flooded(what: str, seconds: float, programs: int) -> tuple[float, int, float]:
     """Return the loop's rate, slots lost, and how long a stop took, in ms."""
-    made = assemble(load_rig("desk"), Choice(True, False, 0, "visitor"))
+    made = assemble(load_rig("desk"), RunOptions(True, False, 0, "visitor"))
     robot = made.robot
-    tuning = Tuning(made.retuner, robot.order, "desk")
+    tuning = Tuning(made.live, robot.order, "desk")
     about = {"rig": "desk", "pid": os.getpid()}
     live = LiveControl(robot, tuning, (ConfigError,), made.clock, about, lambda _: None)
     robot.start(made.clock)

@@ -32,7 +32,7 @@ from true_shafts import Judge, Late, looked_at, on_time, run, sometimes_late
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.commands import LookAt
 from gazerig.sim_mock.scenes.registry import scenes
 
@@ -98,7 +98,7 @@ def table(args: argparse.Namespace) -> None:
 def one(rig: Rig, scene: str, late: Late, seconds: float) -> tuple[int, Judge]:
     """Run one rig in one scene; returns the ticks and what true joints did."""
     looks = scene not in scenes()
-    choice = Choice(mock=True, fast=True, seed=0, scene="visitor" if looks else scene)
+    choice = RunOptions(mock=True, fast=True, seed=0, scene="visitor" if looks else scene)
     with looked_at(rig, choice) as (made, shafts):
         judge = Judge(rig)
         if looks:

@@ -14,7 +14,8 @@ from ruckig import InputParameter, OutputParameter, Ruckig
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Bodies, Face, Percept
-from gazerig.robot.app.assemble import Choice, assemble
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.types import JointState
 
 TICK_S = 0.005
@@ -57,7 +58,7 @@ def percept(faces: int, bodies: int, t_s: float, rng: np.random.Generator) -> Pe
 
 def gaze_step(faces: int, bodies: int, pictures: int) -> tuple[float, float]:
     """Return seconds a tick, and a tick with a new picture, at 30 pictures, 200 ticks a second."""
-    choice = Choice(mock=True, fast=True, seed=0, scene="visitor")
+    choice = RunOptions(mock=True, fast=True, seed=0, scene="visitor")
     robot = assemble(load_rig("desk"), choice).robot
     joints = JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ())
     pose = robot._kinematics.forward(joints)

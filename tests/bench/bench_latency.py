@@ -20,7 +20,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Detections
 from gazerig.drivers.vision.face_detector import face_detector
 from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 
 MEDIA = Path(__file__).resolve().parents[3] / "shared" / "media"
@@ -65,7 +65,7 @@ def measured(film: Path, motion: bool) -> Stamps:
     """Run the rig before a film."""
     rig = load_rig("desk")
     rig = replace(rig, motion=replace(rig.motion, enabled=motion))
-    made = assemble(rig, Choice(mock=True, fast=False, seed=0, video=film))
+    made = assemble(rig, RunOptions(mock=True, fast=False, seed=0, video=film))
     stamps = stamped(made)
     made.robot.start(made.clock)
     try:

@@ -29,14 +29,12 @@ import zstandard
 from websockets.sync.client import ClientConnection
 from websockets.sync.connection import Connection
 
-from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import Tuning
-from gazerig.robot.app.run_observers import Audience, Told, Wished
+from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick, run
-from gazerig.robot.recording.run_info import RunInfo
 
 TESTS = Path(__file__).parents[1]
 sys.path.insert(0, str(TESTS))
@@ -74,10 +72,6 @@ def messages(data: bytes) -> list[dict[str, Any]]:
     return found
 
 
-def no_recording() -> RunInfo:
-    raise AssertionError("nothing is recorded here")
-
-
 class Run(NamedTuple):
     off_slot_ms: np.ndarray
     overruns: int
@@ -90,13 +84,12 @@ class Bench:
 
     def __init__(self, page: bool) -> None:
         self.made = made = assemble(
-            load_rig("desk"), Choice(mock=True, fast=False, seed=0, scene="visitor")
+            load_rig("desk"), RunOptions(mock=True, fast=False, seed=0, scene="visitor")
         )
         robot = made.robot
-        tuning = Tuning(made.retuner, robot.order, "desk")
-        told = Told(tuning, (ConfigError,), {"rig": "desk", "pid": os.getpid()}, no_recording)
-        wished = Wished(page=("127.0.0.1", 8700) if page else None)
-        self.audience = Audience(made, wished, told, False, lambda _: None, lambda _: None)
+        tuning = Tuning(made.live, robot.order, "desk")
+        options = RunOptions(page="127.0.0.1:8700" if page else None)
+        self.audience = RunObservers(made, options, lambda _: None, lambda _: None, tuning)
         self.page = self.audience._page
         self.times: list[float] = []
         self.obeyed: list[tuple[float, object]] = []

@@ -16,8 +16,8 @@ import numpy as np
 
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import Choice
+from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.loop import Tick, run
@@ -26,26 +26,27 @@ from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
 
 
-def made(fast: bool) -> Assembly:
+def made(fast: bool, recording: Recorder) -> Assembly:
     """Assemble the desk rig with emulated servos before a simulated visitor."""
-    return assemble(load_rig("desk"), Choice(mock=True, fast=fast, seed=0, scene="visitor"))
+    options = RunOptions(mock=True, fast=fast, seed=0, scene="visitor")
+    return assemble(load_rig("desk"), options, Substitutes(body=recording.recorded))
 
 
-def recorder(assembly: Assembly, path: Path, fast: bool) -> Recorder:
+def recorder(path: Path, fast: bool) -> Recorder:
     """Make a recorder as ``gazerig run --record`` does."""
-    rig = assembly.retuner.rig
+    rig = load_rig("desk")
     info = RunInfo(
         "desk", rig.profile, rig_text(rig), 0, rig.loop.rate_hz, "2026-01-31T00:00:00+00:00",
         walk_yaml=walk_text(rig.gaze.scanpath.walk), scene="visitor", mock=True, fast=fast,
         versions=versions(),
     )  # fmt: skip
-    return Recorder(path, info, assembly.robot.body.bus.health, patient=fast)
+    return Recorder(path, info, patient=fast)
 
 
 def jitter(path: Path, seconds: float) -> None:
     """Run in real time; print lateness and processor time of ticks with and without."""
-    assembly = made(fast=False)
-    recording = recorder(assembly, path, fast=False)
+    recording = recorder(path, fast=False)
+    assembly = made(False, recording)
     recording.open()
     robot, clock = assembly.robot, assembly.clock
     rows: list[tuple[bool, float, float, float]] = []
@@ -89,11 +90,10 @@ def jitter(path: Path, seconds: float) -> None:
 
 def volume(path: Path, seconds: float) -> None:
     """Record simulated seconds; print bytes a minute and the speed of reading."""
-    assembly = made(fast=True)
-    recording = recorder(assembly, path, fast=True)
+    recording = recorder(path, fast=True)
+    assembly = made(True, recording)
     robot = assembly.robot
     recording.open()
-    robot.body = recording.tapped(robot.body)
     robot.start(assembly.clock)
     start_s = time.monotonic()
     stop = recording.timed(lambda s: "seconds" if s >= seconds else None)

@@ -21,7 +21,8 @@ from fastcrc import crc16
 from gazerig.config.schema import load_rig
 from gazerig.drivers.dynamixel.bus import DynamixelBus
 from gazerig.robot.analysis.summary import Summary
-from gazerig.robot.app.assemble import Assembly, Choice, assemble
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
 from gazerig.robot.model.types import in_order
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -42,7 +43,7 @@ def main() -> None:
 
 def real_time_loop(seconds: float) -> None:
     """Measure rate and jitter at 200 Hz on the pseudo-terminal, without a page."""
-    made = assemble(load_rig("desk"), Choice(mock=True, fast=False, seed=0, scene="visitor"))
+    made = assemble(load_rig("desk"), RunOptions(mock=True, fast=False, seed=0, scene="visitor"))
     summary, starts = Summary(), []
     began_cpu = time.process_time()
     made.robot.start(made.clock)
@@ -189,7 +190,7 @@ def bus_exchange(cycles: int = 4000) -> None:
 
 def fast(seed: int) -> Assembly:
     """Assemble the desk rig and the visitor in simulated time."""
-    return assemble(load_rig("desk"), Choice(mock=True, fast=True, seed=seed, scene="visitor"))
+    return assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=seed, scene="visitor"))
 
 
 def timed(work: Callable[..., Any], spent: dict[str, float], name: str) -> Callable[..., Any]:

@@ -1,0 +1,95 @@
+"""The models of gaze/ with a rig's parameters."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.config.schema import Rig
+from gazerig.gaze.bottom_up import BottomUp
+from gazerig.gaze.breathing import Breathing
+from gazerig.gaze.field_of_view import FieldOfView
+from gazerig.gaze.head import Head
+from gazerig.gaze.idle import Idle
+from gazerig.gaze.lids import Lids
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.pursuit import Pursuit
+from gazerig.gaze.saccade import Saccade
+from gazerig.gaze.top_down import TopDown
+from gazerig.robot.app.rig_limits import eye_limits, head_limits, lid_ends
+from gazerig.robot.model.kinematics import Kinematics
+
+
+def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
+    """Return a rig's geometry and its oculomotor model, for looking without a camera."""
+    lid_dice, landing_dice = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
+    )
+    kinematics = kinematics_of(rig)
+    lids = Lids(rig.gaze.lids, lid_dice)
+    return kinematics, oculomotor(rig, kinematics, movers(rig), lids, landing_dice)
+
+
+def kinematics_of(rig: Rig) -> Kinematics:
+    """Return a rig's geometry."""
+    return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
+
+
+class Deciders(NamedTuple):
+    """What attention decides between."""
+
+    field_of_view: FieldOfView
+    bottom_up: BottomUp
+    top_down: TopDown
+    idle: Idle
+
+
+def deciders(rig: Rig, idle_dice: np.random.Generator) -> Deciders:
+    """Return what attention decides between."""
+    gaze = rig.gaze
+    return Deciders(
+        FieldOfView(gaze.field_of_view),
+        BottomUp(gaze.bottom_up),
+        TopDown(gaze.top_down),
+        Idle(gaze.idle, idle_dice),
+    )
+
+
+class Movers(NamedTuple):
+    """What moves eyes and head."""
+
+    saccade: Saccade
+    pursuit: Pursuit
+    head: Head
+    breathing: Breathing
+
+
+def movers(rig: Rig) -> Movers:
+    """Return what moves eyes and head."""
+    gaze = rig.gaze
+    return Movers(
+        Saccade(gaze.saccade),
+        Pursuit(gaze.pursuit),
+        Head(gaze.head, *head_limits(rig)),
+        Breathing(gaze.breathing),
+    )
+
+
+def oculomotor(
+    rig: Rig,
+    kinematics: Kinematics,
+    moves: Movers,
+    lids: Lids,
+    landing_dice: np.random.Generator,
+) -> Oculomotor:
+    """Compose the models with the narrower of the rig's and the profile's ranges."""
+    return Oculomotor(
+        rig.gaze.oculomotor,
+        kinematics,
+        eye_limits(rig),
+        moves.saccade,
+        moves.pursuit,
+        moves.head,
+        lids,
+        moves.breathing,
+        landing_dice,
+    )

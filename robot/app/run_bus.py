@@ -1,0 +1,80 @@
+"""The bus of one run: real ports, emulated servos on a pseudo-terminal, or in this process."""
+
+import hashlib
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.serial.list_ports import serial_ports
+from gazerig.drivers.serial.port_owner import refuse_owner
+from gazerig.drivers.types import ServoBus
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus
+from gazerig.robot.app.camera_factory import HeadPose
+from gazerig.robot.app.emulation import emulated_lines, place_of
+from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.frames import PoseHistory
+from gazerig.robot.model.kinematics import NECK
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.pty.client import PtyBuses
+
+
+class RunBus(NamedTuple):
+    """The bus of the rig, and what is emulated behind it in this process, by the bus's name."""
+
+    bus: ServoBus
+    devices: Mapping[str, Device]
+    digest: Callable[[], str | None]
+    close: Callable[[], None]
+
+
+def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
+    """Return the real port, an emulated bus in this process, or one on a pseudo-terminal."""
+    if not options.mock:
+        paths, here = ports_of(rig, options.port), serial_ports()
+        for name, path in paths.items():
+            refuse_owner(path, rig.bus_named(name).kind, here)
+        return RunBus(guarded_rig_bus(rig, paths), {}, _no_digest, _nothing)
+    lines = emulated_lines(rig)
+    if not options.fast:
+        buses = PtyBuses()
+        return RunBus(guarded_rig_bus(rig, buses.start(lines)), {}, _no_digest, buses.stop)
+    sent = hashlib.sha256()
+    devices = {name: build(line, clock.now_s) for name, line in lines.items()}
+    ports = {name: InProcessPort(device, sent.update) for name, device in devices.items()}
+    return RunBus(rig_bus(rig, ports), devices, sent.hexdigest, _nothing)
+
+
+def _no_digest() -> str | None:
+    return None
+
+
+def _nothing() -> None:
+    return None
+
+
+def true_head(devices: Mapping[str, Device], rig: Rig, poses: PoseHistory) -> HeadPose:
+    """Return where the emulated head is: from the servos themselves where they are at hand.
+
+    It is built as the rig says now, whatever is believed of it later.
+    """
+    if not devices:
+        return poses.head_pose
+    kinematics = kinematics_of(rig)
+    axes = [
+        (i, rig.joints[name].made(), devices[rig.joints[name].bus], place_of(rig, name))
+        for i, name in enumerate(NECK)
+        if name in rig.joints
+    ]
+
+    def now(_: float) -> tuple[Mat3, Vec3]:
+        angles = [0.0, 0.0, 0.0]
+        for i, linkage, device, place in axes:
+            angles[i] = linkage.angle_rad(device.positions_steps()[place])
+        return kinematics.head_pose((angles[0], angles[1], angles[2]))
+
+    return now
