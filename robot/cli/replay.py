@@ -15,8 +15,8 @@ from rich.table import Table
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing
-from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.app.options import host_port
+from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import (
     FAULT,
     ForceOption,
