@@ -4,7 +4,7 @@ from math import inf
 from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
-from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
+from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_TURN
 from gazerig.drivers.event_log import servo_label as label_with
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
 from gazerig.drivers.hobby_board.models import HOBBY, US_STEPS

@@ -9,8 +9,8 @@ from gazerig.drivers.servo_bus.discovery import Found, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.bus_search import Looked
-from gazerig.robot.bringup.doctor.checks import CHECKS, apply_fix, examine, take
-from gazerig.robot.bringup.doctor.dynamixel import READ
+from gazerig.robot.bringup.doctor.checks import apply_fix, examine, take
+from gazerig.robot.bringup.doctor.families import CHECKS
 from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
 from gazerig.robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
 from gazerig.robot.bringup.doctor.run import apply_fixes, check, check_all, fix_latency, look
@@ -132,7 +132,7 @@ def servo_state(kind, setup=None, found=None, corrupt=0, **values):
     }
     own = {
         "dynamixel": {
-            **dict.fromkeys(READ, 0),
+            **dict.fromkeys(CHECKS["dynamixel"].registers, 0),
             "status_return_level": 2,
             "baud_rate": 3,
             "operating_mode": 3,

@@ -18,7 +18,6 @@ from sts_rig import Rig as StsRig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.robot.app.bus_wiring import ports_of, release_plans
-from gazerig.robot.calibration.guarded_servo import GuardedServo
 from gazerig.robot.calibration.smart_servo_access import SmartServo
 from gazerig.robot.guardian.guarded_bus import RETRY_S, GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
@@ -65,17 +64,17 @@ def test_a_dynamixel_with_its_watchdog_needs_no_guardian():
 def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
     rig, guardian = StsRig(), Unattended()
     rig.port.setBaudRate(1_000_000)
-    servo = GuardedServo(SmartServo("eye", 1, "sts3215", rig.port), guardian)
+    servo = SmartServo("eye", 1, "sts3215", rig.port, guardian)
     servo.check()
     assert not guardian.other.armed(0)
-    servo.hold(0.2, 100.0)
-    assert guardian.other.armed(0) and servo.holds()
+    servo.enable_torque(0.2, 100.0)
+    assert guardian.other.armed(0) and servo.torque_is_on()
     servo.send(2010)
     guardian.other.set_state(0, RELEASING)
     with pytest.raises(ServoFault, match="stood still"):
         servo.send(2020)
-    servo.leave()
-    assert not guardian.other.armed(0) and not servo.holds()
+    servo.restore()
+    assert not guardian.other.armed(0) and not servo.torque_is_on()
 
 
 # --- which ports

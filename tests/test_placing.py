@@ -57,7 +57,7 @@ class Bench:
         try:
             return by_places(self.placer, self, margin, more)
         finally:
-            self.hobby.let_go()
+            self.hobby.disable()
 
     # gazerig.robot.calibration.linkage_procedure.Steerer
 

@@ -101,7 +101,7 @@ class Bench:
 def test_by_hand_zero_sign_and_range_are_found(joint: JointParams) -> None:
     bench = Bench(joint)
     bench.script = [-400, 850, -440]  # left end at fewer steps: the sign is -1
-    bench.joint.check()
+    bench.servo.check()
     found = by_hand(bench.joint, bench, 2.0)
     assert found.sign == -1 and found.zero_step == pytest.approx(2110, abs=2)
     assert found.max_deg == pytest.approx((2110 - 1700) / STEPS_PER_DEG - 2.0, abs=0.2)
@@ -127,7 +127,7 @@ def test_by_hand_over_the_seam_is_refused_with_the_turn_that_helps(start: int) -
     with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* take the horn off"):
         by_hand(bench.joint, bench, 2.0)
     with pytest.raises(SetupError, match="cannot set its middle"):
-        bench.joint.set_middle()
+        bench.servo.set_middle()
 
 
 def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> None:
@@ -135,7 +135,7 @@ def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> Non
     bench.script = [600, -1200, 600]
     with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* --set-middle"):
         by_hand(bench.joint, bench, 2.0)
-    bench.joint.set_middle()
+    bench.servo.set_middle()
     bench.script = [600, -1200, 600]
     found = by_hand(bench.joint, bench, 2.0)
     assert found.zero_step == pytest.approx(2048, abs=4) and found.max_deg > 45.0
@@ -157,10 +157,10 @@ def test_a_servo_turned_by_whole_turns_before_gives_the_same() -> None:
 
 def test_an_offset_that_was_set_can_be_cleared_for_good() -> None:
     bench = Bench(STS, 3000)
-    bench.joint.set_middle()
+    bench.servo.set_middle()
     offset = bench.get("position_offset")
-    assert offset and bench.joint.check().homing_offset == offset
-    assert bench.joint.clear_offset() == offset
+    assert offset and bench.servo.check().homing_offset == offset
+    assert bench.servo.clear_offset() == offset
     bench.restart()
     assert bench.get("position_offset") == 0
     assert bench.get("present_position") == pytest.approx(3000, abs=4)
@@ -169,8 +169,8 @@ def test_an_offset_that_was_set_can_be_cleared_for_good() -> None:
 def test_a_homing_offset_can_be_cleared() -> None:
     bench = Bench(EYE)
     bench.put("homing_offset", 300)
-    assert bench.joint.clear_offset() == 300
-    assert bench.joint.check().homing_offset == 0
+    assert bench.servo.clear_offset() == 300
+    assert bench.servo.check().homing_offset == 0
 
 
 # --- driven
@@ -247,7 +247,7 @@ def test_by_motion_a_stop_that_is_asked_for_lets_go_at_once(joint: JointParams) 
 
 def test_by_motion_is_slow_and_weak() -> None:
     bench = Bench(EYE, 2100, STOPS)
-    bench.joint.take_on(GENTLY)
+    bench.joint.enable_torque(GENTLY)
     assert bench.get("goal_pwm") == round(0.3 * bench.get("pwm_limit"))
     assert 0 < bench.get("profile_velocity") <= 2.0 * 15.0 * STEPS_PER_DEG / 15.6 + 1
     assert bench.get("bus_watchdog") == 15
@@ -263,16 +263,16 @@ def test_by_motion_is_slow_and_weak() -> None:
     way = [(p, t) for p, t in seen if t > start + 1.0]
     speed = (way[60][0] - way[0][0]) / (way[60][1] - way[0][1]) / STEPS_PER_DEG
     assert 10.0 < speed < 20.0
-    bench.joint.leave()
+    bench.servo.restore()
 
 
 def test_by_motion_a_servo_without_a_watchdog_is_said_to_be_one() -> None:
     bench = Bench(STS, 2100, STOPS)
-    bench.joint.take_on(GENTLY)
+    bench.joint.enable_torque(GENTLY)
     assert bench.get("torque_limit") == 300
     assert 0 < bench.get("goal_speed") <= 2.0 * 15.0 * STEPS_PER_DEG
     assert "no watchdog" in bench.joint.alone and not Bench(EYE).joint.alone
-    bench.joint.leave()
+    bench.servo.restore()
     by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
     assert any("no watchdog" in line for line in bench.said)
 
@@ -281,7 +281,7 @@ def test_limits_that_a_killed_program_left_open_are_narrow_again_after_a_restart
     bench = Bench(STS, 2100, STOPS)
     bench.put("min_position_limit", 2000)
     bench.put("max_position_limit", 2200)
-    bench.joint.take_on(GENTLY)
+    bench.joint.enable_torque(GENTLY)
     assert bench.get("min_position_limit") == 0
     bench.restart()
     assert bench.limits() == (2000, 2200)
@@ -289,7 +289,7 @@ def test_limits_that_a_killed_program_left_open_are_narrow_again_after_a_restart
 
 def test_a_servo_that_restarts_on_the_way_has_met_no_stop() -> None:
     bench = Bench(STS, 2100, (1000.0, 3000.0))
-    bench.joint.take_on(GENTLY)
+    bench.joint.enable_torque(GENTLY)
     bench.chain.faults.command(f"brown-out {STS.id}")
     with pytest.raises((ServoFault, BusLost)):
         bench.joint.find_stop(GENTLY, 1)
@@ -314,7 +314,7 @@ def test_a_servo_set_up_in_another_way_is_refused(
     bench = Bench(joint)
     bench.put(register, value)
     with pytest.raises(ServoMissing, match=says):
-        bench.joint.check()
+        bench.servo.check()
 
 
 def test_a_wrong_model_is_named() -> None:
@@ -337,10 +337,10 @@ def test_a_servo_that_suffers_or_is_silent_is_named(
     bench = Bench(joint)
     bench.command(fault)
     with pytest.raises(ServoFault, match=says):
-        bench.joint.check()
+        bench.servo.check()
     bench.command("lose {id}")
     with pytest.raises(ServoMissing, match="does not answer"):
-        bench.joint.check()
+        bench.servo.check()
     with pytest.raises(BusLost, match="does not answer any more"):
         bench.joint.position()
 
@@ -348,20 +348,20 @@ def test_a_servo_that_suffers_or_is_silent_is_named(
 def test_a_servo_that_answers_pings_alone_is_brought_to_speak() -> None:
     bench = Bench(EYE)
     bench.put("status_return_level", 0)
-    assert bench.joint.check().limits == (0, 4095)
+    assert bench.servo.check().limits == (0, 4095)
 
 
 def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
     bench = Bench(EYE, 4000)
     bench.chain.here(1).turn(200)
     with pytest.raises(ServoMissing, match="turned over the seam"):
-        bench.joint.take_on(GENTLY)
+        bench.joint.enable_torque(GENTLY)
     assert bench.get("torque_enable") == 0
 
 
 def test_a_joint_that_is_left_alone_stops_by_itself() -> None:
     bench = Bench(EYE)
-    bench.joint.take_on(GENTLY)
+    bench.joint.enable_torque(GENTLY)
     bench.registers.write(1, "goal_position", 3000)
     bench.clock.sleep_until(bench.clock.now_s() + 1.0)
     stopped_at = bench.get("present_position")

@@ -1,9 +1,9 @@
 """Single registers of single servos: for all that is not done every tick."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
-from gazerig.drivers.servo_bus.family import Family, Identity, Status
+from gazerig.drivers.servo_bus.family import Family, Identity, Register, Status
 
 TRIES = 3
 
@@ -54,6 +54,23 @@ class Registers:
         asked = length + (length == self._codec.ECHO_LENGTH)
         status = self._exchange(servo_id, self._codec.read(servo_id, address, asked), asked)
         return None if status is None else status.params[:length]
+
+    def read_many(self, servo_id: int, names: Iterable[str]) -> dict[str, int | None]:
+        """Return values by name; registers that lie side by side are read together.
+
+        None where no good answer came. A servo that falls silent is asked nothing more.
+        """
+        values: dict[str, int | None] = dict.fromkeys(names)
+        for span in side_by_side(self._family, values):
+            first = span[0].address
+            data = self.read_bytes(servo_id, first, span[-1].address + span[-1].size - first)
+            if data is not None:
+                for one in span:
+                    at = one.address - first
+                    values[one.name] = one.decode(data[at : at + one.size])
+            elif not self.refusal:
+                break
+        return values
 
     def write(self, servo_id: int, name: str, value: int) -> bool:
         """Write a register; return whether the servo confirmed it."""
@@ -119,6 +136,23 @@ class Registers:
         if until_s is not None:
             while self._port.read_until(ROOM, until_s):
                 pass
+
+
+def side_by_side(family: Family, names: Iterable[str]) -> list[list[Register]]:
+    """Return registers in groups that one question can read: no byte between belongs to none."""
+    known = {
+        address
+        for one in family.registers.values()
+        for address in range(one.address, one.address + one.size)
+    }
+    groups: list[list[Register]] = []
+    for one in sorted((family.registers[name] for name in names), key=lambda r: r.address):
+        last = groups[-1][-1] if groups else None
+        if last and known.issuperset(range(last.address + last.size, one.address)):
+            groups[-1].append(one)
+        else:
+            groups.append([one])
+    return groups
 
 
 def transact(

@@ -1,7 +1,8 @@
 """The buses of a rig: which joints are on which, and one bus made of them all."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
+from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig
 from gazerig.drivers.dynamixel.bus import DynamixelBus
 from gazerig.drivers.errors import SetupError
@@ -14,10 +15,19 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import BUS_KINDS
 from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.robot.app.rig_limits import park_rad
+from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.control.body import setups
 from gazerig.robot.guardian.guarded_bus import GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan
+
+BUSES: Mapping[str, Callable[[BusPort, Sequence[ServoSetup], BusConfig], ServoBus]] = {
+    "dynamixel": lambda port, setups, bus: DynamixelBus(port, setups, bus.dynamixel),
+    "feetech": lambda port, setups, bus: FeetechBus(port, setups, bus.feetech),
+    "maestro": lambda port, setups, bus: MaestroBus(port, setups, bus.maestro),
+    "pca9685": lambda port, setups, bus: Pca9685Bus(port, setups, bus.pca9685),
+}
+"""What makes a bus of servos on a port, by the kind that the YAML names."""
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
@@ -130,7 +140,12 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
 def has_watchdog(rig: Rig, name: str) -> bool:
     """Return whether the servos of one bus stop by themselves when their program dies."""
     config = rig.bus_named(name)
-    return config.kind == "dynamixel" and config.dynamixel.watchdog_ms > 0
+    kind = KINDS.get(config.kind)
+    return (
+        kind is not None
+        and kind.family.watchdog_unit_s is not None
+        and getattr(config, config.kind).watchdog_ms > 0
+    )
 
 
 def _joined(shares: list[Share]) -> ServoBus:
@@ -144,10 +159,4 @@ def _share(rig: Rig, name: str, port: BusPort) -> Share:
     own = [every[joint] for joint in mine]
     places = tuple(rig.names.index(joint) for joint in mine)
     config = rig.bus_named(name)
-    if config.kind == "feetech":
-        return Share(name, FeetechBus(port, own, config.feetech), places)
-    if config.kind == "pca9685":
-        return Share(name, Pca9685Bus(port, own, config.pca9685), places)
-    if config.kind == "maestro":
-        return Share(name, MaestroBus(port, own, config.maestro), places)
-    return Share(name, DynamixelBus(port, own, config.dynamixel), places)
+    return Share(name, BUSES[config.kind](port, own, config), places)

@@ -1,64 +1,64 @@
-"""Watching servos without touching them: reads alone, nothing is written, torque stays as it is.
+"""Monitoring servos: reads alone, nothing is written, torque stays as it is.
 
-A bus that is opened for moving prepares its servos, which is a write; this one only asks.
+A bus that is opened for moving sets its servos up, which is a write; this one only asks.
 """
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from gazerig.robot.bringup.telemetry import Look, Looks
+from gazerig.robot.bringup.telemetry import Telemetry, TelemetryReader
 from gazerig.robot.model.joint import JointParams
 
 _DIGITS = {"goal_deg": 2, "position_deg": 2, "velocity_deg_s": 1, "load": 3}
 
 
 class Sample(NamedTuple):
-    """One look at all servos.
+    """One reading of all servos.
 
     at_s, took_s: when it was done and how long it took
-    looks: by joint; None where the servo did not answer
+    servos: by joint; None where the servo did not answer
     asked, unanswered: servos asked since the start, and how many of those did not answer
     """
 
     at_s: float
     took_s: float
-    looks: Mapping[str, Look | None]
+    servos: Mapping[str, Telemetry | None]
     asked: int
     unanswered: int
 
 
 class Monitor:
-    """Looks at the servos of a rig, one after the other.
+    """Reads the servos of a rig, one after the other.
 
     Args:
-        looks: what looks at the servos of each bus, by the name of the bus.
+        readers: of the servos of each bus, by the name of the bus.
         joints: in the order of the samples.
         now_s: the ports' clock.
     """
 
     def __init__(
         self,
-        looks: Mapping[str, Looks],
+        readers: Mapping[str, TelemetryReader],
         joints: Mapping[str, JointParams],
         now_s: Callable[[], float],
     ) -> None:
-        self._looks = dict(looks)
+        self._readers = dict(readers)
         self._joints = dict(joints)
         self._now_s = now_s
         self._asked = self._unanswered = 0
 
     def sample(self) -> Sample:
-        """Look at every servo once.
+        """Read every servo once.
 
         Raises:
             BusLost: a port is gone.
         """
         start_s = self._now_s()
-        looks = {name: self._looks[one.bus].look(one) for name, one in self._joints.items()}
-        self._asked += len(looks)
-        self._unanswered += sum(look is None for look in looks.values())
+        servos = {name: self._readers[one.bus].read(one) for name, one in self._joints.items()}
+        self._asked += len(servos)
+        self._unanswered += sum(one is None for one in servos.values())
         end_s = self._now_s()
-        return Sample(end_s, end_s - start_s, looks, self._asked, self._unanswered)
+        return Sample(end_s, end_s - start_s, servos, self._asked, self._unanswered)
 
 
 def as_json(sample: Sample, start_s: float) -> dict[str, object]:
@@ -69,12 +69,12 @@ def as_json(sample: Sample, start_s: float) -> dict[str, object]:
         "asked": sample.asked,
         "unanswered": sample.unanswered,
         "joints": {
-            name: None if seen is None else _plain(seen) for name, seen in sample.looks.items()
+            name: None if seen is None else _plain(seen) for name, seen in sample.servos.items()
         },
     }
 
 
-def _plain(seen: Look) -> dict[str, object]:
+def _plain(seen: Telemetry) -> dict[str, object]:
     values = seen._asdict()
     for key, digits in _DIGITS.items():
         if values[key] is not None:

@@ -9,7 +9,7 @@ from gazerig.drivers.feetech import homing
 from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
 from gazerig.drivers.servo_models import SERVOS
-from gazerig.robot.bringup.servo_family import Driving, ServoKind, Setting
+from gazerig.robot.bringup.servo_family import Driving, ServoKind, Setting, ShownLoad
 
 XL430_LOAD_FULL = 1000.0
 """Models without current measurement give their load in 0.1 % of the stall torque there."""
@@ -68,6 +68,8 @@ DYNAMIXEL = ServoKind(
         gentle=_gentle_dynamixel,
         load=_dynamixel_load,
     ),
+    velocity_unit_steps_s=dynamixel.VELOCITY_UNIT_STEPS_S,
+    shown_load=ShownLoad("present_current", _dynamixel_load),
 )
 
 FEETECH = ServoKind(
@@ -92,6 +94,8 @@ FEETECH = ServoKind(
         gentle=_gentle_feetech,
         load=_feetech_load,
     ),
+    velocity_unit_steps_s=1.0,
+    shown_load=ShownLoad("present_load", lambda model, load: load * feetech.LOAD_UNIT),
     set_middle=homing.set_middle,
 )
 

@@ -150,7 +150,7 @@ class OneHobby:
         said, self._said = self._said, []
         return (*self._bus.events(), *said)
 
-    def let_go(self) -> None:
+    def disable(self) -> None:
         """Stop its pulses and close the port; safe to call at any time.
 
         Raises:

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
 from gazerig.drivers.errors import DriverError, ServoFault
+from gazerig.drivers.servo_models import STEPS_PER_TURN
 from gazerig.robot.calibration.endstop_search import (
     STEPS_PER_DEG,
     Stop,
@@ -11,7 +11,7 @@ from gazerig.robot.calibration.endstop_search import (
     go,
     search,
 )
-from gazerig.robot.calibration.servo_access import Found, OneServo
+from gazerig.robot.calibration.smart_servo_access import SmartServo
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams
 
@@ -38,7 +38,7 @@ class SingleJoint:
         self,
         name: str,
         joint: JointParams,
-        servo: OneServo,
+        servo: SmartServo,
         clock: Clock,
         stopped: Callable[[], str | None],
     ) -> None:
@@ -46,38 +46,22 @@ class SingleJoint:
         self.joint = joint
         self.who = servo.who
         self.alone = servo.alone
-        self._servo = servo
+        self.servo = servo
         self._clock = clock
         self._stopped = stopped
         self._at_s = clock.now_s()
 
-    def check(self) -> Found:
-        """See that it is the right servo, sound, and in position mode; see OneServo."""
-        return self._servo.check()
-
-    def clear_offset(self) -> int:
-        """Set its offset to 0, torque off; gives what it was."""
-        return self._servo.clear_offset()
-
-    def set_middle(self) -> int:
-        """Let the limp servo call its present place 2048; see OneServo."""
-        return self._servo.set_middle()
-
-    def let_go(self) -> None:
-        """Take the torque away, and see that it is gone."""
-        self._servo.let_go()
-
     def position(self) -> tuple[int, float]:
         """Return the present position and the time of the reading."""
-        value = self._servo.position()
+        value = self.servo.position()
         self._at_s = self._clock.now_s()
         return value, self._at_s
 
     # --- driven gently
 
-    def take_on(self, params: StopSearchParams) -> None:
-        """Switch the torque on where the joint is, weak and slow; see OneServo.hold."""
-        self._servo.hold(params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG)
+    def enable_torque(self, params: StopSearchParams) -> None:
+        """Switch the torque on where the joint is, weak and slow; see SmartServo."""
+        self.servo.enable_torque(params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG)
 
     def find_stop(self, params: StopSearchParams, direction: int) -> Stop:
         """Lead it to its stop towards more (1) or fewer (-1) steps, and a little back.
@@ -88,7 +72,7 @@ class SingleJoint:
             Stopped: a person or the system asked for it.
         """
         stop = search(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
-        if not self._servo.holds():
+        if not self.servo.torque_is_on():
             raise ServoFault(
                 f"{self.who} let go on the way: it protected itself or restarted; "
                 "check its supply and begin anew"
@@ -99,16 +83,12 @@ class SingleJoint:
         """Lead it slowly to a position; tells whether it came there unhindered."""
         return go(goal_steps, params, self._exchange)
 
-    def leave(self) -> None:
-        """Torque off, and everything else as it was found."""
-        self._servo.leave()
-
     def _exchange(self, goal: int | None) -> tuple[int, float, float]:
         why = self._stopped()
         if why is not None:
             raise Stopped(why)
         self._clock.sleep_until(self._at_s + PERIOD_S)
         if goal is not None:
-            self._servo.send(goal)
+            self.servo.send(goal)
         position, at_s = self.position()
-        return position, self._servo.load(), at_s
+        return position, self.servo.load(), at_s

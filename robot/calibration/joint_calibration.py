@@ -3,7 +3,7 @@
 A servo counts 4096 steps a turn; where 4095 meets 0 is its seam. After a restart it knows
 only the place within the turn, so a joint whose travel holds the seam would wake up a whole
 turn from where it is: such a joint cannot be used and must be built in anew.
-Steps as in gazerig.drivers.dynamixel.control_table, angles in degrees at the joint.
+Steps as in gazerig.drivers.servo_models, angles in degrees at the joint.
 """
 
 from collections.abc import Mapping
@@ -11,8 +11,9 @@ from dataclasses import replace
 from math import floor
 from typing import NamedTuple
 
-from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.servo_models import STEPS_PER_TURN
+from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.model.joint import JointParams
 
 SMALLEST_RANGE_DEG = 5.0
@@ -163,7 +164,7 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
             f"{SMALLEST_RANGE_DEG:g} are needed: is this the joint that was turned, "
             "and is its horn screwed on?"
         )
-    _refuse_seam(name, low, high, steps_per_deg, joint.facts.bus == "feetech")
+    _refuse_seam(name, low, high, steps_per_deg, kind_of(joint.model).set_middle is not None)
     if not low < marks.zero < high:
         raise CalibrationRefused(
             f"{name}: straight ahead (step {marks.zero % STEPS_PER_TURN}) does not lie between "

@@ -6,7 +6,7 @@ Nothing is printed or written here: questions go to ``Person``, the result is a 
 from collections.abc import Callable
 from typing import Literal, Protocol
 
-from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN
+from gazerig.drivers.servo_models import STEPS_PER_TURN
 from gazerig.robot.calibration.endstop_search import Stop, StopSearchParams
 from gazerig.robot.calibration.joint_access import SingleJoint
 from gazerig.robot.calibration.joint_calibration import (
@@ -76,7 +76,7 @@ def by_hand(single: SingleJoint, person: Person, margin_deg: float) -> Calibrati
         DriverError: the servo does not answer any more.
         gazerig.robot.calibration.joint_access.Stopped: the person wants it to end.
     """
-    single.let_go()
+    single.servo.disable_torque()
     watched = Watched(single)
     positive, negative = ends_of(single.name)
     person.tell(f"{single.who}: torque off, it can be turned by hand")
@@ -109,7 +109,7 @@ def by_motion(
     try:
         marks = _find_stops(single, person, params)
     finally:
-        single.leave()
+        single.servo.restore()
     person.tell(f"{single.who}: torque off")
     if zero_by == "person" and not is_lid(single.name):
         watched = Watched(single)
@@ -124,7 +124,7 @@ def _find_stops(single: SingleJoint, person: Person, params: StopSearchParams) -
     """Return both stops, the zero still open; the person says which way it went."""
     positive, negative = ends_of(single.name)
     way = single.joint.sign
-    single.take_on(params)
+    single.enable_torque(params)
     person.tell(
         f"{single.who}: torque on at {params.strength:.0%} of its strength, "
         f"moving at {params.speed_deg_s:g} deg/s"

@@ -174,7 +174,7 @@ class HandPlacer:
 
     def begin(self) -> None:
         """Take the torque away."""
-        self._single.let_go()
+        self._single.servo.disable_torque()
         self._person.tell(f"{self._single.who}: torque off, it can be turned by hand")
 
     def mark(self, where: str) -> float:

@@ -9,14 +9,13 @@ from gazerig.config.schema import Rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.i2c.port import port_of
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
+from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.calibration.endstop_search import StopSearchParams
-from gazerig.robot.calibration.guarded_servo import GuardedServo
 from gazerig.robot.calibration.hobby_access import OneHobby
 from gazerig.robot.calibration.joint_access import SingleJoint
 from gazerig.robot.calibration.joint_calibration import Calibration, CalibrationRefused, Places
 from gazerig.robot.calibration.joint_procedure import by_hand, by_motion
 from gazerig.robot.calibration.linkage_procedure import HandPlacer, HobbyPlacer, by_places
-from gazerig.robot.calibration.servo_access import OneServo
 from gazerig.robot.calibration.smart_servo_access import SmartServo
 from gazerig.robot.cli.jog_prompt import SteeringPerson
 from gazerig.robot.cli.open_port import opened
@@ -104,17 +103,18 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: How) -> None:
     Raises:
         SetupError: says which, and what can be done.
     """
-    kinds = {name: rig.bus_of(name).kind for name in names}
     blind = [name for name in names if not rig.joints[name].facts.measured]
     if how.by is By.motion and len(blind) == len(names):
         raise SetupError(
             f"--by motion: hobby servos do not tell where they are ({', '.join(blind)}), so no "
             "stop can be found: leave --by away and steer them yourself"
         )
-    other = [name for name, kind in kinds.items() if kind != "feetech"]
+    able = [kind for kind in KINDS.values() if kind.set_middle is not None]
+    other = [name for name in names if KINDS.get(rig.bus_of(name).kind) not in able]
     if how.set_middle and other:
+        titles = " and ".join(kind.title for kind in able)
         raise SetupError(
-            f"--set-middle: only Feetech servos can be told so, not that of {', '.join(other)}: "
+            f"--set-middle: only {titles} servos can be told so, not that of {', '.join(other)}: "
             "choose joints with --joint"
         )
     if how.clear_offset and len(blind) == len(names):
@@ -131,21 +131,20 @@ def _one(bench: Bench, name: str, bus: str) -> Made:
     guardian = _guardian(bench, name, bus)
     with opened(bench.rig, bench.wire, bus, guardian) as port:
         joint = bench.rig.joints[name]
-        servo: OneServo = SmartServo(name, joint.id, joint.model, port)
-        if guardian is not None:
-            servo = GuardedServo(servo, guardian)
+        servo = SmartServo(name, joint.id, joint.model, port, guardian)
         single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
         bench.person.hand = _hand(bench.wire, bus, joint.id)
-        with _let_go_after(single.who, single.let_go, bench.stopped):
+        with _off_after(single.who, servo.disable_torque, bench.stopped):
             return _smart(bench, single)
 
 
 def _guardian(bench: Bench, name: str, bus: str) -> Guardian | None:
-    """Return what lets go of one joint's servo, None where its own watchdog does.
+    """Return what switches one joint's servo off, None where its own watchdog does.
 
-    A single Dynamixel's watchdog is armed whatever the rig says of it.
+    A watchdog is armed for calibrating whatever the rig says of it.
     """
-    if bench.rig.bus_named(bus).kind == "dynamixel":
+    kind = KINDS.get(bench.rig.bus_named(bus).kind)
+    if kind is not None and kind.family.watchdog_unit_s is not None:
         return None
     plan = release_plan(bench.rig, bus, bench.wire.paths[bus])
     return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
@@ -154,10 +153,10 @@ def _guardian(bench: Bench, name: str, bus: str) -> Guardian | None:
 def _smart(bench: Bench, single: SingleJoint) -> Made:
     how, person = bench.how, bench.person
     if how.clear_offset:
-        was = single.clear_offset()
+        was = single.servo.clear_offset()
         if was:
             say(f"{single.who}: its offset {was} -> 0; {_VOID}")
-    single.check()
+    single.servo.check()
     if how.set_middle:
         _set_middle(single, person)
     if single.joint.linkage:
@@ -177,12 +176,12 @@ _VOID = "until this calibration is written the rig file's zero is wrong by that"
 
 
 def _set_middle(single: SingleJoint, person: SteeringPerson) -> None:
-    single.let_go()
+    single.servo.disable_torque()
     person.wait(
         f"turn {single.name} to the middle of its travel, then press Enter",
         lambda: f"{single.name}: step {single.position()[0]}",
     )
-    say(f"{single.who}: its place is 2048 now (offset {single.set_middle()}); {_VOID}")
+    say(f"{single.who}: its place is 2048 now (offset {single.servo.set_middle()}); {_VOID}")
 
 
 def _hobby(bench: Bench, name: str, bus: str) -> Made:
@@ -194,7 +193,7 @@ def _hobby(bench: Bench, name: str, bus: str) -> Made:
     params = config.pca9685 if config.kind == "pca9685" else config.maestro
     hobby = OneHobby(name, joint, port, params, RealClock(), bench.stopped, how.pulses_us, guardian)
     person.hand = None
-    with _let_go_after(hobby.who, hobby.let_go, bench.stopped):
+    with _off_after(hobby.who, hobby.disable, bench.stopped):
         return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)
 
 
@@ -210,8 +209,8 @@ def _hand(wire: Wires, bus: str, servo_id: int) -> Callable[[int], None] | None:
 
 
 @contextlib.contextmanager
-def _let_go_after(
-    who: str, let_go: Callable[[], None], stopped: Callable[[], str | None]
+def _off_after(
+    who: str, torque_off: Callable[[], None], stopped: Callable[[], str | None]
 ) -> Iterator[None]:
     """Take the torque away however the block ends; nothing is said where that works."""
 
@@ -219,7 +218,7 @@ def _let_go_after(
         say(f"{who}: {line}")
 
     with PowerDown(
-        None, let_go, told, Interrupts.of(stopped), left=": cut the servo power", quiet=True
+        None, torque_off, told, Interrupts.of(stopped), left=": cut the servo power", quiet=True
     ) as way_out:
         way_out.switch_on(lambda: None)  # what follows does it, at a time of its own
         yield

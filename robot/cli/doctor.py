@@ -6,14 +6,16 @@ from typing import Annotated
 
 import typer
 
+from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoSetup
 from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
 from gazerig.robot.bringup.doctor import maestro as doctor_maestro
 from gazerig.robot.bringup.doctor import pca9685 as doctor_pca9685
 from gazerig.robot.bringup.doctor import run as checkup
 from gazerig.robot.bringup.doctor.checks import apply_fix
-from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
+from gazerig.robot.bringup.doctor.findings import BOARD, Finding, Fix, worst
 from gazerig.robot.bringup.doctor.guardian import examine_guardian
 from gazerig.robot.bringup.doctor.run import Done
 from gazerig.robot.bringup.scan_text import as_plain, grouped, summed_up
@@ -81,14 +83,24 @@ def _examine(rig: Rig, bus: str, line: BusPort) -> list[Finding]:
     config, setups = rig.bus_named(bus), setups_on(rig, bus)
 
     def behind() -> list[Finding]:
-        if config.kind == "maestro":
-            usb = bench.usb_id(line.port_name)
-            return doctor_maestro.visit(line, config.maestro, setups, usb)
-        if config.kind == "pca9685":
-            return doctor_pca9685.visit(line, config.pca9685, setups)
+        board = BOARDS.get(config.kind)
+        if board is not None:
+            return board(line, config, setups)
         return checkup.check(line, KINDS[config.kind], setups, config.baud, progress)
 
     return checkup.check_all(line, bench.host, behind)
+
+
+def _maestro(line: BusPort, config: BusConfig, setups: Sequence[ServoSetup]) -> list[Finding]:
+    usb = bench.usb_id(line.port_name)
+    return doctor_maestro.visit(line, config.maestro, setups, usb)
+
+
+BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoSetup]], list[Finding]]] = {
+    "maestro": _maestro,
+    "pca9685": lambda line, config, setups: doctor_pca9685.visit(line, config.pca9685, setups),
+}
+"""What examines boards, by the kind of bus."""
 
 
 def _tell(line: str) -> None:
@@ -126,7 +138,7 @@ def _apply(rig: Rig, bus: str, line: BusPort, findings: Sequence[Finding]) -> li
     line.setBaudRate(config.baud)
 
     def write(one: Fix) -> str:
-        if config.kind == "maestro":
+        if one.servo_id == BOARD:
             return doctor_maestro.apply_fix(line, config.maestro, one)
         return apply_fix(line, KINDS[config.kind], one)
 

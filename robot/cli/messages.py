@@ -1,18 +1,11 @@
 """What the servos of a rig do when they are switched on or left alone, in words for a person."""
 
 from gazerig.config.schema import Rig
-from gazerig.drivers.servo_models import BusKind
-from gazerig.robot.app.bus_wiring import bus_names
+from gazerig.robot.app.bus_wiring import bus_names, has_watchdog
+from gazerig.robot.bringup.servo_families import KINDS
 
-_LEFT_ALONE: dict[BusKind, str] = {
-    "dynamixel": "the Dynamixel servos' own watchdog stops them",
-    "feetech": "Feetech servos hold their last goal until the servo power is cut, or "
-    "the guardian, which tries for 10 s, reaches the port",
-    "pca9685": "a PCA9685 goes on with its last pulses until the servo power is cut, or "
-    "the guardian, which tries for 10 s, reaches the bus",
-    "maestro": "a Maestro goes on with its last pulses until the servo power is cut, or "
-    "the guardian, which tries for 10 s, reaches the port",
-}
+BOARDS = {"maestro": "a Maestro", "pca9685": "a PCA9685"}
+"""Boards of hobby servos by the kind of bus."""
 
 
 def holding(rig: Rig) -> str:
@@ -25,11 +18,21 @@ def holding(rig: Rig) -> str:
     return (
         f"torque on: {len(told)} servos hold where they are, {pulses}"
         if told
-        else (f"pulses on: {pulses}")
+        else f"pulses on: {pulses}"
     )
 
 
 def left_alone(rig: Rig) -> str:
     """Say what the servos do that could not be told to let go."""
-    kinds = {rig.bus_named(name).kind for name in bus_names(rig)}
-    return "; ".join(words for kind, words in _LEFT_ALONE.items() if kind in kinds)
+    return "; ".join(dict.fromkeys(_left_alone(rig, bus) for bus in bus_names(rig)))
+
+
+def _left_alone(rig: Rig, bus: str) -> str:
+    kind = rig.bus_named(bus).kind
+    until = "until the servo power is cut, or the guardian, which tries for 10 s, reaches the port"
+    if kind in BOARDS:
+        return f"{BOARDS[kind]} goes on with its last pulses {until}"
+    title = KINDS[kind].title
+    if has_watchdog(rig, bus):
+        return f"the {title} servos' own watchdog stops them"
+    return f"{title} servos hold their last goal {until}"

@@ -11,20 +11,18 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.bringup.monitor import Monitor, Sample, as_json
+from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.bringup.telemetry import (
-    DynamixelLooks,
-    FeetechLooks,
-    Look,
-    Looks,
-    MaestroLooks,
-    Pca9685Looks,
+    MaestroTelemetry,
+    Pca9685Telemetry,
+    SmartServoTelemetry,
+    Telemetry,
+    TelemetryReader,
 )
 from gazerig.robot.cli.open_port import opened
 from gazerig.robot.cli.ports import MockOption, PortOption, Wires, wires
@@ -57,9 +55,9 @@ def monitor(
     """Watch all servos; reads alone: nothing is written, torque stays as it is."""
     with clear_errors(rig, port, mock), signals() as stopped:
         found, clock = load_rig(rig), RealClock()
-        with wires(found, mock, port) as wire, _looks(found, wire) as looks:
+        with wires(found, mock, port) as wire, _readers(found, wire) as readers:
             joints = {name: found.joints[name] for name in found.names}
-            watch = Monitor(looks, joints, clock.now_s)
+            watch = Monitor(readers, joints, clock.now_s)
             samples = _samples(watch, clock, rate, 0.0 if once else seconds, stopped)
             if as_lines:
                 start_s = clock.now_s()
@@ -73,25 +71,27 @@ def monitor(
                         live.update(_table(sample, joints, rate), refresh=True)
 
 
+BOARDS: Mapping[str, Callable[[BusPort, BusConfig], TelemetryReader]] = {
+    "maestro": lambda port, config: MaestroTelemetry(port, config.maestro),
+    "pca9685": lambda port, config: Pca9685Telemetry(port, config.pca9685),
+}
+"""Of the kinds of bus whose servos are not asked themselves."""
+
+
 @contextlib.contextmanager
-def _looks(rig: Rig, wire: Wires) -> Iterator[dict[str, Looks]]:
-    """Open every bus for looking alone."""
+def _readers(rig: Rig, wire: Wires) -> Iterator[dict[str, TelemetryReader]]:
+    """Open every bus for reading alone."""
     with contextlib.ExitStack() as ports:
-        yield {
-            name: _looks_on(rig, name, ports.enter_context(opened(rig, wire, name)))
-            for name in bus_names(rig)
-        }
-
-
-def _looks_on(rig: Rig, bus: str, port: BusPort) -> Looks:
-    config = rig.bus_named(bus)
-    if config.kind == "maestro":
-        return MaestroLooks(port, config.maestro)
-    if config.kind == "pca9685":
-        return Pca9685Looks(port, config.pca9685)
-    if config.kind == "feetech":
-        return FeetechLooks(Registers(port, FEETECH, tries=1))
-    return DynamixelLooks(Registers(port, DYNAMIXEL, tries=1))
+        readers = {}
+        for name in bus_names(rig):
+            port, config = ports.enter_context(opened(rig, wire, name)), rig.bus_named(name)
+            kind = KINDS.get(config.kind)
+            readers[name] = (
+                BOARDS[config.kind](port, config)
+                if kind is None
+                else SmartServoTelemetry(port, kind)
+            )
+        yield readers
 
 
 def _samples(
@@ -137,7 +137,7 @@ def _table(sample: Sample, joints: Mapping[str, JointParams], rate: float) -> Ta
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("torque", no_wrap=True)
     table.add_column("errors")
-    for name, look in sample.looks.items():
+    for name, look in sample.servos.items():
         bus, servo_id = joints[name].bus, joints[name].id
         table.add_row(name, f"{bus}:{servo_id}" if bus else f"{servo_id}", *_row(look))
     return table
@@ -150,7 +150,7 @@ def _columns(joints: Collection[JointParams]) -> tuple[str, ...]:
     return (goal, "at deg", "/".join(units), "deg/s", "load %", "C", "V")
 
 
-def _row(look: Look | None) -> tuple[str, ...]:
+def _row(look: Telemetry | None) -> tuple[str, ...]:
     if look is None:
         return ("",) * (_COLUMNS + 1) + ("[red]no answer[/red]",)
     if look.errors:
@@ -171,7 +171,7 @@ def _row(look: Look | None) -> tuple[str, ...]:
     )
 
 
-def _place(look: Look) -> str:
+def _place(look: Telemetry) -> str:
     """Write the servo's own position, or the pulse that it gets."""
     if look.pulse_us is not None:
         return f"{look.pulse_us:g}" if look.pulse_us else "none"

@@ -1,5 +1,6 @@
 """The command ``gazerig reboot``: servos restarted one by one."""
 
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -10,7 +11,7 @@ from gazerig.drivers.maestro.line import Line
 from gazerig.drivers.pca9685.release import stop_pulses
 from gazerig.drivers.serial.port import BusPort
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
-from gazerig.robot.bringup import servo_reboot as servo_reboot
+from gazerig.robot.bringup import servo_reboot
 from gazerig.robot.bringup.channel_test import sent_home
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.bringup.servo_family import ServoKind
@@ -51,11 +52,8 @@ def reboot(
                 config = model.bus_named(bus)
                 with to_open(wired.paths[bus]) as line:
                     line.setBaudRate(config.baud)
-                    if config.kind == "maestro":
-                        _board(model, bus, line, yes)
-                        continue
-                    if config.kind == "pca9685":
-                        _pulses_off(model, bus, line)
+                    if config.kind in BOARDS:
+                        BOARDS[config.kind](model, bus, line, yes)
                         continue
                     kind = KINDS[config.kind]
                     again += [_reboot(line, kind, model, bus, one, yes) for one in ids]
@@ -64,7 +62,7 @@ def reboot(
 
 
 def _servo(rig: Rig, text: str) -> tuple[str, int]:
-    """Read the name of a joint, or a servo id; gives its bus and id.
+    """Read the name of a joint, or a servo id; return its bus and id.
 
     Raises:
         SetupError: it is neither, or there are several buses with such ids.
@@ -88,7 +86,7 @@ def _servo(rig: Rig, text: str) -> tuple[str, int]:
 
 
 def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, yes: bool) -> bool:
-    """Restart one servo; tells whether it complains again."""
+    """Restart one servo; return whether it complains again."""
     names = [joint for joint in joints_on(rig, bus) if rig.joints[joint].id == servo_id]
     name = f"{names[0]} (servo {servo_id})" if names else f"servo {servo_id}"
     baud = rig.bus_named(bus).baud
@@ -106,7 +104,7 @@ def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, y
     return bool(result.after.errors)
 
 
-def _board(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
+def _maestro(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
     """Do what comes nearest to a restart of a Maestro: clear its errors, send it home."""
     label = bus_label(rig, bus)
     say(
@@ -121,7 +119,7 @@ def _board(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
     say(f"{label}: home; errors it held, cleared now: {', '.join(held) or 'none'}")
 
 
-def _pulses_off(rig: Rig, bus: str, line: BusPort) -> None:
+def _pca9685(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
     """Do what comes nearest to a restart of a PCA9685: stop the pulses of the rig's channels.
 
     Raises:
@@ -138,3 +136,10 @@ def _pulses_off(rig: Rig, bus: str, line: BusPort) -> None:
         f"{bus_label(rig, bus)}: a PCA9685 latches no errors; pulses of its {len(ids)} channels "
         "are off, and it is set up anew at the next start"
     )
+
+
+BOARDS: dict[str, Callable[[Rig, str, BusPort, bool], None]] = {
+    "maestro": _maestro,
+    "pca9685": _pca9685,
+}
+"""What comes nearest to a restart where servos have none, by the kind of bus."""

@@ -1,17 +1,19 @@
-"""The command ``gazerig setup``: each servo gets its id, each channel its person's look."""
+"""The command ``gazerig setup``: each servo gets its id, each channel is tried."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
+from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_models import HOBBY_KINDS, servo_label
+from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.bringup import servo_setup as servo_setup
+from gazerig.robot.bringup import servo_setup
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.bringup.servo_family import ServoKind
 from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, setups_on, wires
@@ -19,7 +21,8 @@ from gazerig.robot.cli.progress import YesOption, progress, to_open, wipe
 from gazerig.robot.cli.setup_maestro import set_up_board, write_settings
 from gazerig.robot.cli.setup_pca9685 import set_up_boards
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
-from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine
+from gazerig.robot.model.joint import JointParams
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()
@@ -50,13 +53,44 @@ def setup(
             mine = [one for one in setups_on(model, bus) if one.name in wanted]
             if not mine:
                 continue
-            if model.bus_named(bus).kind in HOBBY_KINDS:
-                left += _board(model, rig, bus, mine, port, mock, yes, settings)
-            else:
-                left += _chain(model, rig, bus, mine, port, mock, yes)
+            task = _Task(model, rig, bus, mine, port, mock, yes, settings)
+            left += BOARDS.get(model.bus_named(bus).kind, _chain)(task)
         if left:
             say(f"skipped: {', '.join(left)}")
         say(f"done: {len(wanted) - len(left)} of {len(wanted)}. Next: gazerig doctor")
+
+
+class _Task(NamedTuple):
+    """Setting up the servos of one bus, as asked on the command line.
+
+    named: the rig as it was named; setups: of the servos that are meant
+    settings: file for what a Maestro must be set to
+    """
+
+    rig: Rig
+    named: str
+    bus: str
+    setups: list[ServoSetup]
+    port: str | None
+    mock: bool
+    yes: bool
+    settings: Path | None
+
+    @property
+    def title(self) -> str:
+        """Return the rig as it was named, with its bus where there are several."""
+        several = len(bus_names(self.rig)) > 1
+        return f"{self.named}, {bus_label(self.rig, self.bus)}" if several else self.named
+
+    @property
+    def joints(self) -> dict[str, JointParams]:
+        """Return the joints of the servos that are meant."""
+        return {one.name: self.rig.joints[one.name] for one in self.setups}
+
+    @property
+    def config(self) -> BusConfig:
+        """Return the bus as the rig describes it."""
+        return self.rig.bus_named(self.bus)
 
 
 def _known_joints(names: list[str], known: tuple[str, ...]) -> tuple[str, ...]:
@@ -66,65 +100,50 @@ def _known_joints(names: list[str], known: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _where(rig: Rig, bus: str) -> str:
-    """Name a bus where there are several."""
-    return f", {bus_label(rig, bus)}" if len(bus_names(rig)) > 1 else ""
-
-
 # --- servos with ids
 
 
-def _chain(
-    rig: Rig,
-    title: str,
-    bus: str,
-    setups: list[ServoSetup],
-    port: str | None,
-    mock: bool,
-    yes: bool,
-) -> list[str]:
-    """Set the servos of one bus up; gives the joints that were skipped."""
+EMULATED: dict[str, type[DynamixelLine] | type[FeetechLine]] = {
+    "dynamixel": DynamixelLine,
+    "feetech": FeetechLine,
+}
+"""Lines of emulated servos by the kind of bus."""
+
+
+def _chain(task: _Task) -> list[str]:
+    """Set the servos of one bus up; return the joints that were skipped."""
+    count = len(task.setups)
     say(
-        f"{title}{_where(rig, bus)}: {len(setups)} of {len(rig.names)} servos to set up for "
-        f"{rig.bus_named(bus).baud} bit/s. Switch the servo supply off before you plug or "
-        "unplug one."
+        f"{task.title}: {count} of {len(task.rig.names)} servos to set up for {task.config.baud} "
+        "bit/s. Switch the servo supply off before you plug or unplug one."
     )
     left = []
-    for n, one in enumerate(setups, 1):
-        say(
-            f"{n} of {len(setups)}: connect the {one.model} of {servo_label(one)}, and no "
-            f"other servo"
-        )
-        if not _step(rig, bus, one, port, mock, yes):
+    for n, one in enumerate(task.setups, 1):
+        say(f"{n} of {count}: connect the {one.model} of {servo_label(one)}, and no other servo")
+        if not _step(task, one):
             left.append(one.name)
     return left
 
 
-def _step(rig: Rig, bus: str, one: ServoSetup, port: str | None, mock: bool, yes: bool) -> bool:
+def _step(task: _Task, one: ServoSetup) -> bool:
     """Set one joint's servo up, again and again until it is done or skipped."""
-    kind = KINDS[rig.bus_named(bus).kind]
-    fresh = {bus: _fresh(rig, one, kind)}
+    bus, kind, yes = task.bus, KINDS[task.config.kind], task.yes
+    # As it comes from the factory.
+    spec = ServoSpec(FACTORY_ID, one.model, task.rig.joints[one.name].zero)
+    fresh = {bus: EMULATED[kind.name]((spec,), kind.family.factory_baud)}
     while True:
         if not yes and not _go_on("   Enter: it is connected; s: skip this one; Ctrl-C: end "):
             return False
         try:
             with (
-                wires(rig, mock, port, fresh) as wired,
+                wires(task.rig, task.mock, task.port, fresh) as wired,
                 to_open(wired.paths[bus]) as line,
             ):
-                return _set_up(line, kind, one, rig.bus_named(bus).baud, yes)
+                return _set_up(line, kind, one, task.config.baud, yes)
         except DriverError as error:
             if yes:
                 raise
             say(f"   {error}")
-
-
-def _fresh(rig: Rig, one: ServoSetup, kind: ServoKind) -> Emulated:
-    """Return a servo as it comes from the factory."""
-    spec = (ServoSpec(FACTORY_ID, one.model, rig.joints[one.name].zero),)
-    if kind.name == "feetech":
-        return FeetechLine(spec, kind.family.factory_baud)
-    return DynamixelLine(spec, kind.family.factory_baud)
 
 
 def _set_up(line: BusPort, kind: ServoKind, wanted: ServoSetup, baud: int, yes: bool) -> bool:
@@ -158,29 +177,25 @@ def _go_on(question: str) -> bool:
 # --- channels of a board
 
 
-def _board(
-    rig: Rig,
-    title: str,
-    bus: str,
-    setups: list[ServoSetup],
-    port: str | None,
-    mock: bool,
-    yes: bool,
-    settings: Path | None,
-) -> list[str]:
-    """Say what to set on a board and try its channels; gives the joints that were skipped."""
-    config = rig.bus_named(bus)
-    title_of = {"maestro": "a Pololu Maestro", "pca9685": "PCA9685"}[config.kind]
-    say(f"{title}{_where(rig, bus)}: {title_of}; {len(setups)} of its channels to try.")
-    with (
-        wires(rig, mock, port) as wired,
-        to_open(wired.paths[bus]) as line,
-    ):
-        joints = {one.name: rig.joints[one.name] for one in setups}
-        every = setups_on(rig, bus)
-        if config.kind == "pca9685":
-            key = f"buses.{bus}.pca9685" if bus else "bus.pca9685"
-            return set_up_boards(line, config.pca9685, setups, joints, every, title, key, yes)
-        if settings is not None:
-            write_settings(settings, config.maestro, every, line.port_name)
-        return set_up_board(line, config.maestro, setups, joints, yes)
+def _maestro(task: _Task) -> list[str]:
+    """Say what to set on a board and try its channels; return the joints that were skipped."""
+    params, setups = task.config.maestro, task.setups
+    say(f"{task.title}: a Pololu Maestro; {len(setups)} of its channels to try.")
+    with wires(task.rig, task.mock, task.port) as wired, to_open(wired.paths[task.bus]) as line:
+        if task.settings is not None:
+            every = setups_on(task.rig, task.bus)
+            write_settings(task.settings, params, every, line.port_name)
+        return set_up_board(line, params, setups, task.joints, task.yes)
+
+
+def _pca9685(task: _Task) -> list[str]:
+    """Say how boards are wired and try their channels; return the joints that were skipped."""
+    params, setups, every = task.config.pca9685, task.setups, setups_on(task.rig, task.bus)
+    key = f"buses.{task.bus}.pca9685" if task.bus else "bus.pca9685"
+    say(f"{task.title}: PCA9685; {len(setups)} of its channels to try.")
+    with wires(task.rig, task.mock, task.port) as wired, to_open(wired.paths[task.bus]) as line:
+        return set_up_boards(line, params, setups, task.joints, every, task.named, key, task.yes)
+
+
+BOARDS: dict[str, Callable[[_Task], list[str]]] = {"maestro": _maestro, "pca9685": _pca9685}
+"""Kinds of bus whose servos have no ids."""

@@ -9,16 +9,12 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import SHARED, Found
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.doctor.dynamixel import DYNAMIXEL
-from gazerig.robot.bringup.doctor.feetech import FEETECH
+from gazerig.robot.bringup.doctor.families import CHECKS
 from gazerig.robot.bringup.doctor.findings import Finding, Fix
 from gazerig.robot.bringup.doctor.settings import SETTINGS
 from gazerig.robot.bringup.doctor.state import STATE
 from gazerig.robot.bringup.doctor.subject import FIX, ServoChecks, ServoState, Verdict
 from gazerig.robot.bringup.servo_family import ServoKind
-
-CHECKS: dict[str, ServoChecks] = {checks.kind.name: checks for checks in (DYNAMIXEL, FEETECH)}
-"""By the name of the kind."""
 
 MOST_NAMED = 6
 
@@ -42,7 +38,9 @@ def take(
     Raises:
         BusLost: the port is gone.
     """
-    return ServoState(checks, setup, found, checks.read(registers, setup.id), corrupt)
+    return ServoState(
+        checks, setup, found, registers.read_many(setup.id, checks.registers), corrupt
+    )
 
 
 def examine(state: ServoState) -> list[Finding]:
@@ -52,7 +50,7 @@ def examine(state: ServoState) -> list[Finding]:
     """
     whole: list[Verdict] = [*_identity(state), *_collision(state)]
     if not whole:
-        rules = (_mute,) if state.silent else (_unread, *STATE, *SETTINGS, *state.checks.rules)
+        rules = (_mute,) if state.silent else (_unread, *STATE, *SETTINGS)
         whole = [verdict for rule in rules for verdict in rule(state)]
     findings = [_finding(state, verdict) for verdict in whole]
     if not any(finding.level in ("warn", "error") for finding in findings):

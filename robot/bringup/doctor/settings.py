@@ -4,6 +4,9 @@ from collections.abc import Iterator
 
 from gazerig.robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
 
+VOLTAGE = "input voltage"
+"""What every family calls an unfit voltage, in bit 0."""
+
 
 def _firmware(state: ServoState) -> Iterator[Verdict]:
     firmware, wanted = state.found.firmware, state.setup.firmware_min
@@ -35,9 +38,9 @@ def _baud(state: ServoState) -> Iterator[Verdict]:
 def _wanted(state: ServoState) -> Iterator[Verdict]:
     for wanted in state.checks.wanted:
         value = state.values[wanted.register]
-        if value is None or value & wanted.mask == wanted.value:
+        if value is None or wanted.met_by(value):
             continue
-        right = value & ~wanted.mask | wanted.value
+        right = value & ~wanted.mask | wanted.value & wanted.mask
         fixes = ((wanted.register, right),) if wanted.remedy == FIX else ()
         remedy = wanted.remedy.format(joint=state.setup.name)
         yield Verdict(wanted.level, wanted.text(value), remedy, fixes)
@@ -77,4 +80,60 @@ def _protection(state: ServoState) -> Iterator[Verdict]:
         yield Verdict("warn", text, FIX, ((protection.register, right),))
 
 
-SETTINGS: tuple[Rule, ...] = (_firmware, _baud, _wanted, _limits, _protection)
+def _voltage_latch(state: ServoState) -> Iterator[Verdict]:
+    """Where an unfit voltage takes the torque away until a restart, a moment of it is enough."""
+    family, register = state.checks.kind.family, state.checks.protection.register
+    value = state.values[register]
+    if value is None or not family.faults_latch or family.name_errors(value & 1) != (VOLTAGE,):
+        return
+    low, high = state.values["min_voltage_limit"], state.values["max_voltage_limit"]
+    limits = f"{(low or 0) / 10.0:.1f}..{(high or 0) / 10.0:.1f} V"
+    yield Verdict(
+        "note",
+        f"a moment outside {limits} makes it limp until it is restarted "
+        f"({register.capitalize()} {value})",
+        "size the supply for all servos at once, and feed long chains at both ends; "
+        "gazerig reboot brings a latched servo back",
+    )
+
+
+def _overload(state: ServoState) -> Iterator[Verdict]:
+    """Where overload protection has a share and a time of its own, both must let it act."""
+    share, after = state.values.get("overload_torque"), state.values.get("protection_time")
+    if share is not None and after is not None and (share >= 100 or not after):
+        yield Verdict(
+            "warn",
+            "its overload protection cannot act as meant "
+            f"(Overload Torque {share} %, Protection Time {after / 100.0:g} s)",
+            "set Overload Torque (36) to 80 and Protection Time (35) to 200 with "
+            f"{state.checks.program}",
+        )
+
+
+def _speed(state: ServoState) -> Iterator[Verdict]:
+    """The YAML's speed lies within the servo's own limit, or what its motor can do."""
+    kind = state.checks.kind
+    unit_deg_s = kind.velocity_unit_steps_s * 360.0 / kind.family.steps_per_turn
+    asked = int(state.setup.max_speed_steps_s / kind.velocity_unit_steps_s)
+    limit = state.values.get("velocity_limit")
+    if limit is not None and limit < asked:
+        yield Verdict(
+            "note",
+            f"its Velocity Limit is {limit * unit_deg_s:.0f} deg/s, the YAML asks for "
+            f"{asked * unit_deg_s:.0f}",
+            f"lower max_speed_deg_s in the YAML or raise the limit with {state.checks.program}",
+        )
+    fastest_steps_s = state.model.no_load_steps_s
+    if "velocity_limit" not in state.values and state.setup.max_speed_steps_s > fastest_steps_s:
+        yield Verdict(
+            "note",
+            f"the YAML asks its shaft for {asked * unit_deg_s:.0f} deg/s; without load and at "
+            f"{state.model.rated_v:g} V it turns "
+            f"{fastest_steps_s * 360.0 / kind.family.steps_per_turn:.0f}",
+            "lower max_speed_deg_s in the YAML",
+        )
+
+
+SETTINGS: tuple[Rule, ...] = (
+    *(_firmware, _baud, _wanted, _limits, _protection, _voltage_latch, _overload, _speed),
+)

@@ -1,9 +1,8 @@
 """How a servo is now: its errors, supply, heat, torque and position, and what guards it.
 
-Sources: ROBOTIS e-Manual, X series; Feetech memory table STS3215. A Dynamixel latches errors
-until a restart. On an STS nothing latches: a bit of Status stands as long as its cause, but for
-overload and overcurrent, which stand until a goal that leads away from what holds the joint, or
-a restart.
+Where faults latch they stay until a restart. Elsewhere a bit stands as long as its cause, but
+for overload and overcurrent, which stand until a goal that leads away from what holds the
+joint, or a restart. Sources: ROBOTIS e-Manual, X series; Feetech memory table STS3215.
 """
 
 from collections.abc import Iterator

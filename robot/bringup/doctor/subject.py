@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 from gazerig.drivers.servo_bus.discovery import Found
 from gazerig.drivers.servo_bus.family import Model
-from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.doctor.findings import Level
@@ -30,6 +29,7 @@ class WantedSetting(NamedTuple):
     text: says what a value means
     remedy: where it is not ``FIX`` no fix is offered; {joint} stands for the joint
     mask: chooses its bits
+    least, most: other values within them are as good
     """
 
     register: str
@@ -38,6 +38,15 @@ class WantedSetting(NamedTuple):
     text: Callable[[int], str]
     remedy: str = FIX
     mask: int = ~0
+    least: int | None = None
+    most: int | None = None
+
+    def met_by(self, value: int) -> bool:
+        """Return whether a register with this value is as it should be."""
+        if self.least is None and self.most is None:
+            return value & self.mask == self.value
+        above = self.least is None or value >= self.least
+        return above and (self.most is None or value <= self.most)
 
 
 class FirmwareNote(NamedTuple):
@@ -69,20 +78,19 @@ class ServoChecks:
 
     program: of the maker's, for what cannot be set here
     manual: of the maker's
-    read: reads all registers that rules ask for; None where no good answer came
+    registers: those that rules ask for
     ping_only: Status Return Level 0 means that nothing but pings is answered
     out_of_voltage: what comes of a supply outside the limits
     error_remedies: by the error; {id} stands for the servo's; errors that are told by their
         measured value alone have ""
     unlimited_at_zero: both position limits 0 mean none at all
     firmware_notes: of a model, the first that applies is said
-    rules: of this kind alone
     """
 
     kind: ServoKind
     program: str
     manual: str
-    read: Callable[[Registers, int], dict[str, int | None]]
+    registers: tuple[str, ...]
     ping_only: bool
     out_of_voltage: str
     error_remedies: Mapping[str, str]
@@ -90,7 +98,6 @@ class ServoChecks:
     wanted: tuple[WantedSetting, ...]
     protection: Protection
     firmware_notes: Callable[[str], tuple[FirmwareNote, ...]]
-    rules: "tuple[Rule, ...]"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,52 @@
+"""A whole rig on its emulated buses in this process, in simulated time."""
+
+from collections.abc import Mapping
+from math import degrees
+from pathlib import Path
+
+from mixed_rig import mixed_text
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.app.emulation import emulated_lines, place_of
+from gazerig.robot.model.clock import SimulatedClock
+from gazerig.sim_mock.devices import Emulated, build
+from gazerig.sim_mock.in_process_port import InProcessPort
+
+
+def mixed_rig(folder: Path) -> Rig:
+    """Return a rig with eyes on a Maestro, a Dynamixel and a Feetech neck servo."""
+    path = folder / "mixed.yaml"
+    path.write_text(mixed_text(), encoding="utf-8")
+    return load_rig(str(path))
+
+
+class EmulatedRig:
+    """A rig's buses by name: what is emulated, its port, and the packets sent to it.
+
+    Args:
+        rig: whose servos.
+        lines: what is emulated, by the name of the bus; None: the rig's servos.
+    """
+
+    def __init__(self, rig: Rig, lines: Mapping[str, Emulated] | None = None) -> None:
+        self.rig, self.clock = rig, SimulatedClock()
+        self.lines = emulated_lines(rig) if lines is None else lines
+        self.devices = {name: build(line, self.clock.now_s) for name, line in self.lines.items()}
+        self.sent: dict[str, list[bytes]] = {name: [] for name in self.lines}
+        self.ports = {
+            name: InProcessPort(device, self.sent[name].append, sleep_until=self.clock.sleep_until)
+            for name, device in self.devices.items()
+        }
+
+    def command(self, text: str, bus: str = "") -> str:
+        """Let something happen to what is emulated on a bus."""
+        return self.ports[bus].faults.command(text)
+
+    def where(self) -> dict[str, float]:
+        """Return the true joint angles in degrees."""
+        return {
+            name: degrees(
+                joint.angle_rad(self.devices[joint.bus].positions_steps()[place_of(self.rig, name)])
+            )
+            for name, joint in self.rig.joints.items()
+        }
