@@ -405,15 +405,6 @@ def test_help_explains_every_command(world):
     assert world.faults.command("help lose").startswith("lose ID [count N]")
 
 
-def test_methods_do_what_commands_do():
-    by_text, by_method = World(), World()
-    by_text.faults.command("short 2 2")
-    by_text.faults.command("delay 2 5 for 1")
-    by_method.faults.short(2, 2)
-    by_method.faults.delay(2, 5.0, seconds=1.0)
-    assert by_text.plain() == by_method.plain() != good(1) + good(2) + good(3)
-
-
 _WORDS = st.sampled_from(
     [*DynamixelChain.commands.verbs, "help", "1", "2", "3", "0", "-1", "5", "on", "off", "all"]
 )

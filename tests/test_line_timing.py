@@ -106,7 +106,7 @@ def test_an_idle_line_owes_nothing():
 
 def test_a_late_answer_makes_those_behind_it_late():
     wire = Wire()
-    wire.chain.faults.delay(3, 2.0, count=1)
+    wire.chain.faults.command("delay 3 2 count 1")
     assert wire.answers(PLAIN)[-1][0] == pytest.approx(2120e-6 + 2e-3)
 
 

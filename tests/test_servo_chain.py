@@ -442,8 +442,8 @@ def test_both_ways_to_a_fast_reply_give_the_same_bytes(ids, span, level):
         bench.write(2, 68, 1, level)
         bench.chain[3].fail("overheating")
         if spoilt:
-            bench.chain.faults.lose(3, seconds=0.0)
-            bench.chain.faults.delay(1, 5.0)
+            bench.chain.faults.command("lose 3 for 0")
+            bench.chain.faults.command("delay 1 5")
         wanted = struct.pack("<HH", *span) + bytes(ids)
         answers.append(bench.chain.receive(instruction(0xFE, 0x8A, wanted)))
     assert answers[0] == answers[1]

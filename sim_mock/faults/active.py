@@ -100,13 +100,13 @@ class ActiveFaults:
     def roughened(self, data: bytes, now_s: float) -> bytes:
         """Return bytes as they arrive over a noisy line: some changed, lost or added.
 
-        The share of bytes that are hit is the fault's number; of four that are hit two are
+        The fault's number is how many of a hundred bytes are hit; of four that are hit two are
         changed, one is lost, and one has another put before it.
         """
         noise = next((f for f in self._faults if f.kind == "static" and f.lasts(now_s)), None)
         if noise is None:
             return data
-        rng, out, share, at = self._rng, bytearray(), noise.numbers[0], 0
+        rng, out, share, at = self._rng, bytearray(), noise.numbers[0] / 100.0, 0
         while True:
             # The distance to the next byte hit, instead of a draw for each byte.
             ahead = int(log(1.0 - rng.random()) / log(1.0 - share)) if share < 1.0 else 0

@@ -1,10 +1,11 @@
 """What befalls the hobby servos behind an emulated board, whatever board that is."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from gazerig.sim_mock.faults.grammar import Commands
+from gazerig.sim_mock.faults.grammar import SWITCH, Commands, Verb, Word, number, or_all, whole
 from gazerig.sim_mock.faults.line import LineFaults, Struck
+from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, lost
 from gazerig.sim_mock.hobby_servo import HobbyServo
 
 
@@ -38,6 +39,14 @@ class HobbyBoard(Struck, Protocol):
         """Return the servo of a channel, brought up to now."""
         ...
 
+    def restart(self) -> None:
+        """Restart as a dip of the supply makes it."""
+        ...
+
+    def channel_report(self, channel: int) -> dict[str, object]:
+        """Return what a channel sends."""
+        ...
+
 
 class HobbyFaults(LineFaults):
     """The faults of a line, a board and its servos; an id is a channel. Args: as LineFaults."""
@@ -47,6 +56,11 @@ class HobbyFaults(LineFaults):
     def __init__(self, board: HobbyBoard, commands: Commands, seed: int, header: bytes) -> None:
         super().__init__(board, commands, seed, header)
         self._hobby = board
+
+    def brown_out(self) -> str:
+        """Let the board restart as a dip of the supply makes it: no answer tells."""
+        self._hobby.restart()
+        return "the board restarts"
 
     def power(self, on: bool = True) -> str:
         """Return the servos their supply, or take it; what gives the pulses notices nothing."""
@@ -82,3 +96,50 @@ class HobbyFaults(LineFaults):
             return [self._hobby.here(channel)]
         self._hobby.body.advance()
         return self._hobby.body.servos
+
+    def reports(self) -> list[dict[str, object]]:
+        """Return what every channel sends and where its servo truly is."""
+        self._hobby.body.advance()
+        return [
+            {
+                "id": nth,
+                **self._hobby.channel_report(nth),
+                "place": round(servo.place_steps, 1),
+                "straining": servo.straining,
+            }
+            for nth, servo in enumerate(self._hobby.body.servos)
+        ]
+
+
+def channel_word(highest: int) -> Word:
+    """Return the word that names a channel."""
+    return Word("ID", whole(0, highest, "a channel"))
+
+
+# fmt: off
+def hobby_verbs(one: Word, writes: str, own: Mapping[str, Verb]) -> dict[str, Verb]:
+    """Return what can be asked of a board of hobby servos.
+
+    Args:
+        one: reads a channel.
+        writes: what is sent to it without an answer, for "lose-writes".
+        own: what can be asked of this make of board beside.
+    """
+    who = Word(one.shown, or_all(one.read))
+    return {
+        **line_verbs(one),
+        "lose-writes": lost("lose_writes", writes),
+        "lose-bytes": lost("lose_bytes", "bytes of the host"),
+        **adapter_verbs(),
+        **own,
+        "brown-out": Verb(HobbyFaults.brown_out, (),
+                          "the board restarts as a dip of its supply makes it"),
+        "power": Verb(HobbyFaults.power, (SWITCH,),
+                      "supply of the servos; the board notices nothing"),
+        "stick": Verb(HobbyFaults.stick, (who,), "jam the servo where it is"),
+        "free": Verb(HobbyFaults.free, (who,), "let a jammed servo go"),
+        "turn": Verb(HobbyFaults.turn, (who, Word("STEPS", number(-1e5, 1e5, "quarter us"))),
+                     "turn the servo by hand; with pulses it goes back"),
+        **closing_verbs(one),
+    }
+# fmt: on

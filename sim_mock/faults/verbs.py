@@ -1,5 +1,7 @@
 """What can be asked of an emulated line as text, in the parts that devices choose from."""
 
+from collections.abc import Callable
+
 from gazerig.sim_mock.faults.grammar import (
     BOTH,
     MS,
@@ -20,6 +22,73 @@ from gazerig.sim_mock.faults.line import LineFaults
 _BYTE_COUNT = whole(0, 1024, "a number of bytes")
 _BYTES = Word("BYTES", _BYTE_COUNT)
 _N = Word("N", _BYTE_COUNT)
+_TIMES = Word("N", count, True)
+
+Do = Callable[..., str]
+
+
+def answers(kind: str, says: str) -> Do:
+    """Return what lets the answers of a servo, or all, suffer; ``says`` shows who and numbers."""
+
+    def do(
+        faults: LineFaults,
+        servo_id: int | None = None,
+        *numbers: float,
+        count: int | None = None,
+        seconds: float | None = None,
+    ) -> str:
+        told = says.format(*numbers, who=faults.who(servo_id))
+        return faults.begin(kind, servo_id, told, count, seconds, numbers)
+
+    return do
+
+
+def everything(kind: str, says: str) -> Do:
+    """Return what lets a fault of the whole line begin; ``says`` shows its numbers."""
+
+    def do(
+        faults: LineFaults,
+        *numbers: float,
+        count: int | None = None,
+        seconds: float | None = None,
+    ) -> str:
+        return faults.begin(kind, None, says.format(*numbers), count, seconds, numbers)
+
+    return do
+
+
+def times(kind: str, says: str) -> Do:
+    """Return what lets the next so many, or all, suffer."""
+
+    def do(faults: LineFaults, count: int | None = None, seconds: float | None = None) -> str:
+        return faults.begin(kind, None, says, count, seconds)
+
+    return do
+
+
+def switched(kind: str, says: str) -> Do:
+    """Return what switches a fault of the whole line on or off."""
+
+    def do(faults: LineFaults, on: bool = True, seconds: float | None = None) -> str:
+        return faults.switch(kind, on, says, seconds)
+
+    return do
+
+
+def _noise(
+    faults: LineFaults,
+    where: str,
+    data: bytes | None = None,
+    count: int | None = None,
+    seconds: float | None = None,
+) -> str:
+    what = "random bytes" if data is None else data.hex(" ")
+    says = f"noise ({what}) {where} answers"
+    return faults.begin(f"noise_{where}", None, says, count, seconds, (), data)
+
+
+def _plug(faults: LineFaults) -> str:
+    return faults.switch("unplug", False, "unplugged")
 
 
 # fmt: off
@@ -27,22 +96,30 @@ def line_verbs(one: Word) -> dict[str, Verb]:
     """Return what can be asked of any line; ``one`` reads an id."""
     who = Word(one.shown, or_all(one.read))
     return {
-        "lose": Verb(LineFaults.lose, (who,), "stay silent though it obeys", BOTH),
-        "delay": Verb(LineFaults.delay, (who, MS), "answer late", BOTH),
-        "truncate": Verb(LineFaults.truncate, (who, _BYTES),
-                         "only the first BYTES of an answer arrive", BOTH),
-        "duplicate": Verb(LineFaults.duplicate, (who,), "answers arrive twice", BOTH),
-        "corrupt": Verb(LineFaults.corrupt, (who, Word("BIT", whole(0, 8191, "a bit"), True)),
+        "lose": Verb(answers("lose", "{who} does not answer"), (who,),
+                     "stay silent though it obeys", BOTH),
+        "delay": Verb(answers("delay", "{who} answers {:g} ms late"), (who, MS),
+                      "answer late; in a group those behind wait as well", BOTH),
+        "truncate": Verb(answers("truncate", "only {} bytes arrive of what {who} answers"),
+                         (who, _BYTES), "only the first BYTES of an answer arrive", BOTH),
+        "duplicate": Verb(answers("duplicate", "what {who} answers arrives twice"), (who,),
+                          "answers arrive twice", BOTH),
+        "corrupt": Verb(answers("corrupt", "a bit flips in what {who} answers"),
+                        (who, Word("BIT", whole(0, 8191, "a bit"), True)),
                         "a bit flips, at random where none is named", BOTH),
-        "drop": Verb(LineFaults.drop, (who, Word("BYTE", whole(-1024, 1023, "a byte"))),
+        "drop": Verb(answers("drop", "byte {} is lost of what {who} answers"),
+                     (who, Word("BYTE", whole(-1024, 1023, "a byte"))),
                      "byte BYTE of an answer is lost; -1 the last", BOTH),
-        "stall": Verb(LineFaults.stall, (who, MS), "stop half-way through an answer", BOTH),
-        "noise": Verb(LineFaults.noise, (Word("before|after", one_of("before", "after")),
-                                         Word("HEX|random", hex_bytes, True)),
+        "stall": Verb(answers("stall", "{who} stops for {:g} ms half-way through its answer"),
+                      (who, MS), "stop half-way through an answer", BOTH),
+        "noise": Verb(_noise, (Word("before|after", one_of("before", "after")),
+                               Word("HEX|random", hex_bytes, True)),
                       "bytes around whatever is answered", BOTH),
-        "static": Verb(LineFaults.static, (Word("PERCENT", number(0.0, 100.0, "a percentage")),),
+        "static": Verb(everything("static", "noise hits {:g} % of all bytes, to and fro"),
+                       (Word("PERCENT", number(0.0, 100.0, "a percentage")),),
                        "so much of all bytes is hit by noise, to and fro", TIME),
-        "repeat": Verb(LineFaults.repeat, (), "the last answers come again first", BOTH),
+        "repeat": Verb(everything("repeat", "the answers of before arrive again before the next"),
+                       (), "the last answers come again first", BOTH),
     }
 
 
@@ -50,29 +127,42 @@ def packet_verbs(one: Word) -> dict[str, Verb]:
     """Return what can be asked where many servos answer with packets; ``one`` reads an id."""
     who = Word(one.shown, or_all(one.read))
     return {
-        "fragment": Verb(LineFaults.fragment, (who._replace(optional=True),),
+        "fragment": Verb(answers("fragment", "a loose header before what {who} answers"),
+                         (who._replace(optional=True),),
                          "a loose header before the real one", BOTH),
-        "reorder": Verb(LineFaults.reorder, (), "groups answer in reverse order", BOTH),
-        "wrong-id": Verb(LineFaults.wrong_id, (who, Word("AS", whole(0, 255, "an id"))),
-                         "answer under another id", BOTH),
-        "short": Verb(LineFaults.short, (who, _N), "N bytes of data too few, checksum right", BOTH),
-        "long": Verb(LineFaults.long, (who, _N), "N bytes of data too many, checksum right", BOTH),
-        "refuse": Verb(LineFaults.refuse, (who, Word("NUMBER", whole(0, 255, "an error number"))),
+        "reorder": Verb(everything("reorder", "groups answer in reverse order"), (),
+                        "groups answer in reverse order", BOTH),
+        "wrong-id": Verb(answers("wrong_id", "{who} answers as {}"),
+                         (who, Word("AS", whole(0, 255, "an id"))), "answer under another id", BOTH),
+        "short": Verb(answers("short", "{who} answers {} bytes too few"), (who, _N),
+                      "N bytes of data too few, checksum right", BOTH),
+        "long": Verb(answers("long", "{who} answers {} bytes too many"), (who, _N),
+                     "N bytes of data too many, checksum right", BOTH),
+        "refuse": Verb(answers("refuse", "{who} answers with error {} and no data"),
+                       (who, Word("NUMBER", whole(0, 255, "an error number"))),
                        "answer with an error number and no data", BOTH),
-        "lose-writes": Verb(LineFaults.lose_writes, (Word("N", count, True),),
-                            "the next N group writes are lost on their way", TIME),
+        "lose-writes": lost("lose_writes", "group writes"),
     }
+
+
+def lost(kind: str, what: str) -> Verb:
+    """Return what loses things on their way to the device, of which no answer tells."""
+    return Verb(times(kind, f"{what} are lost"), (_TIMES,), f"the next N {what} are lost", TIME)
 
 
 def adapter_verbs() -> dict[str, Verb]:
     """Return what can be asked of the line and adapter as a whole."""
     return {
-        "echo": Verb(LineFaults.echo, (SWITCH,), "the host hears its own bytes", TIME),
-        "babble": Verb(LineFaults.babble, (SWITCH,), "a broken node sends all the time", TIME),
-        "unplug": Verb(LineFaults.unplug, (), "pull the adapter out", TIME),
-        "plug": Verb(LineFaults.plug, (), "put the adapter back under its name"),
-        "deny": Verb(LineFaults.deny, (SWITCH,), "opening the port is forbidden", TIME),
-        "block": Verb(LineFaults.block, (SWITCH,), "the adapter takes no bytes", TIME),
+        "echo": Verb(switched("echo", "the line echoes the host"), (SWITCH,),
+                     "the host hears its own bytes", TIME),
+        "babble": Verb(switched("babble", "a broken node babbles"), (SWITCH,),
+                       "a broken node sends headers and noise all the time", TIME),
+        "unplug": Verb(switched("unplug", "unplugged"), (), "pull the adapter out", TIME),
+        "plug": Verb(_plug, (), "put the adapter back under its name"),
+        "deny": Verb(switched("deny", "opening is forbidden"), (SWITCH,),
+                     "opening the port is forbidden", TIME),
+        "block": Verb(switched("block", "the adapter takes no bytes"), (SWITCH,),
+                      "the adapter takes no bytes", TIME),
     }
 
 

@@ -61,7 +61,7 @@ class MaestroBoard:
     ) -> None:
         self.now_s = now_s
         self.body = Body(servos, now_s, settings or Settings())
-        self.faults = MaestroFaults(self, COMMANDS, seed)
+        self.faults = MaestroFaults(self, self.body, COMMANDS, seed)
         self._wire = self.faults.wire
         self._ear = Ear(device, len(servos) > SIZES[0])
         self._told_baud: int | None = None
@@ -137,6 +137,16 @@ class MaestroBoard:
         if not 0 <= channel < len(servos):
             raise KeyError(f"no channel {channel}; there is 0 to {len(servos) - 1}")
         return servos[channel]
+
+    def channel_report(self, channel: int) -> dict[str, object]:
+        """Return what a channel is sent to, and its pulse on its way there."""
+        one = self.body.channels[channel]
+        return {
+            "target": one.target,
+            "position": one.position,
+            "speed": one.speed,
+            "acceleration": one.acceleration,
+        }
 
     def positions_steps(self) -> tuple[float, ...]:
         """Return where the shafts truly are now, in quarter microseconds, by channel."""

@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 from gazerig.sim_mock.device import Reply
 from gazerig.sim_mock.faults.active import NOBODY
+from gazerig.sim_mock.faults.hobby import HobbyFaults
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
 from gazerig.sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
 from gazerig.sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
-from gazerig.sim_mock.pca9685.faults import CASES, COMMANDS, Pca9685Faults
+from gazerig.sim_mock.pca9685.faults import CASES, COMMANDS
 from gazerig.sim_mock.replies import Piece
 
 START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")
@@ -50,7 +51,7 @@ class Bridge:
         self.now_s = now_s
         chips = {address: Chip(oscillator_hz) for address in addresses}
         self.body = Body(chips, servos, now_s)
-        self.faults = Pca9685Faults(self, COMMANDS, seed)
+        self.faults = HobbyFaults(self, COMMANDS, seed, header=b"S")
         self._wire = self.faults.wire
         self._order = {address: board for board, address in enumerate(addresses)}
         self._unread = b""
@@ -96,6 +97,10 @@ class Bridge:
         if not 0 <= place < len(self.body.servos):
             raise KeyError(f"no channel {place}; there is 0 to {len(self.body.servos) - 1}")
         return self.body.servos[place]
+
+    def channel_report(self, channel: int) -> dict[str, object]:
+        """Return what a channel sends, quarter microseconds."""
+        return {"target": self.body.width_steps(channel, self.now_s())}
 
     def positions_steps(self) -> tuple[float, ...]:
         """Return where the shafts truly are now, in quarter microseconds, by channel."""
