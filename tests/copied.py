@@ -6,7 +6,7 @@ copied as well, which copy.deepcopy alone leaves with the original.
 
 import copy
 import struct
-from types import BuiltinMethodType, CellType, FunctionType
+from types import BuiltinMethodType, CellType, FunctionType, ModuleType
 from typing import Any
 from unittest.mock import patch
 
@@ -18,6 +18,7 @@ def _function(function: FunctionType, memo: dict[int, Any]) -> FunctionType:
     made = FunctionType(
         function.__code__, function.__globals__, function.__name__, function.__defaults__, cells
     )
+    made.__kwdefaults__ = function.__kwdefaults__
     memo[id(function)] = made
     for cell, old in zip(cells, function.__closure__, strict=True):
         cell.cell_contents = copy.deepcopy(old.cell_contents, memo)
@@ -35,7 +36,12 @@ def _same(thing: Any, memo: dict[int, Any]) -> Any:
     return thing
 
 
-_WAYS = {FunctionType: _function, BuiltinMethodType: _method, struct.Struct: _same}
+_WAYS = {
+    FunctionType: _function,
+    BuiltinMethodType: _method,
+    struct.Struct: _same,
+    ModuleType: _same,
+}
 
 
 def copied(thing: Any) -> Any:
