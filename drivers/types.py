@@ -13,6 +13,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
+
 Picture = NDArray[np.uint8]
 """(height, width, 3) BGR."""
 Pixels = NDArray[np.float64]
@@ -181,18 +183,6 @@ class ServoBus(Protocol):
         ...
 
 
-class PictureLens(NamedTuple):
-    """A pinhole as the camera itself knows it, in pixels of the picture that it comes with.
-
-    fx_px, fy_px: focal lengths; cx_px, cy_px: where the optical axis meets the picture
-    """
-
-    fx_px: float
-    fy_px: float
-    cx_px: float
-    cy_px: float
-
-
 @dataclass(frozen=True, slots=True)
 class DetectedFace:
     """A face in a picture.
@@ -263,7 +253,7 @@ class Detections:
     blobs: tuple[MovingBlob, ...] = ()
     picture: Picture | None = None
     depth_m: Depth | None = None
-    lens: PictureLens | None = None
+    lens: Intrinsics | None = None
 
 
 class Camera(Protocol):

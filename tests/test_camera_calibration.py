@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.robot.calibration.board_coverage import Held, ViewParams, coverage, held
 from gazerig.robot.calibration.camera_calibration import (
     CameraCalibrationRefused,
@@ -15,7 +16,7 @@ from gazerig.robot.calibration.camera_calibration import (
     calibrate_lens,
 )
 from gazerig.robot.model.charuco_board import CharucoBoard, SeenBoard
-from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view, project
+from gazerig.robot.model.intrinsics import project
 from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
 from gazerig.sim_mock.cameras.charuco_scene import held_pose
 

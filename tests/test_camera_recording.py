@@ -15,16 +15,17 @@ from mcap.reader import make_reader
 
 from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera import recording_writer as recording_write
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.recorder import CameraRecorder
 from gazerig.drivers.camera.recording_reader import Recording
 from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import DetectedFace, PictureLens
+from gazerig.drivers.types import DetectedFace
 
 GO_ON = threading.Event()
-LENS = PictureLens(310.5, 311.25, 31.5, 23.5)
+LENS = Intrinsics(310.5, 311.25, 31.5, 23.5)
 # Uneven, as real pictures are; far from 0, as a monotonic clock is.
 TIMES_S = tuple(5000.0 + t for t in (0.0, 0.0333, 0.0671, 0.1, 0.2004, 0.2335))
 

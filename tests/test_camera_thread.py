@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import DetectedFace, MovingBlob, PictureLens
+from gazerig.drivers.types import DetectedFace, MovingBlob
 
 PATIENCE_S = 20.0  # how long a test waits before it calls the thread stuck
 
@@ -257,7 +258,7 @@ def test_news_of_the_source_are_handed_on(source, camera):
 
 def test_depth_lens_motion_and_the_cameras_own_faces_come_through(source):
     blob = MovingBlob(1, "thing", (0.0, 0.0, 2.0), 0.1)
-    depth, lens = np.full((24, 32), 2.0, np.float32), PictureLens(30.0, 30.0, 16.0, 12.0)
+    depth, lens = np.full((24, 32), 2.0, np.float32), Intrinsics(30.0, 30.0, 16.0, 12.0)
     seen: list[Shot] = []
 
     def motion(shot: Shot) -> tuple[MovingBlob, ...]:

@@ -190,7 +190,7 @@ def _part(module: ModuleType, path: str, name: str) -> Any:
 
 
 def test_python_that_needs_no_rig_runs(capfd: pytest.CaptureFixture[str]) -> None:
-    [code] = [b.text for b in blocks("python") if "assemble" in b.text]
+    [code] = [b.text for b in blocks("python") if "session.compose" in b.text]
     names: dict[str, Any] = {}
     exec(compile(code.replace("seconds=10", "seconds=0.05"), "README.md", "exec"), names)
     assert names["figures"]["stopped_by"] == "seconds"

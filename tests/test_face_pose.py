@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
-from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view, project
+from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.face_pose import FacePose, face_parts, face_pose
 
 CAMERA = intrinsics_of_view(radians(65.0), 640, 480)

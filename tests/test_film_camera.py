@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import DetectedFace, MovingBlob, PictureLens
+from gazerig.drivers.types import DetectedFace, MovingBlob
 from gazerig.drivers.vision.face_detector import face_detector
 from gazerig.drivers.vision.face_params import FaceDetectorParams
 from gazerig.sim_mock.cameras.video import FilmCamera
@@ -169,7 +170,7 @@ def test_two_runs_over_a_real_film_give_the_same_numbers():
 
 def test_recording_in_simulated_time_gives_depth_and_lens_and_what_moves(tmp_path):
     writer = RecordingWriter(tmp_path / "r.mcap", {})
-    lens = PictureLens(20.0, 20.0, 8.0, 6.0)
+    lens = Intrinsics(20.0, 20.0, 8.0, 6.0)
     for k in range(4):
         picture, depth = np.full((12, 16, 3), k, np.uint8), np.full((12, 16), 1.0 + k, np.float32)
         writer.write(Shot(500.0 + k / 10.0, k + 1, picture, depth, lens))

@@ -10,18 +10,11 @@ from desk import JOINTS, LIDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, LensParams, PoseHistory
-from gazerig.robot.model.intrinsics import (
-    Intrinsics,
-    fits,
-    intrinsics_of_lens,
-    intrinsics_of_view,
-    project,
-    rays,
-    undistorted,
-)
+from gazerig.robot.model.intrinsics import fits, intrinsics_of_lens, project, rays, undistorted
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import Perception

@@ -11,6 +11,7 @@ import pytest
 from desk import JOINTS, LIDS
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import PARTS
@@ -20,7 +21,7 @@ from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.model.intrinsics import intrinsics_of_view, project
+from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.track_params import TrackParams

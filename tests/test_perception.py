@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Angles3, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.model.intrinsics import intrinsics_of_view, project
+from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.egomotion_residual import HeadTurnResidual, Seen, turning_rad_s
 from gazerig.robot.perception.localisation import Box, Reading

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Bodies, Face, Percept, Vec3
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.dashboard.click_to_look import USUAL_M, Picking, distance_m
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.model.intrinsics import intrinsics_of_view, project
+from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 
 CAMERA = CameraParams(position_mm=(20.0, 0.0, 45.0), horizontal_field_deg=70.0)

@@ -6,6 +6,7 @@ from math import radians
 import numpy as np
 import pytest
 
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Picture
 from gazerig.drivers.vision.face_mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face_params import FaceDetectorParams
@@ -13,7 +14,7 @@ from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.types import Angles3, Mat3, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.model.intrinsics import intrinsics_of_view, project
+from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception

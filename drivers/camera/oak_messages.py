@@ -7,8 +7,9 @@ import numpy as np
 
 from gazerig.drivers.camera.depth_roi import metres, resized
 from gazerig.drivers.camera.oak_pipeline import COLOUR, DEPTH, FACES
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import bgr
-from gazerig.drivers.types import Depth, DetectedFace, Picture, PictureLens
+from gazerig.drivers.types import Depth, DetectedFace, Picture
 
 _LANDMARKS = 5
 # A frame that never saw a lens carries the unit matrix.
@@ -35,12 +36,12 @@ def depth_of(group: Any, width_px: int, height_px: int) -> Depth | None:
     return resized(metres(mm), width_px, height_px)
 
 
-def lens_of(group: Any) -> PictureLens | None:
+def lens_of(group: Any) -> Intrinsics | None:
     """Return the lens that the picture carries, None where it carries none."""
     matrix = np.asarray(group[COLOUR].getTransformation().getIntrinsicMatrix(), dtype=float)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or matrix[0, 0] < _LEAST_FOCAL_PX:
         return None
-    return PictureLens(
+    return Intrinsics(
         float(matrix[0, 0]), float(matrix[1, 1]), float(matrix[0, 2]), float(matrix[1, 2])
     )
 

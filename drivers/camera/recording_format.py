@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.depth_roi import metres, millimetres
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot, bgr
-from gazerig.drivers.types import Depth, DetectedFace, Picture, PictureLens
+from gazerig.drivers.types import Depth, DetectedFace, Picture
 
 PICTURE, DEPTH, LENS, FACES = "/camera/picture", "/camera/depth", "/camera/lens", "/camera/faces"
 """Topics."""
@@ -137,7 +138,7 @@ def depth(data: bytes) -> Depth:
     return metres(mm)
 
 
-def lens(data: bytes) -> PictureLens:
+def lens(data: bytes) -> Intrinsics:
     """Read a lens message.
 
     Raises:
@@ -146,7 +147,7 @@ def lens(data: bytes) -> PictureLens:
     K = np.asarray(_load(data, "K"), dtype=np.float64)
     if K.shape != (9,) or not np.isfinite(K).all() or K[0] <= 0.0 or K[4] <= 0.0:
         raise BadMessage("no camera matrix in it")
-    return PictureLens(float(K[0]), float(K[4]), float(K[2]), float(K[5]))
+    return Intrinsics(float(K[0]), float(K[4]), float(K[2]), float(K[5]))
 
 
 def faces(data: bytes) -> tuple[DetectedFace, ...]:
@@ -166,9 +167,9 @@ def faces(data: bytes) -> tuple[DetectedFace, ...]:
     return tuple(found)
 
 
-def _lens(of: PictureLens, shown: Picture, stamp: int) -> dict[str, Any]:
+def _lens(of: Intrinsics, shown: Picture, stamp: int) -> dict[str, Any]:
     """Return a lens as the camera matrix of its picture."""
-    fx, fy, cx, cy = of
+    fx, fy, cx, cy = of.fx_px, of.fy_px, of.cx_px, of.cy_px
     return {
         "timestamp": _stamp(stamp),
         "frame_id": _FRAME,

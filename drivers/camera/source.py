@@ -7,7 +7,8 @@ from typing import Any, NamedTuple, Protocol
 import cv2
 import numpy as np
 
-from gazerig.drivers.types import Depth, DetectedFace, Picture, PictureLens
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import Depth, DetectedFace, Picture
 
 
 class Shot(NamedTuple):
@@ -27,7 +28,7 @@ class Shot(NamedTuple):
     number: int
     picture: Picture
     depth_m: Depth | None = None
-    lens: PictureLens | None = None
+    lens: Intrinsics | None = None
     faces: tuple[DetectedFace, ...] | None = None
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.camera.oak import OakSource
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.pose_buffer import PoseRing
 from gazerig.drivers.camera.process import CameraProcess
@@ -24,7 +25,6 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams
-from gazerig.robot.model.intrinsics import Intrinsics
 from gazerig.robot.perception.motion_source import motion_finder, retuned
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams

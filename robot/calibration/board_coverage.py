@@ -11,10 +11,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.params import Bounds
 from gazerig.robot.calibration.charuco_pose import board_poses
 from gazerig.robot.model.charuco_board import SeenBoard
-from gazerig.robot.model.intrinsics import Intrinsics
 
 
 @dataclass(frozen=True)

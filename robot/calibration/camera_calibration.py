@@ -13,12 +13,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import SetupError
 from gazerig.params import Bounds
 from gazerig.robot.calibration.board_coverage import ViewCollector, ViewParams
 from gazerig.robot.model.charuco_board import SeenBoard
 from gazerig.robot.model.frames import LensParams
-from gazerig.robot.model.intrinsics import Intrinsics, project, rays
+from gazerig.robot.model.intrinsics import project, rays
 
 Floats = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
+from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry
@@ -24,7 +25,6 @@ from gazerig.robot.calibration.camera_calibration import (
 )
 from gazerig.robot.calibration.hand_eye import NeckView
 from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
-from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view
 
 Look = Callable[[], Shot | None]
 """Gives the newest picture at once, None before the first."""

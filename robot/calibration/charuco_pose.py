@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.robot.model.charuco_board import LEAST_CORNERS, SeenBoard
-from gazerig.robot.model.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 

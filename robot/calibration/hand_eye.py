@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.calibration.camera_calibration import CameraCalibrationRefused
@@ -24,7 +25,6 @@ from gazerig.robot.calibration.charuco_pose import board_poses
 from gazerig.robot.calibration.hand_eye_solver import Fit, Pose, Sights, refined, start
 from gazerig.robot.model.charuco_board import SeenBoard
 from gazerig.robot.model.frames import CameraParams, mounted_at
-from gazerig.robot.model.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 

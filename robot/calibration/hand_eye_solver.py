@@ -19,9 +19,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.charuco_board import SeenBoard
-from gazerig.robot.model.intrinsics import Intrinsics, project
+from gazerig.robot.model.intrinsics import project
 
 Floats = NDArray[np.float64]
 

@@ -6,12 +6,13 @@ from math import hypot, radians
 import numpy as np
 
 from gazerig.drivers.camera.depth_roi import depth_at
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_lens, rays
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
 
 NEAR_RAD = 0.12
 """A click within 7 deg of somebody means something as far away as they are."""
@@ -60,10 +61,9 @@ class Picking:
 
     def _lens(self, found: Detections) -> Intrinsics:
         camera = self._camera()
-        if camera.lens is None and found.lens is not None:
-            return Intrinsics(*found.lens)
         field_rad = radians(camera.horizontal_field_deg)
-        return intrinsics_of_lens(camera.lens, field_rad, found.width_px, found.height_px)
+        size_px = found.width_px, found.height_px
+        return intrinsics_of_lens(camera.lens, field_rad, *size_px, found.lens)
 
 
 def distance_m(percept: Percept | None, p_world_m: Vec3, way_world: Vec3) -> float:

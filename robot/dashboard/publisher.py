@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import BusHealth, Detections
 from gazerig.gaze.angles import rotate_back, sub
 from gazerig.robot.control.loop import Tick
@@ -28,7 +29,7 @@ from gazerig.robot.dashboard.page_process import Page
 from gazerig.robot.dashboard.param_feed import TuningFeed
 from gazerig.robot.dashboard.snapshot import Said, Snapshots
 from gazerig.robot.model.frames import CameraMount, PoseHistory
-from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view, project
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 _SNAPSHOT_S = 0.04
@@ -167,11 +168,8 @@ class Onlooker:
         found = tick.detections
         if self._page is None or found is None or found.number == shown:
             return shown
-        lens = (
-            Intrinsics(*found.lens)
-            if found.lens is not None
-            else intrinsics_of_view(radians(self._field_deg()), found.width_px, found.height_px)
-        )
+        field_rad = radians(self._field_deg())
+        lens = intrinsics_of_lens(None, field_rad, found.width_px, found.height_px, found.lens)
         drawn = draw_detections(
             ground(found, self.depth), found, self._gaze_px(tick, found, lens), lens.fx_px
         )

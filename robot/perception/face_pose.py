@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.types import PARTS, Mat3, Vec3
 from gazerig.robot.model.face_geometry import (
     EYES_TO_MOUTH_M,
@@ -27,7 +28,7 @@ from gazerig.robot.model.face_geometry import (
     PARTS_FACE_M,
     PUPIL_DISTANCE_M,
 )
-from gazerig.robot.model.intrinsics import Intrinsics, project
+from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.intrinsics import rays as rays_through
 
 Floats = NDArray[np.float64]

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import DetectedFace, MovingBlob
 from gazerig.gaze.angles import add, compose, norm, rotate, scale
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
-from gazerig.robot.model.intrinsics import Intrinsics
 from gazerig.robot.perception.face_pose import FacePose, face_pose
 from gazerig.robot.perception.tracker import Sighting
 

@@ -44,8 +44,7 @@ class MotionFinder:
         if not self._enabled:
             return ()
         height, width = shot.picture.shape[:2]
-        own = shot.lens if self._lens is None else None
-        lens = own or intrinsics_of_lens(self._lens, self._field_rad, width, height)
+        lens = intrinsics_of_lens(self._lens, self._field_rad, width, height, shot.lens)
         before_s = self._detector.before_s
         turned: Floats | None = np.eye(3)
         if self._turns is not None:

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, norm, rotate, scale, sub, unit
 from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
-from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_lens
+from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.perception.egomotion_residual import (
     HeadTurnResidual,
     ResidualFigures,
@@ -168,9 +169,10 @@ class Perception:
 
     def _lens(self, found: Detections) -> Intrinsics:
         """Return the intrinsics of a picture: as measured, as the camera says, or by its field."""
-        if self._measured is None and found.lens is not None:
-            return Intrinsics(*found.lens)
         width_px, height_px = found.width_px, found.height_px
+        if found.lens is not None:
+            measured, field_rad = self._measured, self._field_rad
+            return intrinsics_of_lens(measured, field_rad, width_px, height_px, found.lens)
         if self._size_px != (width_px, height_px) or self._intrinsics is None:
             self._size_px = (width_px, height_px)
             self._intrinsics = intrinsics_of_lens(

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.model.intrinsics import Intrinsics
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]

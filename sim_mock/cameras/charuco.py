@@ -14,11 +14,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Picture
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.charuco_board import CharucoBoard
-from gazerig.robot.model.intrinsics import Intrinsics, rays
+from gazerig.robot.model.intrinsics import rays
 
 Floats = NDArray[np.float64]
 

@@ -11,12 +11,13 @@ from math import cos, pi, radians, sin
 import cv2
 import numpy as np
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.gaze.angles import add, compose, rotate, rotate_back, sub
 from gazerig.gaze.types import Angles3, HeadGeometry, Mat3, Vec3
 from gazerig.robot.model.charuco_board import CharucoBoard
 from gazerig.robot.model.frames import CameraMount, CameraParams
-from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_lens, rays
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
 from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
 
 # The board's own axes are optical ones, so this is a board that hangs upright before a

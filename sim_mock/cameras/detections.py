@@ -13,13 +13,14 @@ from typing import Annotated
 
 import numpy as np
 
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.model.intrinsics import intrinsics_of_view, project
+from gazerig.robot.model.intrinsics import project
 from gazerig.sim_mock.scenes.scene import Person, Scene, Thing
 
 _FARTHEST_FACE_M = 4.0

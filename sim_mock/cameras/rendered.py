@@ -17,12 +17,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.types import Detections, FaceDetector, MovingBlob, Picture
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.model.intrinsics import Intrinsics, intrinsics_of_view
 from gazerig.sim_mock.cameras.canvas import Picture3d
 from gazerig.sim_mock.cameras.draw_person import draw_person, draw_thing
 from gazerig.sim_mock.cameras.draw_room import draw_room

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.affine import PatchMotion, flow_map, patch_motion
 from gazerig.drivers.vision.motion.anchor import anchor
@@ -28,7 +29,6 @@ from gazerig.drivers.vision.motion.clustering import Group, gathered
 from gazerig.drivers.vision.motion.ego_motion import Ego, own_motion, turn_rad
 from gazerig.drivers.vision.motion.image import (
     Floats,
-    Lens,
     Plane,
     SmallPicture,
     made_small,
@@ -98,7 +98,7 @@ class MotionDetector:
         self,
         picture: NDArray[Any],
         captured_s: float,
-        lens: Lens,
+        lens: Intrinsics,
         R_now_before: NDArray[np.float64] | None,
         depth_m: NDArray[Any] | None = None,
         t_now_before_m: NDArray[np.float64] | None = None,

@@ -4,41 +4,19 @@ Pixels have their centres at whole numbers: a picture of width w reaches from -0
 w - 0.5, so scaling by s takes u to s (u + 0.5) - 0.5.
 """
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from gazerig.drivers.camera.pinhole import Intrinsics
 
 Grey = NDArray[np.uint8]
 """(height, width)."""
 Floats = NDArray[np.float64]
 Plane = NDArray[np.float32]
 """(height, width)."""
-
-
-class Lens(Protocol):
-    """Focal lengths and the place of the optical axis, in pixels of the picture given."""
-
-    @property
-    def fx_px(self) -> float:
-        """Return the focal length across, px."""
-        ...
-
-    @property
-    def fy_px(self) -> float:
-        """Return the focal length down, px."""
-        ...
-
-    @property
-    def cx_px(self) -> float:
-        """Return the optical centre across, px."""
-        ...
-
-    @property
-    def cy_px(self) -> float:
-        """Return the optical centre down, px."""
-        ...
 
 
 class SmallPicture(NamedTuple):
@@ -54,7 +32,9 @@ class SmallPicture(NamedTuple):
     captured_s: float
 
 
-def made_small(picture: NDArray[Any], work_px: int, lens: Lens, captured_s: float) -> SmallPicture:
+def made_small(
+    picture: NDArray[Any], work_px: int, lens: Intrinsics, captured_s: float
+) -> SmallPicture:
     """Scale a picture so that its longer side is at most ``work_px``, and take its brightness.
 
     It is made small before it is made grey: less work on a large picture.
@@ -69,7 +49,7 @@ def made_small(picture: NDArray[Any], work_px: int, lens: Lens, captured_s: floa
     if size != (width, height):
         picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
     scale = size[0] / width, size[1] / height
-    return SmallPicture(grey_of(picture), scale, camera_matrix(lens, scale), captured_s)
+    return SmallPicture(grey_of(picture), scale, lens.scaled(*scale).matrix, captured_s)
 
 
 def grey_of(picture: NDArray[Any]) -> Grey:
@@ -90,18 +70,6 @@ def _check(picture: NDArray[Any]) -> None:
             "a picture is (height, width), or that with 1, 3 or 4 channels, of uint8, not "
             f"{picture.shape} of {picture.dtype}"
         )
-
-
-def camera_matrix(lens: Lens, scale: tuple[float, float]) -> Floats:
-    """Return the (3, 3) camera matrix of a picture scaled by ``scale``."""
-    sx, sy = scale
-    return np.array(
-        [
-            [sx * lens.fx_px, 0.0, sx * (lens.cx_px + 0.5) - 0.5],
-            [0.0, sy * lens.fy_px, sy * (lens.cy_px + 0.5) - 0.5],
-            [0.0, 0.0, 1.0],
-        ]
-    )
 
 
 def to_given(point_px: tuple[float, float], scale: tuple[float, float]) -> tuple[float, float]:
