@@ -101,8 +101,8 @@ class DynamixelDrive(Drive):
         amps += round(current)
         return max(-self._most, min(self._most, amps)), speed, at
 
-    def live(self, tick_ms: int, now_ms: int, voltage: int, temperature: int) -> Live:
-        """Return everything that lives."""
+    def live(self, tick_ms: int, now_ms: int) -> Live:
+        """Return what the profile does."""
         shaft, side, sensed = self.shaft, self._side, self.sensed(now_ms)
         profile = shaft.profile
         running = self.torque and profile.running and profile.v != profile.goal
@@ -117,11 +117,8 @@ class DynamixelDrive(Drive):
             moving=running or abs(sensed[1]) > self.memory.get("moving_threshold"),
             status=status,
             pwm=round(side * shaft.u * PWM_FULL),
-            sensed=sensed,
             velocity_asked=round(side * profile.v / _SPEED_UNIT),
             position_asked=round(side * place + self._shift),
-            voltage=voltage,
-            temperature=temperature,
         )
 
     # --- goals

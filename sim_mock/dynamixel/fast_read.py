@@ -22,8 +22,8 @@ def fast_reply(
     fed_ms: int,
 ) -> bytes:
     """Return the packet up to the first servo that is silent; nothing where that is the first."""
-    parts = [HEAD.pack(HEADER, BROADCAST, length, STATUS)]
-    crc = umts(parts[0])
+    parts = list[bytes]()
+    before, crc = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0
     for servo_id, address, size in rows:
         servo = servos.get(servo_id)
         if servo is None or not servo.advance(now_ms, fed_ms):
@@ -32,9 +32,8 @@ def fast_reply(
             break
         data = servo.read(address, size)
         error = servo.error_flag | (ACCESS if data is None else 0)
-        block = bytes((error, servo_id)) + (data or bytes(size))
+        block = before + bytes((error, servo_id)) + (data or bytes(size))
         crc = umts(block, crc)
-        tail = CRC.pack(crc)
-        crc = umts(tail, crc)
-        parts += (block, tail)
-    return b"".join(parts) if len(parts) > 1 else b""
+        parts.append(block)
+        before = CRC.pack(crc)
+    return b"".join((*parts, before)) if parts else b""

@@ -15,7 +15,7 @@ from gazerig.drivers.dynamixel.control_table import (
     indirect_blocks,
     registers_of,
 )
-from gazerig.sim_mock.dynamixel.live_registers import PROFILED
+from gazerig.sim_mock.dynamixel.live_registers import PROFILED, SENSED_SPAN, SURROUNDINGS_SPAN
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 
 # Numbers of the status error byte (Protocol 2.0).
@@ -31,9 +31,16 @@ Fields = tuple[tuple[Register, int], ...]
 
 
 class Gather(NamedTuple):
-    """The runs of real addresses behind a range, and whether any of them tells of the profile."""
+    """What stands behind a range of addresses, through the indirect windows.
+
+    runs: of real addresses
+    sensed, surroundings, profiled: whether any of them tells what is sensed, voltage or
+        temperature, or what the profile does
+    """
 
     runs: tuple[slice, ...]
+    sensed: bool
+    surroundings: bool
     profiled: bool
 
 
@@ -88,19 +95,24 @@ class DynamixelMemory(ServoMemory[Register]):
 
     def read(self, address: int, length: int) -> bytes | None:
         """Return bytes as they are on the wire, None where an address is not defined."""
-        end = address + length
-        defined = self._defined[address:end]
-        if length == 0 or len(defined) != length or 0 in defined:
-            return None
-        if end <= self._window_low:
-            return bytes(self.bytes[address:end])
-        content = self.bytes
-        return b"".join([content[run] for run in self.gather(address, length).runs])
+        gather = self.gather(address, length)
+        return None if gather is None else self.collect(gather)
 
-    def gather(self, address: int, length: int) -> Gather:
-        """Return what stands behind a range; kept, as a control loop reads the same ever again."""
+    def collect(self, gather: Gather) -> bytes:
+        """Return the bytes that stand behind a range."""
+        content = self.bytes
+        return b"".join([content[run] for run in gather.runs])
+
+    def gather(self, address: int, length: int) -> Gather | None:
+        """Return what stands behind a range, None where an address is not defined.
+
+        It is kept, as a control loop reads the same ranges again and again.
+        """
         found = self._gathers.get((address, length))
         if found is None:
+            defined = self._defined[address : address + length]
+            if length == 0 or len(defined) != length or 0 in defined:
+                return None
             found = self._gathers[address, length] = self._gather(address, address + length)
         return found
 
@@ -112,8 +124,12 @@ class DynamixelMemory(ServoMemory[Register]):
                 runs[-1][1] = real + 1
             else:
                 runs.append([real, real + 1])
-        profiled = any(low < end and high > at for low, high in runs for at, end in PROFILED)
-        return Gather(tuple(slice(low, high) for low, high in runs), profiled)
+
+        def touches(*spans: tuple[int, int]) -> bool:
+            return any(low < end and high > at for low, high in runs for at, end in spans)
+
+        slices = tuple(slice(low, high) for low, high in runs)
+        return Gather(slices, touches(SENSED_SPAN), touches(SURROUNDINGS_SPAN), touches(*PROFILED))
 
     def real(self, address: int) -> int:
         """Return the address an indirect data byte stands for, others unchanged."""

@@ -20,7 +20,13 @@ from gazerig.drivers.dynamixel.control_table import (
 )
 from gazerig.sim_mock.dynamixel.backup import Backup
 from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
-from gazerig.sim_mock.dynamixel.live_registers import LIVE_AT, SENSED, SENSED_AT, put, put_sensed
+from gazerig.sim_mock.dynamixel.live_registers import (
+    SENSED,
+    SENSED_AT,
+    put_profiled,
+    put_sensed,
+    put_surroundings,
+)
 from gazerig.sim_mock.dynamixel.memory import (
     ACCESS,
     DATA_RANGE,
@@ -127,18 +133,16 @@ class DynamixelServo(SmartServo):
         """Return bytes of the control table, None where an address is not defined."""
         if address == SENSED_AT and length == SENSED.size:
             return SENSED.pack(*self.drive.sensed(self._ms))
-        if address + length > LIVE_AT:
-            self._refresh(self.memory.gather(address, length).profiled)
-        return self.memory.read(address, length)
-
-    def _refresh(self, profiled: bool) -> None:
-        """Bring the registers that live up to date, the profile's only where they are asked for."""
-        warmth, drive = round(self.protection.temperature_c), self.drive
-        if profiled:
-            live = drive.live(self._ms - self._booted_ms, self._ms, self.voltage_01v, warmth)
-            put(live, self.memory.bytes)
-        else:
-            put_sensed(drive.sensed(self._ms), self.voltage_01v, warmth, self.memory.bytes)
+        gather = self.memory.gather(address, length)
+        if gather is None:
+            return None
+        if gather.sensed:
+            put_sensed(self.drive.sensed(self._ms), self.memory.bytes)
+        if gather.surroundings:
+            put_surroundings(self.voltage_01v, self.temperature_c, self.memory.bytes)
+        if gather.profiled:
+            put_profiled(self.drive.live(self._ms - self._booted_ms, self._ms), self.memory.bytes)
+        return self.memory.collect(gather)
 
     # --- writing
 

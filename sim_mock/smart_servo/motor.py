@@ -231,6 +231,7 @@ class Shaft:
         # Where there is no speed to follow, D brakes only.
         kr = 0.0 if profile.jumps else kd + f1
         k = kp + kd
+        special = kf2 != 0.0 or gravity != 0.0
         for r in path:
             last = rv
             rv += (r - before - rv) * SMOOTHING
@@ -238,9 +239,8 @@ class Shaft:
                 rv = 0.0
             before = r
             c = kp * (r - x) + kr * rv + i + bias
-            if kf2:
+            if special:
                 c += kf2 * (rv - last)
-            if gravity:
                 load = self._load + gravity * sin((x - self._upright) / STEPS_PER_RAD)
             pull = v + load
             push = accel * volts

@@ -121,7 +121,9 @@ class SmartServo(ABC):
         if ahead > 0:
             if self._watchdog_ms and self.torque and now_ms >= fed_ms + self._watchdog_ms:
                 self._trip(max(0, fed_ms + self._watchdog_ms - self._ms))
-            if self.shaft.quiet and now_ms < self._check_ms:
+            if now_ms < self._check_ms:
+                if not self.shaft.quiet:
+                    self.shaft.run(now_ms - self._ms)
                 self._ms = now_ms
             else:
                 self._move(now_ms)
