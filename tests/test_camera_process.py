@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.recording_writer import RecordingWriter
@@ -20,7 +21,6 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import CameraError, ModelFileError
-from gazerig.drivers.types import PictureLens
 from gazerig.drivers.vision.face_detector import face_detector
 from gazerig.drivers.vision.face_params import FaceDetectorParams
 
@@ -44,7 +44,7 @@ def recording(tmp_path):
         picture = np.full((48, 64, 3), 10 * k, np.uint8)
         depth = np.full((48, 64), 0.5 + k, np.float32)
         writer.write(
-            Shot(9.0 + k / 50.0, k + 1, picture, depth, PictureLens(60.0, 60.0, 32.0, 24.0))
+            Shot(9.0 + k / 50.0, k + 1, picture, depth, Intrinsics(60.0, 60.0, 32.0, 24.0))
         )
     writer.close()
     return tmp_path / "r.mcap"

@@ -1,7 +1,5 @@
 """Slide, growth and spin of a moving patch, against known truth."""
 
-from types import SimpleNamespace
-
 import cv2
 import numpy as np
 import pytest
@@ -9,13 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.affine import affine_rest, flow_map, patch_motion
 from gazerig.drivers.vision.motion.detector import MotionDetector
 from gazerig.drivers.vision.motion.params import MotionParams
 
 WIDTH, HEIGHT, FOCAL, DT_S = 320, 240, 233.0, 1 / 30
-LENS = SimpleNamespace(fx_px=FOCAL, fy_px=FOCAL, cx_px=(WIDTH - 1) / 2, cy_px=(HEIGHT - 1) / 2)
+LENS = Intrinsics(fx_px=FOCAL, fy_px=FOCAL, cx_px=(WIDTH - 1) / 2, cy_px=(HEIGHT - 1) / 2)
 
 
 def textured(seed: int, size: int) -> NDArray[np.float64]:

@@ -1,13 +1,13 @@
 """Any picture, any order of times, any depth: an honest answer, and the same one each time."""
 
 from dataclasses import astuple
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
 from gazerig.drivers.vision.motion.image import made_small
@@ -19,9 +19,9 @@ GROUND = np.clip(128 + 400 * GRAIN, 0, 255).astype(np.uint8)
 Pictures = NDArray[np.uint8]
 
 
-def lens(width: int, height: int) -> SimpleNamespace:
+def lens(width: int, height: int) -> Intrinsics:
     focal = 0.73 * width
-    return SimpleNamespace(fx_px=focal, fy_px=focal, cx_px=(width - 1) / 2, cy_px=(height - 1) / 2)
+    return Intrinsics(fx_px=focal, fy_px=focal, cx_px=(width - 1) / 2, cy_px=(height - 1) / 2)
 
 
 def scene(k: int, width: int = 320, height: int = 240, step: int = 3) -> Pictures:

@@ -1,19 +1,19 @@
 """A head that turns in a still room sees no moving body; and it sees one that moves."""
 
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
 from gazerig.drivers.vision.motion.params import MotionParams
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 233.0
-LENS = SimpleNamespace(fx_px=FOCAL, fy_px=FOCAL, cx_px=(WIDTH - 1) / 2, cy_px=(HEIGHT - 1) / 2)
+LENS = Intrinsics(fx_px=FOCAL, fy_px=FOCAL, cx_px=(WIDTH - 1) / 2, cy_px=(HEIGHT - 1) / 2)
 K = np.array([[FOCAL, 0, LENS.cx_px], [0, FOCAL, LENS.cy_px], [0, 0, 1]])
 DT_S = 1 / 30
 LEVER_M = np.array([0.0, -0.05, 0.10])

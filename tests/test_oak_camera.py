@@ -164,7 +164,10 @@ def test_device_clock_is_translated_whatever_it_shows(film):
 def test_lens_that_the_camera_knows_comes_along(film):
     matrix = [[300.0, 0.0, 159.5], [0.0, 301.0, 119.5], [0.0, 0.0, 1.0]]
     (shot,) = take(opened(host_nodes(film, depth=False, lens=matrix)), 1)
-    assert shot.lens == pytest.approx((300.0, 301.0, 159.5, 119.5))
+    lens = shot.lens
+    assert lens is not None
+    found = lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px
+    assert found == pytest.approx((300.0, 301.0, 159.5, 119.5))
     assert shot.depth_m is None
 
 
