@@ -101,3 +101,12 @@ def no_process_outlives_its_test() -> Iterator[None]:
             child_processes.end(left)
             pytest.fail(f"the test left processes that went on: {left}")
         time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def ideal_servos() -> Iterator[None]:
+    """Have all robots of a file's tests on servos without bytes; see ideal_bus."""
+    from ideal_bus import ideal_buses
+
+    with ideal_buses():
+        yield

@@ -19,6 +19,8 @@ from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.registry import scenes
 from gazerig.sim_mock.scenes.scene import Event, Person, Scene, Thing, there_and_back
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 FACE: Vec3 = (1.0, 0.0, 0.2)
 HAND: Vec3 = (0.7, 0.2, 0.1)
 

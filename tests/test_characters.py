@@ -17,6 +17,8 @@ from gazerig.gaze.idle import Idle
 from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.types import Bodies, GazeState, Percept
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 CHARACTERS = ("bold", "shy", "sleepy", "strong_boxer", "weak_boxer")
 AHEAD = GazeState(
     (0, 0, 0), (0, 0, 0), (0, 0), (0, 0), rotation((0.0, 0.0, 0.0)),

@@ -23,6 +23,8 @@ from gazerig.robot.report.norm_bands import BY_KEY
 from gazerig.robot.report.run_header import About
 from gazerig.robot.report.statistics import Measured, mean, median
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 SECONDS = 16.0
 DICE = np.random.default_rng(11)
 

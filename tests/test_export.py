@@ -30,6 +30,8 @@ from gazerig.robot.recording.export_csv import EVENTS, columns, write_csv
 from gazerig.robot.recording.gaze_angles import Trace, in_space, trace_of
 from gazerig.robot.recording.gaze_labels import Labels, Stretch, labels_of, lag_of, stretches_of
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 RATE_HZ = 200.0
 SETTLED_S = 3.0  # at the start the guard lets the eyes follow the plan only slowly
 ABOUT = About("desk", "face-to-face", RATE_HZ, "2026-01-01T00:00:00+00:00", "gazerig 0")

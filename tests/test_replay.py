@@ -33,6 +33,8 @@ from gazerig.robot.recording.replay import Replay, introduction
 from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.recording.snapshot_index import Frames
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 SECONDS = 6.0
 RATE_HZ = 200.0
 

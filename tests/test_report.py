@@ -34,6 +34,8 @@ from gazerig.robot.report.report import DRAWINGS, found, measured, report_of
 from gazerig.robot.report.run_header import About
 from gazerig.robot.report.statistics import Finding, Measured, judged, mean, median
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 RIG = load_rig("desk")
 SLOWER = replace(RIG, loop=replace(RIG.loop, rate_hz=100.0))
 """Half the ticks: a minute of them is what takes longest here."""

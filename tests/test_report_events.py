@@ -19,6 +19,8 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.report.gaze_trace import Gathered, Gathering
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 SECONDS = 40.0
 STEP_DEG = 360.0 / 4096.0
 
