@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
 from gazerig.config.load import ConfigError, Fault
+from gazerig.config.renamed import report_once
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -46,6 +47,8 @@ def apart(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
     if done.returncode:
         last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
         raise _failed(work, f"ended by itself: {' '.join(last) or done.returncode}")
+    for line in done.stderr.decode(errors="replace").splitlines():
+        report_once(line)  # what it logged
     value, faults = pickle.loads(done.stdout)
     if faults:
         raise ConfigError(faults)

@@ -10,9 +10,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from gazerig.config.load import ConfigError, Fault, shipped_names
+from gazerig.config.renamed import renamed_changes
 
 _KIND_OF_KEY = {
-    "gaze.scanpath.walk": "scanpaths",
+    "gaze.scanpath.transition_matrix": "scanpaths",
     "profile": "profiles",
     "detector.model_file": "",
     "oak.face_model": "",
@@ -63,7 +64,7 @@ class Confined:
             gazerig.config.load.ConfigError: with every file that may not.
         """
         faults: list[Fault] = []
-        for key, value in _leaves("", changes):
+        for key, value in _leaves("", renamed_changes(changes)):
             if isinstance(value, str) and value and key in _KIND_OF_KEY:
                 try:
                     self.file(value, _KIND_OF_KEY[key], key, Path.cwd())

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from gazerig.config.bounds import Form, Shape, judge, shapes_of
 from gazerig.config.export import closest, shown
 from gazerig.config.load import ConfigError, Entry, Fault, weighed
+from gazerig.config.renamed import renamed_changes, renamed_key
 from gazerig.config.schema import RULES, Rig
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.commands import Value
@@ -34,11 +35,11 @@ _AT_START: dict[str, str] = {
     "joints.*.model": "the servos are looked for with it when the bus is opened",
     "joints.*.firmware_min": "the servos are looked for with it when the bus is opened",
     "joints.*.bus": "the servos are looked for with it when the bus is opened",
-    "joints.*.linkage": "a push rod's places are taken over while its servo holds nothing",
-    "joints.*.servo_deg_s": "the servos' places are reckoned with it from the first goal",
+    "joints.*.transmission_points": "a push rod's places are taken over while its servo holds nothing",
+    "joints.*.servo_speed_deg_s": "the servos' places are reckoned with it from the first goal",
     "buses.*": "the servo buses are opened with it",
     "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
-    "joints.*.strength": "servos are set up while their torque is off; a stop and a resume will do",
+    "joints.*.torque_limit": "servos are set up while their torque is off; a stop and a resume will do",
     "camera.mount": "who looks at the pictures must know from the first whether they turn",
     "webcam.*": _AT_OPENING,
     "oak.*": _AT_OPENING,
@@ -91,7 +92,7 @@ def value_of(rig: Rig, key: str) -> Value:
     Raises:
         gazerig.config.load.ConfigError: there is no such key; the message says which there are.
     """
-    value: Any = rig
+    key, value = renamed_key(key), rig
     for done, step in enumerate(steps := key.split(".")):
         held = _parts(value)
         if held is not None and step in held:
@@ -134,6 +135,7 @@ def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     Raises:
         gazerig.config.load.ConfigError: with every fault, in the words of loading a file.
     """
+    changes = renamed_changes(changes)
     made = _judged(rig, changes)
     return made if made is not None else _weighed(rig, changes)
 

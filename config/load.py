@@ -18,6 +18,7 @@ from gazerig.config.entries import Entry as Entry
 from gazerig.config.entries import Fault as Fault
 from gazerig.config.entries import read
 from gazerig.config.export import Complaint, closest, complaint, shown
+from gazerig.config.renamed import renamed
 
 T = TypeVar("T")
 Check = Callable[[T], Iterable[tuple[str, str]]]
@@ -48,11 +49,14 @@ def load(
     *,
     defaults: Sequence[Path] = (),
     checks: Sequence[Check[T]] = (),
+    report: bool = True,
 ) -> T:
     """Read ``path`` over its ``defaults`` (the earliest lowest) into a frozen dataclass.
 
     Checks are asked about the whole value; where fields are at fault, what they find
     is listed if it holds whatever right values take their place.
+
+    report: keys with the names of the version before are reported, each once
 
     Raises:
         ConfigError: with every fault of every file.
@@ -61,7 +65,7 @@ def load(
     faults: list[Fault] = []
     known = tuple(shapes_of(cast(Any, into)))
     layers = [read(file, faults, known)[1] for file in files]
-    whole = [layer for layer in layers if layer is not None]
+    whole = [renamed(layer, into, faults, report) for layer in layers if layer is not None]
     if len(whole) < len(files):  # what a missing layer would have said is unknown
         raise ConfigError(faults)
     root = whole[0]

@@ -18,7 +18,8 @@ from typing import Any
 
 from gazerig.config.bounds import shapes_of
 from gazerig.config.load import ConfigError, Document, Fault, read_yaml, shipped
-from gazerig.config.save_text import Unchangeable, Value, edited, written
+from gazerig.config.renamed import renamed_changes
+from gazerig.config.save_text import Unchangeable, Value, edited, with_new_names, written
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.file_input import read_limited
 
@@ -84,7 +85,8 @@ def save(
 ) -> Saved:
     """Write values at dotted key paths into a YAML file and keep the old file beside it.
 
-    Keys that are not there are added with a comment. Comments, order, style and anchors
+    Keys that are not there are added with a comment; old names of keys become those of now, as
+    soon as anything is written. Comments, order, style and anchors
     stay. The file is replaced only after ``check`` has loaded the new one and found every
     value in it; on any error the file is as it was.
 
@@ -139,7 +141,7 @@ def _proposal(
     target: Path, changes: Mapping[str, Value], into: type, base: bytes | None = None
 ) -> tuple[bytes | None, bytes, tuple[Change, ...]]:
     """Return the file as it is, None where there is none, as it would be, and the difference."""
-    known = tuple(shapes_of(into))
+    known, changes = tuple(shapes_of(into)), renamed_changes(changes, into)
     if base is None:
         before = read_yaml(target, known)  # refuses what is no YAML, with the line
         base = target.read_bytes()
@@ -147,6 +149,8 @@ def _proposal(
     else:
         raw, before = _held(target), _document(base)
     mark = b"\xef\xbb\xbf" if base.startswith(b"\xef\xbb\xbf") else b""
+    if (text := with_new_names(before.text, into)) != before.text:
+        before = _document(text.encode())
     try:
         text = edited(before.text, changes, into)
         _refuse_side_effects(before.data, text, changes)

@@ -92,7 +92,7 @@ def main_sequence() -> None:
 
 def head_goal() -> None:
     """Offset of the head goal over the amount of attention (eq 7)."""
-    params = HeadParams(pull_least=0.0, pull_most=1.0)
+    params = HeadParams(min_salience=0.0, max_salience=1.0)
     limits = ((-2.0, 2.0), (-1.0, 1.0))
     pulls = np.linspace(-0.2, 1.2, 200)
     figure, axes = plt.subplots(figsize=(4.8, 3.4))
@@ -211,7 +211,7 @@ def scanpath() -> None:
         for j in range(8):
             if matrix[i, j] > 0.0:
                 left.text(j, i, f"{matrix[i, j]:.2f}", ha="center", va="center", fontsize=7)
-    model = markov_walk(ScanpathParams(shortest_dwell_ms=0.0), walk, np.random.default_rng(0))
+    model = markov_walk(ScanpathParams(min_dwell_ms=0.0), walk, np.random.default_rng(0))
     drawn = [np.array([model.dwell_s(i) for _ in range(4000)]) for i in range(8)]
     right.boxplot(drawn, showfliers=False, medianprops={"color": INK})
     right.errorbar(

@@ -35,8 +35,8 @@ class AttentionParams:
     """Hysteresis, and how old a picture may be."""
 
     # fmt: off
-    stay_factor: Annotated[float, Bounds(1, 10), "another body must pull this many times stronger to take over"] = 1.2
-    shortest_ms: Annotated[float, Bounds(0, 10000), "shortest time with one body"] = 300.0
+    hysteresis_ratio: Annotated[float, Bounds(1, 10), "another body must pull this many times stronger to take over"] = 1.2
+    min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time with one body"] = 300.0
     stale_ms: Annotated[float, Bounds(20, 10000), "a picture older than this no longer tells what is there"] = 400.0
     habituation: Annotated[HabituationParams, "how interest wears off"] = field(default_factory=HabituationParams)
     # fmt: on
@@ -173,8 +173,8 @@ class Attention:
         row = self._present_row(made)
         if row is None:
             return best
-        young = t_s - self._since_s < self._params.shortest_ms / 1e3 and not changed
-        stays = young or made.total[best] < made.total[row] * self._params.stay_factor
+        young = t_s - self._since_s < self._params.min_dwell_ms / 1e3 and not changed
+        stays = young or made.total[best] < made.total[row] * self._params.hysteresis_ratio
         return row if stays else best
 
     def _present_row(self, made: _Choice) -> int | None:

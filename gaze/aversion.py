@@ -45,7 +45,7 @@ class AversionParams:
     think_away_s: Annotated[float, Bounds(0.1, 60), "thinking: mean time away"] = 3.54
     think_away_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 1.26
     longest_mutual_s: Annotated[float, Bounds(0.5, 14.9), "no look at a face is longer; beyond 15 s it is a stare"] = 14.5
-    shortest_s: Annotated[float, Bounds(0.05, 2), "no time on or away is shorter: eyes and servos must get there first"] = 0.2
+    min_dwell_s: Annotated[float, Bounds(0.05, 2), "no time on or away is shorter: eyes and servos must get there first"] = 0.2
     least_deg: Annotated[float, Bounds(0, 20),
         "no nearer beside the face: half the gazes of the published law would still be on it; 0 is that law"] = 5.0
     talk_most_deg: Annotated[float, Bounds(1, 60), "farthest away while talking or thinking"] = 27.5
@@ -234,7 +234,7 @@ class Aversion:
         """Draw from the log-normal law with a mean and standard deviation."""
         sigma2 = log(1.0 + (sd_s / mean_s) ** 2)
         drawn = mean_s * exp(sqrt(sigma2) * float(self._rng.standard_normal()) - 0.5 * sigma2)
-        return max(drawn, self._params.shortest_s)
+        return max(drawn, self._params.min_dwell_s)
 
 
 def _centre(target: Target) -> Vec3:

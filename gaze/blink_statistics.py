@@ -14,12 +14,12 @@ def pause_s(params: LidParams, per_min: float, length_s: float, rng: np.random.G
     """
     if per_min == 0.0:
         return inf
-    shortest = params.shortest_interval_ms / 1e3
+    shortest = params.min_interval_ms / 1e3
     between = 60.0 / per_min - length_s
     mean = max(between - shortest, 0.05)
-    if params.interval_law == "fixed":
+    if params.interval_distribution == "fixed":
         return shortest + mean
-    if params.interval_law == "exponential":
+    if params.interval_distribution == "exponential":
         return shortest + mean * float(rng.standard_exponential())
     # A log-normal part on top of the shortest pause, with mean and spread such that
     # the whole pause has those asked for.
@@ -29,11 +29,11 @@ def pause_s(params: LidParams, per_min: float, length_s: float, rng: np.random.G
 
 def evokes(params: LidParams, shift_deg: float, rng: np.random.Generator) -> bool:
     """Return whether a gaze shift brings a blink with it (Evinger 1994)."""
-    if params.evoked_literal:
-        return shift_deg > params.evoked_literal_deg
-    beyond = shift_deg - params.evoked_middle_deg
+    if params.gaze_evoked_blink_literal:
+        return shift_deg > params.gaze_evoked_blink_literal_deg
+    beyond = shift_deg - params.gaze_evoked_blink_middle_deg
     # Of the steepest slope the exponential would be beyond what a number can hold.
-    against = exp(min(700.0, -params.evoked_steepness_1_deg * beyond))
+    against = exp(min(700.0, -params.gaze_evoked_blink_steepness_1_deg * beyond))
     return float(rng.random()) < 1.0 / (1.0 + against)
 
 

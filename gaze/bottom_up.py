@@ -44,11 +44,11 @@ class BottomUpParams:
 
     # fmt: off
     form: Annotated[Literal["retinal", "literal"], "retinal: as the eye sees it; literal: eq 1 as printed, without the weights"] = "retinal"
-    slide_rad_s: Annotated[float, Bounds(0.01, 20), "sideways motion, seen from the eye, that pulls with 1"] = 0.5
-    loom_1_s: Annotated[float, Bounds(0.01, 20), "growth or shrinkage, in parts of the distance, that pulls with 1"] = 0.5
-    spin_rad_s: Annotated[float, Bounds(0.01, 100), "rotation about the line of view that pulls with 1"] = 3.0
+    translation_reference_rad_s: Annotated[float, Bounds(0.01, 20), "sideways motion, seen from the eye, that pulls with 1"] = 0.5
+    looming_reference_1_s: Annotated[float, Bounds(0.01, 20), "growth or shrinkage, in parts of the distance, that pulls with 1"] = 0.5
+    rotation_reference_rad_s: Annotated[float, Bounds(0.01, 100), "rotation about the line of view that pulls with 1"] = 3.0
     smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass"] = 0.1
-    onset_pull: Annotated[float, Bounds(0, 10), "pull of what has just come into view; 0 for none"] = 1.0
+    onset_salience: Annotated[float, Bounds(0, 10), "pull of what has just come into view; 0 for none"] = 1.0
     onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which that pull is gone"] = 0.5
     # fmt: on
 
@@ -187,9 +187,9 @@ class BottomUp:
         length = _length(rel)
         raw = _eq_1(v, w, rel / np.maximum(length, 1e-300))
         distance = np.maximum(length, _NEAREST_M)
-        out[0] = raw.slide / (distance * par.slide_rad_s)
-        out[1] = raw.loom / (distance * par.loom_1_s)
-        out[2] = raw.spin / par.spin_rad_s
+        out[0] = raw.slide / (distance * par.translation_reference_rad_s)
+        out[1] = raw.loom / (distance * par.looming_reference_1_s)
+        out[2] = raw.spin / par.rotation_reference_rad_s
 
     def _blend(self, now: Floats, seen: NDArray[np.bool_], t_s: float) -> Pulls:
         """Blend each body's terms with its own past; a new body starts from nothing."""
@@ -204,7 +204,7 @@ class BottomUp:
         smooth -= past
         smooth *= 1.0 - keep
         smooth += past
-        onset = self._params.onset_pull * np.exp((entered_s - t_s) / self._params.onset_s)
+        onset = self._params.onset_salience * np.exp((entered_s - t_s) / self._params.onset_s)
         if not seen.all():
             smooth *= seen
             onset *= seen

@@ -24,13 +24,13 @@ class HabituationParams:
     """Rates of interest, and the place that is avoided."""
 
     # fmt: off
-    fall_1_s: Annotated[float, Bounds(0, 10), "how fast interest in what is looked at falls from 1; 0 for never"] = 0.2
-    rise_1_s: Annotated[float, Bounds(0.01, 10), "how fast it recovers in what is not looked at"] = 1.0
+    decay_rate_1_s: Annotated[float, Bounds(0, 10), "how fast interest in what is looked at falls from 1; 0 for never"] = 0.2
+    recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "how fast it recovers in what is not looked at"] = 1.0
     rule_floor: Annotated[float, Bounds(0, 1),
         "interest kept in what a rule points at; lower: the gaze changes sooner between several people"] = 0.6
-    return_strength: Annotated[float, Bounds(0, 1), "how strongly the place just left is avoided; 0 for not at all"] = 0.5
-    return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that place"] = 4.0
-    return_s: Annotated[float, Bounds(0.05, 60), "time constant with which that is over"] = 1.5
+    inhibition_of_return_strength: Annotated[float, Bounds(0, 1), "how strongly the place just left is avoided; 0 for not at all"] = 0.5
+    inhibition_of_return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that place"] = 4.0
+    inhibition_of_return_s: Annotated[float, Bounds(0.05, 60), "time constant with which that is over"] = 1.5
     # fmt: on
 
 
@@ -54,7 +54,7 @@ class Habituation:
 
     def reset(self, t_s: float) -> None:
         """Find everything interesting again."""
-        # Only those below full interest are kept: the ones attended in the last 1/rise_1_s
+        # Only those below full interest are kept: the ones attended in the last 1/recovery_rate_1_s
         # seconds, a handful however many bodies there are.
         self._interest: dict[int, float] = {}
         self._left: list[_Left] = []
@@ -62,7 +62,7 @@ class Habituation:
 
     def leave(self, p_world_m: Vec3, t_s: float) -> None:
         """Note that the gaze has left a place."""
-        if self._params.return_strength > 0.0:
+        if self._params.inhibition_of_return_strength > 0.0:
             self._left.append(_Left(p_world_m, t_s))
 
     def step(
@@ -84,7 +84,9 @@ class Habituation:
         for id, left in self._interest.items():
             if id in ids:
                 interest[ids.index(id)] = left
-        self._left = [one for one in self._left if t_s - one.at_s < 4.0 * self._params.return_s]
+        self._left = [
+            one for one in self._left if t_s - one.at_s < 4.0 * self._params.inhibition_of_return_s
+        ]
         if self._left:
             self._avoid(interest, ids, p_world_m, p_world_eye_m, attended_id, t_s)
         return interest
@@ -97,12 +99,12 @@ class Habituation:
 
     def _habituate(self, attended_id: int, dt_s: float) -> None:
         """Let interest fall in what is attended and rise in the rest."""
-        risen = self._params.rise_1_s * dt_s
+        risen = self._params.recovery_rate_1_s * dt_s
         attended = self._interest.pop(attended_id, 1.0)
         self._interest = {
             id: left + risen for id, left in self._interest.items() if left + risen < 1.0
         }
-        attended = max(0.0, attended - self._params.fall_1_s * dt_s)
+        attended = max(0.0, attended - self._params.decay_rate_1_s * dt_s)
         if attended_id >= 0 and attended < 1.0:
             self._interest[attended_id] = attended
 
@@ -121,9 +123,9 @@ class Habituation:
         ages = t_s - np.array([one.at_s for one in self._left])
         cosines = _directions(p_world_m - np.asarray(p_eye)) @ _directions(places).T
         angles = np.arccos(np.clip(cosines, -1.0, 1.0))
-        sigmas = angles / radians(par.return_sigma_deg)
-        near = np.exp(-0.5 * sigmas * sigmas - ages / par.return_s)
-        factor = (1.0 - par.return_strength * near).prod(axis=1)
+        sigmas = angles / radians(par.inhibition_of_return_sigma_deg)
+        near = np.exp(-0.5 * sigmas * sigmas - ages / par.inhibition_of_return_s)
+        factor = (1.0 - par.inhibition_of_return_strength * near).prod(axis=1)
         if attended_id in ids:
             factor[ids.index(attended_id)] = 1.0
         interest *= factor

@@ -24,21 +24,21 @@ class HeadParams:
     """Constants of eqs 7 and 8 and of the start rule."""
 
     # fmt: off
-    largest_offset_deg: Annotated[float, Bounds(0, 90),
+    max_offset_deg: Annotated[float, Bounds(0, 90),
         "how far short of the target the least interested head stops; also the trigger; both are lowered to the eye's limit less "
         "eye_margin_deg"] = 30.0
     eye_margin_deg: Annotated[float, Bounds(0, 30), "kept free at the eye limit"] = 2.0
-    pull_least: Annotated[float, Bounds(0, 10), "attention A1 at which the head moves least"] = 0.2
-    pull_most: Annotated[float, Bounds(0, 10), "attention A2 at which the head moves most"] = 1.0
-    goal_by: Annotated[Literal["attention", "align", "stahl"],
+    min_salience: Annotated[float, Bounds(0, 10), "attention A1 at which the head moves least"] = 0.2
+    max_salience: Annotated[float, Bounds(0, 10), "attention A2 at which the head moves most"] = 1.0
+    goal_model: Annotated[Literal["attention", "align", "stahl"],
         "head's share by the amount of attention (eq 7), a fixed alignment, or 0.77 of what lies beyond 17.9 deg (Stahl "
         "1999)"] = "attention"
-    align: Annotated[float, Bounds(0, 1), "with goal_by align: 0 stops as short as may be, 1 faces the target"] = 0.5
+    align: Annotated[float, Bounds(0, 1), "with goal_model align: 0 stops as short as may be, 1 faces the target"] = 0.5
     literal_reach: Annotated[bool, "keep trigger and offset whatever the eyes can reach, as printed"] = False
     lead_ms: Annotated[float, Bounds(0, 100), "head before eyes for top-down targets that it turns to"] = 0.0
     start_delay_ms: Annotated[float, Bounds(0, 1000), "head after eyes for bottom-up targets"] = 20.0
     base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0; the peak speed is (4/3 A/50 + 0.4) V0 for A degrees"] = 70.0
-    shortest_move_ms: Annotated[float, Bounds(20, 5000), "shortest head movement; small ones would be twitches otherwise"] = 300.0
+    min_move_ms: Annotated[float, Bounds(20, 5000), "shortest head movement; small ones would be twitches otherwise"] = 300.0
     replan_deg: Annotated[float, Bounds(0.05, 20), "change of the goal that makes a moving head plan anew"] = 1.0
     recentre_after_ms: Annotated[float, Bounds(0, 60000), "an eye held aside this long is relieved by the head"] = 800.0
     comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity at which the eye is at ease"] = 8.0
@@ -49,10 +49,10 @@ class HeadParams:
         """Check the order of the two amounts of attention.
 
         Raises:
-            ValueError: pull_most is not above pull_least.
+            ValueError: max_salience is not above min_salience.
         """
-        if self.pull_most <= self.pull_least:
-            raise ValueError("pull_most must be above pull_least")
+        if self.max_salience <= self.min_salience:
+            raise ValueError("max_salience must be above min_salience")
 
 
 class Head:
@@ -73,7 +73,7 @@ class Head:
         reachable = eye_limit_rad - radians(params.eye_margin_deg)
         # A head that stops short by more than the eye can cover never brings the gaze
         # to the target, and a trigger beyond the eye's limit never fires.
-        printed = radians(params.largest_offset_deg)
+        printed = radians(params.max_offset_deg)
         self.trigger_rad = printed if params.literal_reach else max(0.0, min(printed, reachable))
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
@@ -90,8 +90,8 @@ class Head:
     def offset_rad(self, pull: float) -> float:
         """Return how far short of the target the head stops (eq 7, sign corrected)."""
         par = self._params
-        z = 2.0 * (pull - par.pull_least) / (par.pull_most - par.pull_least) - 1.0
-        full = radians(par.largest_offset_deg) / (1.0 + exp(min(700.0, 7.0 * z)))
+        z = 2.0 * (pull - par.min_salience) / (par.max_salience - par.min_salience) - 1.0
+        full = radians(par.max_offset_deg) / (1.0 + exp(min(700.0, 7.0 * z)))
         return full if par.literal_reach else min(full, self.trigger_rad)
 
     def goal_rad(self, facing_rad: Angles2, offset_rad: float) -> Angles2:
@@ -186,9 +186,9 @@ class Head:
     def _stops_short(self, target: Target, facing: Angles2) -> float:
         """Return the angle by which the head stops short of the target."""
         par = self._params
-        if par.goal_by == "attention":
+        if par.goal_model == "attention":
             return self.offset_rad(target.pull)
-        if par.goal_by == "align":
+        if par.goal_model == "align":
             return (1.0 - par.align) * self.trigger_rad
         arc = angle_between((1.0, 0.0, 0.0), direction(facing))
         short = arc - 0.77 * max(0.0, arc - radians(17.9))
@@ -222,4 +222,4 @@ class Head:
         peak = (4.0 / 3.0 * amplitude / 50.0 + 0.4) * par.base_speed_deg_s
         if self._relieves:
             peak = min(peak, par.recentre_speed_deg_s)
-        return max(1.875 * amplitude / peak, par.shortest_move_ms / 1e3)
+        return max(1.875 * amplitude / peak, par.min_move_ms / 1e3)

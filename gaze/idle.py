@@ -33,7 +33,7 @@ class IdleParams:
     hold_ms: Annotated[float, Bounds(0, 60000), "time for which the gaze stays where a lost target was"] = 1000.0
     rest_distance_m: Annotated[float, Bounds(0.3, 20), "distance of the resting point"] = 1.5
     rest_height_m: Annotated[float, Bounds(-1, 3), "height of the resting point above the neck base"] = 0.2
-    rest_pull: Annotated[float, Bounds(0, 10), "pull of the resting point"] = 0.2
+    rest_salience: Annotated[float, Bounds(0, 10), "pull of the resting point"] = 0.2
     coast_ms: Annotated[float, Bounds(0, 2000), "for this long at most a lost target is taken to have moved on"] = 200.0
     search_ms: Annotated[float, Bounds(0, 60000), "time of searching for a lost target after that; 0 is not at all"] = 3000.0
     search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean time with one place of the search"] = 600.0
@@ -206,11 +206,11 @@ class Idle:
         """Make the target of a search or glance, with an identity of its own."""
         self._count += 1
         point = add(self._eye, scale(direction(place), distance_m))
-        pull, name = self._params.rest_pull, -1 - self._count
+        pull, name = self._params.rest_salience, -1 - self._count
         self._now = Target(point, _STILL, t_s, kind, name, pull, True, None, 0, why)
 
     def _resting(self, t_s: float) -> Target:
-        pull = self._params.rest_pull
+        pull = self._params.rest_salience
         return Target(self._rest, _STILL, t_s, "rest", -1, pull, True, None, 0, "nobody in sight")
 
     def _time_s(self, mean_ms: float, rng: np.random.Generator) -> float:

@@ -30,10 +30,10 @@ class LidParams:
     # fmt: off
     blinks_per_min: Annotated[float, Bounds(0, 60), "spontaneous blinks at rest; 0 is never"] = 17.0
     conversation_per_min: Annotated[float, Bounds(0, 60), "spontaneous blinks in conversation; 0 is never"] = 26.0
-    interval_law: Annotated[Literal["lognormal", "exponential", "fixed"],
+    interval_distribution: Annotated[Literal["lognormal", "exponential", "fixed"],
         "law of the intervals; all three keep the mean, fixed has no spread"] = "lognormal"
     interval_cv: Annotated[float, Bounds(0.05, 3), "spread of log-normal intervals: standard deviation over mean"] = 0.8
-    shortest_interval_ms: Annotated[float, Bounds(400, 10000), "pause after a blink before a spontaneous one"] = 1000.0
+    min_interval_ms: Annotated[float, Bounds(400, 10000), "pause after a blink before a spontaneous one"] = 1000.0
     double_share: Annotated[float, Bounds(0, 1), "share of blinks with a second one right after them"] = 0.0
     double_gap_ms: Annotated[float, Bounds(0, 500), "pause between those two"] = 100.0
     incomplete_share: Annotated[float, Bounds(0, 1), "share of blinks that shut the lid by 0.70 to 0.85 only"] = 0.12
@@ -48,11 +48,11 @@ class LidParams:
     lower_rest_opening: Annotated[float, Bounds(0.1, 1), "opening of the lower lids with level gaze"] = 0.8
     lower_follow_per_deg: Annotated[float, Bounds(0, 0.1), "shutting of the lower lids as the gaze rises, opening as it sinks"] = 0.008
     lower_close_share: Annotated[float, Bounds(0, 1), "part of its way that a lower lid goes in a blink; 1 meets the upper lid"] = 1.0
-    evoked_middle_deg: Annotated[float, Bounds(1, 180), "gaze shift that brings a blink every second time"] = 17.0
-    evoked_steepness_1_deg: Annotated[float, Bounds(0, 5), "slope of that probability"] = 0.217
-    evoked_pause_ms: Annotated[float, Bounds(0, 10000), "from the onset of a blink to the next that a gaze shift may bring"] = 600.0
-    evoked_literal: Annotated[bool, "a blink with every shift beyond evoked_literal_deg instead of the dice"] = False
-    evoked_literal_deg: Annotated[float, Bounds(0, 180), "a large saccade of Nakamoto & Tsuruno 3.6"] = 20.0
+    gaze_evoked_blink_middle_deg: Annotated[float, Bounds(1, 180), "gaze shift that brings a blink every second time"] = 17.0
+    gaze_evoked_blink_steepness_1_deg: Annotated[float, Bounds(0, 5), "slope of that probability"] = 0.217
+    gaze_evoked_blink_pause_ms: Annotated[float, Bounds(0, 10000), "from the onset of a blink to the next one evoked"] = 600.0
+    gaze_evoked_blink_literal: Annotated[bool, "a blink with every shift beyond gaze_evoked_blink_literal_deg instead of the dice"] = False
+    gaze_evoked_blink_literal_deg: Annotated[float, Bounds(0, 180), "a large saccade of Nakamoto & Tsuruno 3.6"] = 20.0
     sleepy_level: Annotated[float, Bounds(0, 1), "sleepiness at the start"] = 0.0
     sleepy_droop: Annotated[float, Bounds(0, 1), "part of the opening that full sleepiness takes away"] = 0.65
     lower_sleepy_rise: Annotated[float, Bounds(0, 1), "part of a lower lid's opening that full sleepiness takes away"] = 0.1

@@ -138,10 +138,10 @@ class Lids:
         evoked = shift_rad is not None and evokes(par, degrees(abs(shift_rad)), self._rng)
         if any(wink is not None and wink.under_way(t_s) for wink in self._winks.values()):
             # Both eyes would shut, and the wink be lost in it.
-            self._next_s = max(self._next_s, t_s + par.shortest_interval_ms / 1e3)
+            self._next_s = max(self._next_s, t_s + par.min_interval_ms / 1e3)
             return False
         since_s = inf if blink is None else t_s - blink.onset_s
-        if evoked and since_s >= max(par.evoked_pause_ms / 1e3, self._length_s()):
+        if evoked and since_s >= max(par.gaze_evoked_blink_pause_ms / 1e3, self._length_s()):
             return True
         # A rate that was just raised may want the next one before this one is over.
         return t_s >= self._next_s and (blink is None or not blink.under_way(t_s))

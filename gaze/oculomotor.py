@@ -43,12 +43,12 @@ class OculomotorParams(ShiftParams):
     """When to jump, how to bridge delays, and how exactly to land."""
 
     # fmt: off
-    extrapolate_ms: Annotated[float, Bounds(0, 2000), "longest time for which a target is moved on by its own velocity"] = 200.0
+    prediction_horizon_ms: Annotated[float, Bounds(0, 2000), "longest time for which a target is moved on by its own velocity"] = 200.0
     fade_ms: Annotated[float, Bounds(1, 5000), "decay of that velocity when there is no news for longer"] = 300.0
     eye_lag_ms: Annotated[float, Bounds(0, 200), "time from command to motion of an eye; the head's motion in it is foreseen"] = 15.0
     nearest_m: Annotated[float, Bounds(0.05, 2), "no nearer point is converged on (0.2 m is 17.6 deg of vergence)"] = 0.2
-    landing_along: Annotated[float, Bounds(0, 0.2), "scatter of the landing along the way, share of the amplitude; people .03-.05"] = 0.0
-    landing_across: Annotated[float, Bounds(0, 0.2), "scatter of the landing across the way, share of the amplitude; people .02"] = 0.0
+    endpoint_scatter_along: Annotated[float, Bounds(0, 0.2), "scatter along the path, SD as a share of the amplitude; people .03-.05"] = 0.0
+    endpoint_scatter_across: Annotated[float, Bounds(0, 0.2), "scatter across the path, SD as a share of the amplitude; people .02"] = 0.0
     # fmt: on
 
 
@@ -130,9 +130,11 @@ class Oculomotor:
         Raises:
             ValueError: the landing is to scatter and there are no dice.
         """
-        scatter = (params.landing_along, params.landing_across)
+        scatter = (params.endpoint_scatter_along, params.endpoint_scatter_across)
         if any(scatter) and self._rng is None:
-            raise ValueError("landing_along and landing_across need dice: give rng")
+            raise ValueError(
+                "endpoint_scatter_along and endpoint_scatter_across need dice: give rng"
+            )
         self._params, self._scatter, self._eye_limits = params, scatter, eye_limits
         self._rule.retune(params, any(scatter))
 
@@ -257,7 +259,7 @@ class Oculomotor:
         """Move the target on by its own velocity, which fades when there is no news."""
         par = self._params
         age = max(0.0, t_s - target.at_s)
-        known, fade = par.extrapolate_ms / 1e3, par.fade_ms / 1e3
+        known, fade = par.prediction_horizon_ms / 1e3, par.fade_ms / 1e3
         velocity = target.v_world_m_s
         moved = scale(velocity, min(age, known))
         if age > known:

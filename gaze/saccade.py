@@ -29,7 +29,7 @@ class SaccadeParams:
     profile: Annotated[Literal["min_jerk", "main_sequence", "literal_frame"],
         "how an eye jumps: eqs 2-6, as people do, or 0.8 of the way each frame"] = "min_jerk"
     max_speed_deg_s: Annotated[float, Bounds(10, 1000), "fastest eye speed L; the paper's 8.7266 rad/s is 500 deg/s"] = 500.0
-    shortest_ms: Annotated[float, Bounds(10, 1000), "shortest saccade T of the profile min_jerk"] = 50.0
+    min_duration_ms: Annotated[float, Bounds(10, 1000), "shortest saccade T of the profile min_jerk"] = 50.0
     human_base_ms: Annotated[float, Bounds(1, 200), "duration of a human saccade of no size"] = 21.0
     human_per_deg_ms: Annotated[float, Bounds(0.1, 20), "how much longer a human saccade is for each degree"] = 2.2
     human_peak_over_mean: Annotated[float, Bounds(1.2, 1.875), "peak over mean speed of a human saccade below the cap"] = 1.65
@@ -217,4 +217,4 @@ def _profile(params: SaccadeParams) -> Profile:
         return MainSequence(params)
     if params.profile == "literal_frame":
         return LiteralFrame(params.frame_share, params.frame_ms / 1e3)
-    return MinJerk(radians(params.max_speed_deg_s), params.shortest_ms / 1e3)
+    return MinJerk(radians(params.max_speed_deg_s), params.min_duration_ms / 1e3)

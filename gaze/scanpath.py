@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gazerig.gaze.angles import add, sub
-from gazerig.gaze.scanpath_dwell import LAWS, Draw, dwell_law
+from gazerig.gaze.scanpath_dwell import LAWS, Draw, dwell_distribution
 from gazerig.gaze.scanpath_models import (
     FaceLooks,
     FaceTracking,
@@ -79,14 +79,14 @@ class ScanpathParams:
     # fmt: off
     model: Annotated[Literal["markov", "simple", "face_tracking", "random"],
         "measured walk, or one of the three it is compared with"] = "markov"
-    walk: Annotated[str, "name of a shipped walk or path of a YAML file"] = "nakamoto_tsuruno"
+    transition_matrix: Annotated[str, "name of a shipped walk or path of a YAML file"] = "nakamoto_tsuruno"
     start: Annotated[str, Choices("as_walk", *PARTS), "part at which a face is entered, named as in the walk"] = "as_walk"
     viewers_left: Annotated[bool, "left and right in walk and round are the viewer's, not the owner's"] = False
     diagonal: Annotated[Literal["refixation", "whole_visit"],
         "a part drawn again: another dwell, or part of the visit whose dwell it is"] = "refixation"
-    dwell_law: Annotated[str, Choices(*LAWS), "law of the dwell times"] = "lognormal"
-    shortest_dwell_ms: Annotated[float, Bounds(0, 2000), "floor of a dwell: a servo cannot show shorter ones"] = 120.0
-    tempo: Annotated[float, Bounds(0.1, 10), "dwell times are divided by it: 2 wanders twice as fast"] = 1.0
+    dwell_distribution: Annotated[str, Choices(*LAWS), "law of the dwell times"] = "lognormal"
+    min_dwell_ms: Annotated[float, Bounds(0, 2000), "floor of a dwell: a servo cannot show shorter ones"] = 120.0
+    rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by it: 2 wanders twice as fast"] = 1.0
     simple_order: Annotated[tuple[str, ...], Choices(*PARTS), "round of the simple model"] = ("N", "RE", "LE")
     simple_dwell_ms: Annotated[tuple[float, ...], Bounds(1, 60000),
         "time on each part of the simple model's round"] = (459.42, 408.21, 408.21)
@@ -194,12 +194,12 @@ def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> Face
     """Make the model by its name."""
     match params.model:
         case "simple":
-            dwells_s = [ms / 1e3 / params.tempo for ms in params.simple_dwell_ms]
+            dwells_s = [ms / 1e3 / params.rate_scale for ms in params.simple_dwell_ms]
             return SimpleCycle(_owners(params, params.simple_order), dwells_s)
         case "face_tracking":
             return FaceTracking()
         case "random":
-            longest_s = params.random_longest_ms / 1e3 / params.tempo
+            longest_s = params.random_longest_ms / 1e3 / params.rate_scale
             return RandomAngles(params.random_angle_deg, longest_s, rng)
     return markov_walk(params, walk, rng)
 
@@ -223,6 +223,6 @@ def _owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:
 
 def _dwell(params: ScanpathParams, mean_s: float, sd_s: float) -> Draw:
     """Return a part's dwell law at this robot's tempo and above its floor."""
-    law = dwell_law(params.dwell_law, mean_s, sd_s)
-    tempo, floor_s = params.tempo, params.shortest_dwell_ms / 1e3
+    law = dwell_distribution(params.dwell_distribution, mean_s, sd_s)
+    tempo, floor_s = params.rate_scale, params.min_dwell_ms / 1e3
     return lambda rng: max(law(rng) / tempo, floor_s)

@@ -28,7 +28,7 @@ _NORMAL = NormalDist()
 _LEAST_CUT, _MOST_CUT = -30.0, 20.0
 
 
-def dwell_law(law: str, mean_s: float, sd_s: float) -> Draw:
+def dwell_distribution(law: str, mean_s: float, sd_s: float) -> Draw:
     """Return the function that draws dwell times of a law named in ``LAWS``.
 
     Raises:

@@ -28,7 +28,7 @@ class Rule:
     # fmt: off
     look_at: Annotated[str,
         'kind of body to look at, e.g. "face" or "hand"; "id:7" for the body with that id; "point" for the place point_world_m']
-    pull: Annotated[float, Bounds(0, 10), "its constant amount of attention (A_attack, A_guard, A_face)"]
+    salience: Annotated[float, Bounds(0, 10), "its constant amount of attention (A_attack, A_guard, A_face)"]
     point_world_m: Annotated[tuple[float, float, float] | None, Bounds(-100, 100),
         "place to look at: ahead, left and above of the neck base"] = None
     # fmt: on
@@ -64,7 +64,7 @@ class TopDownParams:
 
     # fmt: off
     behaviour: Annotated[str, "behaviour in force at the start"] = "wait"
-    rules: Annotated[Mapping[str, Rule], "behaviour -> what to look at and with what pull"] = field(default_factory=_shipped_rules)
+    rules: Annotated[Mapping[str, Rule], "behaviour -> what to look at and with what salience"] = field(default_factory=_shipped_rules)
     stay_with_person: Annotated[float, Bounds(1, 10), "the one looked at last counts as this many times nearer than the others"] = 1.25
     nearness: Annotated[float, Bounds(0, 4), "how much less the farther of several pull: the power of the distance"] = 0.5
     # fmt: on
@@ -154,7 +154,7 @@ class TopDown:
         if len(rows) == 0 and rule.point_world_m is None:
             return None
         near = self._nearness(bodies, rows, p_world_eye_m, favoured_id)
-        return Wanted(rows, near, rule.point_world_m, rule.pull, self.behaviour)
+        return Wanted(rows, near, rule.point_world_m, rule.salience, self.behaviour)
 
     def _nearness(
         self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3, favoured_id: int

@@ -35,7 +35,7 @@ def recorded(path: Path, seconds: float = 0.5) -> bytes:
     options, rig = RunOptions(mock=True, fast=True, seed=5, scene="visitor"), load_rig("desk")
     info = RunInfo(
         rig="desk", profile=rig.profile, config_yaml=rig_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.walk), seed=5, rate_hz=rig.loop.rate_hz,
+        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=5, rate_hz=rig.loop.rate_hz,
         started_utc="2026-01-31T23:59:59+00:00", scene="visitor", mock=True, fast=True,
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)

@@ -203,7 +203,7 @@ class Machine:
         self.longest_s = 0.0
         self.own_speed = False
         self._fast_s = [0.0] * len(self.names)
-        self._gentle_rad_s = 1.2 * radians(rig.guard.gentle_speed_deg_s)
+        self._gentle_rad_s = 1.2 * radians(rig.guard.soft_start_speed_deg_s)
 
     def start(self) -> None:
         """Torque on, and on the way until slow motion is over."""
@@ -390,7 +390,7 @@ FEW = ("left_eye_pan", "left_eye_tilt", "neck_yaw")
 def quick(rig: Rig) -> Rig:
     """Return the rig with an eye and a turn of the neck alone, and short slow passages."""
     few = {name: joint for name, joint in rig.joints.items() if name in FEW}
-    guard = replace(rig.guard, gentle_ms=200.0)
+    guard = replace(rig.guard, soft_start_ms=200.0)
     return replace(rig, guard=guard, joints=few if len(few) == len(FEW) else rig.joints)
 
 

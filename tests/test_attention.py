@@ -136,14 +136,14 @@ def test_nearly_equal_pulls_do_not_flicker() -> None:
 
 
 def test_a_winner_is_kept_for_the_shortest_time() -> None:
-    model = attention(shortest_ms=300.0)
+    model = attention(min_dwell_ms=300.0)
     model.choose(waving(0.0, 0.0), looking(), 0.0)
     assert model.choose(waving(0.2, 2.0), looking(), 0.2).kind == "face"
     assert model.choose(waving(0.4, 2.0), looking(), 0.4).kind == "hand"
 
 
 def test_of_two_faces_the_nearer_is_kept_until_the_other_is_clearly_nearer() -> None:
-    model = attention(shortest_ms=0.0)
+    model = attention(min_dwell_ms=0.0)
 
     def two(t: float, other_m: float) -> Percept:
         return percept(t, FACE, body(5, "face", (other_m, 0.3, 0.0)))
@@ -172,7 +172,7 @@ def test_stale_pictures_tell_nothing() -> None:
 
 
 def test_behaviours_follow_their_rules() -> None:
-    model = attention(shortest_ms=0.0)
+    model = attention(min_dwell_ms=0.0)
     both = percept(0.0, FACE, body(9, "attack_target", (0.8, -0.2, 0.0)))
     assert model.choose(both, looking(), 0.0).id == 1
     model.top_down.behave("attack")
@@ -250,7 +250,9 @@ def test_hiding_many_at_once_is_hiding_one_by_one() -> None:
 
 
 def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
-    model = BottomUp(BottomUpParams(form="literal", smoothing_s=0.0, slide_rad_s=9.0))
+    model = BottomUp(
+        BottomUpParams(form="literal", smoothing_s=0.0, translation_reference_rad_s=9.0)
+    )
     seen = bodies(body(1, "x", (5, 3, 0), (1, 2, 0)), body(2, "x", (1, 0, 0), (1, 2, 0)))
     seen = replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0], [3.0, 0, 4.0]]))
     for gaze in ((1.0, 0.0, 0.0), (7.0, 0.0, 0.0)):
@@ -281,7 +283,7 @@ def test_the_heads_own_motion_makes_what_stands_still_slide() -> None:
 
 
 def test_what_has_just_come_into_view_pulls_and_that_wears_off() -> None:
-    model = BottomUp(BottomUpParams(onset_pull=0.8, onset_s=0.5))
+    model = BottomUp(BottomUpParams(onset_salience=0.8, onset_s=0.5))
     first, second = body(1, "x", (1, 0, 0)), body(2, "x", (1, 0.3, 0))
     for k in range(11):
         assert model.step(bodies(first), (0, 0, 0), k / 10).onset.tolist() == [0.0]
@@ -408,7 +410,7 @@ def test_behaviours_are_listed_and_forgotten_at_a_reset() -> None:
 
 
 def test_a_change_of_mind_does_not_wait_for_the_end_of_a_fixation() -> None:
-    model = attention(shortest_ms=5000.0)
+    model = attention(min_dwell_ms=5000.0)
     rows = FACE, body(9, "attack_target", (0.8, -0.2, 0.0))
     assert model.choose(percept(0.0, *rows), looking(), 0.0).kind == "face"
     model.top_down.behave("attack")

@@ -165,7 +165,7 @@ def test_e46_a_the_fist_of_a_punch_is_looked_at(boxing: Lived) -> None:
 
 def test_e46_a_without_the_pull_of_motion_no_fist_is_looked_at() -> None:
     rig = load_rig("desk")
-    dull = replace(rig.gaze.bottom_up, slide_rad_s=20.0, loom_1_s=20.0)
+    dull = replace(rig.gaze.bottom_up, translation_reference_rad_s=20.0, looming_reference_1_s=20.0)
     rig = replace(
         rig, gaze=replace(rig.gaze, bottom_up=dull), loop=replace(rig.loop, rate_hz=100.0)
     )

@@ -109,7 +109,9 @@ def test_shipped_rule_sets_load() -> None:
     boxing, talk = sets["boxing"], sets["conversation"]
     assert boxing.rules == TopDownParams().rules and boxing.behaviour == "wait"
     assert set(talk.rules) >= {"wait", "listen", "talk", "think"}
-    assert talk.rules["listen"].pull > talk.rules["talk"].pull > talk.rules["think"].pull
+    assert (
+        talk.rules["listen"].salience > talk.rules["talk"].salience > talk.rules["think"].salience
+    )
     assert talk.rules["recall"].point_world_m == (1.2, 0.35, 0.75)
     for rules in sets.values():
         TopDown(rules).behave(rules.behaviour)

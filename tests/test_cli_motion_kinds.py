@@ -52,7 +52,7 @@ def test_a_hobby_joint_is_steered_and_its_places_are_written(
     done = run("calibrate", path, "--mock", "--joint", "eyes_pan", "--answers", answers)
     assert done.exit_code == 0, done.stderr
     joint = load_rig(path).joints["eyes_pan"]
-    places = dict(joint.linkage)
+    places = dict(joint.transmission_points)
     assert places[0.0] == 1500.0 and places[9.0] == 1600.0 and places[-6.0] == 1430.0
     assert len(places) == 5
     assert (joint.min_deg, joint.max_deg) == (-4.0, 7.0)
@@ -122,7 +122,7 @@ def test_joints_of_several_buses_are_calibrated_in_one_go(
     done = run("calibrate", rigs["mixed"], *words)
     assert done.exit_code == 0, done.stderr
     joints = load_rig(rigs["mixed"]).joints
-    assert len(joints["eyes_tilt"].linkage) == 3
+    assert len(joints["eyes_tilt"].transmission_points) == 3
     assert joints["neck_yaw"].zero_step is not None and joints["neck_pitch"].sign == -1
 
 
@@ -154,7 +154,7 @@ def test_places_on_several_lines_are_refused_before_anything_moves(rigs: dict[st
     path = Path(rigs["maker"])
     text = path.read_text("utf-8")
     line = next(line for line in text.splitlines() if "[-24, 1801]" in line)
-    spread = "    linkage:\n      - [-24, 1801]\n      - [0, 1510]\n      - [24, 1188]"
+    spread = "    transmission_points:\n      - [-24, 1801]\n      - [0, 1510]\n      - [24, 1188]"
     path.write_text(text.replace(line, spread), encoding="utf-8")
     done = run("calibrate", str(path), "--mock", "--joint", "eyes_tilt")
     assert done.exit_code == 2 and "spread over several lines" in done.stderr

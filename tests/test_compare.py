@@ -83,7 +83,7 @@ def record(path: Path, seconds: float, saccade: str) -> None:
     rig = made.live.rig
     info = RunInfo(
         "desk", rig.profile, rig_text(rig), 0, 200.0, "2026-01-31T12:00:00+00:00",
-        walk_yaml=walk_text(rig.gaze.scanpath.walk), scene="face-to-face", mock=True, fast=True,
+        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="face-to-face", mock=True, fast=True,
         versions=versions(),
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)

@@ -272,7 +272,7 @@ def test_a_whole_rig(tmp_path):
         "joints.neck_yaw.zero_step": 2051,
         "joints.neck_yaw.sign": -1,
         "joints.left_eye_pan.min_deg": -31.5,
-        "joints.left_eye_pan.strength": 0.5,
+        "joints.left_eye_pan.torque_limit": 0.5,
         "bus.port": "/dev/serial/by-id/usb-FTDI_USB__-__Serial-if00",
     }
     assert [c.key for c in propose(mine, wishes)] == list(wishes)
@@ -280,7 +280,7 @@ def test_a_whole_rig(tmp_path):
     rig = load_rig(str(mine))
     assert isinstance(rig, Rig)
     assert (rig.joints["neck_yaw"].zero_step, rig.joints["neck_yaw"].sign) == (2051, -1)
-    assert rig.joints["left_eye_pan"].strength == 0.5
+    assert rig.joints["left_eye_pan"].torque_limit == 0.5
     old, new = saved.backup.read_text().splitlines(), mine.read_text().splitlines()
     assert len(set(new) - set(old)) <= 5 + 1 and len(new) - len(old) <= 2
     # A rule between two sections is checked before anything is replaced.

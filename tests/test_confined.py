@@ -30,8 +30,10 @@ def test_files_beside_the_rig_and_shipped_names(home: Path) -> None:
         path = Path(confined.file(given))
         assert path.is_absolute() and path.is_relative_to(home)
     assert confined.file("shy", "characters") == "shy"
-    confined.changes({"gaze.scanpath.walk": "nakamoto_tsuruno", "gaze.lids.close_ms": 80.0})
-    confined.changes({"gaze": {"scanpath": {"walk": f"{home}/walk.yaml"}}})
+    confined.changes(
+        {"gaze.scanpath.transition_matrix": "nakamoto_tsuruno", "gaze.lids.close_ms": 80.0}
+    )
+    confined.changes({"gaze": {"scanpath": {"transition_matrix": f"{home}/walk.yaml"}}})
 
 
 @pytest.mark.parametrize(
@@ -47,7 +49,7 @@ def test_files_elsewhere_are_refused(home: Path, given: str) -> None:
         Confined(home).file(given, "characters" if given else "")
     if given not in ("", ".", ".."):
         with pytest.raises(ConfigError):
-            Confined(home).changes({"gaze.scanpath.walk": given})
+            Confined(home).changes({"gaze.scanpath.transition_matrix": given})
         with pytest.raises(ConfigError):
             Confined(home).changes({"gaze.scanpath": {"walk": given}})
 
@@ -65,7 +67,7 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
         {"character": "/etc/shadow"},
         {"save": str(tmp_path / "made.yaml")},
         {"save": "~/made.yaml"},
-        {"set": {"gaze.scanpath.walk": "/etc/shadow"}},
+        {"set": {"gaze.scanpath.transition_matrix": "/etc/shadow"}},
         {"set": {"detector.model_file": "/etc/shadow"}},
     ):
         words = hear({"tune": asked})

@@ -15,6 +15,7 @@ from ruamel.yaml import YAML
 from gazerig.config.bounds import Shape, shapes_of
 from gazerig.config.knobs import NEXT_TICK, changed, knobs, value_of
 from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.renamed import RIG as RENAMED
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.feetech.family import FEETECH
@@ -226,6 +227,7 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper == EMULATOR:
         return  # its tables are held against the emulator below
     words = {*keys(), *defined(), *SERVOS, *scenes(), *EXAMPLES, *_modes()}
+    words |= {*RENAMED, *RENAMED.values(), "rules.*.pull"}
     words |= {field.name for field in fields(Family)} | {*DYNAMIXEL.registers, *FEETECH.registers}
     for span in spans(paper):
         if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):

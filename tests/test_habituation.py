@@ -60,7 +60,7 @@ def interest(model: Habituation, seen: Bodies, attended: int, t_s: float) -> lis
 
 
 def test_interest_falls_while_attended_and_recovers_otherwise() -> None:
-    model = Habituation(HabituationParams(fall_1_s=0.2, rise_1_s=1.0))
+    model = Habituation(HabituationParams(decay_rate_1_s=0.2, recovery_rate_1_s=1.0))
     seen = bodies("face face", (1, 0.5, 0), (1, -0.5, 0))
     assert interest(model, seen, -1, 0.0) == [1.0, 1.0]
     assert interest(model, seen, 1, 2.0) == pytest.approx([0.6, 1.0])
@@ -89,7 +89,13 @@ def test_a_rule_keeps_its_floor_of_interest() -> None:
 def test_the_place_left_is_avoided_by_a_gaussian_that_decays(
     aside_deg: float, age_s: float
 ) -> None:
-    model = Habituation(HabituationParams(return_strength=0.8, return_sigma_deg=4.0, return_s=1.5))
+    model = Habituation(
+        HabituationParams(
+            inhibition_of_return_strength=0.8,
+            inhibition_of_return_sigma_deg=4.0,
+            inhibition_of_return_s=1.5,
+        )
+    )
     a = radians(aside_deg)
     seen = bodies("hand", (2 * np.cos(a), 2 * np.sin(a), 0))
     interest(model, seen, -1, 10.0)
@@ -102,7 +108,9 @@ def test_the_place_left_is_avoided_by_a_gaussian_that_decays(
 def test_what_is_attended_is_not_avoided_and_strength_0_avoids_nothing() -> None:
     seen = bodies("hand", (1, 0, 0))
     for strength, attended in ((1.0, 1), (0.0, -1)):
-        model = Habituation(HabituationParams(fall_1_s=0.0, return_strength=strength))
+        model = Habituation(
+            HabituationParams(decay_rate_1_s=0.0, inhibition_of_return_strength=strength)
+        )
         model.leave((1.0, 0.0, 0.0), 0.0)
         assert interest(model, seen, attended, 0.1) == [1.0]
 
@@ -125,7 +133,7 @@ def test_two_faces_share_the_gaze_without_flicker() -> None:
 
 
 def test_without_habituation_two_faces_do_not_share() -> None:
-    share = shares(watch(bodies("face face", (1, 0.3, 0), (1, -0.3, 0)), 30.0, fall_1_s=0.0))
+    share = shares(watch(bodies("face face", (1, 0.3, 0), (1, -0.3, 0)), 30.0, decay_rate_1_s=0.0))
     assert share == {1: 1.0}
 
 
@@ -138,7 +146,9 @@ def test_nobody_of_three_is_left_out() -> None:
     three = bodies("face face face", (1, 0.4, 0), (1.1, 0, 0), (1, -0.4, 0))
     targets = watch(three, 120.0)
     assert min(shares(targets).values()) > 0.25 and min(stays_s(targets)) > 1.0
-    assert 2 not in shares(watch(three, 120.0, return_strength=0.0))  # what the default is for
+    assert 2 not in shares(
+        watch(three, 120.0, inhibition_of_return_strength=0.0)
+    )  # what the default is for
 
 
 def test_the_gaze_leaves_a_hand_that_waves_on_and_on_but_not_before_the_face_is_stronger() -> None:

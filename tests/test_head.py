@@ -14,7 +14,7 @@ NECK = ((-2.0, 2.0), (-1.0, 1.0))
 
 
 def head(eye_deg: float = 55.0, params: HeadParams | None = None) -> Head:
-    return Head(params or HeadParams(pull_least=0.0, pull_most=1.0), radians(eye_deg), NECK)
+    return Head(params or HeadParams(min_salience=0.0, max_salience=1.0), radians(eye_deg), NECK)
 
 
 def goal_deg(model: Head, yaw: float, pull: float, pitch: float = 0.0) -> tuple[float, float]:
@@ -74,8 +74,8 @@ def test_a_new_goal_in_flight_makes_no_step() -> None:
 
 
 def test_attention_bounds_must_be_in_order() -> None:
-    with pytest.raises(ValueError, match="above pull_least"):
-        HeadParams(pull_least=1.0, pull_most=1.0)
+    with pytest.raises(ValueError, match="above min_salience"):
+        HeadParams(min_salience=1.0, max_salience=1.0)
 
 
 def test_an_eye_held_aside_is_relieved_slowly() -> None:
@@ -106,25 +106,25 @@ def aimed(params: HeadParams, centre: float, point: float, top_down: bool = Fals
 
 
 def test_head_turns_to_the_centre_but_never_so_that_the_point_is_out_of_reach() -> None:
-    still = HeadParams(pull_least=0.0, recentre_after_ms=60_000.0)
+    still = HeadParams(min_salience=0.0, recentre_after_ms=60_000.0)
     assert aimed(still, 40.0, 41.0) == pytest.approx(40.0 - 15.0, abs=0.1)
     assert aimed(still, 40.0, 50.0) == pytest.approx(50.0 - 18.0, abs=0.1)
 
 
 @pytest.mark.parametrize(("align", "short"), [(0.0, 18.0), (0.5, 9.0), (1.0, 0.0)])
 def test_alignment_is_one_less_the_share_of_the_offset(align: float, short: float) -> None:
-    params = HeadParams(goal_by="align", align=align, recentre_after_ms=60_000.0)
+    params = HeadParams(goal_model="align", align=align, recentre_after_ms=60_000.0)
     assert aimed(params, 50.0, 50.0) == pytest.approx(50.0 - short, abs=0.1)
 
 
 @pytest.mark.parametrize(("target", "head_deg"), [(30.0, 12.0), (40.0, 22.0), (60.0, 42.0)])
 def test_stahl_share_is_lifted_where_the_eyes_cannot_reach(target: float, head_deg: float) -> None:
-    params = HeadParams(goal_by="stahl", recentre_after_ms=60_000.0)
+    params = HeadParams(goal_model="stahl", recentre_after_ms=60_000.0)
     assert aimed(params, target, target) == pytest.approx(head_deg, abs=0.1)
 
 
 def test_stahl_share_of_a_wide_eye_range() -> None:
-    model = Head(HeadParams(goal_by="stahl", recentre_after_ms=60_000.0), radians(55.0), NECK)
+    model = Head(HeadParams(goal_model="stahl", recentre_after_ms=60_000.0), radians(55.0), NECK)
     target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
     facing = (radians(40.0), 0.0)
     for k in range(800):
@@ -133,7 +133,7 @@ def test_stahl_share_of_a_wide_eye_range() -> None:
 
 
 def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
-    params = HeadParams(pull_least=0.5, pull_most=1.0, literal_reach=True)
+    params = HeadParams(min_salience=0.5, max_salience=1.0, literal_reach=True)
     model = Head(params, radians(20.0), NECK)
     assert degrees(model.trigger_rad) == pytest.approx(30.0)
     assert degrees(model.offset_rad(0.5)) == pytest.approx(29.97, abs=0.01)

@@ -97,7 +97,7 @@ def test_what_is_wrong_is_refused_in_the_words_of_a_file(
 
 def test_all_faults_are_told_at_once() -> None:
     with pytest.raises(ConfigError) as refused:
-        changed(RIG, {"loop.rate_hz": 5.0, "guard.gentle_ms": -1.0, "gaze.lids.close_ms": "x"})
+        changed(RIG, {"loop.rate_hz": 5.0, "guard.soft_start_ms": -1.0, "gaze.lids.close_ms": "x"})
     assert len(refused.value.faults) == 3
 
 
@@ -122,7 +122,7 @@ def test_differences_turn_one_rig_into_the_other_and_back(name: str) -> None:
 
 
 def test_entries_and_groups_come_and_go() -> None:
-    rule: dict[str, Value] = {"look_at": "hand", "pull": 1.0}
+    rule: dict[str, Value] = {"look_at": "hand", "salience": 1.0}
     other = changed(
         RIG,
         {
@@ -133,7 +133,7 @@ def test_entries_and_groups_come_and_go() -> None:
         },
     )
     assert other.face_parts_mm == {"N": (1.0, 2.0, 3.0)}
-    assert value_of(other, "gaze.top_down.rules.point.pull") == 1.0
+    assert value_of(other, "gaze.top_down.rules.point.salience") == 1.0
     assert changed(RIG, differences(RIG, other)) == other
     assert changed(other, differences(other, RIG)) == RIG
     flat = flattened(other, differences(RIG, other))
@@ -194,7 +194,7 @@ def test_only_what_changed_is_checked_anew(monkeypatch: pytest.MonkeyPatch) -> N
     "changes",
     [
         {"gaze.head": {"align": 0.61}},
-        {"gaze": {"head": {"align": 0.61}}, "gaze.head.pull_least": 0.31},
+        {"gaze": {"head": {"align": 0.61}}, "gaze.head.min_salience": 0.31},
         {"camera.lens": WHOLE_LENS, "camera.lens.fx_px": 510.0},
         {"camera.lens.width_px": 640, "camera.lens": WHOLE_LENS},
         {"joints": {"neck_yaw": {"max_deg": 60.0}}, "joints.neck_yaw.min_deg": -60},

@@ -19,7 +19,10 @@ SHUT_S = 0.085  # after the onset: between close_ms and close_ms + hold_ms
 def lids(seed: int = 0, **params: float) -> Lids:
     """Return lids that blink with every large shift and never else."""
     always = LidParams(
-        blinks_per_min=0.0, incomplete_share=0.0, evoked_literal=True, evoked_pause_ms=0.0
+        blinks_per_min=0.0,
+        incomplete_share=0.0,
+        gaze_evoked_blink_literal=True,
+        gaze_evoked_blink_pause_ms=0.0,
     )
     return Lids(changed(always, **params), np.random.default_rng(seed))
 
@@ -198,7 +201,7 @@ def test_a_blink_that_is_over_does_not_come_back_when_blinks_are_made_longer() -
 
 
 def test_a_higher_rate_begins_no_blink_within_a_blink() -> None:
-    slow = LidParams(interval_law="fixed", incomplete_share=0.0, sleepy_level=1.0)
+    slow = LidParams(interval_distribution="fixed", incomplete_share=0.0, sleepy_level=1.0)
     model = Lids(changed(slow, sleepy_slowness=5.0), np.random.default_rng(0))
     assert not model.step(0.0, 0.0, radians(90.0)).blink and model.blinks == 1
     assert model.step(0.5, 0.0, None).lower_left == 0.0

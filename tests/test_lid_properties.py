@@ -125,8 +125,8 @@ def test_both_lids_follow_the_eye_the_same_way_with_any_parameters(
 def test_a_full_blink_shuts_all_lids_whose_share_is_whole(
     params: LidParams, pitch_deg: float, level: float
 ) -> None:
-    whole = {"lower_close_share": 1.0, "incomplete_share": 0.0, "evoked_literal": True}
-    never = {"blinks_per_min": 0.0, "evoked_literal_deg": 0.0, "sleepy_level": 0.0}
+    whole = {"lower_close_share": 1.0, "incomplete_share": 0.0, "gaze_evoked_blink_literal": True}
+    never = {"blinks_per_min": 0.0, "gaze_evoked_blink_literal_deg": 0.0, "sleepy_level": 0.0}
     chosen = LidParams(**{**vars(params), **whole, **never, "sleepy_slowness": 0.0})
     model = Lids(chosen, np.random.default_rng(0))
     model.sleepy(level)
@@ -150,7 +150,11 @@ def test_rounding_errors_lead_no_lid_beyond_shut_or_open() -> None:
 
 
 def test_the_steepest_rule_of_evoked_blinks_can_be_reckoned() -> None:
-    steep = LidParams(evoked_steepness_1_deg=5.0, evoked_middle_deg=180.0, blinks_per_min=0.0)
+    steep = LidParams(
+        gaze_evoked_blink_steepness_1_deg=5.0,
+        gaze_evoked_blink_middle_deg=180.0,
+        blinks_per_min=0.0,
+    )
     model = Lids(steep, np.random.default_rng(0))
     for k in range(100):
         model.step(k * 1.0, 0.0, radians(1.0))

@@ -122,7 +122,7 @@ def test_shifts_in_quick_succession_share_one_blink() -> None:
 
 @pytest.mark.parametrize("literal", [False, True])
 def test_e53_no_blink_storm(literal: bool) -> None:
-    model = lids(2, evoked_literal=literal)
+    model = lids(2, gaze_evoked_blink_literal=literal)
     model.step(0.0, 0.0, radians(40.0))  # the shift that left the head 40 deg aside
     onsets(model, 60.0, DT)
     assert 5 <= model.blinks <= 25
@@ -139,7 +139,7 @@ def test_e53_no_blink_storm_with_the_head_held_aside(literal: bool) -> None:
         Saccade(SaccadeParams()),
         Pursuit(PursuitParams()),
         Head(HeadParams(), radians(55.0), (span, span)),
-        lids(2, evoked_literal=literal),
+        lids(2, gaze_evoked_blink_literal=literal),
     )
     held = JointState((0.0,) * 6 + (radians(40.0), 0.0, 0.0), (0.0,) * 9, (0.0,) * 9, ())
     state = kinematics.forward(held)
@@ -150,17 +150,17 @@ def test_e53_no_blink_storm_with_the_head_held_aside(literal: bool) -> None:
 
 
 def test_the_literal_rule_blinks_with_every_large_shift_and_no_small_one() -> None:
-    large = Shifts(20.5, lids(evoked_literal=True, blinks_per_min=0.0))
+    large = Shifts(20.5, lids(gaze_evoked_blink_literal=True, blinks_per_min=0.0))
     assert large.counts == [1] * 200 and max(large.delays) == 0.0
-    assert Shifts(-20.5, lids(evoked_literal=True, blinks_per_min=0.0)).share == 1.0
-    assert Shifts(19.5, lids(evoked_literal=True, blinks_per_min=0.0)).share == 0.0
+    assert Shifts(-20.5, lids(gaze_evoked_blink_literal=True, blinks_per_min=0.0)).share == 1.0
+    assert Shifts(19.5, lids(gaze_evoked_blink_literal=True, blinks_per_min=0.0)).share == 0.0
 
 
 @pytest.mark.parametrize(
     ("law", "low", "high"), [("lognormal", 0.5, 1.2), ("exponential", 0.5, 1.0), ("fixed", 0, 0.01)]
 )
 def test_laws_of_the_intervals_keep_the_mean(law: str, low: float, high: float) -> None:
-    gaps = np.diff(onsets(lids(3, interval_law=law), 2400.0, dt_s=0.05))
+    gaps = np.diff(onsets(lids(3, interval_distribution=law), 2400.0, dt_s=0.05))
     assert gaps.mean() == pytest.approx(60.0 / 17.0, rel=0.12)
     assert low <= gaps.std() / gaps.mean() <= high
 
@@ -233,8 +233,8 @@ def test_a_late_or_repeated_wink_makes_no_jump() -> None:
 
 
 def test_no_blink_spoils_a_wink() -> None:
-    model, right = lids(1, interval_law="fixed", evoked_literal=True), []
-    first = onsets(lids(1, interval_law="fixed"), 10.0)[0]
+    model, right = lids(1, interval_distribution="fixed", gaze_evoked_blink_literal=True), []
+    first = onsets(lids(1, interval_distribution="fixed"), 10.0)[0]
     model.step(first - 0.1, 0.0, None)
     model.wink("left", first - 0.1)
     for k in range(80):

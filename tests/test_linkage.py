@@ -85,12 +85,12 @@ def test_places_that_cannot_be_are_refused(
 
 
 def hobby(**other: object) -> JointParams:
-    given = {"linkage": tuple((a, us) for a, us in ROD), **other}
+    given = {"transmission_points": tuple((a, us) for a, us in ROD), **other}
     return JointParams(3, "hobby", -28.0, 28.0, 400.0, 20000.0, **given)  # type: ignore[arg-type]
 
 
 def test_a_hobby_joint_is_set_up_in_quarter_microseconds() -> None:
-    setup = hobby(servo_deg_s=600.0).setup("eyes_pan", radians(10.0))
+    setup = hobby(servo_speed_deg_s=600.0).setup("eyes_pan", radians(10.0))
     made = hobby().made()
     assert (setup.min_steps, setup.max_steps) == (
         -(-made.steps(radians(28.0)) // 1),
@@ -111,9 +111,12 @@ def test_servos_that_tell_their_place_are_not_told_where_they_rest() -> None:
 @pytest.mark.parametrize(
     ("other", "words"),
     [
-        ({"linkage": ((-20.0, 1900.0), (20.0, 1100.0))}, "measured from -20 to 20 deg"),
-        ({"linkage": ((-30.0, 1900.0), (30.0, 400.0))}, "400|outside the servo's 500..2500 us"),
-        ({"linkage": (), "zero_step": 2400}, "outside the servo's 500..2500 us"),
+        ({"transmission_points": ((-20.0, 1900.0), (20.0, 1100.0))}, "measured from -20 to 20 deg"),
+        (
+            {"transmission_points": ((-30.0, 1900.0), (30.0, 400.0))},
+            "400|outside the servo's 500..2500 us",
+        ),
+        ({"transmission_points": (), "zero_step": 2400}, "outside the servo's 500..2500 us"),
     ],
 )
 def test_a_joint_beyond_its_servo_or_its_measuring_is_refused(

@@ -187,7 +187,9 @@ def test_the_head_goes_first_only_where_it_is_wanted(top_down: bool) -> None:
 
 
 def test_scattered_landings_are_corrected_by_small_saccades() -> None:
-    noisy = OculomotorParams(eye_lag_ms=5.0, landing_along=0.05, landing_across=0.02)
+    noisy = OculomotorParams(
+        eye_lag_ms=5.0, endpoint_scatter_along=0.05, endpoint_scatter_across=0.02
+    )
     after, misses = [], []
     for seed in range(12):
         trace = Rig(params=noisy, dice=seed).run(still(28.0), 0.8)
@@ -208,7 +210,7 @@ def test_scattered_landings_are_corrected_by_small_saccades() -> None:
 
 def test_scatter_without_dice_is_refused() -> None:
     with pytest.raises(ValueError, match="need dice"):
-        Rig(params=OculomotorParams(landing_along=0.04))
+        Rig(params=OculomotorParams(endpoint_scatter_along=0.04))
 
 
 def test_breathing_moves_the_head_and_not_the_gaze() -> None:
@@ -238,7 +240,7 @@ def test_the_head_faces_the_centre_while_the_gaze_wanders_over_parts() -> None:
 
 
 def test_e58_a_lost_target_is_followed_for_a_moment_and_then_no_more() -> None:
-    rig = Rig(params=OculomotorParams(eye_lag_ms=5.0, extrapolate_ms=100.0))
+    rig = Rig(params=OculomotorParams(eye_lag_ms=5.0, prediction_horizon_ms=100.0))
     v = radians(20.0)
 
     def where(t: float) -> Target:

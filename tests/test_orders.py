@@ -169,7 +169,7 @@ def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running) -> No
     assert not ticks[0].stopped and all(ticks[2].joints.torque)
     start = ticks[0].verdict.command_rad
     assert start == pytest.approx(before.joints.position_rad, abs=radians(0.5))
-    gentle = radians(load_rig("desk").guard.gentle_speed_deg_s)
+    gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
     for a, b in zip(ticks, ticks[1:100], strict=False):
         for old, new in zip(a.verdict.command_rad, b.verdict.command_rad, strict=True):
             assert abs(new - old) <= gentle * (b.t_s - a.t_s) * 1.01 + 1e-9
@@ -227,7 +227,7 @@ def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running
     assert all(
         abs(a - b) < 1e-3 for i, (a, b) in enumerate(zip(end, held, strict=True)) if i != YAW
     )
-    gentle = radians(load_rig("desk").guard.gentle_speed_deg_s)
+    gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
     steps = [
         abs(b.verdict.command_rad[YAW] - a.verdict.command_rad[YAW]) / (b.t_s - a.t_s)
         for a, b in zip(ticks, ticks[1:], strict=False)
@@ -328,7 +328,7 @@ def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None
     words = [event for tick in ticks for event in tick.events]
     assert "led by a show (process 7): jog neck_yaw 17.2" in words
     assert "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze leads again" in words
-    gentle = radians(load_rig("desk").guard.gentle_speed_deg_s)
+    gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
     yaw = [tick.verdict.command_rad[YAW] for tick in ticks]
     assert max(abs(b - a) for a, b in zip(yaw, yaw[1:], strict=False)) <= gentle * 0.005 * 1.01
 

@@ -607,8 +607,8 @@ def test_every_parameter_of_every_rig_becomes_a_control(
                     assert read(knob, texts[knob.key]) == value
                 control.remove()
     if name == "maker":
-        assert texts["joints.eyes_pan.linkage"].startswith("[[-32.0, 1068.0], [")
-        linkage = next(knob for knob in places if knob.key == "joints.eyes_pan.linkage")
+        assert texts["joints.eyes_pan.transmission_points"].startswith("[[-32.0, 1068.0], [")
+        linkage = next(knob for knob in places if knob.key == "joints.eyes_pan.transmission_points")
         assert "next start" in hint(linkage) and "default" not in hint(linkage)
     assert refused == []
 

@@ -35,7 +35,7 @@ def test_a_declaration_says_all_of_a_parameter() -> None:
         ("max_speed_deg_s", "deg/s"),
         ("park_s", "s"),
         ("follow_per_deg", "1/deg"),
-        ("evoked_steepness_1_deg", "1/deg"),
+        ("gaze_evoked_blink_steepness_1_deg", "1/deg"),
         ("baud", "bit/s"),
         ("strength", ""),
         ("class", ""),

@@ -43,7 +43,7 @@ def test_a_lid_ends_where_it_was_marked_and_its_keys_are_its_own() -> None:
     assert (made.min_deg, made.max_deg) == (-9.0, 20.0)
     wanted = changes("left_lower_lid", LID, made, {"left_lower_lid": -12.0})
     assert wanted == {
-        "joints.left_lower_lid.linkage": ((-9, 1600), (5, 1450), (20, 1250)),
+        "joints.left_lower_lid.transmission_points": ((-9, 1600), (5, 1450), (20, 1250)),
         "joints.left_lower_lid.min_deg": -9.0,
         "joints.left_lower_lid.max_deg": 20.0,
         "lid_joints.left_lower_shut_deg": -9.0,
@@ -87,7 +87,7 @@ def test_places_between_are_evenly_spread() -> None:
 
 def test_a_smart_servo_behind_a_push_rod_is_measured_in_steps() -> None:
     smart = JointParams(
-        1, "sts3215", -20.0, 20.0, 300.0, 20000.0, linkage=((-25, 1800), (25, 2300))
+        1, "sts3215", -20.0, 20.0, 300.0, 20000.0, transmission_points=((-25, 1800), (25, 2300))
     )
     made = places("eyes_pan", [(0.0, 2050.0), (22.0, 2300.0), (-21.0, 1790.0)], smart, 1.0)
     joint = replace(smart, **made._asdict())

@@ -180,10 +180,10 @@ def test_people_are_as_published() -> None:
 
 
 def test_the_rigs_own_walk_knows_its_floor() -> None:
-    walk, dice = load_walk(RIG.gaze.scanpath.walk), np.random.default_rng(0)
+    walk, dice = load_walk(RIG.gaze.scanpath.transition_matrix), np.random.default_rng(0)
     model = own(RIG.gaze.scanpath, walk)
     assert model is not None
-    assert model.visits(0, 300, dice).min() >= RIG.gaze.scanpath.shortest_dwell_ms / 1e3
+    assert model.visits(0, 300, dice).min() >= RIG.gaze.scanpath.min_dwell_ms / 1e3
 
 
 def fixed(parts: list[int], seconds: float = 0.3) -> Gathered:

@@ -53,7 +53,7 @@ def recorded(
     rig = load_rig("desk", character)
     info = RunInfo(
         rig="desk", profile=rig.profile, character=character, config_yaml=rig_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.walk), seed=5, rate_hz=rig.loop.rate_hz,
+        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=5, rate_hz=rig.loop.rate_hz,
         started_utc="2026-01-31T12:00:00+00:00", scene="visitor", mock=True, fast=True,
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)

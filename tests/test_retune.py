@@ -358,7 +358,7 @@ def test_a_tune_of_nothing_different_touches_nothing() -> None:
     quiet, tuned = started(), started()
     quiet.go(200)
     tuned.go(100)
-    same = {key: value_of(RIG, key) for key in ("gaze.lids.blinks_per_min", "guard.gentle_ms")}
+    same = {key: value_of(RIG, key) for key in ("gaze.lids.blinks_per_min", "guard.soft_start_ms")}
     tuned.made.robot.order(Tune(tuple(same.items())))
     tuned.go(100)
     assert tuned.goals == quiet.goals

@@ -88,7 +88,7 @@ def test_shipped_profiles_characters_and_walks_load() -> None:
         (r"rate_hz: 200.0", "rate_hz: 2000.0", "loop.rate_hz", "above 1000"),
         (r"interocular_mm", "interocular", "geometry", "interocular_mm"),
         (r"^    zero_step: 2048", "    zero_step: 20", "joints.left_eye_pan", "0..4095"),
-        (r"pull_most: 1.0", "pull_most: 0.1", "gaze.head", "above pull_least"),
+        (r"max_salience: 1.0", "max_salience: 0.1", "gaze.head", "above min_salience"),
     ],
 )
 def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_path: Path) -> None:
@@ -102,8 +102,8 @@ def test_all_faults_come_in_one_message(tmp_path: Path) -> None:
         (r"^    id: 9 ", "    id: 8 "),
         (r"rate_hz: 200.0", "rate_hz: -1.0"),
         (r"^name: desk", "naem: desk"),
-        (r"shortest_ms: 50.0", "shortest_ms: fast"),
+        (r"min_duration_ms: 50.0", "min_duration_ms: fast"),
     )
     text = "\n".join(faults)
-    for part in ("id 8 is already", "rate_hz", "naem", "missing", "shortest_ms"):
+    for part in ("id 8 is already", "rate_hz", "naem", "missing", "min_duration_ms"):
         assert part in text

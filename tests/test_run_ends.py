@@ -20,8 +20,8 @@ def rig_at(file: Path, rate_hz: float, give_up_s: float = 60.0) -> str:
     assert desk.index("give_up_s: 60.0") < desk.index("geometry:")
     assert desk.count("rate_hz: 200.0  # Hz, 20") == 1
     # A machine that does much else may keep answers waiting: that is no fault of a joint here.
-    assert desk.count("stale_joints_ms: 150.0") == 1
-    desk = desk.replace("stale_joints_ms: 150.0", "stale_joints_ms: 5000.0")
+    assert desk.count("joint_timeout_ms: 150.0") == 1
+    desk = desk.replace("joint_timeout_ms: 150.0", "joint_timeout_ms: 5000.0")
     desk = desk.replace("rate_hz: 200.0  # Hz, 20", f"rate_hz: {rate_hz}  # Hz, 20")
     file.write_text(desk.replace("give_up_s: 60.0", f"give_up_s: {give_up_s}", 1), encoding="utf-8")
     return str(file)

@@ -205,7 +205,9 @@ def test_a_stale_picture_holds_the_neck_and_not_the_eyes() -> None:
 
 
 def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish() -> None:
-    guard = Guard(GuardParams(gentle_speed_deg_s=60.0, gentle_accel_deg_s2=300.0), LIMITS, JOINTS)
+    guard = Guard(
+        GuardParams(soft_start_speed_deg_s=60.0, soft_start_accel_deg_s2=300.0), LIMITS, JOINTS
+    )
     guard.reset(0.0, (0.5,) * 9)
     path, t = [0.5], 0.0
     while guard.gentle and t < 3.0:

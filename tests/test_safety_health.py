@@ -23,7 +23,7 @@ class World:
     """Joints that are where their commands were one tick ago, and whose servos say things."""
 
     def __init__(self) -> None:
-        self.guard = Guard(GuardParams(gentle_ms=0.0), LIMITS, JOINTS)
+        self.guard = Guard(GuardParams(soft_start_ms=0.0), LIMITS, JOINTS)
         self.guard.reset(0.0, (0.0,) * 9)
         self.guard._gentle = [False] * 9
         self.t_s = 0.0

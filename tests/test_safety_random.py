@@ -49,7 +49,7 @@ class Trial:
     def __init__(self, limits: tuple[JointLimit, ...], boxes: tuple[CollisionParams, ...]) -> None:
         self.limits = np.array(limits)
         self.boxes = boxes
-        self.guard = Guard(GuardParams(collisions=boxes, gentle_ms=100.0), limits, JOINTS)
+        self.guard = Guard(GuardParams(collisions=boxes, soft_start_ms=100.0), limits, JOINTS)
         self.low, self.high = self.limits[:, 0], self.limits[:, 1]
         self.begin_p: list[Row] = []
         self.begin_v: list[Row] = []

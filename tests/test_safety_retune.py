@@ -17,7 +17,7 @@ from gazerig.robot.model.types import JointState
 from gazerig.robot.safety.guard import Guard
 
 DT_S = 0.005
-GENTLE = GuardParams(gentle_ms=50.0)
+GENTLE = GuardParams(soft_start_ms=50.0)
 BOX = CollisionParams("neck_pitch", -60.0, -30.0, "left_upper_lid", 40.0, 70.0)
 
 
@@ -75,7 +75,7 @@ def test_every_command_keeps_the_limits_in_force(seed: int) -> None:
         watched.wander(int(dice.integers(2, 40)))
         boxes = (BOX,) if dice.random() < 0.3 else ()
         try:
-            watched.guard.retune(GuardParams(gentle_ms=50.0, collisions=boxes), limits(dice))
+            watched.guard.retune(GuardParams(soft_start_ms=50.0, collisions=boxes), limits(dice))
         except ValueError:  # no pose is left
             continue
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
-from gazerig.robot.model.guard_params import GuardParams, StuckParams
+from gazerig.robot.model.guard_params import GuardParams, StallParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointState, Verdict
 from gazerig.robot.safety.guard import Guard
@@ -192,7 +192,7 @@ def test_a_stuck_joint_lets_the_others_move() -> None:
 
 
 def test_params_that_contradict_each_other_are_refused() -> None:
-    with pytest.raises(ValueError, match="retry_deg 3.0 must be above stuck_deg 3.0"):
-        StuckParams(retry_deg=3.0)
-    with pytest.raises(ValueError, match="moved_deg 3.0 must be below stuck_deg 3.0"):
-        StuckParams(moved_deg=3.0)
+    with pytest.raises(ValueError, match="retry_deg 3.0 must be above position_error_deg 3.0"):
+        StallParams(retry_deg=3.0)
+    with pytest.raises(ValueError, match="moved_deg 3.0 must be below position_error_deg 3.0"):
+        StallParams(moved_deg=3.0)

@@ -12,7 +12,7 @@ from gazerig.gaze.scanpath_models import MarkovWalk
 from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
-NO_FLOOR = ScanpathParams(shortest_dwell_ms=0.0)
+NO_FLOOR = ScanpathParams(min_dwell_ms=0.0)
 
 
 def walker(seed: int = 1, params: ScanpathParams = NO_FLOOR) -> Scanpath:
@@ -89,9 +89,9 @@ def test_floor_and_tempo() -> None:
     def walk(seed: int, params: ScanpathParams) -> MarkovWalk:
         return markov_walk(params, WALK, np.random.default_rng(seed))
 
-    floored = walk(4, ScanpathParams(shortest_dwell_ms=120.0))
+    floored = walk(4, ScanpathParams(min_dwell_ms=120.0))
     assert min(floored.dwell_s(2) for _ in range(2000)) == 0.12
-    slow = walk(5, ScanpathParams(shortest_dwell_ms=0.0, tempo=0.5))
+    slow = walk(5, ScanpathParams(min_dwell_ms=0.0, rate_scale=0.5))
     quick = walk(5, NO_FLOOR)
     assert slow.dwell_s(1) == pytest.approx(2.0 * quick.dwell_s(1))
 

@@ -5,14 +5,14 @@ import pytest
 
 from gazerig.config.load import load, shipped
 from gazerig.gaze.scanpath import Walk
-from gazerig.gaze.scanpath_dwell import dwell_law
+from gazerig.gaze.scanpath_dwell import dwell_distribution
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 TABLE_1 = list(zip(WALK.order, WALK.dwell_mean_s, WALK.dwell_sd_s, strict=True))
 
 
 def drawn(law: str, mean_s: float, sd_s: float, count: int = 50_000) -> np.ndarray:
-    draw, rng = dwell_law(law, mean_s, sd_s), np.random.default_rng(1)
+    draw, rng = dwell_distribution(law, mean_s, sd_s), np.random.default_rng(1)
     return np.array([draw(rng) for _ in range(count)])
 
 
@@ -74,4 +74,4 @@ def test_without_spread_every_law_gives_the_mean(law: str) -> None:
 
 def test_an_unknown_law_is_named() -> None:
     with pytest.raises(ValueError, match="no dwell law 'normal'; there are lognormal, gamma"):
-        dwell_law("normal", 0.2, 0.1)
+        dwell_distribution("normal", 0.2, 0.1)

@@ -13,9 +13,9 @@ from gazerig.gaze.types import PARTS
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 
 
-def walked(count: int, seed: int = 1, dwell_law: str = "gamma") -> list[Fixation]:
+def walked(count: int, seed: int = 1, dwell_distribution: str = "gamma") -> list[Fixation]:
     """Fixations of the known walk, 20 ms of flight between them."""
-    params = ScanpathParams(shortest_dwell_ms=0.0, dwell_law=dwell_law)
+    params = ScanpathParams(min_dwell_ms=0.0, dwell_distribution=dwell_distribution)
     walk = markov_walk(params, WALK, np.random.default_rng(seed))
     part, t_s, out = 5, 0.0, []
     for _ in range(count):

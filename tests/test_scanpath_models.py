@@ -70,7 +70,7 @@ def test_e41_simple_model() -> None:
 
 def test_e41_simple_model_waits_for_arrival_and_takes_another_order() -> None:
     params = ScanpathParams(
-        model="simple", simple_order=("LE", "M"), simple_dwell_ms=(100.0, 200.0), tempo=0.5
+        model="simple", simple_order=("LE", "M"), simple_dwell_ms=(100.0, 200.0), rate_scale=0.5
     )
     path = Scanpath(params, WALK, np.random.default_rng(1))
     for k in range(100):
@@ -185,7 +185,7 @@ def test_whole_visit_merges_refixations() -> None:
 
 def test_whole_visit_shares_of_steps_and_rate() -> None:
     # Stationary shares of the merged chain, and 5.66 shifts a second without travel or floor.
-    params = ScanpathParams(diagonal="whole_visit", shortest_dwell_ms=0.0)
+    params = ScanpathParams(diagonal="whole_visit", min_dwell_ms=0.0)
     walk = markov_walk(params, WALK, np.random.default_rng(8))
     parts = [0]
     for _ in range(50_000):
@@ -200,7 +200,7 @@ def test_whole_visit_shares_of_steps_and_rate() -> None:
 
 
 def test_refixations_give_a_human_rate_of_gaze_shifts() -> None:
-    looks = looks_of(ScanpathParams(shortest_dwell_ms=0.0), 450.0, 0.003)
+    looks = looks_of(ScanpathParams(min_dwell_ms=0.0), 450.0, 0.003)
     shifts = sum(a.shift != b.shift for a, b in zip(looks, looks[1:], strict=False)) / 450.0
     assert shifts == pytest.approx(3.68, abs=0.2)
 

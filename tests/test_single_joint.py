@@ -387,7 +387,9 @@ class Reader(Bench):
 
 
 def test_a_push_rod_on_a_smart_servo_is_measured_by_hand() -> None:
-    rod = replace(STS, min_deg=-20.0, max_deg=20.0, linkage=((-25.0, 1800.0), (25.0, 2400.0)))
+    rod = replace(
+        STS, min_deg=-20.0, max_deg=20.0, transmission_points=((-25.0, 1800.0), (25.0, 2400.0))
+    )
     bench = Reader(STS)
     single = SingleJoint("left_eye_pan", rod, bench.servo, bench.clock, lambda: None)
     bench.script = [0, 250, -490, 120, 240]

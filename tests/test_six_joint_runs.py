@@ -63,7 +63,7 @@ def recorded(path: Path, rig: Rig, seconds: float) -> Run:
     options = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
     info = RunInfo(
         "a rig", rig.profile, rig_text(rig), 5, rig.loop.rate_hz, STARTED,
-        walk_yaml=walk_text(rig.gaze.scanpath.walk), scene="visitor", mock=True, fast=True,
+        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="visitor", mock=True, fast=True,
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)
     recorder.open()

@@ -165,7 +165,7 @@ def test_the_neck_does_not_move_on_a_stale_picture(
 ) -> None:
     """From the guard's age on it stands, whatever search and rest wish."""
     rig, ticks = request.getfixturevalue(name)
-    blind_s = last_picture_s(ticks) + rig.guard.stale_picture_ms / 1e3
+    blind_s = last_picture_s(ticks) + rig.guard.frame_timeout_ms / 1e3
     blind = between(ticks, blind_s + 0.02, BACK_S)
     commands = {tick.verdict.command_rad[NECK] for tick in blind}
     assert len(commands) == 1

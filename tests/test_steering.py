@@ -136,4 +136,8 @@ def test_keys_steer_a_hobby_servo_at_the_terminal(tmp_path: Path) -> None:
         terminal.reads("at 1480 us: how many degrees")
         terminal.types(b"-7\n")
         terminal.reads("written into")
-    assert load_rig(str(rig)).joints["eyes_tilt"].linkage == ((-7, 1480), (0, 1530), (8, 1580))
+    assert load_rig(str(rig)).joints["eyes_tilt"].transmission_points == (
+        (-7, 1480),
+        (0, 1530),
+        (8, 1580),
+    )

@@ -44,7 +44,7 @@ def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]
     """Run a rig that hardly rests between glances around, with all of the head in each."""
     patch.setattr(assembling, "scenes", lambda: {room.name: room})
     rig = load_rig("desk")
-    idle = replace(rig.gaze.idle, rest_ms=400.0, glance_ms=500.0, rest_pull=1.0)
+    idle = replace(rig.gaze.idle, rest_ms=400.0, glance_ms=500.0, rest_salience=1.0)
     rig = replace(
         rig,
         loop=replace(rig.loop, rate_hz=100.0),

@@ -124,7 +124,7 @@ def test_joints_come_from_anywhere_slowly_at_start_and_at_resume(
         gentle += [list(bench.guard._gentle)] * (len(bench.shafts.angles_rad) - len(gentle))
     angles = np.degrees(np.array(bench.shafts.angles_rad))
     speed = np.abs(angles[5:] - angles[:-5]) / 0.005 * np.array(gentle)[5:]
-    most = GENTLE * rig.guard.gentle_speed_deg_s
+    most = GENTLE * rig.guard.soft_start_speed_deg_s
     assert dict(zip(rig.names, (speed.max(axis=0) <= most).tolist(), strict=True)) == dict.fromkeys(
         rig.names, True
     )
@@ -151,5 +151,7 @@ def test_a_maestros_pulse_outside_its_range_comes_inside_slowly(rigs: dict[str, 
         bench.tick(wish)
     seen = np.degrees(np.array(bench.shafts.angles_rad))[:, rig.names.index(name)]
     # A servo that hears a pulse every 20 ms goes in jumps; 100 ms tell its pace.
-    assert (np.abs(seen[100:] - seen[:-100]) / 0.1).max() <= GENTLE * rig.guard.gentle_speed_deg_s
+    assert (
+        np.abs(seen[100:] - seen[:-100]) / 0.1
+    ).max() <= GENTLE * rig.guard.soft_start_speed_deg_s
     assert seen[-1] < joint.max_deg - 10.0

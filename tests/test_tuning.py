@@ -74,12 +74,12 @@ def test_one_wrong_value_refuses_all_with_every_rule() -> None:
     bench = Bench("desk")
     with pytest.raises(ConfigError) as refused:
         bench.tuning.set(
-            {"gaze.lids.close_ms": 9e9, "gaze.lids.open_ms": 100.0, "guard.gentle_ms": -1.0}
+            {"gaze.lids.close_ms": 9e9, "gaze.lids.open_ms": 100.0, "guard.soft_start_ms": -1.0}
         )
     assert len(refused.value.faults) == 2 and not bench.orders
     assert bench.tuning.values()["gaze.lids.open_ms"] == 175.0
     with pytest.raises(ConfigError, match="no such file"):
-        bench.tuning.set({"gaze.scanpath.walk": "absent.yaml"})
+        bench.tuning.set({"gaze.scanpath.transition_matrix": "absent.yaml"})
     assert not bench.orders and bench.tuning.version == 0
 
 
@@ -256,16 +256,16 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
     bench.tuning.character("bold")
     bench.tuning.reload(mine)
     assert bench.made.live.rig.gaze.scanpath.model == "random"
-    bench.tuning.set({"gaze.aversion.shortest_s": 0.3})
+    bench.tuning.set({"gaze.aversion.min_dwell_s": 0.3})
     bench.tuning.save()
     assert load_rig(str(mine)).gaze.scanpath.model == "markov"
-    assert load_rig(str(mine)).gaze.aversion.shortest_s == 0.3
+    assert load_rig(str(mine)).gaze.aversion.min_dwell_s == 0.3
 
 
 def test_knobs_follow_what_entries_there_are() -> None:
     bench = Bench("desk")
     before = len(bench.tuning.knobs())
-    rule: dict[str, Any] = {"look_at": "hand", "pull": 1.0}
+    rule: dict[str, Any] = {"look_at": "hand", "salience": 1.0}
     bench.tuning.set({"gaze.top_down.rules.fetch": rule})
     assert len(bench.tuning.knobs()) == before + 3
     assert "fetch" in bench.made.robot.menus()["behaviour"]

@@ -248,7 +248,7 @@ class Bench:
         for name, angle in (where_rad or {}).items():
             self.turn(name, angle)
         self.body = Body(
-            rig_bus(rig, ports), rig.joints, park_rad(rig), rig.guard.gentle_speed_deg_s
+            rig_bus(rig, ports), rig.joints, park_rad(rig), rig.guard.soft_start_speed_deg_s
         )
         self.guard = Guard(
             rig.guard, limits(rig.joints), self.names, self.body.reach, 1.0 / rig.loop.rate_hz

@@ -197,5 +197,5 @@ def _report(
         f"widest interval of a transition: {max(widths):.2f},"
         f" usual: {sorted(widths)[len(widths) // 2]:.2f}"
     )
-    lines.append(f"written to {out}; use it as gaze.scanpath.walk of a rig")
+    lines.append(f"written to {out}; use it as gaze.scanpath.transition_matrix of a rig")
     return "\n".join(lines)

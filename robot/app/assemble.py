@@ -139,7 +139,7 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     clock: Clock = SimulatedClock() if options.fast else RealClock()
     kinematics = kinematics_of(rig)
     camera, notes = _camera_params(rig, options, kinematics)
-    walk = load_walk(rig.gaze.scanpath.walk)
+    walk = load_walk(rig.gaze.scanpath.transition_matrix)
     note = row_sums_note(walk)
     sight = _sight(kinematics, camera, options, scene is None)
     wires = run_bus(rig, options, clock)
@@ -237,7 +237,7 @@ def _components(
 
 
 def _body(rig: Rig, wires: RunBus) -> Body:
-    gentle_deg_s = rig.guard.gentle_speed_deg_s
+    gentle_deg_s = rig.guard.soft_start_speed_deg_s
     return Body(wires.bus, rig.joints, park_rad(rig), gentle_deg_s)
 
 

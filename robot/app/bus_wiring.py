@@ -64,7 +64,7 @@ def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
 
 def rig_setups(rig: Rig) -> tuple[ServoSetup, ...]:
     """Return what buses must know of a rig's servos, in the order of its joints."""
-    return setups(rig.joints, park_rad(rig), rig.guard.gentle_speed_deg_s)
+    return setups(rig.joints, park_rad(rig), rig.guard.soft_start_speed_deg_s)
 
 
 def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:

@@ -62,8 +62,8 @@ def _line(rig: Rig, name: str) -> Emulated:
 def _hobby(joint: JointParams, name: str) -> HobbySpec:
     low, high = _stops(joint)
     facts, spec = joint.facts, HobbySpec(joint.id)
-    if joint.servo_deg_s is not None:
-        spec = spec._replace(speed_steps_s=joint.servo_deg_s * facts.steps_per_turn / 360.0)
+    if joint.servo_speed_deg_s is not None:
+        spec = spec._replace(speed_steps_s=joint.servo_speed_deg_s * facts.steps_per_turn / 360.0)
     # The board's own range of the channel is set as wide as such servos go.
     return spec._replace(
         start_steps=_start(joint, name),

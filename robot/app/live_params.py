@@ -110,7 +110,7 @@ class LiveParams:
         self.parts = parts
         self._placed = placed
         self._started = rig
-        self._walk = load_walk(rig.gaze.scanpath.walk)
+        self._walk = load_walk(rig.gaze.scanpath.transition_matrix)
         self._ready: dict[int, _Ready] = {}
 
     @property
@@ -208,8 +208,8 @@ class LiveParams:
         if (new.joints, new.guard) == (old.joints, old.guard):
             return ()
         parts, joints, before = self.parts, self._lasting(new), self._lasting(old)
-        gentle_deg_s = new.guard.gentle_speed_deg_s
-        others = (joints, gentle_deg_s) != (before, old.guard.gentle_speed_deg_s)
+        gentle_deg_s = new.guard.soft_start_speed_deg_s
+        others = (joints, gentle_deg_s) != (before, old.guard.soft_start_speed_deg_s)
         if others:
             for i, (factor, offset_rad) in parts.body.retune(joints, gentle_deg_s).items():
                 parts.guard.recount(i, factor, offset_rad)
@@ -227,7 +227,7 @@ class LiveParams:
         }
 
 
-_OF_THE_SERVO = ("id", "model", "firmware_min", "bus", "linkage", "servo_deg_s")
+_OF_THE_SERVO = ("id", "model", "firmware_min", "bus", "transmission_points", "servo_speed_deg_s")
 """What of a joint stays as it was when the bus was opened."""
 
 
@@ -245,8 +245,8 @@ def _ready(order: Tune, base: Rig, rig: Rig) -> _Ready:
     Raises:
         gazerig.config.load.ConfigError: the walk that the rig names is at fault.
     """
-    name = rig.gaze.scanpath.walk
-    walk = load_walk(name) if name != base.gaze.scanpath.walk else None
+    name = rig.gaze.scanpath.transition_matrix
+    walk = load_walk(name) if name != base.gaze.scanpath.transition_matrix else None
     return _Ready(order.changes, base, rig, walk)
 
 

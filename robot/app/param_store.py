@@ -31,6 +31,7 @@ from gazerig.config.knobs import (
 )
 from gazerig.config.knobs import knobs as knobs_of
 from gazerig.config.load import ConfigError, Fault, shipped_names
+from gazerig.config.renamed import renamed_key
 from gazerig.config.rig_files import Layers, RigFiles, read_all, save_copy, save_over
 from gazerig.config.save import Change, Saved, rig_file
 from gazerig.config.save_text import Unchangeable, written
@@ -145,7 +146,7 @@ class Tuning:
         Raises:
             gazerig.config.load.ConfigError: there is none; the message says what is near.
         """
-        state = self._state
+        state, prefix = self._state, renamed_key(prefix)
         found = {key: value for key, value in state.values.items() if key.startswith(prefix)}
         return found or {prefix: value_of(state.rig, prefix)}
 

@@ -318,18 +318,20 @@ def _rig(
     if character is not None:
         found = load(_character(character), Rig, defaults=(whole,))
     scanpath = found.gaze.scanpath
-    same_walk = rig is None and scanpath.walk == base.gaze.scanpath.walk
+    same_walk = rig is None and scanpath.transition_matrix == base.gaze.scanpath.transition_matrix
     if not same_walk or not recording.info.walk_yaml:
         return found
     # The walk's own file may have changed since, or be on another machine.
     walk = str(_kept(recording.info.walk_yaml, folder / "walk.yaml"))
-    return replace(found, gaze=replace(found.gaze, scanpath=replace(scanpath, walk=walk)))
+    return replace(
+        found, gaze=replace(found.gaze, scanpath=replace(scanpath, transition_matrix=walk))
+    )
 
 
 def _read(recording: RunRecording, whole: Path) -> Rig:
     """Read the recorded configuration."""
     try:
-        return load(whole, Rig)
+        return load(whole, Rig, report=False)
     except ConfigError as error:
         first = error.faults[0]
         raise BadRecording(

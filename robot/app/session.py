@@ -68,7 +68,7 @@ def run_info(rig: Rig, options: RunOptions) -> RunInfo:
         profile=rig.profile,
         character=options.character,
         config_yaml=rig_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.walk),
+        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
         seed=options.seed,
         rate_hz=rig.loop.rate_hz,
         started_utc=datetime.now(UTC).isoformat(),

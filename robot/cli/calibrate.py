@@ -122,8 +122,12 @@ def _refuse_long_lists(rig: str, loaded: Rig, names: tuple[str, ...]) -> None:
     Raises:
         gazerig.config.load.ConfigError: a linkage is spread over several lines, which are kept.
     """
-    joints = [n for n in names if loaded.joints[n].linkage or not loaded.joints[n].facts.measured]
-    propose(rig_file(rig), {f"joints.{name}.linkage": ((0, 0),) for name in joints})
+    joints = [
+        n
+        for n in names
+        if loaded.joints[n].transmission_points or not loaded.joints[n].facts.measured
+    ]
+    propose(rig_file(rig), {f"joints.{name}.transmission_points": ((0, 0),) for name in joints})
 
 
 def _span(pulses: str) -> tuple[float, float]:

@@ -159,10 +159,10 @@ def _smart(bench: Bench, single: SingleJoint) -> Made:
     single.servo.check()
     if how.set_middle:
         _set_middle(single, person)
-    if single.joint.linkage:
+    if single.joint.transmission_points:
         if how.by is By.motion:
             raise CalibrationRefused(
-                f"{single.name}: its push rod has measured places (linkage), which motion cannot "
+                f"{single.name}: its push rod has measured places (transmission_points), which motion cannot "
                 "find: --by hand"
             )
         return by_places(HandPlacer(single, person), person, how.margin_deg, how.more)

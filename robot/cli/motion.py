@@ -197,7 +197,7 @@ def _control(
     body = Body(guarded_rig_bus(rig, wire.paths), rig.joints, park_rad(rig))
     period_s = 1.0 / JogParams().rate_hz
     guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=period_s)
-    gentle = rig.guard.gentle_speed_deg_s
+    gentle = rig.guard.soft_start_speed_deg_s
     if speed > gentle:
         say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
     params = JogParams(speed_deg_s=min(speed, gentle))

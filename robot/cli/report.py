@@ -169,7 +169,7 @@ def _simulated(
         ("scene", f"{options.scene}, simulated"),
         ("seed", str(options.seed)),
     )
-    walk = load_walk(rig.gaze.scanpath.walk)
+    walk = load_walk(rig.gaze.scanpath.transition_matrix)
     name = " ".join(filter(None, (options.scene, layers.character, layers.profile)))
     return _described(name, facts, rig, walk), gathering.gathered()
 
@@ -252,7 +252,7 @@ def _configured(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
         rig_file.write_text(config_yaml, encoding="utf-8")
         rig = load(rig_file, Rig, checks=RULES)
         if not walk_yaml:
-            return rig, load_walk(rig.gaze.scanpath.walk)
+            return rig, load_walk(rig.gaze.scanpath.transition_matrix)
         walk_file.write_text(walk_yaml, encoding="utf-8")
         return rig, load(walk_file, Walk)
 
@@ -274,7 +274,7 @@ def _described(
     )
     shown = (
         ("saccades", gaze.saccade.profile),
-        ("face scanpath", f"{gaze.scanpath.model}, walk {gaze.scanpath.walk}"),
+        ("face scanpath", f"{gaze.scanpath.model}, walk {gaze.scanpath.transition_matrix}"),
     )
     return About(name, (*facts, *shown), frozenset(styles), own(gaze.scanpath, walk))
 

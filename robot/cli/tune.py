@@ -94,7 +94,7 @@ def get(
     """Show the running rig's parameters: value, unit, default; * marks what is not saved."""
     with clear_errors(), RunningRig.connect(pid) as rig:
         values = rig.get(prefix)
-        found = [knob for knob in rig.knobs(prefix) if knob.key in values]
+        found = [knob for knob in rig.knobs() if knob.key in values]
         if differs:
             other = {change.key for change in rig.differs()}
             found = [knob for knob in found if knob.key in other]

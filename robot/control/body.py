@@ -187,11 +187,11 @@ class Body:
 
 def _counts_alike(one: JointParams, other: JointParams) -> bool:
     """Return whether both make the same angle of the same step."""
-    return (one.sign, one.ratio, one.zero, one.linkage) == (
+    return (one.sign, one.ratio, one.zero, one.transmission_points) == (
         other.sign,
         other.ratio,
         other.zero,
-        other.linkage,
+        other.transmission_points,
     )
 
 

@@ -33,16 +33,16 @@ class HealthParams:
 
 
 @dataclass(frozen=True)
-class StuckParams:
+class StallParams:
     """When a joint counts as stuck, and how it tries again."""
 
     # fmt: off
-    stuck_deg: Annotated[float, Bounds(0.5, 45),
+    position_error_deg: Annotated[float, Bounds(0.5, 45),
         "a joint this far from its command ought to be moving; more than friction and weight leave"] = 3.0
     moved_deg: Annotated[float, Bounds(0.1, 10), "a way towards the command that counts as moving"] = 0.5
     # Dead time of a healthy servo is some 30 ms; with an answer's age and one tick more the
     # joint is found within 200 ms.
-    stuck_ms: Annotated[float, Bounds(50, 5000), "a joint that has not moved for so long is stuck: it stops pushing"] = 150.0
+    detection_ms: Annotated[float, Bounds(50, 5000), "a joint that has not moved for so long is stuck: it stops pushing"] = 150.0
     retry_ms: Annotated[float, Bounds(100, 60000), "a stuck joint tries again, slowly, after so long"] = 1000.0
     retry_deg: Annotated[float, Bounds(0.5, 45), "then the command is never farther ahead of the joint, so it pushes weakly"] = 4.5
     # fmt: on
@@ -53,10 +53,14 @@ class StuckParams:
         Raises:
             ValueError: it could not; the message says what would do.
         """
-        if self.retry_deg <= self.stuck_deg:
-            raise ValueError(f"retry_deg {self.retry_deg} must be above stuck_deg {self.stuck_deg}")
-        if self.moved_deg >= self.stuck_deg:
-            raise ValueError(f"moved_deg {self.moved_deg} must be below stuck_deg {self.stuck_deg}")
+        if self.retry_deg <= self.position_error_deg:
+            raise ValueError(
+                f"retry_deg {self.retry_deg} must be above position_error_deg {self.position_error_deg}"
+            )
+        if self.moved_deg >= self.position_error_deg:
+            raise ValueError(
+                f"moved_deg {self.moved_deg} must be below position_error_deg {self.position_error_deg}"
+            )
 
 
 @dataclass(frozen=True)
@@ -64,15 +68,15 @@ class GuardParams:
     """Ages beyond which nothing moves, slow passages, and what the servos bear."""
 
     # fmt: off
-    stale_joints_ms: Annotated[float, Bounds(5, 5000), "a joint whose last answer is older holds still"] = 150.0
-    stale_picture_ms: Annotated[float, Bounds(50, 60000), "the neck holds still when the last picture is older"] = 1500.0
-    gentle_ms: Annotated[float, Bounds(0, 60000), "shortest time of slow motion after torque-on"] = 1000.0
-    gentle_speed_deg_s: Annotated[float, Bounds(1, 500), "speed after torque-on and while parking"] = 60.0
-    gentle_accel_deg_s2: Annotated[float, Bounds(1, 50000), "acceleration after torque-on and while parking"] = 300.0
+    joint_timeout_ms: Annotated[float, Bounds(5, 5000), "a joint whose last answer is older holds still"] = 150.0
+    frame_timeout_ms: Annotated[float, Bounds(50, 60000), "the neck holds still when the last picture is older"] = 1500.0
+    soft_start_ms: Annotated[float, Bounds(0, 60000), "shortest time of slow motion after torque-on"] = 1000.0
+    soft_start_speed_deg_s: Annotated[float, Bounds(1, 500), "speed after torque-on and while parking"] = 60.0
+    soft_start_accel_deg_s2: Annotated[float, Bounds(1, 50000), "acceleration after torque-on and while parking"] = 300.0
     late_ms: Annotated[float, Bounds(0, 5000), "joints gather speed softly for so long after a tick that missed its slot"] = 50.0
     late_accel_deg_s2: Annotated[float, Bounds(10, 200_000), "most acceleration while they do; servos brake when no goals come"] = 15000.0
     health: Annotated[HealthParams, "what the servos bear"] = field(default_factory=HealthParams)
-    stuck: Annotated[StuckParams, "joints that are told to move and do not"] = field(default_factory=StuckParams)
+    stall: Annotated[StallParams, "joints that are told to move and do not"] = field(default_factory=StallParams)
     collision_margin_deg: Annotated[float, Bounds(0.1, 20), "distance kept from collisions; servos round and lag"] = 1.0
     collisions: Annotated[tuple[CollisionParams, ...], "pairs of joint ranges that may not be taken together"] = ()
     # fmt: on

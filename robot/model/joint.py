@@ -27,14 +27,14 @@ class JointParams:
     ratio: Annotated[float, Bounds(0.05, 50), "turns of the servo for one turn of the joint"] = 1.0
     zero_step: Annotated[int | None, Bounds(0, 4095), Unit("steps or us"),
         "servo position at 0 deg, the pulse width in us of a hobby servo; null: the middle, 2048 or 1500"] = None
-    linkage: Annotated[tuple[tuple[float, float], ...], Bounds(-180, 4095), Unit("deg, steps or us"),
+    transmission_points: Annotated[tuple[tuple[float, float], ...], Bounds(-180, 4095), Unit("deg, steps or us"),
         "measured places of a push rod, each [joint angle, servo position]; they take the place of sign, ratio and zero_step"] = ()
     bus: Annotated[str, "name of its bus under buses; empty: the one under bus"] = ""
-    servo_deg_s: Annotated[float | None, Bounds(10, 5000),
+    servo_speed_deg_s: Annotated[float | None, Bounds(10, 5000),
         "how fast a hobby servo turns its own shaft (0.12 s for 60 deg is 500): its place is reckoned with it, as it tells none; "
         "null: as fast as max_speed_deg_s"] = None
     gains: Annotated[tuple[int, int, int] | None, Bounds(0, 16383), "the servo's Position P, I and D Gain; null: left as they are"] = None
-    strength: Annotated[float | None, Bounds(0.05, 1),
+    torque_limit: Annotated[float | None, Bounds(0.05, 1),
         "share of its full drive that the servo may use (PWM Limit), which bounds force and top speed alike; null: left as it is"] = None
     firmware_min: Annotated[int, Bounds(0, 255), "oldest servo firmware that will do"] = 0
     # fmt: on
@@ -61,8 +61,8 @@ class JointParams:
         if facts is None:
             return
         linkage = self.made()
-        if self.linkage:
-            least, most = self.linkage[0][0], self.linkage[-1][0]
+        if self.transmission_points:
+            least, most = self.transmission_points[0][0], self.transmission_points[-1][0]
             if not least <= self.min_deg < self.max_deg <= most:
                 raise ValueError(
                     f"its linkage was measured from {least:g} to {most:g} deg: min_deg "
@@ -100,8 +100,8 @@ class JointParams:
             ValueError: the linkage cannot be.
         """
         facts = self.facts
-        if self.linkage:
-            angles, places = zip(*self.linkage, strict=True)
+        if self.transmission_points:
+            angles, places = zip(*self.transmission_points, strict=True)
             return Curve([radians(a) for a in angles], [facts.unit_steps * p for p in places])
         slope = self.sign * self.ratio * facts.steps_per_turn / (2.0 * pi)
         return Straight(facts.unit_steps * self.zero, slope)
@@ -138,7 +138,7 @@ class JointParams:
         """
         linkage, facts = self.made(), self.facts
         ends = sorted(linkage.steps(radians(end)) for end in (self.min_deg, self.max_deg))
-        own = self.servo_deg_s
+        own = self.servo_speed_deg_s
         return ServoSetup(
             self.id,
             self.model,
@@ -148,7 +148,7 @@ class JointParams:
             name,
             self.firmware_min,
             self.gains,
-            self.strength,
+            self.torque_limit,
             radians(self.max_accel_deg_s2) * linkage.steepest,
             None if rest_rad is None or facts.measured else round(linkage.steps(rest_rad)),
             None if own is None else own * facts.steps_per_turn / 360.0,

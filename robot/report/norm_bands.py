@@ -49,7 +49,7 @@ _LITERAL = (
 )
 _FLOOR = (
     "scanpath markov",
-    "the model holds no look shorter than its floor (gaze.scanpath.shortest_dwell_ms), which "
+    "the model holds no look shorter than its floor (gaze.scanpath.min_dwell_ms), which "
     "lengthens the shortest ones of table 1",
 )
 _NO_WALK = (

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gazerig.gaze.scanpath import ScanpathParams, Walk, normalised, without_refixations
-from gazerig.gaze.scanpath_dwell import dwell_law
+from gazerig.gaze.scanpath_dwell import dwell_distribution
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
 
@@ -30,7 +30,7 @@ class ModelWalk:
         """
         self._steps = steps
         statistics = zip(dwell_mean_s, dwell_sd_s, strict=True)
-        self._laws = [dwell_law(law, mean, sd) for mean, sd in statistics]
+        self._laws = [dwell_distribution(law, mean, sd) for mean, sd in statistics]
         self._tempo, self._floor_s = tempo, floor_s
 
     def visits(self, part: int, count: int, rng: np.random.Generator) -> Floats:
@@ -64,9 +64,9 @@ def own(params: ScanpathParams, walk: Walk) -> ModelWalk | None:
         steps[np.ix_(order, order)],
         [walk.dwell_mean_s[i] for i in order],
         [walk.dwell_sd_s[i] for i in order],
-        params.dwell_law,
-        params.tempo,
-        params.shortest_dwell_ms / 1e3,
+        params.dwell_distribution,
+        params.rate_scale,
+        params.min_dwell_ms / 1e3,
     )
 
 

@@ -69,7 +69,7 @@ class Guard:
         self._waiting: set[int] = set()
         self._outside: set[int] = set()
         self._health = Health(params.health, limits)
-        self._stuck = Stuck(params.stuck, len(limits))
+        self._stuck = Stuck(params.stall, len(limits))
         self._collisions = Collisions(
             params.collisions, params.collision_margin_deg, limits, joints
         )
@@ -77,8 +77,8 @@ class Guard:
 
     def _take(self, params: GuardParams) -> None:
         self._params = params
-        self._gentle_speed = radians(params.gentle_speed_deg_s)
-        self._gentle_accel = radians(params.gentle_accel_deg_s2)
+        self._gentle_speed = radians(params.soft_start_speed_deg_s)
+        self._gentle_accel = radians(params.soft_start_accel_deg_s2)
         self._late_accel = radians(params.late_accel_deg_s2)
 
     def pace(self, period_s: float) -> None:
@@ -99,7 +99,7 @@ class Guard:
         self._collisions = collisions
         self._take(params)
         self._health.retune(params.health)
-        self._stuck.retune(params.stuck)
+        self._stuck.retune(params.stall)
         self._wanted = limits
         self._waiting = {
             i for i, limit in enumerate(self._within_reach()) if limit != self._limits[i]
@@ -186,7 +186,7 @@ class Guard:
     def go_gently(self) -> None:
         """Move slowly for a while, and each joint until it has once met its wish."""
         self._gentle = [True] * len(self._limits)
-        self._gentle_until_s = [self._t_s + self._params.gentle_ms / 1e3] * len(self._limits)
+        self._gentle_until_s = [self._t_s + self._params.soft_start_ms / 1e3] * len(self._limits)
 
     @property
     def limits(self) -> tuple[JointLimit, ...]:
@@ -221,8 +221,8 @@ class Guard:
         self._health.step(joints, dt_s)
         if self._collisions:
             self._collisions.look(self._motion, wish_rad, joints.position_rad, self._held)
-        stale_s = t_s - self._params.stale_joints_ms / 1e3
-        blind = not picture_age_s <= self._params.stale_picture_ms / 1e3
+        stale_s = t_s - self._params.joint_timeout_ms / 1e3
+        blind = not picture_age_s <= self._params.frame_timeout_ms / 1e3
         usual = self._all_well(joints)
         far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
         columns = zip(wish_rad, joints.position_rad, joints.measured_s, strict=True)
@@ -307,7 +307,7 @@ class Guard:
     def _slow_down(self, i: int) -> None:
         """Let one joint go on slowly, as after torque-on."""
         self._gentle[i] = True
-        self._gentle_until_s[i] = self._t_s + self._params.gentle_ms / 1e3
+        self._gentle_until_s[i] = self._t_s + self._params.soft_start_ms / 1e3
 
     def _pass(
         self, i: int, wish: float, joints: JointState, fresh: bool, unseen: bool, dt_s: float

@@ -6,7 +6,7 @@ pushed: the command comes back to where the joint is, waits, and tries again sof
 
 from math import nan, radians
 
-from gazerig.robot.model.guard_params import StuckParams
+from gazerig.robot.model.guard_params import StallParams
 
 
 class Stuck:
@@ -17,7 +17,7 @@ class Stuck:
     watched: side of the joint on which its command is far away, 0 where it is near
     """
 
-    def __init__(self, params: StuckParams, count: int) -> None:
+    def __init__(self, params: StallParams, count: int) -> None:
         """Find all joints well."""
         self.retune(params)
         self.watched = [0] * count
@@ -25,12 +25,12 @@ class Stuck:
         self._anchor_rad = [0.0] * count
         self._until_s = [nan] * count
 
-    def retune(self, params: StuckParams) -> None:
+    def retune(self, params: StallParams) -> None:
         """Watch otherwise; joints that wait to try again still do."""
-        self._stuck_s = params.stuck_ms / 1e3
+        self._stuck_s = params.detection_ms / 1e3
         self._retry_s = params.retry_ms / 1e3
         self._moved_rad = radians(params.moved_deg)
-        self.far_rad = radians(params.stuck_deg)
+        self.far_rad = radians(params.position_error_deg)
         self.lead_rad = radians(params.retry_deg)
 
     def forget(self, i: int) -> None:

@@ -37,7 +37,7 @@ def recorder(path: Path, fast: bool) -> Recorder:
     rig = load_rig("desk")
     info = RunInfo(
         "desk", rig.profile, rig_text(rig), 0, rig.loop.rate_hz, "2026-01-31T00:00:00+00:00",
-        walk_yaml=walk_text(rig.gaze.scanpath.walk), scene="visitor", mock=True, fast=fast,
+        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="visitor", mock=True, fast=fast,
         versions=versions(),
     )  # fmt: skip
     return Recorder(path, info, patient=fast)
