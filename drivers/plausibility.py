@@ -8,6 +8,7 @@ is believed then.
 """
 
 from collections.abc import Sequence
+from operator import sub
 
 SLACK_STEPS = 64
 """So far apart two answers may be whatever the time between them: play, and jitter."""
@@ -39,6 +40,7 @@ class Plausibility:
         self._fastest = tuple(fastest_steps_s)
         self._pace = tuple(MARGIN * speed for speed in fastest_steps_s)
         self._free = tuple(SLACK_STEPS + LATE_S * pace for pace in self._pace)
+        self._nearest = min(self._free, default=0.0)
         self._damaged_s = float("-inf")
         self.forget()
 
@@ -62,9 +64,11 @@ class Plausibility:
         # Every tick: where all were last heard together there is one time for all of them.
         if not since_s >= 0.0 or None in last:
             return False
-        for now, before, free, pace in zip(positions, last, self._free, self._pace, strict=True):
-            if not -free - pace * since_s <= now - before <= free + pace * since_s:  # type: ignore[operator]
-                return False
+        ways = tuple(map(sub, positions, last))
+        if not -self._nearest <= min(ways) <= max(ways) <= self._nearest:
+            for way, free, pace in zip(ways, self._free, self._pace, strict=True):
+                if not -free - pace * since_s <= way <= free + pace * since_s:
+                    return False
         self._last[:] = positions
         self._whole_s = at_s
         self._at_s[:] = [at_s] * len(last)

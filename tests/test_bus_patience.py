@@ -1,5 +1,6 @@
 """Patience, views in turn, back-off, health and names: the driver's small parts."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,7 +13,12 @@ from gazerig.drivers.dynamixel.read_windows import (
 )
 from gazerig.drivers.event_log import MOST, EventLog, register_label
 from gazerig.drivers.serial.reopening import Reconnect
-from gazerig.drivers.servo_bus.adaptive_timeout import WINDOW, Patience
+from gazerig.drivers.servo_bus.adaptive_timeout import (
+    REFILL,
+    RESERVE_S,
+    WINDOW,
+    AdaptiveTimeout,
+)
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, Health
 from gazerig.drivers.servo_bus.window_schedule import CALM_S
 from gazerig.drivers.servo_models import servo_label
@@ -20,34 +26,72 @@ from gazerig.drivers.types import ServoSetup
 
 
 def test_patience_begins_long_and_becomes_twice_the_worst_delay():
-    patience = Patience(0.001, 0.02)
-    assert patience.seconds == 0.02
+    timeout = AdaptiveTimeout(0.001, 0.02)
+    assert timeout.seconds == 0.02
     for _ in range(WINDOW):
-        patience.note(0.002)
-    assert patience.seconds == 0.004
+        timeout.note(0.002)
+    assert timeout.seconds == 0.004
     for _ in range(3 * WINDOW):
-        patience.note(0.0001)
-    assert patience.seconds == 0.001
+        timeout.note(0.0001)
+    assert timeout.seconds == 0.001
     for expected in (0.001, 0.001, 0.006, 0.006):
-        patience.note(0.003)
-        assert patience.seconds == expected
+        timeout.note(0.003)
+        assert timeout.seconds == expected
 
 
 def test_answers_after_the_end_lengthen_patience():
-    patience = Patience(0.001, 0.02)
+    timeout = AdaptiveTimeout(0.001, 0.02)
     for _ in range(2 * WINDOW):
-        patience.note(0.0)
+        timeout.note(0.0)
     for expected in (0.001, 0.001, 0.002, 0.002, 0.002, 0.004):
-        patience.missed()
-        assert patience.seconds == expected or expected == 0.004
+        timeout.missed()
+        assert timeout.seconds == expected or expected == 0.004
 
 
 @given(st.lists(st.floats(-1.0, 10.0), max_size=600))
 def test_patience_keeps_to_its_bounds(delays):
-    patience = Patience(0.001, 0.02)
+    timeout = AdaptiveTimeout(0.001, 0.02)
     for late_s in delays:
-        patience.note(late_s)
-        assert 0.001 <= patience.seconds <= 0.02
+        timeout.note(late_s)
+        assert 0.001 <= timeout.seconds <= 0.02
+
+
+def settled(least_s=0.001, most_s=0.02):
+    """A time-out of a bus that answers at once."""
+    timeout = AdaptiveTimeout(least_s, most_s)
+    for _ in range(2 * WINDOW):
+        timeout.note(0.0)
+    return timeout
+
+
+def test_the_reserve_covers_a_pause_and_a_success_costs_nothing_of_it():
+    timeout = settled()
+    assert timeout.with_reserve(5.0) == pytest.approx(0.001 + RESERVE_S)
+    timeout.note(0.009)
+    assert timeout.seconds == 0.001
+    assert timeout.with_reserve(5.0) == pytest.approx(0.001 + RESERVE_S)
+
+
+def test_waiting_in_vain_costs_one_hundredth_of_the_time_at_most():
+    timeout = settled()
+    now_s, waited_s = 100.0, 0.0
+    for _ in range(20_000):
+        now_s += 0.005
+        beyond_s = timeout.with_reserve(now_s) - timeout.seconds
+        now_s += beyond_s
+        waited_s += beyond_s
+        timeout.waited_in_vain(beyond_s, now_s)
+    assert waited_s <= RESERVE_S + 1.02 * REFILL * (now_s - 100.0)
+    # Half a second later there is some of it again, and after a while all.
+    assert timeout.with_reserve(now_s + 0.5) == pytest.approx(0.001 + 0.5 * REFILL, rel=0.05)
+    assert timeout.with_reserve(now_s + 5.0) == pytest.approx(0.001 + RESERVE_S)
+
+
+def test_a_reserve_never_goes_beyond_the_longest_time_out():
+    timeout = AdaptiveTimeout(0.02, 0.02)
+    assert timeout.with_reserve(1.0) == 0.02
+    timeout.waited_in_vain(-0.01, 1.0)
+    assert timeout.with_reserve(1.0) == 0.02
 
 
 def test_no_two_views_that_may_follow_each_other_have_the_same_length():

@@ -125,9 +125,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     # --- what the driver's control loop uses
 
-    def now_s(self) -> float:
-        """Return host monotonic seconds."""
-        return time.monotonic()
+    now_s = staticmethod(time.monotonic)
+    """Host monotonic seconds."""
 
     def write(self, data: bytes) -> None:
         """Send bytes; waits at most 50 ms for room in the adapter's buffer.
@@ -165,7 +164,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
                 left_s = deadline_s - time.monotonic()
                 if not select.select(self._fds, (), (), left_s if left_s > 0.0 else 0.0)[0]:
                     break
-                got += self._take(length - len(got))
+                more = self._take(length - len(got))
+                got = got + more if got else more
                 if len(got) >= length:
                     return got
         except (OSError, ValueError) as error:

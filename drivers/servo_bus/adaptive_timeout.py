@@ -2,10 +2,16 @@
 
 A bus without a USB adapter answers within microseconds, an adapter with a latency timer
 of 1 ms within about two, one left at 16 ms within 16. None says which it is, so it is
-measured: twice the worst delay of late but for a few, within bounds. The few are those of
-a host that was busy elsewhere, which says nothing about the bus. A false alarm costs one
-servo one value, and what arrives after it counts as a delay.
+measured: the prompt time-out is twice the worst delay of late but for a few, within bounds.
+
+Those few are delays of a host that was busy elsewhere for a moment, which says nothing
+about the bus. No time-out that is prompt can cover them, so there is a reserve beyond it: it
+is spent only by waiting in vain, and fills up again with one hundredth of the time that
+passes. So a computer that pauses now and then costs no value, and servos that keep silent
+cost one hundredth of the time, whatever they do, beyond their prompt time-outs.
 """
+
+from math import inf
 
 WINDOW = 128
 """The worst of so many answers count, for as many more."""
@@ -15,11 +21,20 @@ RANK = 3
 
 FACTOR = 2.0
 
+RESERVE_S = 0.01
+"""A full reserve: a pause of the host as long as this costs nothing."""
 
-class Patience:
+REFILL = 0.01
+"""Share of the time that goes into the reserve."""
+
+
+class AdaptiveTimeout:
     """Learns from every whole answer how late answers are.
 
-    seconds: the patience now; begins at its longest
+    Args:
+        least_s, most_s: bounds of the prompt time-out, and of it with the reserve.
+
+    seconds: the prompt time-out now; begins at its longest
     """
 
     def __init__(self, least_s: float, most_s: float) -> None:
@@ -29,9 +44,21 @@ class Patience:
         self._before_s = 0.0
         self._worst_s = [0.0] * RANK
         self._count = 0
+        self._empty_s = -inf
+
+    def with_reserve(self, now_s: float) -> float:
+        """Return the time-out with all of the reserve."""
+        reserve_s = REFILL * (now_s - self._empty_s)
+        return min(self._most_s, self.seconds + min(RESERVE_S, reserve_s))
+
+    def waited_in_vain(self, beyond_s: float, now_s: float) -> None:
+        """Take from the reserve what was waited beyond the prompt time-out."""
+        if beyond_s > 0.0:
+            left_s = min(RESERVE_S, REFILL * (now_s - self._empty_s)) - beyond_s
+            self._empty_s = now_s - max(0.0, left_s) / REFILL
 
     def note(self, late_s: float) -> None:
-        """Note by how much an answer came later than its bytes take."""
+        """Record by how much an answer came later than its bytes take."""
         worst_s = self._worst_s
         if late_s > worst_s[0]:
             worst_s[0] = late_s
@@ -43,7 +70,7 @@ class Patience:
             self._turn()
 
     def missed(self) -> None:
-        """Note that an answer came after waiting had ended."""
+        """Record that an answer came after waiting had ended."""
         self.note(self.seconds)
 
     def _turn(self) -> None:

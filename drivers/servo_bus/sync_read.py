@@ -166,7 +166,7 @@ class Reader(Generic[View, Sample]):
         raw = self._line.complete(raw, group.missing, self._line.deadline_s)
         samples = group.pieces(raw).samples
         if len(samples) < len(group.ids) and not self._line.quiet:
-            self._line.drain(self._line.patience.seconds)
+            self._line.drain(self._line.timeout.seconds)
         return {servo_id: Heard(sample, at_s) for servo_id, sample in samples.items()}
 
     def _with_care(self, now_s: float) -> dict[int, Heard[Sample]]:
@@ -189,7 +189,9 @@ class Reader(Generic[View, Sample]):
         if not ids:
             return
         group = self._group(ids, turns)
-        raw, at_s = self._line.exchange(group.request, group.reply_length)
+        # Who has been silent already is not worth the reserve.
+        reserve = turns is self._together
+        raw, at_s = self._line.exchange(group.request, group.reply_length, reserve)
         # The whole read has one time limit, that of its first exchange at its most patient.
         self._until_s = min(self._until_s, self._line.whole_s + self._line.most_s)
         self._save(group, raw, at_s, heard, now_s, turns)
@@ -250,5 +252,5 @@ class Reader(Generic[View, Sample]):
             line.errors["timeout"] += 1
             roll.silent(servo_id, now_s)
         turns.trouble(now_s)
-        if not line.quiet and line.drain(line.patience.seconds):
-            line.patience.missed()
+        if not line.quiet and line.drain(line.timeout.seconds):
+            line.timeout.missed()

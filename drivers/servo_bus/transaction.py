@@ -6,7 +6,7 @@ from math import inf
 
 from gazerig.drivers.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
-from gazerig.drivers.servo_bus.adaptive_timeout import Patience
+from gazerig.drivers.servo_bus.adaptive_timeout import AdaptiveTimeout
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.poll_list import silent_ones
 
@@ -17,7 +17,7 @@ _BACKLOG_S = 0.05
 
 
 class Line:
-    """A port with the patience of one bus; every method may raise BusLost.
+    """A port with the time-outs of one bus; every method may raise BusLost.
 
     What is asked and written here goes through sync read and sync write even for a single
     servo: an echo of such a question cannot be taken for its answer.
@@ -25,7 +25,7 @@ class Line:
     family: the make of the servos
     tx_bytes, rx_bytes: counts since it was made
     errors: counts by kind
-    patience: that of the cyclic exchange; all others have the longest
+    timeout: that of the cyclic exchange; all others have the longest
     tries: how often a servo is asked outside the cyclic exchange; in the loop, once
     starving_s: silence after which a servo's own watchdog trips; inf where none is armed
     starved: such a silence has happened
@@ -33,7 +33,7 @@ class Line:
     lateness: answers that came after waiting had ended
     quiet: nothing came any more when the last exchange was given up
     whole_s: when the last exchange's answer was due as far as the wire goes
-    deadline_s: end of the last exchange's patience
+    deadline_s: end of the last exchange's time-out
     """
 
     def __init__(
@@ -49,14 +49,14 @@ class Line:
         self._names = names or {}
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
-        self.patience = Patience(least_s, most_s)
+        self.timeout = AdaptiveTimeout(least_s, most_s)
         self.most_s = most_s
         self.tries = TRIES
         self.starving_s = inf
         self.starved = False
         self.asleep_s = 0.0
         self.lateness = HostLateness()
-        self._unheard = self._owed = False
+        self._unheard = self._owed = self._clean = False
         self.quiet = True
         self.whole_s = self.deadline_s = 0.0
         self.baud, self._byte_s = baud, BITS_PER_BYTE / baud
@@ -69,10 +69,11 @@ class Line:
 
     def send(self, packet: bytes) -> None:
         """Send a packet."""
-        now_s = self.port.now_s()
-        self.port.write(packet)
+        port = self.port
+        now_s = port.now_s()
+        port.write(packet)
         # Up to after the write: the host may have been asleep just before the bytes left.
-        silent_s = self.port.now_s() - self._sent_s
+        silent_s = port.now_s() - self._sent_s
         if silent_s >= self.starving_s:
             self.starved = True
             self.asleep_s = max(self.asleep_s, silent_s)
@@ -84,39 +85,52 @@ class Line:
         self._free_s = free_s + len(packet) * self._byte_s
         self.tx_bytes += len(packet)
 
-    def exchange(self, request: bytes, length: int) -> tuple[bytes, float]:
+    def exchange(self, request: bytes, length: int, reserve: bool = True) -> tuple[bytes, float]:
         """Send a request, wait for ``length`` bytes; gives what came, and when.
 
-        The wait ends as the patience does, beyond the time the bytes take on the wire.
+        The wait ends as the time-out does, beyond the time the bytes take on the wire.
+
+        Args:
+            request: the packet.
+            length: bytes of a whole answer.
+            reserve: wait for as long as the time-out's reserve goes; else only promptly.
         """
-        port = self.port
-        # What is here before the question cannot be its answer: it is that of an earlier one.
-        waited = self._owed and bool(port.getBytesAvailable())
-        if waited:
-            self._note_late(port.read_until(_ROOM, port.now_s()))
-        port.clearPort()
+        port, timeout = self.port, self.timeout
+        waited = False
+        if not self._clean:
+            # What is here before the question cannot be its answer: it is that of an earlier one.
+            # After a whole answer nothing is: what came beside it makes the next one not whole.
+            waited = self._owed and bool(port.getBytesAvailable())
+            if waited:
+                self._note_late(port.read_until(_ROOM, port.now_s()))
+            port.clearPort()
         self.send(request)
         self.quiet = False
-        whole_s = self._free_s + length * self._byte_s
-        half_s = 0.5 * self.patience.seconds
-        raw = port.read_until(length, whole_s + half_s)
+        self.whole_s = whole_s = self._free_s + length * self._byte_s
+        prompt_s = timeout.seconds
+        wait_s = timeout.with_reserve(self._sent_s) if reserve else prompt_s
+        self.deadline_s = whole_s + wait_s
+        raw = port.read_until(length, self.deadline_s - 0.5 * prompt_s)
         if len(raw) < length:
-            # The second half shows whether the line has fallen silent.
-            more = port.read_until(length - len(raw), whole_s + 2.0 * half_s)
+            # The rest of the time-out shows whether the line has fallen silent.
+            more = port.read_until(length - len(raw), self.deadline_s)
             self.quiet = not more
             raw += more
         at_s = port.now_s()
-        self.whole_s, self.deadline_s = whole_s, whole_s + 2.0 * half_s
         self.rx_bytes += len(raw)
         # The first that is heard after a silence may be owed, too: more of that may follow.
         self._owed = not raw or (self._owed and (self._unheard or waited))
         self._unheard = not raw
         if len(raw) == length:
-            self.patience.note(at_s - whole_s)
+            timeout.note(at_s - whole_s)
+            self._clean = not self._owed
+        else:
+            timeout.waited_in_vain(at_s - whole_s - prompt_s, at_s)
         return raw, at_s
 
     def complete(self, raw: bytes, missing: Callable[[bytes], int], deadline_s: float) -> bytes:
         """Wait on for an answer that has turned out to be longer than its shortest form."""
+        self._clean = False
         while wanted := missing(raw):
             more = self.port.read_until(wanted, deadline_s)
             if not more:
@@ -131,6 +145,7 @@ class Line:
 
         Gives up on a line that never falls silent.
         """
+        self._clean = False
         end_s = self.port.now_s() + BABBLE_S
         dropped = b""
         while True:
@@ -187,6 +202,7 @@ class Line:
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos once; gives those of who answered well."""
         codec = self.family.codec
+        self._clean = False
         self.port.clearPort()
         self.send(codec.sync_read(ids, address, length))
         deadline_s = self._ends_s(len(ids) * (length + codec.STATUS_OVERHEAD))
@@ -215,6 +231,6 @@ class Line:
 
         In the loop others are waiting, and how late answers are has been measured.
         """
-        hurried_s = min(self.most_s, HURRIED * self.patience.seconds)
+        hurried_s = min(self.most_s, HURRIED * self.timeout.seconds)
         patience_s = self.most_s if self.tries > 1 else hurried_s
         return self._free_s + answer_bytes * self._byte_s + patience_s
