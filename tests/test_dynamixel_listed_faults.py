@@ -64,6 +64,7 @@ from servo_rows import rows
 
 from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.servo_bus.adaptive_timeout import RESERVE_S
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -464,7 +465,8 @@ def test_14_one_silent_servo_of_nine_costs_little_time(fast):
     chain.faults.command("lose 5")
     first_s, values = cycle()
     assert values == 8
-    assert first_s - usual_s < 0.002
+    # Once all of the reserve: it might have been the host that paused.
+    assert first_s - usual_s < 0.002 + RESERVE_S
     later = [cycle() for _ in range(600)]
     assert {values for _, values in later} == {8}
     assert sum(span for span, _ in later) / len(later) < 1.01 * usual_s
