@@ -13,19 +13,28 @@ from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
+from gazerig.sim_mock.devices import (
+    DynamixelLine,
+    Emulated,
+    FeetechLine,
+    MaestroLine,
+    Pca9685Line,
+    build,
+)
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 TICK_S = 0.005
 IDS = (1, 2, 3, 4, 5, 6)
-KINDS = ("dynamixel", "dynamixel direct", "feetech", "maestro", "maestro crc")
-RANGES = {"dynamixel": (1000, 3000), "feetech": (1000, 3000), "maestro": (4400, 7600)}
-SPEED_STEPS_S = {"dynamixel": 4000.0, "feetech": 3000.0, "maestro": 12_000.0}
-"""Armed in the servos, or in the board."""
+KINDS = ("dynamixel", "dynamixel direct", "feetech", "maestro", "maestro crc", "pca9685")
+BOARDS = ("maestro", "pca9685")
+RANGES = {"dynamixel": (1000, 3000), "feetech": (1000, 3000), **dict.fromkeys(BOARDS, (4400, 7600))}
+SPEED_STEPS_S = {"dynamixel": 4000.0, "feetech": 3000.0, **dict.fromkeys(BOARDS, 12_000.0)}
+"""Armed in the servos or in the board, or kept by the driver."""
 
 WRONG_STEPS = 6
 """A value given as fresh is wrong from so far off on: half a degree from where the joint was
@@ -106,15 +115,17 @@ class Noisy:
             # The channels' own ranges are set as gazerig setup says.
             specs = [HobbySpec(i, middle, min_steps=self.low, max_steps=self.high) for i in IDS]
             return MaestroLine(12, servos=tuple(specs))
+        if self._make == "pca9685":
+            return Pca9685Line(servos=tuple(HobbySpec(i, middle) for i in IDS))
         model = "sts3215" if self._make == "feetech" else "xl330-m077"
         servos = tuple(ServoSpec(i, model, middle) for i in IDS)
         return FeetechLine(servos) if self._make == "feetech" else DynamixelLine(servos)
 
     def _bus(self, kind: str) -> ServoBus:
-        model = {"dynamixel": "xl330-m077", "feetech": "sts3215", "maestro": "hobby"}[self._make]
-        rest = (self.low + self.high) // 2 if self._make == "maestro" else None
+        model = {"dynamixel": "xl330-m077", "feetech": "sts3215"}.get(self._make, "hobby")
+        rest = (self.low + self.high) // 2 if self._make in BOARDS else None
         speed = SPEED_STEPS_S[self._make]
-        own = 22_000.0 if self._make == "maestro" else None
+        own = 22_000.0 if self._make in BOARDS else None
         setups = [
             ServoSetup(
                 i,
@@ -131,6 +142,8 @@ class Noisy:
         if self._make == "maestro":
             params = MaestroParams(stagger_ms=0.0, crc=kind.endswith("crc"))
             return MaestroBus(self.port, setups, params)
+        if self._make == "pca9685":
+            return Pca9685Bus(self.port, setups, Pca9685Params(stagger_ms=0.0))
         if self._make == "feetech":
             return FeetechBus(self.port, setups, FeetechParams())
         direct = kind.endswith("direct")
@@ -140,7 +153,7 @@ class Noisy:
     def truth(self) -> tuple[float, ...]:
         """Return where the joints truly are."""
         places = self.device.positions_steps()
-        if self._make == "maestro":
+        if self._make in BOARDS:
             return tuple(places[i] for i in IDS)
         return places[: len(IDS)]  # without whoever has joined them
 

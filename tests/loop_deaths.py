@@ -13,22 +13,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 from servo_rows import rows
+from struck_rigs import rig_of
 
 from gazerig.config.rig import Rig
-from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus, rig_setups
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
-RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker"}
 SLOW_DEG_S = 4.0
 PATIENCE_S = 30.0
 
 
 def slow(kind: str, watchdog: bool = True) -> Rig:
     """Return a kind's shipped rig whose joints take seconds to their ends."""
-    rig = load_rig(RIGS[kind])
+    rig = rig_of(kind)
     joints = {n: replace(j, max_speed_deg_s=SLOW_DEG_S) for n, j in rig.joints.items()}
     if not watchdog:
         dynamixel = replace(rig.bus.dynamixel, watchdog_ms=0)
@@ -109,7 +108,7 @@ class Driven(NamedTuple):
 
     def places(self) -> list[float]:
         """Return where the servos truly are."""
-        return [one.get("place", one["position"]) for one in self._servos()]
+        return [one.get("place", one.get("position", 0.0)) for one in self._servos()]
 
     def _servos(self) -> list[dict[str, float]]:
         servos: list[dict[str, float]] = json.loads(self.buses.command("status", ""))["servos"]

@@ -5,11 +5,11 @@ import json
 import re
 from pathlib import Path
 
+import board_rig
 import pytest
 from mixed_rig import mixed_text
 from typer.testing import CliRunner
 
-from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.list_ports import Host, SerialPort
 from gazerig.drivers.serial.port import BlockingPort
@@ -233,12 +233,7 @@ def test_setup_of_a_board_that_is_too_small(monkeypatch):
 @pytest.fixture
 def on_pca9685(tmp_path):
     """Return the path of the maker's rig with a PCA9685 in place of its Maestro."""
-    text = shipped("rigs", "maker").read_text(encoding="utf-8")
-    start, end = text.index("bus:  #"), text.index("geometry:")
-    section = "bus:\n  port: /dev/i2c-1\n  kind: pca9685  # mine\n\n"
-    path = tmp_path / "mine.yaml"
-    path.write_text(text[:start] + section + text[end:], encoding="utf-8")
-    return str(path)
+    return board_rig.on_pca9685(tmp_path)
 
 
 def test_setup_of_a_pca9685_measures_its_clock_and_moves_one_channel_after_another(on_pca9685):

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from board_rig import on_pca9685
 from typer.testing import CliRunner
 
 from gazerig.drivers.i2c import bridge
@@ -83,16 +84,8 @@ def test_pulses_that_were_left_on(counts: int, level: str, remedy: str) -> None:
     assert remedy in found.remedy
 
 
-@pytest.fixture
-def rig_file(tmp_path: Path) -> str:
-    """Return the path of the maker's eyes on a PCA9685."""
-    text = Path("config/rigs/maker.yaml").read_text(encoding="utf-8")
-    path = tmp_path / "board.yaml"
-    path.write_text(text.replace("kind: maestro", "kind: pca9685", 1), encoding="utf-8")
-    return str(path)
-
-
-def test_doctor_and_setup_as_typed(rig_file: str) -> None:
+def test_doctor_and_setup_as_typed(tmp_path: Path) -> None:
+    rig_file = on_pca9685(tmp_path)
     done = CliRunner().invoke(cli_servos.app, ["doctor", rig_file, "--mock"])
     assert done.exit_code == 0, done.output
     assert "answers at 0x40; pulses on 0 of 6 channels" in done.output

@@ -31,7 +31,7 @@ PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 # --- a loop that dies, in a process of its own
 
 
-@pytest.mark.parametrize("kind", ["feetech", "maestro"])
+@pytest.mark.parametrize("kind", ["feetech", "maestro", "pca9685"])
 def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
     with driven(kind) as it:
         assert all(it.holding())

@@ -59,8 +59,21 @@ def test_noise_on_the_line_of_a_board_leads_no_joint_out_nor_faster_than_a_servo
     assert outcome.recover_s < 3.0
 
 
-def test_a_board_of_which_only_damaged_answers_come_is_not_given_up_and_nothing_moves():
-    noisy = Noisy("maestro crc")
+def test_noise_on_an_i2c_bus_whose_bytes_carry_no_check_is_over_in_a_tick():
+    """A pulse that noise has made stands until the next goals: 5 ms, and never while unheard."""
+    noisy = Noisy("pca9685", seed=2)
+    noisy.start()
+    outcome = noisy.run("static 0.5", 0.5, 2000)
+    assert outcome.errors["other pulse"] > 5 and outcome.damaged > 500
+    assert (outcome.wrong, outcome.ended) == (0, "")
+    assert outcome.outside <= 40, outcome  # of 12,000 looks
+    assert outcome.recover_s is not None
+    assert outcome.recover_s < 3.0
+
+
+@pytest.mark.parametrize("kind", ["maestro crc", "pca9685"])
+def test_a_board_of_which_only_damaged_answers_come_is_not_given_up_and_nothing_moves(kind):
+    noisy = Noisy(kind)
     noisy.start()
     outcome = noisy.run("repeat", 0.0, 14_000)  # 70 s, longer than give_up_s
     assert outcome.ended == ""

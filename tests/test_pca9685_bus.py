@@ -4,10 +4,10 @@ import errno
 from dataclasses import replace
 
 import pytest
+from board_rig import on_pca9685
 from servo_rows import rows
 from smbus2 import i2c_msg
 
-from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.i2c import port as i2c_port
@@ -291,8 +291,31 @@ def test_what_cannot_be_used_is_named_and_nothing_moves(world, command, told):
     world.held()
 
 
+def test_pulses_that_noise_has_made_are_put_right_while_the_board_is_not_heard(world):
+    world.held().run(0.2, [6000] * 3)
+    world.command("lose all")
+    world.run(0.02, [6000] * 3)
+    EmulatedSMBus(world.device.body).i2c_rdwr(i2c_msg.write(0x40, [6, *pulse(4000)]))
+    assert world.widths()[0] > 70_000
+    world.run(0.01, [7600] * 3)
+    assert world.widths() == pytest.approx([6000] * 3, abs=GRAIN)
+
+
+def test_a_board_that_lost_its_clock_on_the_way_is_named_and_nothing_is_said_to_be_held(world):
+    world.held().run(0.2, [6000] * 3)
+    bus = EmulatedSMBus(world.device.body)
+    bus.write_byte_data(0x40, MODE1, 0x30)
+    bus.write_byte_data(0x40, MODE1, 0x70)
+    told = world.run(0.5, [6000] * 3)
+    assert told == [None] * 3
+    assert "board 0x40: it was set to an external clock: switch its logic supply off and on" in (
+        world.bus.faults()
+    )
+
+
 def test_a_board_on_an_external_clock_is_refused(world):
-    EmulatedSMBus(world.device.body).write_byte_data(0x40, MODE1, 0x50)
+    bus = EmulatedSMBus(world.device.body)
+    bus.write_byte_data(0x40, MODE1, 0x50)
     with pytest.raises(ServoMissing, match="external clock"):
         world.bus.open()
 
@@ -462,13 +485,9 @@ def test_a_maestros_yaml_on_an_i2c_bus_is_refused():
 
 
 def test_the_makers_rig_runs_on_either_board_by_one_section(tmp_path):
-    text = load_text("maker")
-    start, end = text.index("bus:  #"), text.index("geometry:")
-    section = "bus:\n  port: /dev/i2c-1\n  kind: pca9685\n  pca9685: {address: 0x40}\n\n"
-    file = tmp_path / "maker.yaml"
-    file.write_text(text[:start] + section + text[end:], encoding="utf-8")
+    file = on_pca9685(tmp_path)
     seen = {}
-    for name in ("maker", str(file)):
+    for name in ("maker", file):
         rig = load_rig(name)
         made = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="boxing"))
         clock, head, poses = made.clock, made.robot, []
@@ -488,7 +507,3 @@ def test_the_makers_rig_runs_on_either_board_by_one_section(tmp_path):
     ]
     # Two estimates of the same goals: a board's ramp is 10 ms behind, a fast eye moves then.
     assert sorted(apart)[len(apart) // 2] < 0.02
-
-
-def load_text(name):
-    return shipped("rigs", name).read_text(encoding="utf-8")

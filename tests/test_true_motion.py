@@ -9,15 +9,17 @@ from math import radians
 
 import numpy as np
 import pytest
+from board_rig import on_pca9685
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from mixed_rig import mixed_text
 from true_shafts import Bench, Judge, restless
 
 from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.servo_models import HOBBY_KINDS
 from gazerig.robot.app.rig_limits import limits
 
-NAMES = ("desk", "feetech", "maker", "mixed")
+NAMES = ("desk", "feetech", "maker", "pca9685", "mixed")
 BEYOND_DEG = 0.5
 SPEED = 1.03
 """Of the limit: 2 % of the joint's own, 1 % of rounding to servo steps in 5 ms."""
@@ -33,7 +35,8 @@ GENTLE = 1.1
 def rigs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rig]:
     mixed = tmp_path_factory.mktemp("rig") / "mixed.yaml"
     mixed.write_text(mixed_text(), encoding="utf-8")
-    return {name: load_rig(str(mixed) if name == "mixed" else name) for name in NAMES}
+    files = {"mixed": str(mixed), "pca9685": on_pca9685(mixed.parent)}
+    return {name: load_rig(files.get(name, name)) for name in NAMES}
 
 
 def gaps(seed: int, share: float, longest: int) -> Iterator[int]:
@@ -64,7 +67,7 @@ def judged(judge: Judge) -> None:
         i = judge.rig.names.index(name)
         assert worst.stops == 0, f"{name} touched its stop"
         assert worst.beyond_deg <= BEYOND_DEG, f"{name} {worst.beyond_deg:.2f} deg beyond its range"
-        if judge.rig.bus_of(name).kind == "maestro":
+        if judge.rig.bus_of(name).kind in HOBBY_KINDS:
             continue  # a hobby servo leaps from pulse to pulse as it likes
         assert worst.speed_deg_s <= SPEED * judge.top[i], f"{name} {worst.speed_deg_s:.0f} deg/s"
         assert worst.accel_deg_s2 <= ACCEL * judge.most[i], f"{name} {worst.accel_deg_s2:.0f}"

@@ -349,6 +349,8 @@ def test_a_run_without_faults_has_none(devices: list[Device]) -> None:
         ("desk", "run", "SIGHUP"),
         ("feetech", "jog", "tty closed"),
         ("maker", "home", "full pipe that nobody reads"),
+        ("pca9685", "run", "SIGTERM"),
+        ("pca9685", "jog", "tty closed"),
         ("desk", "run", "| head -1"),
     ],
 )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 import gazerig.robot.app.assemble as assembling
 import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import Rig
+from gazerig.drivers.servo_models import HOBBY_KINDS
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.emulation import emulated_lines, place_of
@@ -117,7 +118,7 @@ class Judge:
         self.rig = rig
         joint_limits = np.array([limit[:4] for limit in limits(rig.joints)])
         self.low, self.high, self.top, self.most = np.degrees(joint_limits.T)
-        self.pulsed = np.array([rig.bus_of(name).kind == "maestro" for name in rig.names])
+        self.pulsed = np.array([rig.bus_of(name).kind in HOBBY_KINDS for name in rig.names])
         self.worst = {name: Worst(-180.0, 0.0, 0.0, 0) for name in rig.names}
 
     def take(self, shafts: Shafts) -> None:

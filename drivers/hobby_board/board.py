@@ -148,6 +148,10 @@ class Board(Protocol):
         """Send channels to their goals."""
         ...
 
+    def steady(self, channels: Sequence[Channel]) -> None:
+        """Keep pulses where they are while the board is not heard, where that does no harm."""
+        ...
+
     def lead(self, channels: Sequence[Channel]) -> None:
         """Send pulses that are on their way a little farther, where the board does not itself."""
         ...

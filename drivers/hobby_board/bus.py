@@ -169,8 +169,9 @@ class HobbyBoardBus(PortBus):
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every channel in one write; goals are clipped to the limits.
 
-        Sends nothing while nothing is held, the port is gone, or the board did not answer:
-        it may have restarted, and would take goals without any limit of speed.
+        Sends nothing while nothing is held or the port is gone. While the board does not answer
+        pulses stay where they are: it may have restarted, and would take goals without any limit
+        of speed.
 
         Raises:
             ValueError: a goal is not a number, or there are not as many as servos.
@@ -178,16 +179,17 @@ class HobbyBoardBus(PortBus):
         goals = [
             channel.clip(goal) for channel, goal in zip(self._channels, goals_steps, strict=True)
         ]
-        if not self._supervisor.engaged or self._link.down or not self._supervisor.sure:
-            return
         held = [channel for channel in self._channels if channel.held]
-        if not held:
+        if not self._supervisor.engaged or self._link.down or not held:
             return
         now_s = self._port.now_s()
-        for channel, goal in zip(self._channels, goals, strict=True):
-            if channel.held:
-                channel.aim(goal, now_s)
         try:
+            if not self._supervisor.sure:
+                self._board.steady(held)
+                return
+            for channel, goal in zip(self._channels, goals, strict=True):
+                if channel.held:
+                    channel.aim(goal, now_s)
             self._board.send_goals(held)
         except BusLost as lost:
             self._lose(lost)

@@ -35,6 +35,7 @@ class Supervisor:
         self._line = board.line
         self._channels = tuple(channels)
         self._log = log
+        self._led = board.timing.longest_lead_s < inf
         self.engaged = False
         self._pending: list[Channel] = []
         self._asked = -1
@@ -116,9 +117,12 @@ class Supervisor:
 
     def lead(self) -> None:
         """Lead pulses that are on their way, where the board does not do that itself."""
-        if self._board.timing.longest_lead_s == inf:
+        if not self._led:
             return
         self.advance(self._line.port.now_s())
+        off = [channel.id for channel in self._pending if not channel.on]
+        if off:
+            self._board.stop(off)  # noise may have begun their pulses
         if self.sure:
             self._board.lead([channel for channel in self._channels if channel.held])
 
@@ -152,10 +156,13 @@ class Supervisor:
         held = [channel for channel in self._channels if channel.held]
         odd = [channel for channel in held if channel.strange(found[channel], now_s, away)]
         home = [channel for channel in odd if not found[channel]]
-        if home or (odd and (away or len(odd) == len(held))):
-            self._lost_hold(odd, errors, now_s)
-        else:
-            for channel in odd:
+        # Boards that lead their pulses to their home are lost with any other pulse as well.
+        astray = not self._led and (home or away or len(odd) == len(held))
+        lost = odd if astray else home
+        if lost:
+            self._lost_hold(lost, errors, now_s)
+        for channel in odd:
+            if channel not in lost:
                 self._met_end(channel, found[channel])
         for channel in held:
             if channel not in odd:
@@ -183,7 +190,7 @@ class Supervisor:
 
     def _met_end(self, channel: Channel, pulse: int) -> None:
         """Note that a channel stays elsewhere: it meets an end of the board's own range."""
-        if self._board.timing.longest_lead_s < inf:
+        if self._led:
             # Boards that are led have no range of their own: what was sent was lost.
             self._line.errors["other pulse"] += 1
             channel.found(pulse)

@@ -154,6 +154,9 @@ class MaestroBoard:
         """Send channels to their goals."""
         self.line.send(self.line.speech.targets(goals_of(channels)))
 
+    def steady(self, channels: Sequence[Channel]) -> None:
+        """Do nothing: a board that may have restarted would take goals without any ramp."""
+
     def lead(self, channels: Sequence[Channel]) -> None:
         """Do nothing: the board leads its pulses itself."""
 

@@ -5,7 +5,7 @@ goal that is not followed up stands. What a servo's id is: sixteen times its boa
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import BoardTexts, Seen, Timing
@@ -21,6 +21,7 @@ from gazerig.drivers.pca9685.registers import (
     AWAKE,
     BYTES,
     CHANNELS,
+    EXTCLK,
     FULL_OFF,
     MODE1,
     MODE2,
@@ -45,6 +46,11 @@ LONGEST_LEAD_S = 0.05
 
 FOLLOW_UP_S = 0.015
 """Pulses on their way are sent by reads where no goals have come for so long."""
+
+SILENT = SLEEP | RESTART | EXTCLK
+"""Modes without pulses."""
+
+NO_CLOCK = "it was set to an external clock: switch its logic supply off and on"
 
 PRESCALE_EVERY = 8
 """The prescaler is looked at in every so many looks."""
@@ -225,7 +231,9 @@ class Pca9685Board:
         if now is None or pulses is None:
             return None
         well = now[0] & ~RESTART == AWAKE and now[2] == self._clocks[address].prescale
-        asleep = bool(now[0] & (SLEEP | RESTART))
+        if now[0] & EXTCLK:
+            return Seen(0, (NO_CLOCK,))
+        asleep = bool(now[0] & SILENT)
         changed = () if well or asleep or not channel.held else ("settings changed",)
         return Seen(pulses[0], changed)
 
@@ -259,7 +267,7 @@ class Pca9685Board:
                 return None
             mode, prescale = modes[0][0], modes[1][0]
             base = CHANNELS * self.params.addresses.index(address)
-            if mode & (SLEEP | RESTART):
+            if mode & SILENT:
                 pulses.update(dict.fromkeys((base + channel for channel in own), 0))
                 continue
             outputs = self._outputs(address, own, bool(mode & AUTO_INCREMENT))
@@ -298,11 +306,16 @@ class Pca9685Board:
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
         """Send channels to where they are on the way to their goals, those of a board at once."""
-        boards: dict[int, dict[int, bytes]] = defaultdict(dict)
         for channel in channels:
             self._sent[channel.id] = self._due(channel)
-            address, nth = self._place(channel.id)
-            boards[address][nth] = pulse(self._sent[channel.id][0])
+        self._send({channel.id: self._sent[channel.id][0] for channel in channels})
+
+    def _send(self, counts: Mapping[int, int]) -> None:
+        """Send pulses by the ids of their servos, those of a board in as few writes as can be."""
+        boards: dict[int, dict[int, bytes]] = defaultdict(dict)
+        for servo_id, width in counts.items():
+            address, nth = self._place(servo_id)
+            boards[address][nth] = pulse(width)
         packet = b"".join(
             bridge.write(address, output(run[0]), b"".join(outputs[nth] for nth in run))
             for address, outputs in boards.items()
@@ -316,6 +329,10 @@ class Pca9685Board:
         steps, setup = round(channel.ramp.pulse_steps), channel.setup
         grain = self._clock(channel.id).grain_steps
         return counts_within(steps, setup.min_steps, setup.max_steps, grain), steps
+
+    def steady(self, channels: Sequence[Channel]) -> None:
+        """Send pulses once more as they were sent: a byte lost in a row of them shifts the rest."""
+        self._send({c.id: self._sent[c.id][0] for c in channels if c.id in self._sent})
 
     def lead(self, channels: Sequence[Channel]) -> None:
         """Send pulses that are on their way a little farther, where no goals come."""

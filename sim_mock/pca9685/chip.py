@@ -113,8 +113,8 @@ class Chip:
             self._held_back = True
         if before & SLEEP and not byte & SLEEP:
             self._awake_s = now_s + START_S
-        # The external clock is chosen while asleep, and for good.
-        clock = before & EXTCLK or (byte & EXTCLK if before & SLEEP else 0)
+        # The external clock is chosen asleep, by both bits at once, and until the next reset.
+        clock = EXTCLK if before & EXTCLK or (before & byte & SLEEP and byte & EXTCLK) else 0
         self._registers[MODE1] = byte & ~(RESTART | EXTCLK) | clock
         self._mark_restart()
 

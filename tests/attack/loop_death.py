@@ -21,6 +21,8 @@ CASES = [
     ("feetech, guardian", "feetech", True, True),
     ("maestro, no guardian", "maestro", False, True),
     ("maestro, guardian", "maestro", True, True),
+    ("pca9685, no guardian", "pca9685", False, True),
+    ("pca9685, guardian", "pca9685", True, True),
 ]
 
 

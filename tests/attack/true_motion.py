@@ -25,6 +25,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import struck_rigs
+from board_rig import on_pca9685
 from mixed_rig import mixed_text
 from struck_rigs import CASES, Machine, pair_of, quick
 from true_shafts import Judge, Late, looked_at, on_time, run, sometimes_late
@@ -36,7 +37,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.commands import LookAt
 from gazerig.sim_mock.scenes.registry import scenes
 
-RIGS = ("desk", "feetech", "maker", "mixed")
+RIGS = ("desk", "feetech", "maker", "pca9685", "mixed")
 LATES: dict[str, Callable[[], Late]] = {
     "on time": lambda: on_time,
     "1 slot, half of all": lambda: sometimes_late(1, 0.5, 1),
@@ -50,6 +51,8 @@ out = Console(width=120)
 
 def rig_called(name: str, folder: str) -> Rig:
     """Load a shipped rig, or the one of three kinds of bus."""
+    if name == "pca9685":
+        return load_rig(on_pca9685(folder))
     if name != "mixed":
         return load_rig(name)
     path = Path(folder) / "mixed.yaml"

@@ -20,14 +20,18 @@ import select
 import signal
 import subprocess
 import sys
-import tempfile
 import termios
 import time
 from collections.abc import Callable, Iterator
 from itertools import product
 from math import degrees
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from board_rig import on_pca9685
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.emulation import emulated_lines
@@ -35,7 +39,8 @@ from gazerig.robot.app.rig_limits import park_rad
 from gazerig.sim_mock.pty.client import PtyBuses
 
 ROOT = Path(__file__).parents[2]
-RIGS = {"desk": "dynamixel", "feetech": "feetech", "maker": "maestro"}
+RIGS = {"desk": "dynamixel", "feetech": "feetech", "maker": "maestro", "pca9685": "pca9685"}
+BOARDS = ("maker", "pca9685")
 LONGEST_S = 20.0
 # Broken on purpose, from outside: what a plug-in, a small machine or a bug of ours would do.
 BROKEN = {
@@ -52,10 +57,11 @@ START = (
 )
 
 
-def commands(rig: str) -> dict[str, list[str]]:
+def commands(name: str, rig: str = "") -> dict[str, list[str]]:
     """Return what is typed, by name; each holds the torque on until it is ended."""
-    joint = "eyes_pan" if rig == "maker" else "left_eye_pan"
-    by = [] if rig == "maker" else ["--by", "motion"]
+    rig = rig or name
+    joint = "eyes_pan" if name in BOARDS else "left_eye_pan"
+    by = [] if name in BOARDS else ["--by", "motion"]
     return {
         "run": ["run", rig, "--scene", "visitor", "--no-page"],
         "jog": ["jog", rig, joint, "8", "--hold", "--yes"],
@@ -69,9 +75,10 @@ def commands(rig: str) -> dict[str, list[str]]:
 
 
 class Bench(NamedTuple):
-    """A rig whose servos are emulated."""
+    """A rig whose servos are emulated; file: what is typed for it."""
 
     name: str
+    file: str
     rig: Rig
     buses: PtyBuses
     port: str
@@ -88,7 +95,7 @@ class Bench(NamedTuple):
 
     def off_park_deg(self) -> float:
         """Return how far the worst joint is from its parking pose."""
-        at = {servo["id"]: servo.get("place", servo["position"]) for servo in self.servos()}
+        at = {servo["id"]: servo.get("place", servo.get("position")) for servo in self.servos()}
         park = park_rad(self.rig)
         return max(
             abs(degrees(j.made().angle_rad(at[j.id]) - park.get(name, 0.0)))
@@ -98,10 +105,11 @@ class Bench(NamedTuple):
 
 @contextlib.contextmanager
 def bench(name: str) -> Iterator[Bench]:
-    rig = load_rig(name)
-    with PtyBuses() as buses:
+    with TemporaryDirectory() as folder, PtyBuses() as buses:
+        file = on_pca9685(folder) if name == "pca9685" else name
+        rig = load_rig(file)
         (path,) = buses.start(emulated_lines(rig)).values()
-        yield Bench(name, rig, buses, path)
+        yield Bench(name, file, rig, buses, path)
 
 
 class Started(NamedTuple):
@@ -269,14 +277,14 @@ class Row(NamedTuple):
 
 def attack(at: Bench, name: str, way: str) -> Row:
     """Start a command, wait for the torque, end it one way, look at the servos."""
-    words = [*commands(at.name)[name], "--port", at.port]
-    folder = tempfile.TemporaryDirectory()
+    words = [*commands(at.name, at.file)[name], "--port", at.port]
+    folder = TemporaryDirectory()
     if way == "page killed":
         words.remove("--no-page")
     if way == "recorder's disk full":
         words += ["--record", f"{folder.name}/full.mcap", "--force"]
     run = started(words, way)
-    if name == "calibrate" and at.name == "maker" and run.process.stdin is not None:
+    if name == "calibrate" and at.name in BOARDS and run.process.stdin is not None:
         with contextlib.suppress(OSError):
             run.process.stdin.write(b"1500\n+40\n")
             run.process.stdin.flush()
