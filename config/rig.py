@@ -65,18 +65,13 @@ class BusConfig:
     @property
     def baud(self) -> int:
         """Return the speed of its line in bit/s."""
-        if self.kind == "dynamixel":
-            return self.dynamixel.baud
-        if self.kind == "pca9685":
-            return self.pca9685.baud
-        return self.feetech.baud if self.kind == "feetech" else self.maestro.baud
+        return int(getattr(self, self.kind).baud)
 
     @property
     def channels(self) -> float:
         """Return how many channels its boards have; inf where servos have ids instead."""
-        if self.kind == "pca9685":
-            return self.pca9685.channels
-        return self.maestro.channels if self.kind == "maestro" else inf
+        channels: float = getattr(getattr(self, self.kind), "channels", inf)
+        return channels
 
 
 @dataclass(frozen=True)

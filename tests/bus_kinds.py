@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 from servo_rows import Row, rows
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
 from gazerig.drivers.maestro.commands import Speech
@@ -17,6 +19,7 @@ from gazerig.drivers.multi_bus import MixedBus, Share
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
@@ -108,9 +111,11 @@ class Twin:
         if self._patient:
             patience["prompt_timeout_ms"] = 200.0
         if name == "feetech":
-            return FeetechBus(port, setups, FeetechParams(**patience, give_up_s=give_up_s))
-        return DynamixelBus(
-            port, setups, DynamixelParams(**patience, watchdog_ms=0, give_up_s=give_up_s)
+            return SmartServoBus(
+                FEETECH, port, setups, FeetechParams(**patience, give_up_s=give_up_s)
+            )
+        return SmartServoBus(
+            DYNAMIXEL, port, setups, DynamixelParams(**patience, watchdog_ms=0, give_up_s=give_up_s)
         )
 
     # --- shares and steps

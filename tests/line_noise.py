@@ -9,11 +9,14 @@ from math import pi, sin
 
 from servo_rows import Row, rows
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import DriverError
-from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
@@ -145,10 +148,10 @@ class Noisy:
         if self._make == "pca9685":
             return Pca9685Bus(self.port, setups, Pca9685Params(stagger_ms=0.0))
         if self._make == "feetech":
-            return FeetechBus(self.port, setups, FeetechParams())
+            return SmartServoBus(FEETECH, self.port, setups, FeetechParams())
         direct = kind.endswith("direct")
         params = DynamixelParams(indirect_block=not direct, fast_sync_read=not direct)
-        return DynamixelBus(self.port, setups, params)
+        return SmartServoBus(DYNAMIXEL, self.port, setups, params)
 
     def truth(self) -> tuple[float, ...]:
         """Return where the joints truly are."""

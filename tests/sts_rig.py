@@ -2,7 +2,9 @@
 
 from moving_bus import IDS, NAMES, MovingBus
 
-from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.params import FeetechParams
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -27,7 +29,7 @@ class Rig(MovingBus):
             ServoSetup(i, "sts3215", 1000, 3000, SPEED, name)
             for i, name in zip(IDS, NAMES, strict=True)
         ]
-        self.bus = FeetechBus(self.port, self.setups, FeetechParams(**params))
+        self.bus = SmartServoBus(FEETECH, self.port, self.setups, FeetechParams(**params))
 
     def run(self, seconds, goals):
         for _ in range(round(seconds / 0.01)):

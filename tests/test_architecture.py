@@ -109,7 +109,7 @@ def test_storeys(tmp_path: Path) -> None:
     [
         ("gaze", "gazerig.robot.control.loop"),
         ("drivers/camera", "gazerig.gaze.types"),
-        ("drivers/servo_bus", "gazerig.drivers.dynamixel.bus"),
+        ("drivers/servo_bus", "gazerig.drivers.dynamixel.family"),
         ("config", "gazerig.robot.control.loop"),
         ("sim_mock/scenes", "gazerig.robot.safety.guard"),
         ("robot/control", "gazerig.config.schema"),

@@ -5,12 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks
-from gazerig.drivers.dynamixel.read_windows import (
-    INDIRECT_MAP,
-    alone_turns,
-    direct_turns,
-    indirect_turns,
-)
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
+from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP, direct_windows, indirect_windows
 from gazerig.drivers.event_log import MOST, EventLog, register_label
 from gazerig.drivers.serial.reopening import Reconnect
 from gazerig.drivers.servo_bus.adaptive_timeout import (
@@ -20,7 +17,7 @@ from gazerig.drivers.servo_bus.adaptive_timeout import (
     AdaptiveTimeout,
 )
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, Health
-from gazerig.drivers.servo_bus.window_schedule import CALM_S
+from gazerig.drivers.servo_bus.read_windows import CALM_S
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 
@@ -96,16 +93,17 @@ def test_a_reserve_never_goes_beyond_the_longest_time_out():
 
 def test_no_two_views_that_may_follow_each_other_have_the_same_length():
     block = indirect_blocks(MODELS["xl330-m077"], 53)[0]
-    alone = {view.length for view in alone_turns()._spare}
-    assert len(alone) == len(alone_turns()._spare)
-    for turns in (direct_turns(), indirect_turns(block)):
+    one_by_one = DYNAMIXEL.read_plan([], DynamixelParams(), None).alone
+    alone = {view.length for view in one_by_one._spare}
+    assert len(alone) == len(one_by_one._spare)
+    for turns in (direct_windows(), indirect_windows(block)):
         lengths = [view.length for view in (*turns._usual, *turns._spare)]
         assert len(set(lengths)) == len(lengths)
         assert not alone.intersection(lengths)
 
 
 def test_after_trouble_views_differ_until_it_has_been_calm_for_a_while():
-    turns = direct_turns()
+    turns = direct_windows()
     assert turns.next().length == 10
     seen = []
     for k in range(4):

@@ -8,10 +8,12 @@ import pytest
 from dynamixel_sdk import PacketHandler
 from servo_rows import rows
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -38,11 +40,11 @@ class Twin(NamedTuple):
     port: object
     wait: Callable[[float], None]
 
-    def bus(self, setups=SETUPS, **params) -> DynamixelBus:
+    def bus(self, setups=SETUPS, **params) -> SmartServoBus:
         # A shared machine may stall a process for longer than real servos ever wait.
         patience = {"reply_timeout_ms": 100.0, "prompt_timeout_ms": 100.0}
         chosen = {**patience, "watchdog_ms": 0, **params}
-        return DynamixelBus(self.port, setups, DynamixelParams(**chosen))
+        return SmartServoBus(DYNAMIXEL, self.port, setups, DynamixelParams(**chosen))
 
     def run(self, bus, seconds, goals=None):
         """Tick every 10 ms; give the last readings."""

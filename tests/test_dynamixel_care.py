@@ -3,7 +3,9 @@
 import pytest
 from servo_rows import rows
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -21,8 +23,11 @@ class Rig:
         specs = [ServoSpec(i, "xl330-m077", at) for i, at in zip(IDS, starts, strict=True)]
         self.chain = build_dynamixel(specs, lambda: self.now_s)
         setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
-        self.bus = DynamixelBus(
-            InProcessPort(self.chain), setups, DynamixelParams(fast_sync_read=fast, **params)
+        self.bus = SmartServoBus(
+            DYNAMIXEL,
+            InProcessPort(self.chain),
+            setups,
+            DynamixelParams(fast_sync_read=fast, **params),
         )
         self.bus.open()
 

@@ -5,9 +5,11 @@ import struct
 import pytest
 from servo_rows import rows
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
@@ -46,7 +48,9 @@ class Rig:
         self.chain = build_dynamixel(specs, lambda: self.now_s)
         self.port = UnkindPort(self.chain, self.sent.append)
         setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
-        self.bus = DynamixelBus(self.port, setups, DynamixelParams(fast_sync_read=fast, **params))
+        self.bus = SmartServoBus(
+            DYNAMIXEL, self.port, setups, DynamixelParams(fast_sync_read=fast, **params)
+        )
 
     def open(self):
         self.bus.open()
@@ -92,7 +96,7 @@ def data_of(raw, servo_id, fast):
 
 @pytest.mark.parametrize("victim", IDS)
 def test_a_damaged_answer_costs_only_its_servo_and_only_once(rig, victim):
-    fast = rig.bus._fast
+    fast = rig.bus._plan.packets is not None
     rig.port.spoil = once(lambda raw: flipped(raw, data_of(raw, victim, fast)))
     expected = [None if i == victim else 2000 + i for i in IDS]
     assert rig.places() == expected
@@ -102,7 +106,7 @@ def test_a_damaged_answer_costs_only_its_servo_and_only_once(rig, victim):
 
 
 def test_a_servo_that_only_garbles_leaves_the_group_until_it_is_well(rig):
-    fast = rig.bus._fast
+    fast = rig.bus._plan.packets is not None
 
     def garble(code, raw):
         asked = rig.sent[-1][12:-2]
@@ -125,8 +129,8 @@ def test_a_servo_that_only_garbles_leaves_the_group_until_it_is_well(rig):
 
 @pytest.mark.parametrize("kept", range(3))
 def test_a_truncated_answer_gives_what_arrived(rig, kept):
-    fast = rig.bus._fast
-    block = (14 if fast else 21) + (0 if rig.bus._block is None else 3)
+    fast = rig.bus._plan.packets is not None
+    block = (14 if fast else 21) + (0 if rig.bus._plan.block is None else 3)
     size = (8 if fast else 0) + block * kept + 3
     rig.port.spoil = once(lambda raw: raw[:size])
     # Those behind the one that fell silent are asked again without it, in the same cycle.
@@ -136,7 +140,7 @@ def test_a_truncated_answer_gives_what_arrived(rig, kept):
 
 def test_a_repeated_answer_is_not_taken_for_the_next_one(rig):
     rig.bus.engage()
-    size = 50 if rig.bus._fast else 21
+    size = 50 if rig.bus._plan.packets is not None else 21
     rig.port.spoil = lambda code, raw: raw + raw[-size:]
     for k in range(20):
         rig.now_s += 0.005

@@ -62,9 +62,11 @@ from moving_bus import (
 )
 from servo_rows import rows
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.servo_bus.adaptive_timeout import RESERVE_S
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -86,7 +88,7 @@ class Rig(MovingBus):
             for i, name in zip(IDS, NAMES, strict=True)
         ]
         chosen = DynamixelParams(fast_sync_read=fast, indirect_block=indirect, **params)
-        self.bus = DynamixelBus(self.port, setups, chosen)
+        self.bus = SmartServoBus(DYNAMIXEL, self.port, setups, chosen)
 
     def errors(self):
         return self.bus.health().errors
@@ -448,7 +450,7 @@ def test_14_one_silent_servo_of_nine_costs_little_time(fast):
     chain = build_dynamixel([ServoSpec(i, "xl330-m077", 2000) for i in ids], lambda: now_s[0])
     port = InProcessPort(chain, sleep_until=sleep_until, wire_time=True)
     setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
-    bus = DynamixelBus(port, setups, DynamixelParams(fast_sync_read=fast))
+    bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams(fast_sync_read=fast))
     bus.open()
     bus.engage()
 

@@ -4,10 +4,11 @@ import pytest
 from dynamixel_sdk import PacketHandler
 from servo_rows import rows
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.protocol import HEADER
 from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -39,7 +40,7 @@ class Rig:
         )
         self.port = SpoiltPort(self.chain, self.sent.append)
         setups = [ServoSetup(i, model, 1000, 3000, 6000.0) for i in IDS]
-        self.bus = DynamixelBus(self.port, setups, DynamixelParams())
+        self.bus = SmartServoBus(DYNAMIXEL, self.port, setups, DynamixelParams())
 
     def open(self):
         self.bus.open()
@@ -103,7 +104,7 @@ def test_one_message_names_missing_unexpected_wrong_and_old_servos_by_joint():
         ServoSetup(9, "xl330-m077", 1000, 3000, 6000.0, "jaw"),
     ]
     with pytest.raises(ServoMissing) as caught:
-        DynamixelBus(rig.port, setups, DynamixelParams()).open()
+        SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams()).open()
     message = str(caught.value)
     assert "neck_yaw (servo 1) is xl330-m077, not xl430-w250" in message
     assert "eye_left (servo 2) has firmware 53, older than 99" in message
@@ -117,7 +118,7 @@ def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told():
     servo = rig.chain[2]
     servo.memory.set("velocity_limit", 100)
     setup = ServoSetup(2, "xl330-m077", 1000, 3000, 6000.0, "jaw", 0, (700, 10, 30), 0.4)
-    bus = DynamixelBus(rig.port, [setup], DynamixelParams())
+    bus = SmartServoBus(DYNAMIXEL, rig.port, [setup], DynamixelParams())
     bus.open()
     get = servo.memory.get
     names = ("position_p_gain", "position_i_gain", "position_d_gain")
@@ -143,7 +144,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
     now_s = [0.0]
     port = InProcessPort(build_dynamixel(specs, lambda: now_s[0]), sent.append)
     setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
-    bus = DynamixelBus(port, setups, DynamixelParams())
+    bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams())
     bus.open()
     bus.engage()
     spans = set()
@@ -166,7 +167,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
 def test_the_block_can_be_left_out_by_choice():
     rig = Rig()
     setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
-    bus = DynamixelBus(rig.port, setups, DynamixelParams(indirect_block=False))
+    bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(indirect_block=False))
     bus.open()
     rig.sent.clear()
     bus.read(1.0)
@@ -176,7 +177,7 @@ def test_the_block_can_be_left_out_by_choice():
 def test_open_with_an_impossible_baud_rate_names_it():
     rig = Rig()
     setups = [ServoSetup(1, "xl330-m077", 1000, 3000, 6000.0)]
-    rig.bus = DynamixelBus(rig.port, setups, DynamixelParams(baud=1234))
+    rig.bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(baud=1234))
     with pytest.raises(PortError, match="cannot run at 1234 bit/s"):
         rig.open()
 
@@ -186,7 +187,7 @@ def test_old_firmware_is_read_the_plain_way():
     sent: list[bytes] = []
     port = InProcessPort(build_dynamixel(specs, lambda: 0.0), sent.append)
     setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
-    bus = DynamixelBus(port, setups, DynamixelParams())
+    bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams())
     bus.open()
     assert None not in rows(bus.read(0.0))
     assert sent[-1][7] == 0x82

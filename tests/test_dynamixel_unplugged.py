@@ -10,8 +10,10 @@ from pathlib import Path
 
 from servo_rows import rows
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -23,11 +25,10 @@ ROOT = Path(__file__).parents[1]
 
 DRIVER = """
 import sys, time
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.types import ServoSetup
 setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 200.0) for i in (1, 2, 3)]
-bus = DynamixelBus(BlockingPort(sys.argv[1]), setups, DynamixelParams(reply_timeout_ms=100.0))
+bus = SmartServoBus(DYNAMIXEL, BlockingPort(sys.argv[1]), setups, DynamixelParams(reply_timeout_ms=100.0))
 bus.open()
 bus.engage()
 while True:
@@ -56,8 +57,11 @@ def run(bus, seconds, goals=None, until=lambda readings: False):
 
 def test_pulled_out_and_put_back_it_goes_on_from_where_the_joints_are():
     with PtyBus() as server:
-        bus = DynamixelBus(
-            BlockingPort(server.start(SPECS)), SETUPS, DynamixelParams(reply_timeout_ms=100.0)
+        bus = SmartServoBus(
+            DYNAMIXEL,
+            BlockingPort(server.start(SPECS)),
+            SETUPS,
+            DynamixelParams(reply_timeout_ms=100.0),
         )
         bus.open()
         bus.engage()

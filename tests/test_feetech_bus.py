@@ -11,8 +11,10 @@ from servo_rows import rows
 from sts_rig import Rig
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
-from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
@@ -36,7 +38,7 @@ class Twin:
     def bus(self, setups=SETUPS):
         # A shared machine may stall a process for longer than real servos ever wait.
         patient = FeetechParams(reply_timeout_ms=200.0, prompt_timeout_ms=200.0)
-        return FeetechBus(self.port, setups, patient)
+        return SmartServoBus(FEETECH, self.port, setups, patient)
 
     def run(self, bus, seconds, goals=None):
         end_s = self.port.now_s() + seconds
@@ -229,12 +231,12 @@ def test_ranges_and_numbers_that_cannot_be_are_refused():
     for low, high in ((-1, 5), (0, 4096), (9, 8)):
         wrong = [s._replace(min_steps=low, max_steps=high) for s in rig.setups]
         with pytest.raises(ValueError, match=r"eye \(servo 1\): .* is no range within 0..4095"):
-            FeetechBus(rig.port, wrong, FeetechParams())
+            SmartServoBus(FEETECH, rig.port, wrong, FeetechParams())
         with pytest.raises(ValueError, match="is no range within"):
             rig.bus.retune(wrong)
     crowd = [ServoSetup(i, "sts3215", 0, 4095, 3000.0) for i in range(36)]
     with pytest.raises(ValueError, match="36 servos are too many for one bus: 35 at most"):
-        FeetechBus(rig.port, crowd, FeetechParams())
+        SmartServoBus(FEETECH, rig.port, crowd, FeetechParams())
 
 
 GOALS = st.lists(st.integers(-(2**40), 2**40) | st.just(10**400), min_size=4, max_size=4)

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.dynamixel.bus import DynamixelBus
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.bringup.look_at import ends_reached, look_at
 from gazerig.robot.bringup.manual_control import JogParams, ManualControl, duration_s
@@ -38,7 +39,7 @@ class Bench:
         self.chain = build_dynamixel(specs, self.clock.now_s)
         self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
         setups = [rig.joints[name].setup(name) for name in JOINTS]
-        bus = DynamixelBus(self.port, setups, rig.bus.dynamixel)
+        bus = SmartServoBus(DYNAMIXEL, self.port, setups, rig.bus.dynamixel)
         guard = Guard(rig.guard, tuple(rig.joints[name].limit() for name in JOINTS), JOINTS)
         self.steps: list[Step] = []
         self.why: str | None = None

@@ -147,7 +147,7 @@ def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
 def test_load_is_a_share_of_the_stall() -> None:
     assert DYNAMIXEL.driving.load("xl330-m077", -147) == pytest.approx(-0.1)
     assert DYNAMIXEL.driving.load("xl430-w250", 250) == pytest.approx(0.25)
-    assert FEETECH.shown_load.share("sts3215", -100) == pytest.approx(-0.1)
+    assert -100 * FEETECH.family.models["sts3215"].load_unit == pytest.approx(-0.1)
 
 
 def test_registers_are_shown_in_units_of_the_joint() -> None:

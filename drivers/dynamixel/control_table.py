@@ -126,6 +126,16 @@ class Model(NamedTuple):
             return 1.0
         return 1.34 if self.name.startswith("xh430-v") else 2.69
 
+    @property
+    def load_unit(self) -> float:
+        """Return the share of the stall torque that one unit of Present Current is.
+
+        Models without a current sensor report load in 0.1 % there.
+        """
+        if not self.current_unit_ma:
+            return 0.001
+        return self.current_unit_ma / (1000.0 * self.stall_current_a)
+
 
 # fmt: off
 MODELS: dict[str, Model] = {m.name: m for m in (

@@ -10,12 +10,14 @@ from gazerig.drivers.dynamixel.control_table import (
     PWM_FULL,
     REGISTERS,
     STEPS_PER_TURN,
+    VELOCITY_UNIT_STEPS_S,
     WATCHDOG_UNIT_S,
     acceleration_units,
     name_errors,
     speed_units,
 )
 from gazerig.drivers.dynamixel.protocol_1 import ask_protocol_1
+from gazerig.drivers.dynamixel.read_plan import read_plan
 from gazerig.drivers.servo_bus.family import Arming, Family
 
 if TYPE_CHECKING:  # the guardian starts without numpy
@@ -78,6 +80,8 @@ DYNAMIXEL = Family(
     models=MODELS,
     steps_per_turn=STEPS_PER_TURN,
     name_errors=name_errors,
+    velocity_unit_steps_s=VELOCITY_UNIT_STEPS_S,
+    sign_bits={},
     speed_units=speed_units,
     acceleration_units=acceleration_units,
     goals=Goals,
@@ -86,6 +90,10 @@ DYNAMIXEL = Family(
     factory_baud=57_600,
     highest_id=252,
     version=str,
+    read_plan=read_plan,
+    effort_register="present_current",
+    armed=lambda setup: {},
+    weak_check=False,
     # Written in this order, as a new operating mode puts gains and profile back.
     spans=(
         ("return_delay_time", "operating_mode"),
@@ -102,6 +110,7 @@ DYNAMIXEL = Family(
     lock=None,
     error_register="hardware_error_status",
     faults_latch=True,
+    torque_faults=0,
     watchdog_unit_s=WATCHDOG_UNIT_S,
     goal_speed=False,
     single_turn=False,

@@ -133,6 +133,21 @@ def statuses(raw: bytes) -> list[Status]:
     return found
 
 
+CHECK = "H"
+"""Struct code of the CRC."""
+
+
+def status_head(servo_id: int, length: int) -> bytes:
+    """Return a status's bytes before its error byte; ``length``: of its params."""
+    return _HEAD.pack(HEADER, servo_id, length + 4, STATUS)
+
+
+def all_intact(raw: bytes, size: int, checks: Sequence[int]) -> bool:
+    """Return whether the CRCs of statuses of equal size, one after the other, are right."""
+    starts = range(0, size * len(checks), size)
+    return [umts(raw[start : start + size - 2]) for start in starts] == list(checks)
+
+
 def bytes_missing(raw: bytes, count: int, length: int) -> int:
     """Count the bytes still to come of ``count`` statuses with ``length`` bytes of params each.
 

@@ -1,5 +1,6 @@
 """Feetech STS servos as a family of the servo bus."""
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from gazerig.drivers.feetech import protocol
@@ -15,8 +16,11 @@ from gazerig.drivers.feetech.memory_table import (
     name_errors,
     speed_units,
 )
+from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import MOST_GOALS, GoalWrite
 from gazerig.drivers.servo_bus.family import Arming, Family
+from gazerig.drivers.servo_bus.read_plan import ReadPlan
+from gazerig.drivers.servo_bus.read_windows import ReadWindow, WindowSchedule
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoSetup
@@ -48,6 +52,58 @@ def wanted_settings(setup: "ServoSetup") -> dict[str, int]:
     return wanted
 
 
+SIGN_BITS = {"position": 15, "velocity": 15, "effort": 10}
+
+_SENSED = ("position", "velocity", "effort", "voltage", "temperature", "status")
+_ARMED = ("torque", "acceleration", "torque_limit")
+_SENSED_AT, _ARMED_AT = (REGISTERS[n].address for n in ("present_position", "torque_enable"))
+_END = REGISTERS["present_current"].address + REGISTERS["present_current"].size
+
+
+def window(address: int) -> ReadWindow:
+    """Return a window up to Present Current (69).
+
+    address: 56 or below; from 40 or below torque and armed limits are told too
+    """
+    armed = address <= _ARMED_AT
+    pad = (_ARMED_AT if armed else _SENSED_AT) - address
+    layout = f"{pad}x" + ("BB6xH6x" if armed else "") + "HHHBBxB5x"
+    fields = (*_ARMED, *_SENSED) if armed else _SENSED
+    return ReadWindow(address, _END - address, layout, fields, "<", tuple(SIGN_BITS.items()))
+
+
+def read_plan(
+    setups: "Sequence[ServoSetup]", params: FeetechParams, firmware: Mapping[int, int] | None
+) -> ReadPlan:
+    """Return how servos are read: what a loop needs every tick lies side by side in 56..70.
+
+    Torque and the armed limits lie before it, so now and then the reading begins at 40 and tells
+    them too.
+    """
+    every = params.torque_every
+    armed, sensed = window(_ARMED_AT), (window(_SENSED_AT), window(_SENSED_AT - 1))
+    usual = [armed, *sensed * every][:every]
+    if every == 1:
+        usual.append(window(_ARMED_AT - 1))
+    spare = [window(_SENSED_AT - more) for more in range(2, 7)]
+    second = [window(_SENSED_AT - more) for more in range(7, 11)]
+    # Of servos asked alone: never as long as a reading of all, and never twice the same.
+    alone = [window(_ARMED_AT - more) for more in range(1, 11)]
+    return ReadPlan(
+        WindowSchedule(usual, spare),
+        WindowSchedule(alone, alone),
+        WindowSchedule(second, second),
+        armed=armed,
+    )
+
+
+def armed_limits(setup: "ServoSetup") -> dict[str, int | None]:
+    """Return what is written before the torque comes on, as a reading tells it."""
+    limit = None if setup.strength is None else round(setup.strength * TORQUE_FULL)
+    acceleration = acceleration_units(setup.max_accel_steps_s2)
+    return {"acceleration": acceleration, "torque_limit": limit}
+
+
 def _target(name: str, found: int, wanted: int) -> int:
     """One bit of Phase is of several others, which belong to the servo's own making."""
     return found & ~MULTI_TURN if name == "phase" else wanted
@@ -60,6 +116,8 @@ FEETECH = Family(
     models=MODELS,
     steps_per_turn=STEPS_PER_TURN,
     name_errors=name_errors,
+    velocity_unit_steps_s=1.0,
+    sign_bits=SIGN_BITS,
     speed_units=speed_units,
     acceleration_units=acceleration_units,
     goals=GoalWrite,
@@ -68,6 +126,10 @@ FEETECH = Family(
     factory_baud=1_000_000,
     highest_id=HIGHEST_ID,
     version=lambda firmware: f"{firmware // 100}.{firmware % 100}",
+    read_plan=read_plan,
+    effort_register="present_load",
+    armed=armed_limits,
+    weak_check=True,
     spans=(("return_delay_time", "operating_mode"), ("torque_limit", "lock")),
     wanted=wanted_settings,
     target=_target,
@@ -76,6 +138,7 @@ FEETECH = Family(
     lock="lock",
     error_register="status",
     faults_latch=False,
+    torque_faults=REGISTERS["unloading_condition"].initial or 0,
     watchdog_unit_s=None,
     goal_speed=True,
     single_turn=True,

@@ -10,6 +10,8 @@ Sources: Feetech memory table STS3215, and the tables of public clients where it
 
 from typing import Literal, NamedTuple
 
+from gazerig.drivers.servo_bus.read_windows import from_sign_magnitude
+
 Access = Literal["r", "rw"]
 
 STEPS_PER_TURN = 4096
@@ -75,6 +77,11 @@ class FeetechModel(NamedTuple):
         """Return the speed without load at the rated voltage."""
         return self.no_load_rpm / 60.0 * self.steps_per_turn
 
+    @property
+    def load_unit(self) -> float:
+        """Return the share of the stall torque that one unit of Present Load is."""
+        return LOAD_UNIT
+
 
 MODELS = {
     model.name: model
@@ -134,12 +141,6 @@ def to_sign_magnitude(value: int, sign: int) -> int:
     if abs(value) >= 1 << sign:
         raise ValueError(f"{value} does not fit into {sign} bits and a sign")
     return -value | 1 << sign if value < 0 else value
-
-
-def from_sign_magnitude(raw: int, sign: int) -> int:
-    """Return the number that a magnitude with its sign in bit ``sign`` stands for."""
-    magnitude = raw & (1 << sign) - 1
-    return -magnitude if raw >> sign & 1 else magnitude
 
 
 # fmt: off

@@ -1,7 +1,7 @@
 """How to speak with the Feetech servos of one bus: what a rig file may choose."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from gazerig.drivers.feetech.memory_table import BAUD_RATES
 from gazerig.params import Bounds, Choices, Unit
@@ -19,3 +19,5 @@ class FeetechParams:
     torque_every: Annotated[int, Bounds(1, 100), Unit("reads"),
         "Every so many reads also tell whether torque and settings are still there."] = 8
     # fmt: on
+    watchdog_ms: ClassVar[int] = 0
+    """These servos have none."""

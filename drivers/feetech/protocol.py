@@ -154,6 +154,22 @@ def statuses(raw: bytes) -> list[Status]:
     return _apart(found)
 
 
+CHECK = "B"
+"""Struct code of the checksum."""
+
+
+def status_head(servo_id: int, length: int) -> bytes:
+    """Return a status's bytes before its error byte; ``length``: of its params."""
+    return HEADER + bytes((servo_id, length + 2))
+
+
+def all_intact(raw: bytes, size: int, checks: Sequence[int]) -> bool:
+    """Return whether the checksums of statuses of equal size, one after the other, are right."""
+    starts = range(2, size * len(checks), size)
+    # From the id to the checksum, which is the inverse of the sum before it.
+    return {sum(raw[start : start + size - 2]) & 0xFF for start in starts} == {0xFF}
+
+
 def _apart(found: Sequence[tuple[int, int, Status]]) -> list[Status]:
     """Leave out what looked like a status inside a right one; spoil right ones that overlap."""
     right = [(at, end) for at, end, status in found if status.intact]

@@ -1,12 +1,11 @@
 """Smart servos of one family on one serial bus: one read and one write a tick."""
 
-from abc import abstractmethod
-from collections.abc import Collection, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping, Sequence
+from math import ceil
 
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog, servo_label
-from gazerig.drivers.port_bus import PortBus, Supervising
+from gazerig.drivers.port_bus import CUT, PortBus
 from gazerig.drivers.released import Released
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.reconnect import LastingPort
@@ -15,10 +14,15 @@ from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.faults import Health
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.goals import clipped
+from gazerig.drivers.servo_bus.latched_faults import LatchedFaultSupervisor
+from gazerig.drivers.servo_bus.params import BusParams
+from gazerig.drivers.servo_bus.passing_faults import PassingFaultSupervisor
 from gazerig.drivers.servo_bus.poll_list import Roll
-from gazerig.drivers.servo_bus.provisioning import AddressMap, Provisioning
+from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_bus.supervisor import Supervisor
+from gazerig.drivers.servo_bus.sync_read import Heard, Reader, Whole
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Line
 from gazerig.drivers.types import Feedback, ServoSetup
@@ -27,80 +31,38 @@ RESTART_S = 0.1
 """Servos that were silent for so long may have restarted: their power was cut."""
 
 
-class BusParams(Protocol):
-    """What a rig file chooses for a bus of any family."""
-
-    @property
-    def baud(self) -> int:
-        """Bit/s."""
-
-    @property
-    def reply_timeout_ms(self) -> float:
-        """Longest patience for an answer beyond its time on the wire."""
-
-    @property
-    def prompt_timeout_ms(self) -> float:
-        """Shortest patience."""
-
-    @property
-    def give_up_s(self) -> float:
-        """How long port or servos may be gone."""
-
-
-class SmartSupervising(Supervising, Protocol):
-    """What the bus asks of whoever looks after its servos."""
-
-    def take_on(self, entering: Collection[int]) -> None:
-        """Begin to look after servos under torque; some of them are outside their limits."""
-
-    def mark_all_for_recovery(self) -> None:
-        """Trust no servo to be as it was left."""
-
-
-class Polled(Protocol):
-    """What reads all servos of a poll list."""
-
-    roll: Roll
-
-
 class SmartServoBus(PortBus):
     """A chain of smart servos in position mode; implements gazerig.drivers.types.ServoBus.
 
-    A family's own bus says how an answer becomes feedback, and who looks after the servos.
+    Where faults latch, who looks after the servos asks for them; else every answer tells.
 
     Args:
+        family: the make of the servos.
         port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
         setups: the servos, in the order of every sequence given and taken.
-        family: the make of the servos.
         params: how to speak with them.
-        watchdog: Bus Watchdog to arm, in its units; 0 for none.
 
     Raises:
         ValueError: more servos than one packet of goals can hold, or a range beyond one turn.
     """
 
     _line: Line
-    _supervisor: SmartSupervising
-    _reader: Polled
-    _feedback: FeedbackColumns
+    _supervisor: Supervisor
 
     def __init__(
-        self,
-        port: BusPort,
-        setups: Sequence[ServoSetup],
-        family: Family,
-        params: BusParams,
-        watchdog: int = 0,
+        self, family: Family, port: BusPort, setups: Sequence[ServoSetup], params: BusParams
     ) -> None:
         if len(setups) > family.most_goals:
             raise ValueError(
                 f"{len(setups)} servos are too many for one bus: {family.most_goals} at most"
             )
-        self._family, self._watchdog = family, watchdog
+        self._family = family
+        unit_s = family.watchdog_unit_s
+        self._watchdog = ceil(params.watchdog_ms / 1000.0 / unit_s) if unit_s else 0
         self._check_setups(setups)
         self._port = port
         self._setups = self._wanted = tuple(setups)
-        self._bus_params = params
+        self._params = params
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
@@ -115,7 +77,7 @@ class SmartServoBus(PortBus):
             params.baud,
             {setup.id: servo_label(setup) for setup in setups},
         )
-        self._block: AddressMap | None = None
+        self._damaged = 0
         self._assemble(None)
 
     def _assemble(self, firmware: Mapping[int, int] | None) -> None:
@@ -126,38 +88,128 @@ class SmartServoBus(PortBus):
         line, log = self._line, self._log
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
         self._link = LastingPort(
-            self._port, self._bus_params.baud, self._bus_params.give_up_s, log, self._trust_nobody
+            self._port, self._params.baud, self._params.give_up_s, log, self._trust_nobody
         )
         self._roll = Roll(self._ids)
         self._health = Health(by_id, log)
-        self._block = self._address_map(firmware)
+        plan = self._plan = self._family.read_plan(self._setups, self._params, firmware)
         single = Registers(self._port, self._family, 1)
-        self._provisioning = Provisioning(line, single, self._setups, log, self._block)
+        self._provisioning = Provisioning(line, single, self._setups, log, plan.block)
         self._recovery = Recovery(
             line, self._provisioning, by_id, self._watchdog, self._health, log
         )
         self._speeds = self._recovery.speeds(self._ids, ())
-        self._assemble_family(firmware)
+        self._feedback = FeedbackColumns(self._family, self._setups)
+        self._reader = Reader(line, self._roll, plan)
+        kind: Callable[..., Supervisor]
+        kind = LatchedFaultSupervisor if self._family.faults_latch else PassingFaultSupervisor
+        self._supervisor = kind(
+            line, by_id, self._recovery, self._health, self._feedback, plan, self._watchdog
+        )
 
-    @abstractmethod
-    def _assemble_family(self, firmware: Mapping[int, int] | None) -> None:
-        """Make the parts that differ from family to family."""
+    # --- one reading
 
-    def _address_map(self, firmware: Mapping[int, int] | None) -> AddressMap | None:
-        """Return what indirect blocks must hold, None where there are none."""
-        return None
-
-    @abstractmethod
     def _read(self, now_s: float) -> None:
-        """Read all servos into the feedback's columns while the port is there."""
+        """Read all servos into the feedback's columns while the port is there.
+
+        Raises:
+            BusLost: the port is gone.
+        """
+        if self._line.starved:
+            self._supervisor.recover_tripped(self._roll.group)
+        answer = self._reader.read(now_s)
+        if not isinstance(answer, Whole):
+            self._take(answer, now_s)
+        elif not self._take_whole(answer, now_s):
+            self._take(answer.each(), now_s)
+        elif self._health.returning:
+            self._health.heard_again(now_s, self._line.lateness)
+        self._supervisor.service(self._roll.group, now_s)
+
+    def _take_whole(self, answer: Whole, now_s: float) -> bool:
+        """Take an answer in which nothing is amiss; False where anything must be looked at."""
+        if self._family.weak_check and (self._disturbed(now_s) or self._reader.any_owing(now_s)):
+            return False
+        return self._supervisor.at_ease and self._feedback.take_whole(answer)
+
+    def _take(self, heard: dict[int, Heard], now_s: float) -> None:
+        """Take an answer servo by servo, each with its errors."""
+        supervisor, feedback = self._supervisor, self._feedback
+        feedback.begin()
+        if heard and self._health.silent_for_s(now_s) >= RESTART_S:
+            # All were silent together: their power may have been cut.
+            supervisor.mark_all_for_recovery()
+        if self._family.weak_check:
+            heard = self._without_doubtful(heard, now_s)
+        believed, dark = feedback.all_believed(heard), not self._roll.group
+        for servo_id, one in heard.items():
+            slot = self._slot[servo_id]
+            was_out = self._roll.answered(servo_id)
+            if was_out:
+                supervisor.answers_again(servo_id)
+            if one.sample.error & self._family.codec.REFUSAL:
+                supervisor.check_status(servo_id, one.sample, now_s)
+                self._line.errors["refused"] += 1
+            elif was_out and dark:
+                continue  # the first answer after long silence may be an old one
+            elif one.sample.blank:
+                supervisor.check_status(servo_id, one.sample, now_s)
+            elif believed or feedback.believes(slot, one):
+                supervisor.check_status(servo_id, one.sample, now_s)
+                feedback.take(slot, one)
+            else:
+                self._line.errors["implausible"] += 1
+        supervisor.note_out(self._roll.out, now_s)
+        self._health.note_silent(
+            self._roll.out, now_s, self._roll.garbling, self._line.lateness, bool(heard)
+        )
+
+    def _disturbed(self, now_s: float) -> bool:
+        """Return whether answers have been damaged of late."""
+        places = self._feedback.places
+        if (damaged := self._line.errors["corrupt"]) != self._damaged:
+            self._damaged = damaged
+            places.damaged(now_s)
+        return places.disturbed(now_s)
+
+    def _without_doubtful(self, heard: dict[int, Heard], now_s: float) -> dict[int, Heard]:
+        """Ask servos whose answers may be damaged or late once more; keep what both answers say.
+
+        Raises:
+            BusLost: the port is gone.
+        """
+        disturbed = self._disturbed(now_s)
+        doubtful = [i for i in heard if disturbed or self._reader.owing(i, now_s)]
+        again = self._reader.again(doubtful) if doubtful else {}
+        kept = {i: one for i, one in heard.items() if i not in doubtful}
+        for servo_id in doubtful:
+            self._roll.answered(servo_id)
+            second = again.get(servo_id)
+            slot, first = self._slot[servo_id], heard[servo_id]
+            both = second and self._feedback.confirmed(slot, first, second)
+            if both:
+                kept[servo_id] = both
+            else:
+                self._line.errors["unconfirmed"] += 1
+        return kept
 
     def _send(self, goals: Sequence[int]) -> None:
-        """Send goals, each within its limits."""
-        self._line.send(self._goals.packet(goals, self._speeds))
+        """Send goals, each within its limits, with the speeds that may be used for them.
 
-    @abstractmethod
-    def _first_look(self) -> None:
-        """Look at servos that have just been prepared."""
+        Raises:
+            BusLost: the port is gone.
+        """
+        entering, speeds = self._supervisor.entering, self._speeds
+        if entering and self._family.goal_speed:
+            speeds = self._recovery.speeds(self._ids, entering.ids)
+        withheld = self._supervisor.withheld(self._now_s)
+        if not withheld:
+            self._line.send(self._goals.packet(goals, speeds))
+            return
+        kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
+        if kept:
+            some = self._family.goals([self._ids[k] for k in kept])
+            self._line.send(some.packet([goals[k] for k in kept], [speeds[k] for k in kept]))
 
     # --- the bus as others see it
 
@@ -169,7 +221,7 @@ class SmartServoBus(PortBus):
             ServoMissing: servos are absent, of another model or refuse.
         """
         self._take_wanted()
-        where, baud = self._port.port_name, self._bus_params.baud
+        where, baud = self._port.port_name, self._params.baud
         if not self._port.setBaudRate(baud):
             raise PortError(
                 f"{where} cannot run at {baud} bit/s: choose {self._family.usual_bauds}"
@@ -178,11 +230,12 @@ class SmartServoBus(PortBus):
         try:
             firmware = find(self._line, registers, self._setups, self._log)
             self._assemble(firmware)
-            first = Provisioning(self._line, registers, self._setups, self._log, self._block)
+            block = self._plan.block
+            first = Provisioning(self._line, registers, self._setups, self._log, block)
             first.disable(self._ids)
             first.apply(self._ids)
             self._line.starved = False
-            self._first_look()
+            self._supervisor.look_first()
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
@@ -276,6 +329,19 @@ class SmartServoBus(PortBus):
     def _servo_label(self, servo_id: int) -> str:
         return self._line.who(servo_id)
 
+    def _cannot_release(self) -> str:
+        unit_s = self._family.watchdog_unit_s
+        rest = "they go on to their last goal and hold it"
+        if self._watchdog and unit_s:
+            stops_s = self._watchdog * unit_s
+            rest = f"their bus watchdog stops them within {stops_s:.2f} s and they hold their place"
+        elif not unit_s:
+            rest += ", as this kind has no bus watchdog"
+        return (
+            f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
+            f"power keep their torque, {rest}: {CUT} to free them"
+        )
+
     def _mind_silence(self, now_s: float) -> None:
         """Give up where nobody has answered for too long.
 
@@ -283,7 +349,7 @@ class SmartServoBus(PortBus):
             BusLost: so it is.
         """
         silent_s = self._health.silent_for_s(now_s)
-        if silent_s >= self._bus_params.give_up_s:
+        if silent_s >= self._params.give_up_s:
             raise BusLost(
                 f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s: "
                 "check servo power and the cable"

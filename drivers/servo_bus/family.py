@@ -7,11 +7,12 @@ field.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from gazerig.drivers.serial.port import BusPort
 
 if TYPE_CHECKING:  # the guardian starts without numpy
+    from gazerig.drivers.servo_bus.read_plan import ReadPlan
     from gazerig.drivers.types import ServoSetup
 
 
@@ -66,6 +67,10 @@ class Model(Protocol):
         """Speed of its shaft without load."""
 
     @property
+    def load_unit(self) -> float:
+        """Share of the stall torque that one unit of its present effort is."""
+
+    @property
     def max_voltage(self) -> int:
         """Upper voltage limit from the factory, 0.1 V."""
 
@@ -107,6 +112,16 @@ class Codec(Protocol):
     @property
     def ECHO_LENGTH(self) -> int | None:
         """Params of a read whose echo looks like an answer, None where none does."""
+
+    @property
+    def CHECK(self) -> str:
+        """Struct code of the check behind an answer's params."""
+
+    def status_head(self, servo_id: int, length: int) -> bytes:
+        """Return an answer's bytes before its error byte; ``length``: of its params."""
+
+    def all_intact(self, raw: bytes, size: int, checks: Sequence[int]) -> bool:
+        """Return whether the checks of answers of equal size, one after the other, are right."""
 
     @property
     def IDENTITY_LENGTH(self) -> int:
@@ -168,6 +183,8 @@ class Family:
         registers, models: by name
         steps_per_turn: of the shaft
         name_errors: texts for the bits of ``error_register``
+        velocity_unit_steps_s: of the present velocity
+        sign_bits: fields of a ``Sample`` whose sign is a bit of its own, and that bit
         speed_units: from steps/s to the register of speed limits; at least 1
         acceleration_units: likewise from steps/s^2, None for no limit
         goals: packets of goals for some servos
@@ -176,6 +193,14 @@ class Family:
         factory_baud: of a new servo
         highest_id: of a servo
         version: writes a firmware number as the maker does
+
+    Reading:
+        read_plan: windows and packets for some servos, a rig's choice (params) and the servos'
+            firmware by id, None before it is known
+        effort_register: the one that tells load or current
+        armed: fields of a ``Sample`` that tell whether a servo is armed as it was left, and what
+            they should be; None where anything will do
+        weak_check: the check over an answer lets some damage pass
 
     Settings:
         spans: first and last of registers that are read together
@@ -188,6 +213,7 @@ class Family:
     Traits:
         error_register: tells what ails a servo
         faults_latch: a fault stays until the servo is restarted; else its bit comes and goes
+        torque_faults: bits of faults that take the torque away, where they come and go
         watchdog_unit_s: of Bus Watchdog; None where there is no watchdog
         goal_speed: a goal carries the speed that may be used for it
         single_turn: beyond its encoder's zero a servo would go the long way round
@@ -207,6 +233,8 @@ class Family:
     models: Mapping[str, Model]
     steps_per_turn: int
     name_errors: Callable[[int], tuple[str, ...]]
+    velocity_unit_steps_s: float
+    sign_bits: Mapping[str, int]
     speed_units: Callable[[float], int]
     acceleration_units: Callable[[float | None], int]
     goals: Callable[[Sequence[int]], GoalPackets]
@@ -215,6 +243,10 @@ class Family:
     factory_baud: int
     highest_id: int
     version: Callable[[int], str]
+    read_plan: "Callable[[Sequence[ServoSetup], Any, Mapping[int, int] | None], ReadPlan]"
+    effort_register: str
+    armed: Callable[["ServoSetup"], Mapping[str, int | None]]
+    weak_check: bool
     spans: tuple[tuple[str, str], ...]
     wanted: Callable[["ServoSetup"], Mapping[str, int]]
     target: Callable[[str, int, int], int]
@@ -223,6 +255,7 @@ class Family:
     lock: str | None
     error_register: str
     faults_latch: bool
+    torque_faults: int
     watchdog_unit_s: float | None
     goal_speed: bool
     single_turn: bool

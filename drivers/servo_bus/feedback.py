@@ -1,10 +1,26 @@
-"""What is known of all servos of a bus, column by column, from one exchange to the next."""
+"""What is known of all servos of a bus, column by column, from one exchange to the next.
 
-from collections.abc import Sequence
-from typing import TypeVar
+Where the check over an answer is weak (a sum of one byte), bytes spoilt in two places pass it now
+and then. So a position that no joint can have come to since the last one is not given
+(``gazerig.drivers.plausibility``), and on a disturbed line every answer needs a second one that
+says the same.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
 
 from gazerig.drivers.plausibility import Plausibility
+from gazerig.drivers.servo_bus.family import Family
+from gazerig.drivers.servo_bus.read_windows import Columns
+from gazerig.drivers.servo_bus.sync_read import Heard, Whole
+from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.types import Feedback, ServoSetup
+
+ALIKE_C, ALIKE_TENTH_V = 3, 10
+"""So far apart temperatures and voltages of two answers right after one another may be."""
+
+MOST_CELSIUS = 125
+"""A temperature above is none."""
 
 Value = TypeVar("Value")
 
@@ -12,20 +28,29 @@ Value = TypeVar("Value")
 class FeedbackColumns:
     """Columns of the exchange that is being taken; state that is read in turn is kept.
 
-    A family's own class fills them in from register units.
-
     Args:
-        fastest_steps_s: speed of each servo's motor without load.
+        family: the make of the servos.
+        setups: the servos.
 
     places: which positions can be true
     """
 
-    def __init__(self, fastest_steps_s: Sequence[float]) -> None:
-        self.places = Plausibility(fastest_steps_s)
-        self._none = none = Feedback.of_none(len(fastest_steps_s))
+    def __init__(self, family: Family, setups: Sequence[ServoSetup]) -> None:
+        models = [family.models[setup.model] for setup in setups]
+        self._family = family
+        self._ids = tuple(setup.id for setup in setups)
+        self._velocity_unit = family.velocity_unit_steps_s
+        self._load_units = tuple(model.load_unit for model in models)
+        self._turn = family.steps_per_turn if family.single_turn else 0
+        self._signs = dict(family.sign_bits)
+        self._engaged = False
+        self._armed: tuple[int, ...] = (0,) * len(setups)
+        self.places = Plausibility([model.no_load_steps_s for model in models])
+        self._none = none = Feedback.of_none(len(setups))
         self._torque, self._fault = none.torque, none.fault
         self._temperature, self._voltage = none.temperature_c, none.voltage_v
         self._rearmed: set[int] = set()
+        self.set_limits(setups)
         self.begin()
 
     def begin(self) -> None:
@@ -77,7 +102,124 @@ class FeedbackColumns:
         )
 
     def set_limits(self, setups: Sequence[ServoSetup]) -> None:
-        """Take other ranges for the same servos; most families' positions do not need them."""
+        """Take other ranges and armed limits for the same servos."""
+        self._ranges = [(setup.min_steps, setup.max_steps) for setup in setups]
+        armed = [self._family.armed(setup) for setup in setups]
+        self._limits = {name: [one[name] for one in armed] for name in armed[0]} if armed else {}
+
+    # --- an answer of all servos
+
+    def take_whole(self, answer: Whole) -> bool:
+        """Take an answer in which nothing is amiss; False where anything must be looked at."""
+        values, at, at_s = answer.values, answer.group.columns, answer.at_s
+        if any(values[at.error]) or (at.status is not None and any(values[at.status])):
+            return False
+        if at.temperature is not None and max(values[at.temperature]) > MOST_CELSIUS:
+            return False
+        position = self._signed("position", values[at.position])
+        if at.torque is not None:
+            if values[at.torque] != self._armed or not self._keeps_limits(values, at):
+                return False
+            # Without torque a zero may be that of an indirect block without addresses.
+            if not self._engaged and 0 in position:
+                return False
+            self._torque = (self._engaged,) * len(position)
+        if self._turn:
+            position = tuple(
+                [
+                    p if low <= p <= high else nearest_turn(p, low, high, self._turn)
+                    for p, (low, high) in zip(position, self._ranges, strict=True)
+                ]
+            )
+        if not self.places.whole(position, at_s):
+            return False
+        if at.temperature is not None:
+            self._temperature = values[at.temperature]
+        if at.voltage is not None:
+            self._voltage = tuple([0.1 * tenths for tenths in values[at.voltage]])
+        effort, unit = self._signed("effort", values[at.effort]), self._velocity_unit
+        loads = [e * share for e, share in zip(effort, self._load_units, strict=True)]
+        if max(loads) > 1.0 or min(loads) < -1.0:
+            loads = [max(-1.0, min(1.0, load)) for load in loads]
+        velocity = self._signed("velocity", values[at.velocity])
+        self._take_all(position, tuple([v * unit for v in velocity]), tuple(loads), at_s)
+        return True
+
+    def _signed(self, field: str, column: tuple[int, ...]) -> tuple[int, ...]:
+        """Return a column whose sign may be a bit of its own."""
+        bit = self._signs.get(field)
+        if bit is None or max(column) < (sign := 1 << bit):
+            return column
+        return tuple([value if value < sign else sign - value for value in column])
+
+    def _keeps_limits(self, values: tuple[Any, ...], at: Columns) -> bool:
+        """Return whether an answer tells the limits that were armed, as far as it tells them."""
+        if not self._engaged:
+            return True
+        for name, wanted in self._limits.items():
+            column = getattr(at, name)
+            pairs = zip(values[column], wanted, strict=True) if column is not None else ()
+            if any(limit is not None and found != limit for found, limit in pairs):
+                return False
+        return True
+
+    # --- answers servo by servo
+
+    def all_believed(self, heard: Mapping[int, Heard]) -> bool:
+        """Return whether all servos have answered in one exchange, and all of it can be true."""
+        if len(heard) < len(self._ids):
+            return False
+        answers = [heard[i] for i in self._ids]
+        at_s = answers[0].at_s
+        if any(one.at_s != at_s for one in answers):
+            return False
+        return self.places.whole(
+            [self._near(slot, one.sample.position) for slot, one in enumerate(answers)], at_s
+        )
+
+    def believes(self, slot: int, heard: Heard) -> bool:
+        """Return whether one servo's answer can be true; to be asked once for every answer."""
+        return self.places.one(slot, self._near(slot, heard.sample.position), heard.at_s)
+
+    def confirmed(self, slot: int, first: Heard, second: Heard) -> Heard | None:
+        """Return what two answers right after one another both say; None where they differ."""
+        one, other = first.sample, second.sample
+        alike = (
+            abs((one.temperature or 0) - (other.temperature or 0)) <= ALIKE_C
+            and abs((one.voltage or 0) - (other.voltage or 0)) <= ALIKE_TENTH_V
+            and self.places.pair(slot, one.position, first.at_s, other.position, second.at_s)
+        )
+        if not alike:
+            return None
+        # The middle of both, and the smaller of what nothing else can tell damage of.
+        return first._replace(
+            sample=one._replace(
+                error=one.error & other.error,
+                status=(one.status or 0) & (other.status or 0),
+                position=(one.position + other.position) // 2,
+                velocity=min(one.velocity, other.velocity, key=abs),
+                effort=min(one.effort, other.effort, key=abs),
+            )
+        )
+
+    def take(self, slot: int, heard: Heard) -> None:
+        """Take one servo's answer, which was not refused."""
+        sample = heard.sample
+        if sample.torque is not None:
+            self.set_torque(slot, sample.torque == 1)
+        if not sample.blank:
+            warm = sample.temperature
+            if warm is not None and warm <= MOST_CELSIUS:
+                self._temperature = with_value(self._temperature, slot, warm)
+            if sample.voltage is not None:
+                self._voltage = with_value(self._voltage, slot, 0.1 * sample.voltage)
+        load = max(-1.0, min(1.0, sample.effort * self._load_units[slot]))
+        position = self._near(slot, sample.position)
+        self._take_one(slot, position, sample.velocity * self._velocity_unit, load, heard.at_s)
+
+    def _near(self, slot: int, position: int) -> int:
+        """Return a position, whole turns added, where turns cannot be told apart."""
+        return nearest_turn(position, *self._ranges[slot], self._turn) if self._turn else position
 
     # --- one servo
 
@@ -99,13 +241,20 @@ class FeedbackColumns:
 
     def expect_torque(self, on: bool) -> None:
         """Record that the torque has been switched for all."""
-        self._torque = (on,) * len(self._torque)
+        self._engaged, self._torque = on, (on,) * len(self._torque)
+        self._armed = (int(on),) * len(self._torque)
+
+    def set_climate(self, slot: int, tenth_volts: int, temperature_c: int) -> None:
+        """Record a servo's voltage and temperature."""
+        self._voltage = with_value(self._voltage, slot, 0.1 * tenth_volts)
+        self._temperature = with_value(self._temperature, slot, float(temperature_c))
 
     def hold(self, slot: int, position: int, at_s: float, torque: bool) -> None:
         """Take the place of a servo that was just set up again and stands still."""
+        near = self._near(slot, position)
         self.set_torque(slot, torque)
-        self.places.place(slot, position, at_s)
-        self._take_one(slot, position, 0.0, 0.0, at_s)
+        self.places.place(slot, near, at_s)
+        self._take_one(slot, near, 0.0, 0.0, at_s)
 
 
 def with_value(column: tuple[Value, ...], slot: int, value: Value) -> tuple[Value, ...]:

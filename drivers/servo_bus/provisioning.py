@@ -10,6 +10,7 @@ from typing import NamedTuple
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog, register_label, servo_label
 from gazerig.drivers.servo_bus.family import Register
+from gazerig.drivers.servo_bus.read_plan import AddressMap
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.transaction import Line
 from gazerig.drivers.types import ServoSetup
@@ -22,13 +23,6 @@ class Difference(NamedTuple):
     register: Register
     found: int
     wanted: int
-
-
-class AddressMap(NamedTuple):
-    """Addresses that a servo's indirect block must hold, as bytes from ``address`` on."""
-
-    address: int
-    data: bytes
 
 
 class Provisioning:

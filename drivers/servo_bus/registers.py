@@ -31,14 +31,14 @@ class Registers:
     """
 
     def __init__(self, port: BusPort, family: Family, tries: int = TRIES) -> None:
-        self._port, self._family, self._codec = port, family, family.codec
+        self._port, self._family = port, family
         self._tries = tries
         self._late_until_s: dict[int, float] = {}
         self.error = self.refusal = 0
 
     def identify(self, servo_id: int) -> Identity | None:
         """Return what a servo calls itself, None where it does not answer."""
-        codec = self._codec
+        codec = self._family.codec
         status = self._exchange(servo_id, codec.identify(servo_id), codec.IDENTITY_LENGTH)
         return None if status is None else codec.identity(status)
 
@@ -51,8 +51,8 @@ class Registers:
     def read_bytes(self, servo_id: int, address: int, length: int) -> bytes | None:
         """Return bytes of the table, None where no good answer came."""
         # Where a question's echo looks like an answer the answer must be of another length.
-        asked = length + (length == self._codec.ECHO_LENGTH)
-        status = self._exchange(servo_id, self._codec.read(servo_id, address, asked), asked)
+        asked = length + (length == self._family.codec.ECHO_LENGTH)
+        status = self._exchange(servo_id, self._family.codec.read(servo_id, address, asked), asked)
         return None if status is None else status.params[:length]
 
     def read_many(self, servo_id: int, names: Iterable[str]) -> dict[str, int | None]:
@@ -79,14 +79,14 @@ class Registers:
 
     def write_bytes(self, servo_id: int, address: int, data: bytes) -> bool:
         """Write bytes of the table; return whether the servo confirmed it."""
-        request = self._codec.write(servo_id, address, data)
+        request = self._family.codec.write(servo_id, address, data)
         return self._exchange(servo_id, request, 0, insist=True) is not None
 
     def write_all(self, ids: Sequence[int], name: str, value: int) -> None:
         """Write one value to a register of several servos at once, unconfirmed."""
         register = self._family.registers[name]
         rows = [register.encode(value)] * len(ids)
-        self._port.write(self._codec.sync_write(ids, register.address, register.size, rows))
+        self._port.write(self._family.codec.sync_write(ids, register.address, register.size, rows))
 
     def settle(self, servo_id: int, name: str, value: int) -> bool:
         """Write a register only where it differs; return whether it now has the value."""
@@ -120,7 +120,7 @@ class Registers:
                 self._port.drain()
                 continue
             self.error = status.error
-            self.refusal = status.error & self._codec.REFUSAL
+            self.refusal = status.error & self._family.codec.REFUSAL
             if not self.refusal:
                 return status
             if not insist:

@@ -1,13 +1,16 @@
 """Looking after servos between the exchanges: what does not depend on how a family tells faults."""
 
-from abc import ABC
-from collections.abc import Collection, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Mapping
 from math import inf
 
 from gazerig.drivers.servo_bus.faults import Health
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
+from gazerig.drivers.servo_bus.read_plan import ReadPlan
+from gazerig.drivers.servo_bus.read_windows import Sample
 from gazerig.drivers.servo_bus.recovery import Recovery
-from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.servo_bus.torque import heal_tripped
+from gazerig.drivers.servo_bus.transaction import TRIES, Line
 from gazerig.drivers.slow_entry import SlowEntry
 from gazerig.drivers.types import ServoSetup
 
@@ -18,32 +21,102 @@ AGAIN_S = 0.25
 class Supervisor(ABC):
     """What is done about the servos' health.
 
+    Args:
+        line: the bus.
+        setups: the servos by id.
+        recovery: sets them up again.
+        health: told what ails them.
+        feedback: what is known of them.
+        plan: how they are read.
+        watchdog: Bus Watchdog that is armed, in its units; 0 for none.
+
     engaged: the torque is on
     entering: servos on their slow way into their limits
     """
 
-    _feedback: FeedbackColumns
-
     def __init__(
-        self, line: Line, setups: Mapping[int, ServoSetup], recovery: Recovery, health: Health
+        self,
+        line: Line,
+        setups: Mapping[int, ServoSetup],
+        recovery: Recovery,
+        health: Health,
+        feedback: FeedbackColumns,
+        plan: ReadPlan,
+        watchdog: int = 0,
     ) -> None:
-        self._line = line
+        self._line, self._family = line, line.family
         self._setups = setups
         self._ids = tuple(setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._recovery = recovery
         self._health = health
+        self._feedback = feedback
+        self._plan = plan
+        self._watchdog = watchdog
         self.engaged = False
         self.entering = SlowEntry(setups)
         self._suspects: set[int] = set()
         self._rearmed: set[int] = set()
-        self._recover_at_s = -inf
+        self._recover_at_s = self._check_at_s = -inf
+        self._checked = 0
+
+    @property
+    def at_ease(self) -> bool:
+        """Return whether nothing is known of any servo that an answer could change."""
+        return True
+
+    def take_on(self, entering: Collection[int]) -> None:
+        """Begin to look after servos under torque; some of them are outside their limits."""
+        self.engaged = True
+        self.entering.begin(entering)
+        self._suspects.clear()
+        unit = self._family.watchdog_unit_s or 0.0
+        self._line.starving_s, self._line.tries = self._watchdog * unit or inf, 1
+        self._feedback.expect_torque(True)
+        self._feedback.places.forget()
+
+    def let_go(self) -> None:
+        """Leave servos without torque alone."""
+        self.engaged = False
+        self.entering.clear()
+        self._suspects.clear()
+        self._rearmed.clear()
+        self._line.starving_s, self._line.starved, self._line.tries = inf, False, TRIES
+        self._feedback.expect_torque(False)
 
     def mark_all_for_recovery(self) -> None:
         """Trust no servo to be as it was left."""
         self._suspects.update(self._ids)
         self._recover_at_s = -inf
         self._feedback.places.forget()
+
+    @abstractmethod
+    def look_first(self) -> None:
+        """Look at servos that have just been prepared."""
+
+    @abstractmethod
+    def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
+        """Look at one servo's answer: its faults, and whether it is armed as it was left."""
+
+    @abstractmethod
+    def service(self, group: Collection[int], now_s: float) -> None:
+        """Do what is due after a read; servos that are well again are taken here.
+
+        Raises:
+            BusLost: the port is gone.
+        """
+
+    def withheld(self, now_s: float) -> frozenset[int]:
+        """Return the servos that must get no goals now."""
+        return frozenset()
+
+    def answers_again(self, servo_id: int) -> None:  # noqa: B027  # some have nothing to do
+        """Look at a servo that had been out of the group."""
+
+    def note_out(self, out: Collection[int], now_s: float) -> None:  # noqa: B027
+        """Record who is out of the group now."""
+
+    # --- servos to be set up again
 
     def _recover(self, group: Collection[int], now_s: float) -> None:
         """Set up again who may have restarted and answers; tried again later where that fails."""
@@ -57,7 +130,7 @@ class Supervisor(ABC):
         self._suspects.difference_update(ids)
         at_s = self._line.port.now_s()
         for servo_id in ids:
-            self._feedback.name_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
+            self._name_fault(servo_id)
         for servo_id, position in found.items():
             self._line.errors["rearmed"] += 1
             slot = self._slot[servo_id]
@@ -70,6 +143,32 @@ class Supervisor(ABC):
     def _recovered(self, servo_id: int) -> None:  # noqa: B027  # most have nothing to add
         """Forget what was thought of a servo that is well again."""
 
+    def recover_tripped(self, group: Iterable[int]) -> None:
+        """Bring servos back whose own watchdog has stopped them."""
+        self._line.starved = False
+        ids = tuple(group)
+        if not ids:
+            return
+        healed = heal_tripped(self._line, ids, self._watchdog, self._recovery.clip)
+        self._rearmed.update(healed)
+        self._line.errors["watchdog"] += len(healed)
+        if healed:
+            self._health.stopped(len(healed), self._line.asleep_s, self._line.port.now_s())
+        self._line.asleep_s = 0.0
+
+    def _name_fault(self, servo_id: int) -> None:
+        """Let the feedback tell what a servo suffers from."""
+        self._feedback.name_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
+
+    def _next_to_check(self, group: Collection[int], again_s: float) -> int | None:
+        """Return the servo whose turn it is, None where it is out of the group."""
+        self._check_at_s = again_s
+        self._checked = (self._checked + 1) % len(self._ids)
+        servo_id = self._ids[self._checked]
+        return servo_id if servo_id in group else None
+
+    # --- marks on answers
+
     def _mark_rearmed(self) -> None:
         """Mark the first answer of servos whose torque came on anew."""
         for servo_id in tuple(self._rearmed):
@@ -78,15 +177,26 @@ class Supervisor(ABC):
                 self._rearmed.discard(servo_id)
                 self._feedback.mark_rearmed(slot)
 
-    def _arrived(self, now_s: float) -> tuple[int, ...]:
-        """Mark the answers of servos on their slow way; return those that have arrived."""
-        there = []
+    def _mark_entering(self, now_s: float) -> None:
+        """Mark the answers of servos on their slow way; give those that arrive their speed back."""
         for slot, servo_id in enumerate(self._ids):
             if servo_id not in self.entering:
                 continue
             steps = self._feedback.position(slot)
             if steps is not None:
                 self._feedback.mark_rearmed(slot)
-                if self.entering.arrived(servo_id, steps, now_s):
-                    there.append(servo_id)
-        return tuple(there)
+                if self.entering.arrived(servo_id, steps, now_s) and self._full_speed(servo_id):
+                    self.entering.end(servo_id)
+
+    def _full_speed(self, servo_id: int) -> bool:
+        """Return whether a servo may be as fast as ever; that goes with the next goal or is told.
+
+        Raises:
+            BusLost: the port is gone.
+        """
+        if self._family.goal_speed:
+            return True
+        name = self._family.arming.register
+        (speed,) = self._recovery.speeds((servo_id,), ())
+        self._line.write_all((servo_id,), name, (speed,))
+        return self._line.ask((servo_id,), name).get(servo_id) == speed

@@ -4,13 +4,15 @@ A servo that keeps silent or garbles costs only itself: those whose answers were
 its own are asked again at once without it.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from math import inf
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple
 
 from gazerig.drivers.servo_bus.poll_list import Roll, silent_ones
+from gazerig.drivers.servo_bus.read_plan import ReadPlan
+from gazerig.drivers.servo_bus.read_windows import Sample, WindowSchedule
+from gazerig.drivers.servo_bus.sync_packets import GroupRead, SyncRead, Values
 from gazerig.drivers.servo_bus.transaction import Line
-from gazerig.drivers.servo_bus.window_schedule import Turns
 
 MOST_GROUPS = 64
 """So many prepared exchanges are kept."""
@@ -18,110 +20,47 @@ MOST_GROUPS = 64
 OWED_S = 0.5
 """An answer may still come so long after waiting for it has ended."""
 
-Sample = TypeVar("Sample")
 
-
-class Window(Protocol):
-    """Bytes read from every servo."""
-
-    @property
-    def address(self) -> int:
-        """First byte."""
-
-    @property
-    def length(self) -> int:
-        """Number of bytes."""
-
-
-View = TypeVar("View", bound=Window)
-
-
-class Pieces(NamedTuple, Generic[Sample]):
-    """What could be saved of an answer.
-
-    samples: proved values by id
-    damaged: servos whose bytes were spoilt
-    unproved: servos whose bytes cannot be judged because of a damaged one before them
-    """
-
-    samples: dict[int, Sample]
-    damaged: frozenset[int]
-    unproved: frozenset[int] = frozenset()
-
-
-class Group(Protocol[Sample]):
-    """A read of some servos with everything fixed beforehand."""
-
-    ids: tuple[int, ...]
-    request: bytes
-    reply_length: int
-
-    def whole(self, raw: bytes) -> Any | None:
-        """Return all values, None where anything at all is not as it should be."""
-
-    def missing(self, raw: bytes) -> int:
-        """Return how many bytes are still to come."""
-
-    def pieces(self, raw: bytes) -> Pieces[Sample]:
-        """Save what can be proved right."""
-
-    def each(self, raw: bytes, values: Any) -> Mapping[int, Sample]:
-        """Return a faultless answer servo by servo."""
-
-
-class Heard(NamedTuple, Generic[Sample]):
+class Heard(NamedTuple):
     """One servo's answer and when it arrived."""
 
     sample: Sample
     at_s: float
 
 
-class Whole(NamedTuple, Generic[Sample]):
-    """A faultless answer of everybody, and when it arrived."""
+class Whole(NamedTuple):
+    """A faultless answer of all servos asked, and when it arrived."""
 
-    group: Any
+    group: GroupRead
     raw: bytes
-    values: Any
+    values: Values
     at_s: float
 
-    def each(self) -> dict[int, Heard[Sample]]:
+    def each(self) -> dict[int, Heard]:
         """Return the answer servo by servo."""
-        samples: Mapping[int, Sample] = self.group.each(self.raw, self.values)
+        samples = self.group.pieces(self.raw).samples
         return {servo_id: Heard(sample, self.at_s) for servo_id, sample in samples.items()}
 
 
-class Reader(Generic[View, Sample]):
+class Reader:
     """Reads all servos of a poll list.
 
     Args:
         line: the bus.
         roll: who is asked; told who failed.
-        together: the views of the group's reading.
-        alone: the views of servos that are asked alone.
-        kind: makes the read of some servos with a view.
-        header: first bytes of every answer.
-        second: views of readings that confirm others, and have other lengths than they.
+        plan: how they are read.
     """
 
-    def __init__(
-        self,
-        line: Line,
-        roll: Roll,
-        together: Turns[View],
-        alone: Turns[View],
-        kind: Callable[[Sequence[int], View], Group[Sample]],
-        header: bytes,
-        second: Turns[View] | None = None,
-    ) -> None:
+    def __init__(self, line: Line, roll: Roll, plan: ReadPlan) -> None:
         self._line = line
         self.roll = roll
-        self._together, self._alone, self._second = together, alone, second or alone
-        self._kind, self._header = kind, header
+        self._together, self._alone, self._second = plan.together, plan.alone, plan.second
+        self._packets, self._header = plan.packets, line.family.codec.HEADER
         self._until_s = inf
         self._unanswered_s: dict[int, float] = {}
-        self._groups: dict[tuple[tuple[int, ...], int, int], Group[Sample]] = {}
+        self._groups: dict[tuple[tuple[int, ...], int, int], GroupRead] = {}
 
-    def read(self, now_s: float) -> Whole[Sample] | dict[int, Heard[Sample]]:
+    def read(self, now_s: float) -> Whole | dict[int, Heard]:
         """Read everybody who is asked now; who is not in the answer gave no good one.
 
         Raises:
@@ -138,7 +77,7 @@ class Reader(Generic[View, Sample]):
         values = group.whole(raw)
         if values is not None:
             return Whole(group, raw, values, at_s)
-        heard: dict[int, Heard[Sample]] = {}
+        heard: dict[int, Heard] = {}
         self._save(group, raw, at_s, heard, now_s, self._together)
         return heard
 
@@ -155,7 +94,7 @@ class Reader(Generic[View, Sample]):
         unanswered_s = self._unanswered_s
         return bool(unanswered_s) and now_s - max(unanswered_s.values()) <= OWED_S
 
-    def again(self, ids: Sequence[int]) -> dict[int, Heard[Sample]]:
+    def again(self, ids: Sequence[int]) -> dict[int, Heard]:
         """Ask some servos once more, in one exchange; who is not in the answer gave no good one.
 
         Raises:
@@ -169,9 +108,9 @@ class Reader(Generic[View, Sample]):
             self._line.drain(self._line.timeout.seconds)
         return {servo_id: Heard(sample, at_s) for servo_id, sample in samples.items()}
 
-    def _with_care(self, now_s: float) -> dict[int, Heard[Sample]]:
+    def _with_care(self, now_s: float) -> dict[int, Heard]:
         """Read the group, and one of those who are out of it."""
-        heard: dict[int, Heard[Sample]] = {}
+        heard: dict[int, Heard] = {}
         together, due = self.roll.group, self.roll.due(now_s)
         self._until_s = inf
         self._read(together, heard, now_s, self._together)
@@ -182,9 +121,9 @@ class Reader(Generic[View, Sample]):
     def _read(
         self,
         ids: tuple[int, ...],
-        heard: dict[int, Heard[Sample]],
+        heard: dict[int, Heard],
         now_s: float,
-        turns: Turns[View],
+        turns: WindowSchedule,
     ) -> None:
         if not ids:
             return
@@ -196,25 +135,29 @@ class Reader(Generic[View, Sample]):
         self._until_s = min(self._until_s, self._line.whole_s + self._line.most_s)
         self._save(group, raw, at_s, heard, now_s, turns)
 
-    def _group(self, ids: tuple[int, ...], turns: Turns[View]) -> Group[Sample]:
+    def _group(self, ids: tuple[int, ...], turns: WindowSchedule) -> GroupRead:
         """Return the prepared exchange for some servos."""
-        view = turns.next()
-        key = ids, view.address, view.length
+        window = turns.next()
+        key = ids, window.address, window.length
         group = self._groups.get(key)
         if group is None:
             if len(self._groups) >= MOST_GROUPS:
                 self._groups.clear()
-            group = self._groups[key] = self._kind(ids, view)
+            if self._packets is not None:
+                group = self._packets(ids, window)
+            else:
+                group = SyncRead(self._line.family.codec, ids, window)
+            self._groups[key] = group
         return group
 
     def _save(
         self,
-        group: Group[Sample],
+        group: GroupRead,
         raw: bytes,
         at_s: float,
-        heard: dict[int, Heard[Sample]],
+        heard: dict[int, Heard],
         now_s: float,
-        turns: Turns[View],
+        turns: WindowSchedule,
     ) -> None:
         """Save what is right of an answer; ask again those who lost theirs through another."""
         while True:
@@ -239,7 +182,7 @@ class Reader(Generic[View, Sample]):
             raw, at_s = self._line.exchange(group.request, group.reply_length)
 
     def _blame(
-        self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: Turns[View]
+        self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: WindowSchedule
     ) -> None:
         """Note who failed; what still comes must not be taken for the next answer."""
         line, roll = self._line, self.roll

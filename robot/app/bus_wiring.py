@@ -1,33 +1,34 @@
 """The buses of a rig: which joints are on which, and one bus made of them all."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
 
-from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig
-from gazerig.drivers.dynamixel.bus import DynamixelBus
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.feetech.bus import FeetechBus
+from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.i2c.port import port_of
 from gazerig.drivers.maestro.bus import MaestroBus
 from gazerig.drivers.multi_bus import MixedBus, Share
 from gazerig.drivers.pca9685.bus import Pca9685Bus
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_models import BUS_KINDS
+from gazerig.drivers.servo_bus.bus import SmartServoBus
+from gazerig.drivers.servo_models import BUS_KINDS, BusKind
 from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.robot.app.rig_limits import park_rad
-from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.control.body import setups
 from gazerig.robot.guardian.guarded_bus import GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan
 
-BUSES: Mapping[str, Callable[[BusPort, Sequence[ServoSetup], BusConfig], ServoBus]] = {
-    "dynamixel": lambda port, setups, bus: DynamixelBus(port, setups, bus.dynamixel),
-    "feetech": lambda port, setups, bus: FeetechBus(port, setups, bus.feetech),
-    "maestro": lambda port, setups, bus: MaestroBus(port, setups, bus.maestro),
-    "pca9685": lambda port, setups, bus: Pca9685Bus(port, setups, bus.pca9685),
+BUSES: Mapping[BusKind, Callable[[BusPort, Sequence[ServoSetup], Any], ServoBus]] = {
+    "dynamixel": partial(SmartServoBus, DYNAMIXEL),
+    "feetech": partial(SmartServoBus, FEETECH),
+    "maestro": MaestroBus,
+    "pca9685": Pca9685Bus,
 }
-"""What makes a bus of servos on a port, by the kind that the YAML names."""
+"""What makes the bus of a kind: a port, its servos, and the rig's section of the kind's name."""
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
@@ -140,12 +141,7 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
 def has_watchdog(rig: Rig, name: str) -> bool:
     """Return whether the servos of one bus stop by themselves when their program dies."""
     config = rig.bus_named(name)
-    kind = KINDS.get(config.kind)
-    return (
-        kind is not None
-        and kind.family.watchdog_unit_s is not None
-        and getattr(config, config.kind).watchdog_ms > 0
-    )
+    return bool(getattr(getattr(config, config.kind), "watchdog_ms", 0))
 
 
 def _joined(shares: list[Share]) -> ServoBus:
@@ -159,4 +155,4 @@ def _share(rig: Rig, name: str, port: BusPort) -> Share:
     own = [every[joint] for joint in mine]
     places = tuple(rig.names.index(joint) for joint in mine)
     config = rig.bus_named(name)
-    return Share(name, BUSES[config.kind](port, own, config), places)
+    return Share(name, BUSES[config.kind](port, own, getattr(config, config.kind)), places)

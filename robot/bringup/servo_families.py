@@ -9,10 +9,7 @@ from gazerig.drivers.feetech import homing
 from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
 from gazerig.drivers.servo_models import SERVOS
-from gazerig.robot.bringup.servo_family import Driving, ServoKind, Setting, ShownLoad
-
-XL430_LOAD_FULL = 1000.0
-"""Models without current measurement give their load in 0.1 % of the stall torque there."""
+from gazerig.robot.bringup.servo_family import Driving, ServoKind, Setting
 
 GENTLE_ACCELERATION = 10
 """1000 steps/s2: a search begins within a tenth of a second."""
@@ -20,10 +17,7 @@ GENTLE_ACCELERATION = 10
 
 def _dynamixel_load(model: str, current: int) -> float:
     """Return Present Current, or Present Load where the model has that, as a share of the stall."""
-    one = dynamixel.MODELS[model]
-    if one.current_limit is None:
-        return current / XL430_LOAD_FULL
-    return current * one.current_unit_ma / (1000.0 * one.stall_current_a)
+    return current * dynamixel.MODELS[model].load_unit
 
 
 def _feetech_load(model: str, current: int) -> float:
@@ -68,8 +62,6 @@ DYNAMIXEL = ServoKind(
         gentle=_gentle_dynamixel,
         load=_dynamixel_load,
     ),
-    velocity_unit_steps_s=dynamixel.VELOCITY_UNIT_STEPS_S,
-    shown_load=ShownLoad("present_current", _dynamixel_load),
 )
 
 FEETECH = ServoKind(
@@ -94,8 +86,6 @@ FEETECH = ServoKind(
         gentle=_gentle_feetech,
         load=_feetech_load,
     ),
-    velocity_unit_steps_s=1.0,
-    shown_load=ShownLoad("present_load", lambda model, load: load * feetech.LOAD_UNIT),
     set_middle=homing.set_middle,
 )
 

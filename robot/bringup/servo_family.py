@@ -46,13 +46,6 @@ class Driving(NamedTuple):
     load: Callable[[str, int], float]
 
 
-class ShownLoad(NamedTuple):
-    """What a monitor shows as load: a register, and its share of the stall torque by the model."""
-
-    register: str
-    share: Callable[[str, int], float]
-
-
 class ServoKind(NamedTuple):
     """One kind of smart servo; ports are open at the baud rate that is given or was found.
 
@@ -60,7 +53,6 @@ class ServoKind(NamedTuple):
     family: what the engine must know of it
     no_reply: what to look at where no servo answers
     notes: what must be known of all of them
-    velocity_unit_steps_s: of Present Velocity
     set_middle: makes the present position the middle, None where a kind cannot
     """
 
@@ -70,6 +62,4 @@ class ServoKind(NamedTuple):
     no_reply: str
     notes: tuple[str, ...]
     driving: Driving
-    velocity_unit_steps_s: float
-    shown_load: ShownLoad
     set_middle: Callable[[BusPort, Family, int], int] | None = None

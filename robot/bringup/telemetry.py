@@ -77,7 +77,7 @@ class SmartServoTelemetry:
 
     def __init__(self, port: BusPort, kind: ServoKind) -> None:
         self._registers, self._kind = Registers(port, kind.family, tries=1), kind
-        self._names = (*LIVE, kind.family.error_register, kind.shown_load.register)
+        self._names = (*LIVE, kind.family.error_register, kind.family.effort_register)
 
     def read(self, joint: JointParams) -> Telemetry | None:
         """Ask a joint's servo; see TelemetryReader."""
@@ -88,19 +88,20 @@ class SmartServoTelemetry:
 
 def telemetry_of(kind: ServoKind, joint: JointParams, values: Mapping[str, int]) -> Telemetry:
     """Return a servo's registers, by name, in units of its joint."""
+    family, effort = kind.family, values[kind.family.effort_register]
     goal, position = values["goal_position"], values["present_position"]
-    velocity_steps_s = values["present_velocity"] * kind.velocity_unit_steps_s
+    velocity_steps_s = values["present_velocity"] * family.velocity_unit_steps_s
     return Telemetry(
         degrees(joint.angle_rad(goal)),
         goal,
         degrees(joint.angle_rad(position)),
         position,
         degrees(velocity_steps_s * joint.made().rate_rad(position)),
-        kind.shown_load.share(joint.model, values[kind.shown_load.register]),
+        effort * family.models[joint.model].load_unit,
         values["present_temperature"],
         values["present_input_voltage"] / 10.0,
         values["torque_enable"] == 1,
-        kind.family.name_errors(values[kind.family.error_register]),
+        family.name_errors(values[family.error_register]),
     )
 
 

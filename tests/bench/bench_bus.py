@@ -22,8 +22,10 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Xl330PyController
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import Feedback, ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -63,7 +65,7 @@ def main() -> None:
 def ours(path: str, baud: int, **chosen: object) -> Iterator[Cycle]:
     """Our driver, its torque on."""
     params = DynamixelParams(baud=baud, **chosen)  # type: ignore[arg-type]
-    bus = DynamixelBus(BlockingPort(path), SETUPS, params)
+    bus = SmartServoBus(DYNAMIXEL, BlockingPort(path), SETUPS, params)
     bus.open()
     bus.engage()
 
@@ -242,7 +244,9 @@ def line_alone() -> None:
                 sleep_until=lambda t, now=now: now.__setitem__(0, max(now[0], t)),
                 wire_time=True,
             )
-            bus = DynamixelBus(port, SETUPS, DynamixelParams(baud=baud, indirect_block=indirect))
+            bus = SmartServoBus(
+                DYNAMIXEL, port, SETUPS, DynamixelParams(baud=baud, indirect_block=indirect)
+            )
             bus.open()
             bus.engage()
             _line_cycles(bus, now, 300)
@@ -262,7 +266,7 @@ def line_alone() -> None:
     out.print(table)
 
 
-def _line_cycles(bus: DynamixelBus, now: list[float], cycles: int) -> tuple[float, float]:
+def _line_cycles(bus: SmartServoBus, now: list[float], cycles: int) -> tuple[float, float]:
     """Run cycles in simulated time; gives the mean time and the mean number of values."""
     began, values = now[0], 0
     for k in range(cycles):
@@ -280,7 +284,7 @@ def unplug(times: int) -> None:
     notices, returns = [], []
     with PtyBus() as server:
         path = server.start(SPECS)
-        bus = DynamixelBus(BlockingPort(path), SETUPS, DynamixelParams())
+        bus = SmartServoBus(DYNAMIXEL, BlockingPort(path), SETUPS, DynamixelParams())
         bus.open()
         bus.engage()
         for _ in range(times):
@@ -299,7 +303,7 @@ def unplug(times: int) -> None:
     out.print(table)
 
 
-def _cycles(bus: DynamixelBus, done: Callable[[Feedback], bool], most_s: float) -> float:
+def _cycles(bus: SmartServoBus, done: Callable[[Feedback], bool], most_s: float) -> float:
     """Run at 100 Hz until something is so; gives how long that took in ms."""
     start = time.perf_counter()
     while time.perf_counter() - start < most_s:
@@ -334,7 +338,7 @@ def dice(cycles: int) -> None:
         tap=lambda data: truth.append(chain.positions_steps()),
         sleep_until=lambda t: now.__setitem__(0, max(now[0], t)),
     )
-    bus = DynamixelBus(port, SETUPS, DynamixelParams(give_up_s=600.0))
+    bus = SmartServoBus(DYNAMIXEL, port, SETUPS, DynamixelParams(give_up_s=600.0))
     bus.open()
     bus.engage()
     dice = random.Random(7)

@@ -24,11 +24,14 @@ from rich.console import Console
 from rich.table import Table
 from rustypot import Sts3215PyController, Xl330PyController
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
-from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
 from gazerig.drivers.multi_bus import MixedBus, Share
 from gazerig.drivers.serial.port import BlockingPort, BusPort
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
 from gazerig.sim_mock.hobby_servo import HobbySpec
@@ -95,10 +98,10 @@ def driver(kind: str, port: BusPort, ids: tuple[int, ...]) -> ServoBus:
         return MaestroBus(port, setups, MaestroParams(stagger_ms=0.0))
     if kind == "feetech":
         setups = [ServoSetup(i, "sts3215", 1000, 3000, 3000.0) for i in ids]
-        return FeetechBus(port, setups, FeetechParams())
+        return SmartServoBus(FEETECH, port, setups, FeetechParams())
     setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
     # While others have their turn it is silent for longer than servos bear.
-    return DynamixelBus(port, setups, DynamixelParams(watchdog_ms=0))
+    return SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams(watchdog_ms=0))
 
 
 @contextmanager

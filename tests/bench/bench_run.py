@@ -19,7 +19,8 @@ from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler
 from fastcrc import crc16
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.dynamixel.bus import DynamixelBus
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
@@ -143,7 +144,7 @@ def bus_exchange(cycles: int = 4000) -> None:
     rig = load_rig("desk")
     setups = [rig.joints[name].setup() for name in in_order(rig.joints)]
     chain = build_dynamixel(specs, lambda: now[0])
-    bus = DynamixelBus(InProcessPort(chain), setups, rig.bus.dynamixel)
+    bus = SmartServoBus(DYNAMIXEL, InProcessPort(chain), setups, rig.bus.dynamixel)
     bus.open()
     bus.engage()
     goals = [2048] * 9

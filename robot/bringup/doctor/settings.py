@@ -113,8 +113,8 @@ def _overload(state: ServoState) -> Iterator[Verdict]:
 def _speed(state: ServoState) -> Iterator[Verdict]:
     """The YAML's speed lies within the servo's own limit, or what its motor can do."""
     kind = state.checks.kind
-    unit_deg_s = kind.velocity_unit_steps_s * 360.0 / kind.family.steps_per_turn
-    asked = int(state.setup.max_speed_steps_s / kind.velocity_unit_steps_s)
+    unit_deg_s = kind.family.velocity_unit_steps_s * 360.0 / kind.family.steps_per_turn
+    asked = int(state.setup.max_speed_steps_s / kind.family.velocity_unit_steps_s)
     limit = state.values.get("velocity_limit")
     if limit is not None and limit < asked:
         yield Verdict(

@@ -1,21 +1,11 @@
-"""Looking after STS servos between the exchanges: faults that come and go, torque, restarts."""
+"""Looking after servos whose faults come and go: every answer tells them, none latches."""
 
-from collections.abc import Collection, Mapping
-from math import inf
+from collections.abc import Collection
+from typing import Any
 
-from gazerig.drivers.feetech.feedback import FeetechFeedback
-from gazerig.drivers.feetech.memory_table import (
-    REGISTERS,
-    TORQUE_FULL,
-    acceleration_units,
-    name_errors,
-)
-from gazerig.drivers.feetech.views import ARMED, Sample
-from gazerig.drivers.servo_bus.faults import Health
-from gazerig.drivers.servo_bus.recovery import FAR_SIDE, Recovery
+from gazerig.drivers.servo_bus.read_windows import Sample
+from gazerig.drivers.servo_bus.recovery import FAR_SIDE
 from gazerig.drivers.servo_bus.supervisor import Supervisor
-from gazerig.drivers.servo_bus.transaction import TRIES, Line
-from gazerig.drivers.types import ServoSetup
 
 CHECK_S = 0.1
 """On a disturbed line one servo's settings are compared so often, each in turn."""
@@ -26,64 +16,45 @@ GONE_S = 1.0
 RESTART_S = 0.1
 """A servo that was silent for so long may have restarted: it gets no goals until it is set up."""
 
-TAKES_TORQUE = REGISTERS["unloading_condition"].initial or 0
-"""Faults that take the torque away, as from the factory."""
 
+class PassingFaultSupervisor(Supervisor):
+    """Supervisor of servos whose faults come and go."""
 
-class FeetechSupervisor(Supervisor):
-    """What is done about the servos' health."""
-
-    _feedback: FeetechFeedback
-
-    def __init__(
-        self,
-        line: Line,
-        setups: Mapping[int, ServoSetup],
-        recovery: Recovery,
-        health: Health,
-        feedback: FeetechFeedback,
-    ) -> None:
-        super().__init__(line, setups, recovery, health)
-        self._feedback = feedback
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **more)
         self._limp: set[int] = set()
         self._out_since_s: dict[int, float] = {}
         self._seen_s: dict[int, dict[int, float]] = {}
         self._told_before: dict[int, int] = {}
         self._doubted: set[int] = set()
-        self._check_at_s = -inf
-        self._checked = 0
-
-    def take_on(self, entering: Collection[int]) -> None:
-        """Begin to look after servos under torque; some of them are outside their limits."""
-        self.engaged = True
-        self.entering.begin(entering)
-        self._suspects.clear()
-        self._limp.clear()
-        self._doubted.clear()
-        self._line.tries = 1
-        self._feedback.expect_torque(True)
-        self._feedback.places.forget()
-        # What was wrong of old is not: all have just taken their goals and their torque.
-        for servo_id in [i for i in self._health.faults if i not in self._health.latches]:
-            del self._health.faults[servo_id]
-            self._feedback.name_fault(self._slot[servo_id], "")
-
-    def let_go(self) -> None:
-        """Leave servos without torque alone."""
-        self.engaged = False
-        self.entering.clear()
-        for one in (self._suspects, self._rearmed, self._limp, self._doubted):
-            one.clear()
-        self._line.tries = TRIES
-        self._feedback.expect_torque(False)
 
     @property
     def at_ease(self) -> bool:
         """Return whether nothing is known of any servo that an answer could change."""
-        return not (self._seen_s or self._health.faults or any(self._told_before.values()))
+        doubts = self._limp or self._doubted or self._seen_s or self._health.faults
+        return not (doubts or any(self._told_before.values()))
+
+    def take_on(self, entering: Collection[int]) -> None:
+        """Begin to look after servos under torque; some of them are outside their limits."""
+        super().take_on(entering)
+        self._limp.clear()
+        self._doubted.clear()
+        # What was wrong of old is not: all have just taken their goals and their torque.
+        for servo_id in [i for i in self._health.faults if i not in self._health.latches]:
+            del self._health.faults[servo_id]
+            self._name_fault(servo_id)
+
+    def let_go(self) -> None:
+        """Leave servos without torque alone."""
+        super().let_go()
+        self._limp.clear()
+        self._doubted.clear()
+
+    def look_first(self) -> None:
+        """Look at servos that have just been prepared: every answer tells their faults."""
 
     def withheld(self, now_s: float) -> frozenset[int]:
-        """Name the servos that must get no goals now.
+        """Return the servos that must get no goals now.
 
         Some firmware switches the torque on with a goal, so whoever may have restarted, or is
         limp, is first given its present place.
@@ -100,21 +71,22 @@ class FeetechSupervisor(Supervisor):
         self._limp.discard(servo_id)
 
     def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
-        """Look at one servo's answer: its faults, and whether it is armed as it should be."""
+        """Look at one servo's answer: its faults, and whether it is armed as it was left."""
+        error = sample.error | (sample.status or 0)
         # Damaged bytes may pass for a fault, which ends a run: it must be told twice in a row.
-        told = sample.error & self._told_before.get(servo_id, 0)
-        self._told_before[servo_id] = sample.error
+        told = error & self._told_before.get(servo_id, 0)
+        self._told_before[servo_id] = error
         if told or servo_id in self._seen_s:
-            self._mind_bits(servo_id, told, now_s)
+            self._record_bits(servo_id, told, now_s)
         if not self.engaged:
             return
         if self._health.faults.get(servo_id) == FAR_SIDE:
-            self._mind_far_side(servo_id, sample.position)
+            self._check_far_side(servo_id, sample.position)
         if sample.torque is not None:
-            self._mind_torque(servo_id, sample)
+            self._check_torque(servo_id, sample)
 
     def note_out(self, out: Collection[int], now_s: float) -> None:
-        """Note who is out of the group now; who is back after long may have restarted."""
+        """Record who is out of the group now; who is back after long may have restarted."""
         for servo_id in [i for i in self._out_since_s if i not in out]:
             since_s = self._out_since_s.pop(servo_id)
             if self.engaged and now_s - since_s >= RESTART_S:
@@ -122,7 +94,7 @@ class FeetechSupervisor(Supervisor):
         for servo_id in out:
             self._out_since_s.setdefault(servo_id, now_s)
 
-    def _mind_bits(self, servo_id: int, error: int, now_s: float) -> None:
+    def _record_bits(self, servo_id: int, error: int, now_s: float) -> None:
         """Name faults as they come, and say when they are gone."""
         seen_s = self._seen_s.setdefault(servo_id, {})
         before = self._bits(servo_id)
@@ -145,35 +117,33 @@ class FeetechSupervisor(Supervisor):
         if servo_id in health.faults and servo_id not in health.latches:
             return  # something worse is known of it
         if bits:
-            health.name(servo_id, " and ".join(name_errors(bits)))
+            health.name(servo_id, " and ".join(self._family.name_errors(bits)))
             health.latches.add(servo_id)
             self._line.errors["alert"] += 1
         else:
             health.cleared(servo_id)
-        self._feedback.name_fault(self._slot[servo_id], health.faults.get(servo_id, ""))
+        self._name_fault(servo_id)
 
-    def _mind_far_side(self, servo_id: int, steps: int) -> None:
-        """See whether somebody has turned a joint back into its range."""
+    def _check_far_side(self, servo_id: int, steps: int) -> None:
+        """See whether a joint has been turned back into its range by hand."""
         if not self._recovery.is_lost(servo_id, steps):
             self._health.latches.add(servo_id)
             self._health.cleared(servo_id)
-            self._feedback.name_fault(self._slot[servo_id], "")
+            self._name_fault(servo_id)
             self._suspects.add(servo_id)
 
-    def _mind_torque(self, servo_id: int, sample: Sample) -> None:
+    def _check_torque(self, servo_id: int, sample: Sample) -> None:
         """Doubt a servo that does not seem armed as it was left: it is asked once more."""
-        if sample.torque == 1 and self._armed(servo_id, sample):
+        if sample.torque == 1 and self._is_armed(servo_id, sample):
             self._limp.discard(servo_id)
             self._doubted.discard(servo_id)
         elif servo_id not in self._limp or not self._known_reason(servo_id):
             self._doubted.add(servo_id)
 
-    def _armed(self, servo_id: int, sample: Sample) -> bool:
+    def _is_armed(self, servo_id: int, sample: Sample) -> bool:
         """Return whether speed and torque limits are as they were written."""
-        setup = self._setups[servo_id]
-        strength = sample.limit if setup.strength is None else round(setup.strength * TORQUE_FULL)
-        armed = acceleration_units(setup.max_accel_steps_s2), strength
-        return (sample.acceleration, sample.limit) == armed
+        wanted = self._family.armed(self._setups[servo_id]).items()
+        return all(limit is None or getattr(sample, name) == limit for name, limit in wanted)
 
     def _look_again(self, group: Collection[int]) -> None:
         """Ask those in doubt once more, and suspect who is not armed indeed.
@@ -181,20 +151,22 @@ class FeetechSupervisor(Supervisor):
         Raises:
             BusLost: the port is gone.
         """
+        window = self._plan.armed
+        if window is None:
+            return
         ids = tuple(i for i in self._ids if i in self._doubted and i in group)
-        found = self._line.ask_bytes(ids, ARMED.address, ARMED.length)
-        for servo_id, data in found.items():
+        for servo_id, data in self._line.ask_bytes(ids, window.address, window.length).items():
             self._doubted.discard(servo_id)
-            sample = ARMED.sample(0, data)
+            sample = window.sample(0, data)
             if sample.torque != 1:
                 self._limp.add(servo_id)
                 if not self._known_reason(servo_id):
                     self._suspects.add(servo_id)
-            elif not self._armed(servo_id, sample):
-                # A restart so short that nobody noticed, and a goal that brought the torque back.
+            elif not self._is_armed(servo_id, sample):
+                # A restart so short that it went unnoticed, and a goal that brought the torque.
                 self._suspects.add(servo_id)
 
-    def _check_next(self, group: Collection[int], now_s: float) -> None:
+    def _check_settings(self, group: Collection[int], now_s: float) -> None:
         """On a disturbed line compare one servo's settings, the next at the next time.
 
         An order that noise has changed may pass the sum of one byte and be written anywhere:
@@ -203,10 +175,8 @@ class FeetechSupervisor(Supervisor):
         Raises:
             BusLost: the port is gone.
         """
-        self._check_at_s = now_s + CHECK_S
-        self._checked = (self._checked + 1) % len(self._ids)
-        servo_id = self._ids[self._checked]
-        if servo_id not in group:
+        servo_id = self._next_to_check(group, now_s + CHECK_S)
+        if servo_id is None:
             return
         # The answers of a line that has just been in trouble do not tell the torque.
         self._doubted.add(servo_id)
@@ -218,7 +188,9 @@ class FeetechSupervisor(Supervisor):
         """Return whether it is known why a servo has no torque."""
         if servo_id not in self._health.faults:
             return False
-        return servo_id not in self._health.latches or bool(self._bits(servo_id) & TAKES_TORQUE)
+        if servo_id not in self._health.latches:
+            return True
+        return bool(self._bits(servo_id) & self._family.torque_faults)
 
     # --- after every read
 
@@ -229,13 +201,12 @@ class FeetechSupervisor(Supervisor):
             BusLost: the port is gone.
         """
         if self.engaged and now_s >= self._check_at_s and self._feedback.places.disturbed(now_s):
-            self._check_next(group, now_s)
+            self._check_settings(group, now_s)
         if self._doubted and group:
             self._look_again(group)
         if self._suspects and now_s >= self._recover_at_s:
             self._recover(group, now_s)
         if self.entering:
-            for servo_id in self._arrived(now_s):
-                self.entering.end(servo_id)
+            self._mark_entering(now_s)
         if self._rearmed:
             self._mark_rearmed()

@@ -1,0 +1,156 @@
+"""Looking after servos whose faults latch: an alert bit tells of them, a restart ends them."""
+
+from collections.abc import Collection, Sequence
+from math import inf
+from typing import Any
+
+from gazerig.drivers.servo_bus.read_windows import Sample
+from gazerig.drivers.servo_bus.supervisor import AGAIN_S, Supervisor
+from gazerig.drivers.servo_bus.torque import TRIPPED
+
+CHECK_S = 1.0
+"""So often one servo is asked whether it is still armed, each in turn."""
+
+SLOW_S = 0.05
+"""So often one servo is asked for what a group reading does not cover, each in turn."""
+
+
+class LatchedFaultSupervisor(Supervisor):
+    """Supervisor of servos whose faults latch."""
+
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **more)
+        self._unnamed: set[int] = set()
+        self._name_at_s = self._slow_at_s = -inf
+        self._due_s = -inf
+        self._slow = 0
+
+    def mark_all_for_recovery(self) -> None:
+        """Trust no servo to be as it was left."""
+        super().mark_all_for_recovery()
+        self._due_s = -inf
+
+    def look_first(self) -> None:
+        """Look at servos that have just been prepared."""
+        self._find_alerts(self._ids)
+
+    def answers_again(self, servo_id: int) -> None:
+        """Look at a servo that had been out of the group: is it still armed?"""
+        if self.engaged:
+            self._check(servo_id)
+
+    def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
+        """Look at one servo's answer: its faults, and whether it is armed as it was left."""
+        if sample.status:
+            # Damaged bytes may pass for a fault, which ends a run: the servo is asked once more.
+            if servo_id in self._health.latches:
+                self._latched(servo_id, sample.status)
+            else:
+                self._alert(servo_id)
+        elif sample.error & self._family.codec.ALERT:
+            self._alert(servo_id)
+        elif (
+            servo_id in self._health.latches
+            or sample.blank
+            or self._is_limp(servo_id, sample.torque)
+        ):
+            self._suspect(servo_id)
+
+    def _alert(self, servo_id: int) -> None:
+        """Record that a servo has raised the alert bit."""
+        if servo_id not in self._health.faults:
+            self._unnamed.add(servo_id)
+            self._due_s = -inf
+
+    def _is_limp(self, servo_id: int, torque: int | None) -> bool:
+        """Return whether a servo has no torque that should, and nothing known is the reason."""
+        return self.engaged and torque == 0 and servo_id not in self._health.faults
+
+    def _suspect(self, servo_id: int) -> None:
+        self._suspects.add(servo_id)
+        self._due_s = -inf
+
+    def _latched(self, servo_id: int, status: int) -> None:
+        if self._health.latched(servo_id, self._family.name_errors(status)):
+            self._line.errors["alert"] += 1
+            self._name_fault(servo_id)
+
+    # --- after every read
+
+    def service(self, group: Collection[int], now_s: float) -> None:
+        """Do what is due after a read; servos that are well again are taken here.
+
+        Raises:
+            BusLost: the port is gone.
+        """
+        if now_s >= self._due_s:
+            self._do_due(group, now_s)
+        if self.entering:
+            self._mark_entering(now_s)
+        if self._rearmed:
+            self._mark_rearmed()
+
+    def _do_due(self, group: Collection[int], now_s: float) -> None:
+        covered = self._plan.covered
+        if self._suspects and now_s >= self._recover_at_s:
+            self._recover(group, now_s)
+        if self._unnamed and now_s >= self._name_at_s:
+            self._name_at_s = now_s + AGAIN_S
+            self._find_alerts(tuple(self._unnamed))
+        if self.engaged and now_s >= self._check_at_s:
+            # A host that slept is noticed so.
+            due = self._next_to_check(group, now_s + CHECK_S)
+            if due is not None:
+                self._check(due)
+        if not covered and now_s >= self._slow_at_s:
+            self._ask_slow(group, now_s)
+        self._due_s = min(
+            self._recover_at_s if self._suspects else inf,
+            self._name_at_s if self._unnamed else inf,
+            self._check_at_s if self.engaged else inf,
+            inf if covered else self._slow_at_s,
+        )
+
+    def _find_alerts(self, ids: Sequence[int]) -> None:
+        """Ask servos whether they have latched an error, and which."""
+        found = self._line.ask(ids, self._family.error_register)
+        self._unnamed.difference_update(found)
+        latched = {servo_id: status for servo_id, status in found.items() if status}
+        for servo_id, status in latched.items():
+            self._latched(servo_id, status)
+        if latched and not self._plan.covered:
+            for servo_id, torque in self._line.ask(tuple(latched), "torque_enable").items():
+                self._feedback.set_torque(self._slot[servo_id], bool(torque))
+
+    # --- asking in turn
+
+    def _check(self, servo_id: int) -> None:
+        """See that a servo is still armed; after a restart its RAM is as from the factory."""
+        name, armed = ("bus_watchdog", self._watchdog) if self._watchdog else ("torque_enable", 1)
+        state = self._line.ask((servo_id,), name).get(servo_id, armed)
+        if state == TRIPPED:
+            # Where one has starved the others have too.
+            self._line.starved = True
+        elif state != armed and servo_id not in self._health.faults:
+            self._suspect(servo_id)
+
+    def _ask_slow(self, group: Collection[int], now_s: float) -> None:
+        """Read torque, or voltage and temperature, of one servo; the next at the next time."""
+        self._slow_at_s = now_s + SLOW_S
+        self._slow = (self._slow + 1) % (2 * len(self._ids))
+        slot, climate = divmod(self._slow, 2)
+        servo_id = self._ids[slot]
+        if servo_id not in group:
+            return
+        if climate:
+            registers = self._family.registers
+            volts, warm = registers["present_input_voltage"], registers["present_temperature"]
+            span = warm.address + warm.size - volts.address
+            for data in self._line.ask_bytes((servo_id,), volts.address, span).values():
+                tenths, celsius = volts.decode(data[: volts.size]), warm.decode(data[-warm.size :])
+                self._feedback.set_climate(slot, tenths, celsius)
+        else:
+            for torque in self._line.ask((servo_id,), "torque_enable").values():
+                self._feedback.set_torque(slot, bool(torque))
+                if self._is_limp(servo_id, torque):
+                    self._suspect(servo_id)

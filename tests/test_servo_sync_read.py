@@ -1,0 +1,371 @@
+"""Sync reads of every family: whole answers at once, damaged ones piece by piece, and who is asked.
+
+What their values become, and which of them are believed, is here, too.
+"""
+
+import struct
+from functools import partial
+
+import pytest
+
+from gazerig.drivers.dynamixel import protocol as dynamixel_protocol
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.read_plan import DIRECT, direct_windows
+from gazerig.drivers.dynamixel.sync_packets import FastSyncRead
+from gazerig.drivers.feetech import protocol as feetech_protocol
+from gazerig.drivers.feetech.family import FEETECH, window
+from gazerig.drivers.feetech.params import FeetechParams
+from gazerig.drivers.feetech.protocol import checksum
+from gazerig.drivers.servo_bus.feedback import FeedbackColumns
+from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
+from gazerig.drivers.servo_bus.sync_packets import SyncRead
+from gazerig.drivers.servo_bus.sync_read import Heard, Whole
+from gazerig.drivers.types import ServoSetup
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+IDS = (4, 1, 9)
+PLACES = {4: 1000, 1: 2000, 9: 3000}
+BLOCK = struct.pack("<HHHBBBBB2xH", 0x8006, 0x8064, 0x052C, 74, 31, 0, 0x20, 1, 0x8002)
+SENSED, ARMED = window(56), window(40)
+
+dynamixel_read = partial(SyncRead, dynamixel_protocol)
+feetech_read = partial(SyncRead, feetech_protocol)
+
+READS = {
+    "dynamixel": (dynamixel_read, (DIRECT, *direct_windows()._spare)),
+    "dynamixel fast": (FastSyncRead, (DIRECT, *direct_windows()._spare)),
+    "feetech": (feetech_read, (SENSED, ARMED, window(55), window(30))),
+}
+
+
+class Kind:
+    """A kind of read: how it is made, its windows, and servos that answer it."""
+
+    def __init__(self, name):
+        self.name, (self.make, self.windows) = name, READS[name]
+        if name == "feetech":
+            specs = [ServoSpec(i, "sts3215", PLACES[i]) for i in IDS]
+            self.chain = build_feetech(specs, lambda: 0.0)
+        else:
+            self.chain = build_dynamixel([(i, "xl330-m288", PLACES[i]) for i in IDS], lambda: 0.0)
+
+    def asked(self, number=0):
+        """Return a read with one of the windows, and its answer."""
+        group = self.make(IDS, self.windows[number])
+        return group, self.chain.receive(group.request)
+
+
+@pytest.fixture(params=READS)
+def kind(request):
+    return Kind(request.param)
+
+
+def test_a_whole_answer_is_taken_at_once(kind):
+    for number in range(len(kind.windows)):
+        group, raw = kind.asked(number)
+        assert len(raw) == group.reply_length
+        assert group.whole(raw)[group.columns.position] == (1000, 2000, 3000)
+        assert group.missing(raw) == 0
+        assert {i: a.position for i, a in group.pieces(raw).samples.items()} == PLACES
+
+
+def test_any_single_damaged_byte_is_found_and_costs_little(kind):
+    group, raw = kind.asked()
+    head = 8 if kind.make is FastSyncRead else 0
+    for at in range(len(raw)):
+        for flip in (0x01, 0x80, 0xFF):
+            bad = raw[:at] + bytes([raw[at] ^ flip]) + raw[at + 1 :]
+            assert group.whole(bad) is None
+            answers = group.pieces(bad).samples
+            assert all(answer.position == PLACES[i] for i, answer in answers.items())
+            # A damaged CRC of a fast block is also the start of the next block's proof.
+            assert len(answers) >= (1 if at >= head else 0)
+            if kind.name == "dynamixel":
+                assert len(answers) == 2
+
+
+def test_any_lost_or_added_byte_never_makes_a_wrong_value(kind):
+    group, raw = kind.asked()
+    for at in range(len(raw)):
+        for bad in (raw[:at] + raw[at + 1 :], raw[:at] + b"\xff" + raw[at:], raw[:at]):
+            if bad == raw:
+                continue
+            answers = group.pieces(bad).samples
+            assert all(answer.position == PLACES[i] for i, answer in answers.items())
+
+
+def test_a_short_answer_gives_what_it_has(kind):
+    group, raw = kind.asked()
+    cut = raw[: len(raw) - 5]
+    assert group.whole(cut) is None
+    assert group.missing(cut) == 5
+    assert set(group.pieces(cut).samples) == {4, 1}
+
+
+def test_an_answer_of_another_reading_is_not_taken(kind):
+    _, raw = kind.asked()
+    now, _ = kind.asked(1)
+    assert now.whole(raw) is None
+    assert now.pieces(raw).samples == {}
+
+
+def test_noise_before_the_answer_does_no_harm(kind):
+    group, raw = kind.asked()
+    noisy = b"\xff\xff\xfd\x00" + raw
+    assert {i: a.position for i, a in group.pieces(noisy).samples.items()} == PLACES
+
+
+def test_stuffed_answers_are_longer_and_understood():
+    everyday = struct.pack("<hii", -1, -3, 2000)
+    group = dynamixel_read(IDS, DIRECT)
+    raw = b"".join(status(i, 0, everyday if i == 1 else bytes(10)) for i in IDS)
+    assert everyday[:3] + b"\xfd" in raw
+    assert group.whole(raw) is None
+    assert group.missing(raw[: group.reply_length]) == 1
+    sample = group.pieces(raw).samples[1]
+    assert (sample.effort, sample.velocity, sample.position) == (-1, -3, 2000)
+
+
+def test_a_refusal_without_bytes_is_an_answer_with_its_error():
+    group = dynamixel_read((1,), DIRECT)
+    assert group.pieces(status(1, 0x87, b"")).samples[1].error == 0x87
+    assert group.pieces(status(1, 0x80, b"")).samples == {}
+
+
+# --- numbers with a sign of their own, windows that tell more
+
+
+def sts_status(servo_id, params, error=0):
+    body = bytes((servo_id, len(params) + 2, error)) + params
+    return b"\xff\xff" + body + bytes((checksum(body),))
+
+
+def test_signs_units_and_both_error_bytes():
+    sample = SENSED.sample(0x01, BLOCK)
+    assert (sample.position, sample.velocity, sample.effort) == (-6, -100, -300)
+    assert (sample.voltage, sample.temperature) == (74, 31)
+    assert (sample.error, sample.status) == (0x01, 0x20)
+    assert sample.torque is None
+    armed = ARMED.sample(0, bytes((1, 50)) + bytes(6) + struct.pack("<H", 400) + bytes(6) + BLOCK)
+    assert (armed.torque, armed.acceleration, armed.torque_limit) == (1, 50, 400)
+    told = {"torque": None, "acceleration": None, "torque_limit": None, "error": 0x01}
+    assert armed._replace(**told) == sample
+
+
+@pytest.mark.parametrize("address", [*range(30, 41), *range(51, 57)])
+def test_wherever_a_reading_begins_it_says_the_same(address):
+    view = window(address)
+    sample = view.sample(0, bytes(view.length - 15) + BLOCK)
+    assert sample[:4] == SENSED.sample(0, BLOCK)[:4]
+    assert (sample.torque == 0) == (address <= 40)
+
+
+def test_after_trouble_no_reading_has_the_length_of_the_one_before():
+    plan = FEETECH.read_plan([], FeetechParams(torque_every=8), None)
+    together, alone = plan.together, plan.alone
+    tells = ["torque" in together.next().fields for _ in range(16)]
+    assert tells == ([True] + [False] * 7) * 2
+    lengths = []
+    for k in range(5):
+        together.trouble(0.01 * k)
+        lengths.append(together.next().length)
+    usual = {SENSED.length, ARMED.length}
+    assert len(set(lengths)) == 5 and not usual & set(lengths)
+    together.calm(0.28)
+    assert together.next().length not in usual
+    together.calm(0.30)
+    assert together.next().length in usual
+    others = {alone.next().length for _ in range(10)}
+    assert len(others) == 10 and not others & (usual | set(lengths))
+
+
+@pytest.mark.parametrize("at", range(42))
+def test_any_single_damaged_byte_of_a_whole_answer_is_found(at):
+    group = feetech_read((2, 5), SENSED)
+    raw = sts_status(2, BLOCK) + sts_status(5, BLOCK)
+    assert group.whole(raw) is not None
+    assert group.whole(raw[:at] + bytes([raw[at] ^ 0x40]) + raw[at + 1 :]) is None
+    assert group.whole(sts_status(5, BLOCK) + sts_status(2, BLOCK)) is None
+
+
+def test_twice_the_same_is_an_echo_and_two_that_differ_are_nobodys():
+    group = feetech_read((2, 5), SENSED)
+    other = bytes(15)
+    twice = group.pieces(sts_status(2, BLOCK) * 2 + sts_status(5, BLOCK))
+    assert set(twice.samples) == {2, 5} and not twice.damaged
+    mixed = group.pieces(sts_status(2, BLOCK) + sts_status(2, other) + sts_status(5, BLOCK))
+    assert (set(mixed.samples), mixed.damaged) == ({5}, {2})
+
+
+def test_an_answer_of_another_length_is_not_the_one_asked_for():
+    pieces = feetech_read((2,), SENSED).pieces(sts_status(2, BLOCK + b"\x00"))
+    assert (pieces.samples, pieces.damaged) == ({}, {2})
+
+
+# --- what values become, and which are believed
+
+
+def columns_of(family, model, *ids, **limits):
+    """Return the columns of some servos that are under torque."""
+    setups = [ServoSetup(i, model, 0, 4095, 3000.0, **limits) for i in ids]
+    columns = FeedbackColumns(family, setups)
+    columns.expect_torque(True)
+    return columns
+
+
+def both_ways(group, raw, *columns):
+    """Take an answer at once with the first columns, servo by servo with the second."""
+    one, other = columns
+    for each in columns:
+        for slot in range(len(group.ids)):
+            each.places.place(slot, 900, 0.99)
+            assert each.places.one(slot, 900, 1.0)
+    whole = Whole(group, raw, group.whole(raw), 1.01)
+    taken, each = one.take_whole(whole), whole.each()
+    for slot, servo_id in enumerate(group.ids):
+        other.take(slot, each[servo_id])
+    return taken
+
+
+@pytest.mark.parametrize("velocity, load", [(0x8064, 0x052C), (100, 0x7FF), (0, 0x3FF)])
+@pytest.mark.parametrize("view", [SENSED, ARMED])
+def test_a_whole_answer_at_once_reads_as_servo_by_servo(view, velocity, load):
+    group = feetech_read((2, 5), view)
+    block = struct.pack("<HHHBBBBB2xH", 906, velocity, load, 74, 31, 0, 0, 1, 7)
+    armed = bytes((1, 0)) + bytes(6) + struct.pack("<H", 1000) + bytes(6) if view is ARMED else b""
+    raw = sts_status(2, armed + block) + sts_status(5, armed + block)
+    columns = [columns_of(FEETECH, "sts3215", 2, 5) for _ in range(2)]
+    assert both_ways(group, raw, *columns)
+    assert columns[0].feedback() == columns[1].feedback()
+    assert columns[0].feedback().missing == ()
+
+
+def test_the_same_of_servos_that_speak_with_a_crc():
+    group = dynamixel_read((2, 5), DIRECT)
+    raw = b"".join(status(i, 0, struct.pack("<hii", -147, -3, 906)) for i in (2, 5))
+    columns = [columns_of(DYNAMIXEL, "xl330-m077", 2, 5) for _ in range(2)]
+    assert both_ways(group, raw, *columns)
+    told = columns[0].feedback()
+    assert told == columns[1].feedback()
+    assert told.load == pytest.approx((-0.1, -0.1)) and told.velocity_steps_s[0] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("torque", "acceleration", "limit", "error", "status_bits", "warm", "taken"),
+    [
+        (1, 0, 400, 0, 0, 31, True),
+        (0, 0, 400, 0, 0, 31, False),
+        (1, 50, 400, 0, 0, 31, False),
+        (1, 0, 1000, 0, 0, 31, False),
+        (1, 0, 400, 0x20, 0, 31, False),
+        (1, 0, 400, 0, 0x04, 31, False),
+        (1, 0, 400, 0, 0, 200, False),
+    ],
+)
+def test_an_answer_in_which_anything_is_amiss_is_looked_at(
+    torque, acceleration, limit, error, status_bits, warm, taken
+):
+    group = feetech_read((2, 5), ARMED)
+    block = struct.pack("<HHHBBBBB2xH", 906, 0, 0, 74, warm, 0, status_bits, 0, 0)
+    well = bytes((1, 0)) + bytes(6) + struct.pack("<H", 400) + bytes(6)
+    armed = bytes((torque, acceleration)) + bytes(6) + struct.pack("<H", limit) + bytes(6)
+    calm = struct.pack("<HHHBBBBB2xH", 906, 0, 0, 74, 31, 0, 0, 0, 0)
+    raw = sts_status(2, well + calm) + sts_status(5, armed + block, error)
+    columns = [columns_of(FEETECH, "sts3215", 2, 5, strength=0.4) for _ in range(2)]
+    assert both_ways(group, raw, *columns) == taken
+
+
+def test_a_place_that_no_joint_can_have_come_to_must_be_said_twice():
+    columns = FeedbackColumns(FEETECH, [ServoSetup(1, "sts3215", 0, 4095, 3000.0)])
+
+    def believes(position, at_s):
+        sample = SENSED.sample(0, struct.pack("<H", position) + BLOCK[2:])
+        return columns.believes(0, Heard(sample, at_s))
+
+    assert believes(1000, 0.0)
+    assert not believes(3000, 0.01)
+    assert believes(1010, 0.02)
+    assert not believes(3000, 0.03)
+    assert not believes(200, 0.04)
+    assert not believes(3000, 0.05)
+    assert not believes(2990, 0.06)
+    # Three in a row that agree: somebody has turned it by hand.
+    assert believes(2980, 0.07)
+    # What the motor can do in a second is no leap, nor is anything after a port was gone.
+    assert believes(200, 1.07)
+    columns.places.forget()
+    assert believes(4000, 1.08)
+
+
+# --- who is asked
+
+
+@pytest.mark.parametrize(
+    ("heard", "blamed"),
+    [
+        ((4, 1, 9), ()),
+        ((), (4,)),
+        ((4,), (1,)),
+        ((4, 1), (9,)),
+        ((1, 9), (4,)),
+        ((9,), (4, 1)),
+        ((1,), (4, 9)),
+    ],
+)
+def test_only_those_who_kept_silent_themselves_are_blamed(heard, blamed):
+    assert silent_ones(IDS, heard) == blamed
+
+
+def test_a_silent_servo_is_asked_at_once_then_ever_more_seldom():
+    roll = Roll(IDS)
+    now_s = 10.0
+    roll.silent(1, now_s)
+    assert (roll.group, roll.due(now_s)) == ((4, 9), 1)
+    waits = []
+    for _ in range(6):
+        roll.silent(1, now_s)
+        start_s = now_s
+        while roll.due(now_s) is None:
+            now_s += AGAIN_FIRST_S / 4
+        waits.append(now_s - start_s)
+    assert waits == [0.0625, 0.125, 0.25, 0.5, 0.5, AGAIN_LAST_S]
+    assert roll.answered(1)
+    assert (roll.group, roll.troubled) == (IDS, False)
+    assert not roll.answered(1)
+
+
+def test_where_all_are_out_somebody_is_always_asked_and_one_answer_calls_all_back():
+    roll = Roll(IDS)
+    for servo_id in IDS:
+        roll.silent(servo_id, 1.0)
+        roll.silent(servo_id, 1.0)
+    assert roll.group == ()
+    assert roll.due(1.0) == 4
+    roll.silent(4, 1.0)
+    assert roll.due(1.0) == 1
+    assert roll.answered(1)
+    assert (roll.group, roll.due(1.0)) == (IDS, None)
+
+
+def test_damage_three_times_in_a_row_takes_a_servo_out():
+    roll = Roll(IDS)
+    for _ in range(2):
+        roll.damaged(9, 0.0)
+    roll.answered(9)
+    for _ in range(2):
+        roll.damaged(9, 0.0)
+    assert roll.group == IDS
+    roll.damaged(9, 0.0)
+    assert roll.group == (4, 1)
+
+
+def test_several_out_take_turns():
+    roll = Roll(IDS)
+    roll.silent(4, 1.0)
+    roll.silent(9, 1.1)
+    assert roll.due(2.0) == 4
+    roll.silent(4, 2.0)
+    assert roll.due(2.0) == 9
