@@ -483,6 +483,21 @@ def test_retune_waits_for_the_next_torque(here):
 
 # --- properties
 
+
+@pytest.mark.parametrize("kind", ["dynamixel", "feetech"])
+def test_a_goal_between_two_steps_is_rounded(kind):
+    twin = Twin(kind, in_process(kind).wires, patient=False)
+    twin.pulses_on()
+    bus = twin.bus()
+    bus.open()
+    bus.engage()
+    bus.read(twin.now_s())
+    middle = [(setup.min_steps + setup.max_steps) // 2 for setup in twin.setups]
+    bus.write([steps + 0.4 for steps in middle])
+    twin.wait(0.02)
+    assert list(twin.goals()) == middle
+
+
 ANY = st.integers(-(2**40), 2**40) | st.floats(allow_nan=True, allow_infinity=True)
 FAULTS = ("", "lose all count 2", "delay all 15 count 3", "corrupt all count 3", "unplug for 0.05")
 

@@ -1,5 +1,6 @@
 """Smart servos of one family on one serial bus: one read and one write a tick."""
 
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from math import ceil
 
@@ -303,7 +304,10 @@ class SmartServoBus(PortBus):
         if not self._supervisor.engaged or self._link.down or self._line.starved:
             return
         try:
-            self._send(goals)
+            try:
+                self._send(goals)
+            except struct.error:  # whole numbers are the rule
+                self._send([round(goal) for goal in goals])
         except BusLost as lost:
             self._lose(lost)
 
