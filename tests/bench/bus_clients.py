@@ -17,11 +17,14 @@ from fastcrc.crc16 import umts
 from rustypot import Sts3215PyController, Xl330PyController
 from serial import Serial
 
-from gazerig.drivers.dynamixel.bus import DynamixelBus, DynamixelParams
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.protocol import sync_read as dynamixel_read
-from gazerig.drivers.feetech.bus import FeetechBus, FeetechParams
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import sync_read as feetech_read
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoSetup
 
 IDS = tuple(range(1, 10))
@@ -48,8 +51,8 @@ def ours(kind: str, path: str, baud: int, **chosen: object) -> AbstractContextMa
     if kind == "dynamixel":
         # While others have their turn it is silent for longer than servos bear.
         params = DynamixelParams(baud=baud, watchdog_ms=0, **chosen)  # type: ignore[arg-type]
-        return _driven(DynamixelBus(port, setups, params))
-    return _driven(FeetechBus(port, setups, FeetechParams(baud=baud)))
+        return _driven(SmartServoBus(DYNAMIXEL, port, setups, params))
+    return _driven(SmartServoBus(FEETECH, port, setups, FeetechParams(baud=baud)))
 
 
 @contextmanager
