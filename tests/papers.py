@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PAPERS = [
     ROOT / "README.md",
-    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
     ROOT / "tests/attack/README.md",
 ]
 EMULATOR = ROOT / "docs/emulator.md"
