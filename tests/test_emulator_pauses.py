@@ -1,7 +1,7 @@
 """Emulators that nobody asks for an hour: the next packet is answered at once, and truly."""
 
 import pytest
-from sts_bench import Bench
+from servo_bench import FeetechBench
 from test_maestro_board import World, acceleration, speed, target
 
 from gazerig.drivers.dynamixel.control_table import MODELS
@@ -70,7 +70,7 @@ STATES = [moved, slow, wheel, loose, jammed]
 
 @pytest.mark.parametrize("begin", STATES)
 def test_an_hour_costs_no_more_than_seconds(begin, lived_ms):
-    bench = Bench(ServoSpec(1, "sts3215", 2048.0))
+    bench = FeetechBench(ServoSpec(1, "sts3215", 2048.0))
     begin(bench)
     lived_ms[0] = 0
     bench.now_s += HOUR_S
@@ -82,7 +82,7 @@ def test_an_hour_costs_no_more_than_seconds(begin, lived_ms):
 def test_a_pause_ends_where_a_life_through_it_does(begin):
     ends = []
     for looks in (1, 40):  # of a second each, which is no pause
-        bench = Bench(ServoSpec(1, "sts3215", 2048.0))
+        bench = FeetechBench(ServoSpec(1, "sts3215", 2048.0))
         begin(bench)
         bench.wait(40.0, looks)
         servo = bench.chain.here(1)

@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sts_bench import Bench, instruction
+from servo_bench import FeetechBench
 
 from gazerig.sim_mock.feetech.packets import FeetechFraming, checksum, signed, status, unsigned
 
@@ -31,7 +31,7 @@ def test_the_makers_examples_are_understood(name):
 
 
 def test_the_makers_examples_are_answered_to_the_byte():
-    bench = Bench((1, "sts3215", 1304.0))
+    bench = FeetechBench((1, "sts3215", 1304.0))
     said = [bench.chain.receive(bytes.fromhex(MAKERS[n])) for n in ("ping", "read", "write")]
     assert said[0] == bytes.fromhex("FF FF 01 02 00 FC")
     assert said[1] == bytes.fromhex("FF FF 01 04 00 18 05 DD")
@@ -41,7 +41,7 @@ def test_the_makers_examples_are_answered_to_the_byte():
 
 
 def test_the_makers_sync_write_reaches_all_four():
-    bench = Bench(*[(i, "sts3215", 1000.0) for i in (1, 2, 3, 4)])
+    bench = FeetechBench(*[(i, "sts3215", 1000.0) for i in (1, 2, 3, 4)])
     assert bench.chain.receive(bytes.fromhex(MAKERS["sync write"])) == b""
     assert [bench.read(i, 42, 2) for i in (1, 2, 3, 4)] == [2048] * 4
 
@@ -55,7 +55,7 @@ def test_the_checksum_is_the_inverse_of_the_sum():
 @given(st.binary(max_size=6), st.integers(0, 253), st.binary(max_size=40), st.integers(1, 60))
 def test_an_instruction_in_pieces_behind_noise_is_found(noise, servo_id, params, cut):
     noise = noise.replace(b"\xff", b"\x00")
-    data = noise + instruction(servo_id, 3, params)
+    data = noise + FeetechBench.instruction(servo_id, 3, params)
     framing = FeetechFraming(0.001, 0.0)
     first = framing.feed(data[:cut], 0.0)
     found = first + framing.feed(data[cut:], 0.0005)
@@ -63,7 +63,7 @@ def test_an_instruction_in_pieces_behind_noise_is_found(noise, servo_id, params,
 
 
 def test_the_end_counts_from_the_newest_piece():
-    data = instruction(1, 3, bytes(8))
+    data = FeetechBench.instruction(1, 3, bytes(8))
     framing = FeetechFraming(0.001, 0.0)
     assert framing.feed(data[:5], 0.0) == []
     [found] = framing.feed(data[5:] + b"\x00", 0.0)
@@ -73,16 +73,16 @@ def test_the_end_counts_from_the_newest_piece():
 @pytest.mark.parametrize("length", [0, 1])
 def test_a_length_that_cannot_be_is_passed_over(length):
     bad = bytes((255, 255, 1, length))
-    assert len(feed(bad + instruction(1, 1))) == 1
+    assert len(feed(bad + FeetechBench.instruction(1, 1))) == 1
 
 
 def test_more_than_two_ff_before_the_id_are_still_a_header():
-    assert feed(b"\xff" + instruction(5, 1)) == [(5, 1, b"", 7)]
+    assert feed(b"\xff" + FeetechBench.instruction(5, 1)) == [(5, 1, b"", 7)]
 
 
 @given(st.binary(max_size=300))
 def test_random_bytes_never_raise(data):
-    bench = Bench((1, "sts3215", 2048.0), (0, "sts3215", 10.0))
+    bench = FeetechBench((1, "sts3215", 2048.0), (0, "sts3215", 10.0))
     bench.chain.receive(data)
     bench.now_s = 1.0
     bench.chain.receive(b"\xff\xff" + data)
@@ -93,11 +93,11 @@ def test_random_bytes_never_raise(data):
 
 @given(st.integers(0, 0xFD), st.sampled_from([2, 3, 4, 5, 6, 8, 10, 11, 0x82, 0x83]), st.data())
 def test_random_instructions_never_raise(servo_id, code, data):
-    bench = Bench((1, "sts3215", 2048.0), (servo_id, "sts3215", 10.0))
+    bench = FeetechBench((1, "sts3215", 2048.0), (servo_id, "sts3215", 10.0))
     for _ in range(4):
         params = data.draw(st.binary(max_size=24))
         target = data.draw(st.sampled_from((servo_id, 0xFE)))
-        bench.chain.receive(instruction(target, code, params))
+        bench.chain.receive(FeetechBench.instruction(target, code, params))
         bench.now_s += 0.5
     assert all(abs(x) < 1e7 for x in bench.chain.positions_steps())
 

@@ -4,7 +4,7 @@ import math
 import time
 
 import pytest
-from sts_bench import ALL, PING, READ, SYNC_READ, SYNC_WRITE, WRITE, Bench, instruction, packets
+from servo_bench import ALL, PING, READ, SYNC_READ, SYNC_WRITE, WRITE, FeetechBench
 
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
@@ -14,7 +14,7 @@ BAUD = 1_000_000
 FOUND = {1: 1284, 2: 1284}
 
 
-class ScsBench(Bench):
+class ScsBench(FeetechBench):
     """A bench whose numbers of two bytes have the high one first."""
 
     def __init__(self, *specs, **options):
@@ -101,15 +101,17 @@ def test_an_overload_leaves_what_register_37_says():
 
 def test_it_answers_no_sync_read_and_takes_sync_writes():
     bench = ScsBench((1, "scs0009", 100.0), (2, "scs0009", 200.0))
-    assert bench.chain.receive(instruction(ALL, SYNC_READ, 56, 2, 1, 2)) == b""
+    assert bench.chain.receive(FeetechBench.instruction(ALL, SYNC_READ, 56, 2, 1, 2)) == b""
     bench.ask(ALL, SYNC_WRITE, 42, 2, 1, 1, 0, 2, 2, 0)
     assert [bench.word(42, i) for i in (1, 2)] == [256, 512]
 
 
 def test_its_own_baud_rates():
     bench = ScsBench(baud=19_200)
-    assert packets(bench.chain.receive(instruction(1, PING), 19_200)) == [(1, 0, b"")]
-    assert bench.chain.receive(instruction(1, PING), 38_400) == b""
+    assert FeetechBench.packets(bench.chain.receive(FeetechBench.instruction(1, PING), 19_200)) == [
+        (1, 0, b"")
+    ]
+    assert bench.chain.receive(FeetechBench.instruction(1, PING), 38_400) == b""
     with pytest.raises(ValueError, match="baud 76800: scs0009 knows 1000000"):
         ScsBench(baud=76_800)
 

@@ -117,18 +117,6 @@ def test_some_firmware_wraps_the_position_as_the_torque_comes_on():
         assert bench.read(132, 4, signed=True) == at
 
 
-def test_without_torque_a_joint_stays_or_falls_to_its_stop():
-    load = Physics(load_nm=-0.1, stop_low_steps=700)
-    stays, sinks = Bench("xl330-m288", 1000), Bench("xl330-m288", 1000, 53, load)
-    for bench in (stays, sinks):
-        bench.engage()
-        bench.now_s = 1.0
-        bench.read(132, 4)
-        bench.write(64, 1, 0)
-        bench.now_s = 6.0
-    assert (stays.read(132, 4), sinks.read(132, 4)) == (1000, 700)
-
-
 def test_live_registers_tell_the_motion():
     bench = Bench("xl330-m077", 1000)
     bench.write(112, 4, 100)

@@ -1,7 +1,7 @@
 """What goes wrong with emulated STS servos: error bits, protections, restarts, their line."""
 
 import pytest
-from sts_bench import ALL, PING, READ, SYNC_READ, Bench, instruction
+from servo_bench import ALL, READ, SYNC_READ, FeetechBench
 
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
@@ -10,7 +10,7 @@ VOLTAGE, ANGLE, HEAT, CURRENT, OVERLOAD = 1, 2, 4, 8, 32
 
 def jammed(goal=3000, **physics):
     """A servo that pushes against something."""
-    bench = Bench(ServoSpec(1, "sts3215", 2048, physics=Physics(**physics)))
+    bench = FeetechBench(ServoSpec(1, "sts3215", 2048, physics=Physics(**physics)))
     bench.engage()
     bench.chain.faults.command("stick 1")
     bench.write(1, 42, goal, 2)
@@ -22,7 +22,7 @@ def jammed(goal=3000, **physics):
 
 @pytest.mark.parametrize(("volts", "bits"), [(7.4, 0), (8.0, 0), (8.2, 1), (12.0, 1), (3.9, 1)])
 def test_voltage_stands_in_every_answer_as_long_as_it_is_wrong(volts, bits):
-    bench = Bench()
+    bench = FeetechBench()
     bench.chain.faults.command(f"voltage 1 {volts}")
     bench.wait(0.1)
     assert bench.read(1, 62) == round(volts * 10)
@@ -36,7 +36,7 @@ def test_voltage_stands_in_every_answer_as_long_as_it_is_wrong(volts, bits):
 
 
 def test_a_wrong_voltage_takes_the_torque_only_where_that_is_chosen():
-    bench = Bench()
+    bench = FeetechBench()
     bench.engage()
     bench.chain.faults.command("voltage 1 9")
     bench.wait(0.1)
@@ -48,7 +48,7 @@ def test_a_wrong_voltage_takes_the_torque_only_where_that_is_chosen():
 
 
 def test_heat_takes_the_torque_until_it_has_cooled_and_someone_switches_it_on():
-    bench = Bench()
+    bench = FeetechBench()
     bench.engage()
     bench.chain.faults.command("overheat 1")
     bench.wait(0.04)
@@ -69,7 +69,7 @@ def test_a_stall_warms_the_motor():
 
 
 def test_a_broken_angle_sensor_is_flagged_until_the_restart():
-    bench = Bench()
+    bench = FeetechBench()
     bench.chain.faults.command("encoder 1")
     bench.wait(5.0)
     assert (bench.error(), bench.read(1, 65)) == (ANGLE, ANGLE)
@@ -123,7 +123,7 @@ def test_a_torque_limit_below_it_never_overloads(limit):
     ],
 )
 def test_what_ends_an_overload(policy, by_goal, by_torque):
-    bench = Bench()
+    bench = FeetechBench()
     bench.chain.choose("overload-ends", policy)
     bench.engage()
     bench.chain.faults.command("overload 1")
@@ -157,7 +157,7 @@ def test_an_overload_that_is_not_to_unload_is_only_flagged():
 
 
 def test_full_speed_is_no_overload():
-    bench = Bench()
+    bench = FeetechBench()
     bench.write(1, 33, 1)
     bench.write(1, 46, 32_000, 2)
     bench.write(1, 40, 1)
@@ -181,18 +181,6 @@ def test_overcurrent_takes_the_torque_until_it_is_switched_on_again():
 # --- restarts
 
 
-def test_a_brown_out_is_deaf_and_then_as_at_power_on():
-    bench = Bench()
-    bench.engage()
-    bench.write(1, 46, 100, 2)
-    bench.chain.faults.command("turn 1 10")
-    bench.chain.faults.command("brown-out 1")
-    assert bench.ask(1, PING) == []
-    bench.wait(1.0)
-    assert [bench.read(1, at, 2) for at in (40, 42, 46)] == [0, 0, 0]
-    assert bench.position() == pytest.approx(2058, abs=10)
-
-
 # --- the line
 
 
@@ -213,12 +201,12 @@ def test_a_brown_out_is_deaf_and_then_as_at_power_on():
     ],
 )
 def test_faults_of_the_line_to_the_byte(fault, said):
-    bench = Bench()
+    bench = FeetechBench()
     bench.chain.faults.command(fault)
-    assert bench.chain.receive(instruction(1, READ, 56, 2)).hex(" ") == said
+    assert bench.chain.receive(FeetechBench.instruction(1, READ, 56, 2)).hex(" ") == said
     assert bench.position() == 2048
 
 
 def test_no_shock_can_be_asked_of_it():
     with pytest.raises(ValueError, match="'shock' is no command"):
-        Bench().chain.faults.command("shock 1")
+        FeetechBench().chain.faults.command("shock 1")

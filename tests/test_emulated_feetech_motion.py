@@ -1,7 +1,7 @@
 """How emulated STS servos move: closed forms of the profile, modes, limits, origin, torque."""
 
 import pytest
-from sts_bench import CALIBRATE, RESET_TURNS, WRITE, Bench
+from servo_bench import CALIBRATE, RESET_TURNS, WRITE, FeetechBench
 
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
@@ -13,7 +13,7 @@ TOP_STEPS_S = 55.0 / 60.0 * 4096.0
 
 
 def one(physics=SMOOTH, start=2048.0, model="sts3215"):
-    return Bench(ServoSpec(1, model, start, physics=physics))
+    return FeetechBench(ServoSpec(1, model, start, physics=physics))
 
 
 def command(bench, goal, speed=0, acceleration=0, time_ms=0):
@@ -125,16 +125,6 @@ def test_the_same_goals_give_the_same_bytes():
 
 
 # --- torque
-
-
-def test_without_torque_it_stays_and_the_goal_waits():
-    bench = one()
-    bench.write(1, 42, 3000, 2)
-    bench.wait(0.5)
-    assert (bench.position(), bench.read(1, 66)) == (2048, 0)
-    bench.write(1, 40, 1)
-    bench.wait(1.0)
-    assert bench.position() == pytest.approx(3000, abs=STEADY_STEPS)
 
 
 def test_the_old_goal_may_be_forgotten_as_the_torque_comes_on():
