@@ -6,11 +6,12 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 import typer
 from typer.core import TyperGroup
+from typer.testing import CliRunner
 
 from gazerig.robot.cli.calibrate_group import DEFAULT, JointsUnlessNamed
 from gazerig.robot.cli.main import app, main
@@ -36,6 +37,29 @@ def typed(*words: str) -> int:
             assert end.code is None or isinstance(end.code, int), end.code
             return end.code or 0
     return 0
+
+
+class Invoked(NamedTuple):
+    """What a command left: its exit code, standard output and standard error."""
+
+    code: int
+    out: str
+    err: str
+
+
+def invoked(*words: str, answers: str = "") -> Invoked:
+    """Run a command in this process; answers: lines on its standard input."""
+    result = CliRunner().invoke(app, list(words), input=answers)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return Invoked(result.exit_code, result.stdout, result.stderr)
+
+
+def answers_in(folder: Path, *lines: str) -> str:
+    """Write a file for --answers; give its path."""
+    file = folder / "answers"
+    file.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    return str(file)
 
 
 def parse(words: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from gazerig.config.rig import LidJoints
 from gazerig.robot.calibration.endstop_search import (
     STEPS_PER_DEG,
-    Stop,
+    EndStop,
     StopSearch,
     StopSearchParams,
     go,
@@ -265,7 +265,7 @@ def test_current_without_motion_ends_a_push_early() -> None:
 def test_the_end_of_the_turn_is_no_stop() -> None:
     free = Toy(3900, -5000, 9000)
     assert search(PARAMS, 1, (0, TURN - 1), free.exchange).kind == "limit"
-    assert isinstance(search(PARAMS, -1, (3000, TURN - 1), free.exchange), Stop)
+    assert isinstance(search(PARAMS, -1, (3000, TURN - 1), free.exchange), EndStop)
 
 
 def test_going_somewhere_tells_whether_something_was_in_the_way() -> None:

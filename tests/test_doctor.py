@@ -8,15 +8,15 @@ from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
 from gazerig.drivers.servo_bus.discovery import Found, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.bus_search import Looked
+from gazerig.robot.bringup.bus_search import SearchRound
 from gazerig.robot.bringup.doctor.checks import apply_fix, examine, take
+from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Fix, worst
 from gazerig.robot.bringup.doctor.families import CHECKS
-from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
 from gazerig.robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
 from gazerig.robot.bringup.doctor.run import apply_fixes, check, check_all, fix_latency, look
 from gazerig.robot.bringup.doctor.subject import ServoState
+from gazerig.robot.bringup.doctor.text import grouped, summed_up, together
 from gazerig.robot.bringup.scan_report import remarks
-from gazerig.robot.bringup.scan_text import grouped, summed_up, together
 from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
@@ -508,7 +508,7 @@ def test_fix_leaves_a_servo_alone_whose_torque_is_on(kind):
 )
 def test_a_servo_that_does_not_take_it_is_said(kind, fault, says):
     rig = Rig(kind)
-    fix = Finding("warn", "w", YAW, "", (Fix(7, "return_delay_time", 3, 0),))
+    fix = Diagnostic("warn", "w", YAW, "", (Fix(7, "return_delay_time", 3, 0),))
     rig.command(fault)
     (done,) = rig.fix([fix])
     assert not done.done and says in done.what
@@ -593,15 +593,15 @@ def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
 
 
 def test_findings_in_words():
-    finding = Finding("warn", "hot", "neck_yaw (servo 7)", "let it cool")
+    finding = Diagnostic("warn", "hot", "neck_yaw (servo 7)", "let it cool")
     assert str(finding) == "warn: neck_yaw (servo 7): hot: let it cool"
     assert worst([]) == "ok"
-    same = [Finding("note", "n", f"j{i} (servo {i})") for i in (1, 2, 4)]
+    same = [Diagnostic("note", "n", f"j{i} (servo {i})") for i in (1, 2, 4)]
     worst_first = grouped([*same, finding])
     assert [row[0] for row in worst_first] == ["warn", "note"]
     assert worst_first[1] == ("note", "j1, j2, j4 (servos 1-2, 4)", "n", "")
     assert together(["/dev/ttyUSB0", "j1 (servo 1)"]) == "/dev/ttyUSB0, j1 (servo 1)"
-    fixable = Finding("warn", "w", "x", fixes=(Fix(1, "return_delay_time", 0, 250),))
+    fixable = Diagnostic("warn", "w", "x", fixes=(Fix(1, "return_delay_time", 0, 250),))
     assert summed_up([finding, fixable], "desk", False) == (
         "desk: 2 warn; gazerig doctor --fix mends 1 of them"
     )
@@ -610,19 +610,19 @@ def test_findings_in_words():
 
 def test_remarks_of_a_scan():
     two = (Found(1, 1190, 53, BAUD, "xl330-m077"), Found(1, 1190, 53, BAUD, "xl330-m077"))
-    said = " ".join(remarks([Looked("dynamixel", BAUD, True, two)], "/dev/x"))
+    said = " ".join(remarks([SearchRound("dynamixel", BAUD, True, two)], "/dev/x"))
     assert "2 servos on /dev/x" in said and "two or more servos have id 1 at 1000000" in said
-    merged = [Looked("dynamixel", BAUD, True, two[:1], shared=(1,))]
+    merged = [SearchRound("dynamixel", BAUD, True, two[:1], shared=(1,))]
     assert "two or more servos have id 1" in " ".join(remarks(merged, "/dev/x"))
     rounds = [
-        Looked("dynamixel", 9600, junk=40),
-        Looked("dynamixel", 57_600, protocol_1=(5,)),
-        Looked("dynamixel", 1, possible=False),
+        SearchRound("dynamixel", 9600, junk=40),
+        SearchRound("dynamixel", 57_600, protocol_1=(5,)),
+        SearchRound("dynamixel", 1, possible=False),
     ]
     said = list(remarks(rounds, "/dev/x"))
     assert any("only pieces came" in line for line in said)
     assert any("Protocol 1 as id 5" in line for line in said)
     assert "asked dynamixel at 9600, 57600 bit/s" in said[0] and "supply" in said[-1]
     # Feetech servos answer the old protocol's ping: that is no riddle where they were found.
-    sts = Looked("feetech", 57_600, True, two[:1])
+    sts = SearchRound("feetech", 57_600, True, two[:1])
     assert not any("Protocol 1" in line for line in remarks([*rounds, sts], "/dev/x"))

@@ -9,7 +9,7 @@ from gazerig.drivers.maestro.line import Line
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.channel_test import sent_home
-from gazerig.robot.bringup.doctor.findings import worst
+from gazerig.robot.bringup.doctor.diagnostics import worst
 from gazerig.robot.bringup.doctor.maestro import apply_fix, visit
 from gazerig.robot.bringup.doctor.run import apply_fixes
 from gazerig.robot.bringup.maestro_settings import (

@@ -1,10 +1,6 @@
 """Findings about PCA9685 boards and their channels, and what is said in setting them up."""
 
-from pathlib import Path
-
 import pytest
-from board_rig import on_pca9685
-from typer.testing import CliRunner
 
 from gazerig.drivers.i2c import bridge
 from gazerig.drivers.pca9685.params import Pca9685Params
@@ -18,9 +14,8 @@ from gazerig.drivers.pca9685.registers import (
     pulse,
 )
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.doctor.findings import worst
+from gazerig.robot.bringup.doctor.diagnostics import worst
 from gazerig.robot.bringup.doctor.pca9685 import visit
-from gazerig.robot.cli import bringup_commands as cli_servos
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pca9685.bridge import build_bridge
 
@@ -82,13 +77,3 @@ def test_pulses_that_were_left_on(counts: int, level: str, remedy: str) -> None:
     found = visit(rig.port, PARAMS, SETUPS)[0]
     assert found.level == level and "though no program runs it" in found.what
     assert remedy in found.remedy
-
-
-def test_doctor_and_setup_as_typed(tmp_path: Path) -> None:
-    rig_file = on_pca9685(tmp_path)
-    done = CliRunner().invoke(cli_servos.app, ["doctor", rig_file, "--mock"])
-    assert done.exit_code == 0, done.output
-    assert "answers at 0x40; pulses on 0 of 6 channels" in done.output
-    done = CliRunner().invoke(cli_servos.app, ["setup", rig_file, "--mock", "--yes"])
-    assert done.exit_code == 0 and "board 0x40: jumpers none closed" in done.stderr
-    assert "eyes_pan: channel 0 of board 0x40" in done.stderr

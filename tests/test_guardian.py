@@ -18,7 +18,7 @@ from sts_rig import Rig as StsRig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.robot.app.bus_wiring import ports_of, release_plans
-from gazerig.robot.calibration.smart_servo_access import SmartServo
+from gazerig.robot.calibration.smart_servo_access import SingleServo
 from gazerig.robot.guardian.guarded_bus import RETRY_S, GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.hang_detector import HANG_S, HangDetector
@@ -64,7 +64,7 @@ def test_a_dynamixel_with_its_watchdog_needs_no_guardian():
 def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
     rig, guardian = StsRig(), Unattended()
     rig.port.setBaudRate(1_000_000)
-    servo = SmartServo("eye", 1, "sts3215", rig.port, guardian)
+    servo = SingleServo("eye", 1, "sts3215", rig.port, guardian)
     servo.check()
     assert not guardian.other.armed(0)
     servo.enable_torque(0.2, 100.0)

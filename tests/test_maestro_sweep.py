@@ -6,7 +6,7 @@ from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.maestro.board import MaestroBoard
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.channel_test import SLOW_STEPS_S, Place, walk
+from gazerig.robot.bringup.channel_test import SLOW_STEPS_S, ChannelPosition, walk
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
@@ -39,7 +39,7 @@ class Bench:
 
 def test_the_first_place_at_once_the_others_slowly_and_the_pulses_end():
     bench = Bench()
-    assert bench.walk() == tuple(Place(p, p) for p in PLACES)
+    assert bench.walk() == tuple(ChannelPosition(p, p) for p in PLACES)
     pulses = [pulse for _, pulse, _ in bench.seen]
     assert pulses[0] == 5000
     ways = [abs(b - a) for a, b in zip(pulses, pulses[1:], strict=False)]
@@ -59,7 +59,7 @@ def test_it_takes_no_longer_than_a_person_waits():
 
 def test_a_range_of_the_board_that_is_narrower_is_seen():
     gone = Bench(low=4900).walk()
-    assert gone[1] == Place(4780, 4900) and gone[2] == Place(5220, 5220)
+    assert gone[1] == ChannelPosition(4780, 4900) and gone[2] == ChannelPosition(5220, 5220)
 
 
 def test_a_channel_that_gives_pulses_already_is_led_slowly_from_there():
@@ -82,7 +82,7 @@ def test_an_error_of_the_board_on_the_way_is_no_place():
         bench.board.faults.command("error protocol")
 
     gone = walk(bench.driver, LID, PLACES, sleep_and_fail)
-    assert gone[0] == Place(5000, 0)
+    assert gone[0] == ChannelPosition(5000, 0)
 
 
 def test_an_input_is_refused():

@@ -10,7 +10,7 @@ from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.maestro.commands import Speech
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.calibration.hobby_access import SPEED_US_S, OneHobby
-from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.calibration.joint_calibration import CalibrationRefused
 from gazerig.robot.calibration.linkage_procedure import LEAD_US, HobbyPlacer, Steered, by_places
 from gazerig.robot.model.clock import SimulatedClock
@@ -84,7 +84,7 @@ class Bench:
 
     def _next(self) -> str:
         if not self.answers:
-            raise Stopped("stopped by you")
+            raise CalibrationStopped("stopped by you")
         return self.answers.pop(0)
 
 
@@ -181,7 +181,7 @@ def test_whoever_ends_it_gets_a_limp_servo(why: str) -> None:
     bench.answers += [""] if why == "SIGINT" else []
     if why == "SIGINT":
         bench.tell = lambda line: setattr(bench, "why", why)  # type: ignore[method-assign]
-    with pytest.raises(Stopped):
+    with pytest.raises(CalibrationStopped):
         bench.measure()
     assert bench.pulse() == 0
 

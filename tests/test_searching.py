@@ -5,7 +5,7 @@ import pytest
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.robot.bringup.bus_search import (
     BOARD_RATES,
-    Looked,
+    SearchRound,
     found_of,
     known_kinds,
     plan,
@@ -153,7 +153,7 @@ def test_nobody():
     assert [(one.kind, one.baud) for one in rounds] == [
         ("maestro", 57_600), ("dynamixel", 57_600), ("feetech", 57_600),
     ]  # fmt: skip
-    assert not any(one.somebody for one in rounds)
+    assert not any(one.answered for one in rounds)
 
 
 def test_all_rates_of_a_kind_are_in_the_plan():
@@ -166,7 +166,7 @@ def test_words_for_kinds():
     assert known_kinds("feetech") == ("feetech",)
     with pytest.raises(ValueError, match="pca: not all or one of dynamixel, feetech, maestro"):
         known_kinds("pca")
-    assert not Looked("feetech", 9600).somebody
+    assert not SearchRound("feetech", 9600).answered
 
 
 def test_sts_servos_that_answer_no_ping_to_everybody_are_found_by_a_thorough_search():

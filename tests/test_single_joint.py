@@ -9,11 +9,11 @@ from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing, SetupError
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.calibration.endstop_search import STEPS_PER_DEG, StopSearchParams
-from gazerig.robot.calibration.joint_access import SingleJoint, Stopped
+from gazerig.robot.calibration.joint_access import CalibrationStopped, SingleJoint
 from gazerig.robot.calibration.joint_calibration import CalibrationRefused
 from gazerig.robot.calibration.joint_procedure import by_hand, by_motion
 from gazerig.robot.calibration.linkage_procedure import HandPlacer, Steered, by_places
-from gazerig.robot.calibration.smart_servo_access import SmartServo
+from gazerig.robot.calibration.smart_servo_access import SingleServo
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -52,7 +52,7 @@ class Bench:
         self.said: list[str] = []
         self.agreed = True
         name = "neck_yaw" if joint is NECK else "left_eye_pan"
-        self.servo = SmartServo(name, joint.id, joint.model, self.port)
+        self.servo = SingleServo(name, joint.id, joint.model, self.port)
         self.joint = SingleJoint(name, joint, self.servo, self.clock, lambda: self.why)
 
     def get(self, register: str) -> int:
@@ -82,7 +82,7 @@ class Bench:
     def wait(self, question: str, live: Callable[[], str]) -> None:
         self.said.append(question)
         if not self.script:
-            raise Stopped("stopped by you")
+            raise CalibrationStopped("stopped by you")
         left = self.script.pop(0)
         while left:
             step = max(-100, min(100, left))
@@ -115,7 +115,7 @@ def test_by_hand_torque_that_was_left_on_goes_off_first(joint: JointParams) -> N
     bench = Bench(joint)
     bench.registers.write(joint.id, "torque_enable", 1)
     bench.script = []
-    with pytest.raises(Stopped):
+    with pytest.raises(CalibrationStopped):
         by_hand(bench.joint, bench, 2.0)
     assert bench.get("torque_enable") == 0
 
@@ -236,7 +236,7 @@ def test_by_motion_without_a_stop_before_the_seam_is_refused() -> None:
 def test_by_motion_a_stop_that_is_asked_for_lets_go_at_once(joint: JointParams) -> None:
     bench = Bench(joint, 2100, STOPS)
     bench.why = "SIGINT"
-    with pytest.raises(Stopped, match="SIGINT"):
+    with pytest.raises(CalibrationStopped, match="SIGINT"):
         by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
     assert bench.get("torque_enable") == 0
     if joint is STS:
@@ -319,7 +319,7 @@ def test_a_servo_set_up_in_another_way_is_refused(
 
 def test_a_wrong_model_is_named() -> None:
     bench = Bench(EYE)
-    wrong = SmartServo("left_eye_pan", EYE.id, "xc330-m288", bench.port)
+    wrong = SingleServo("left_eye_pan", EYE.id, "xc330-m288", bench.port)
     with pytest.raises(ServoMissing, match="is xl330-m077, not xc330-m288"):
         wrong.check()
 

@@ -15,7 +15,7 @@ import pytest
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.cli.jog_prompt import SteeringPerson
 from gazerig.robot.cli.prompts import Lines
 
@@ -64,9 +64,9 @@ def test_a_number_is_said_or_agreed_to(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 def test_q_and_the_end_of_the_answers_end_it(tmp_path: Path) -> None:
-    with pytest.raises(Stopped, match="q"):
+    with pytest.raises(CalibrationStopped, match="q"):
         person(tmp_path, "q").steer("move it", Servo())
-    with pytest.raises(Stopped, match="q"):
+    with pytest.raises(CalibrationStopped, match="q"):
         person(tmp_path, "quit").number("how far?", 1.0, str)
     with pytest.raises(SetupError, match=r"no answer left to: how far\? \[1\]"):
         person(tmp_path).number("how far?", 1.0, str)

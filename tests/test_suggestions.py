@@ -7,7 +7,7 @@ from threading import Thread
 
 import pytest
 import typer
-from test_cli_servos import SMALL
+from test_cli_bringup import SMALL
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig

@@ -40,7 +40,7 @@ RATES: Mapping[BusKind, Sequence[int]] = {
 
 
 @dataclass(frozen=True)
-class Looked:
+class SearchRound:
     """What asking one kind at one baud rate has brought.
 
     possible: the adaptor can run at it; junk: bytes that made no sense
@@ -59,7 +59,7 @@ class Looked:
     channels: int | None = None
 
     @property
-    def somebody(self) -> bool:
+    def answered(self) -> bool:
         """Return whether anyone of this kind has answered."""
         return bool(self.found) or self.board is not None
 
@@ -90,7 +90,7 @@ def search(
     asked: Sequence[tuple[BusKind, int]],
     thorough: bool = False,
     to_the_end: bool = False,
-) -> Iterator[Looked]:
+) -> Iterator[SearchRound]:
     """Ask one kind after the other; ends behind the kind that has answered.
 
     asked: as ``plan`` gives it
@@ -107,26 +107,26 @@ def search(
         if met == "maestro" or (met not in (None, kind) and not to_the_end):
             return
         looked = _look(port, usb, kind, baud, thorough)
-        met = kind if looked.somebody else met
+        met = kind if looked.answered else met
         yield looked
 
 
-def _look(port: BusPort, usb: str, kind: BusKind, baud: int, thorough: bool) -> Looked:
+def _look(port: BusPort, usb: str, kind: BusKind, baud: int, thorough: bool) -> SearchRound:
     if kind == "maestro":
         return _board(port, usb, baud)
     (one,) = scan(port, KINDS[kind].family, (baud,), thorough)
-    return Looked(kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1)
+    return SearchRound(kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1)
 
 
-def _board(port: BusPort, usb: str, baud: int) -> Looked:
+def _board(port: BusPort, usb: str, baud: int) -> SearchRound:
     if not port.setBaudRate(baud):
-        return Looked("maestro", baud, possible=False)
+        return SearchRound("maestro", baud, possible=False)
     # The first six channels are there on every board; others might be an error to it.
     found = probe(port, replace(MaestroParams(), baud=baud))
-    return Looked("maestro", baud, board=found, channels=USB_CHANNELS.get(usb))
+    return SearchRound("maestro", baud, board=found, channels=USB_CHANNELS.get(usb))
 
 
-def found_of(rounds: Iterable[Looked]) -> list[tuple[BusKind, Found]]:
+def found_of(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, Found]]:
     """Return all servos that answered, with their kinds."""
     return [(one.kind, servo) for one in rounds for servo in one.found]
 

@@ -33,7 +33,7 @@ MOST_TRIES = 10
 """A busy computer may keep answers waiting, and nobody is in a hurry here."""
 
 
-class Place(NamedTuple):
+class ChannelPosition(NamedTuple):
     """A place that a channel was sent to, and where the board's pulse ended, in steps."""
 
     asked: int
@@ -46,7 +46,7 @@ def walk(
     places: Sequence[int],
     sleep_until: Callable[[float], None],
     speed_steps_s: float = SLOW_STEPS_S,
-) -> tuple[Place, ...]:
+) -> tuple[ChannelPosition, ...]:
     """Lead a channel to places, the first at once, the others slowly; the pulses are off then.
 
     Args:
@@ -64,7 +64,7 @@ def walk(
     slow = setup._replace(
         max_speed_steps_s=speed_steps_s, max_accel_steps_s2=None, rest_steps=places[0]
     )
-    gone: list[Place] = []
+    gone: list[ChannelPosition] = []
     with given(board, slow) as channel:
         start = round(channel.ramp.pulse_steps)
         for nth, asked in enumerate(places):
@@ -72,7 +72,7 @@ def walk(
             board.send_goals([channel])
             way_s = abs(asked - start) / speed_steps_s + SETTLE_S
             start = _arrived(board, channel, asked, way_s, sleep_until)
-            gone.append(Place(asked, start))
+            gone.append(ChannelPosition(asked, start))
             if not nth:
                 _wait(board, channel, SETTLE_S, sleep_until)
     return tuple(gone)

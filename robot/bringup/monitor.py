@@ -12,7 +12,7 @@ from gazerig.robot.model.joint import JointParams
 _DIGITS = {"goal_deg": 2, "position_deg": 2, "velocity_deg_s": 1, "load": 3}
 
 
-class Sample(NamedTuple):
+class TelemetrySample(NamedTuple):
     """One reading of all servos.
 
     at_s, took_s: when it was done and how long it took
@@ -47,7 +47,7 @@ class Monitor:
         self._now_s = now_s
         self._asked = self._unanswered = 0
 
-    def sample(self) -> Sample:
+    def sample(self) -> TelemetrySample:
         """Read every servo once.
 
         Raises:
@@ -58,10 +58,10 @@ class Monitor:
         self._asked += len(servos)
         self._unanswered += sum(one is None for one in servos.values())
         end_s = self._now_s()
-        return Sample(end_s, end_s - start_s, servos, self._asked, self._unanswered)
+        return TelemetrySample(end_s, end_s - start_s, servos, self._asked, self._unanswered)
 
 
-def as_json(sample: Sample, start_s: float) -> dict[str, object]:
+def as_json(sample: TelemetrySample, start_s: float) -> dict[str, object]:
     """Return a sample as plain values, times in seconds since the start."""
     return {
         "t_s": round(sample.at_s - start_s, 3),

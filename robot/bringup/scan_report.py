@@ -5,7 +5,7 @@ from collections.abc import Container, Iterator, Sequence
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.servo_bus.discovery import Found
 from gazerig.drivers.servo_models import BusKind
-from gazerig.robot.bringup.bus_search import Looked, found_of
+from gazerig.robot.bringup.bus_search import SearchRound, found_of
 
 
 def servo_plain(kind: BusKind, servo: Found) -> dict[str, object]:
@@ -20,7 +20,7 @@ def servo_plain(kind: BusKind, servo: Found) -> dict[str, object]:
     }
 
 
-def board_plain(looked: Looked) -> dict[str, object]:
+def board_plain(looked: SearchRound) -> dict[str, object]:
     """Return a Maestro as JSON can hold it; pulses in us, 0 for none."""
     board = looked.board
     if board is None:
@@ -29,7 +29,7 @@ def board_plain(looked: Looked) -> dict[str, object]:
     return {**board._asdict(), "channels": looked.channels, "baud": looked.baud, "pulses": pulses}
 
 
-def board_words(looked: Looked) -> Iterator[str]:
+def board_words(looked: SearchRound) -> Iterator[str]:
     """Say what a board has told."""
     board = looked.board
     if board is None:
@@ -48,7 +48,9 @@ def board_words(looked: Looked) -> Iterator[str]:
     ]
 
 
-def remarks(rounds: Sequence[Looked], where: str, wished: Sequence[BusKind] = ()) -> Iterator[str]:
+def remarks(
+    rounds: Sequence[SearchRound], where: str, wished: Sequence[BusKind] = ()
+) -> Iterator[str]:
     """Say what tables of servos and boards do not.
 
     wished: kinds that were to be asked, unless one before them answered
@@ -64,7 +66,7 @@ def remarks(rounds: Sequence[Looked], where: str, wished: Sequence[BusKind] = ()
     elif unasked and found:
         yield f"{' and '.join(unasked)} was not asked, as others answered: --kind all asks it too"
     for one in rounds:
-        yield from _odd(one, {rate.baud for rate in rounds if rate.somebody})
+        yield from _odd(one, {rate.baud for rate in rounds if rate.answered})
     if not found and not boards:
         yield (
             "nobody answers: is the servo supply on? does each servo's LED flash once when it "
@@ -74,7 +76,7 @@ def remarks(rounds: Sequence[Looked], where: str, wished: Sequence[BusKind] = ()
         )
 
 
-def _asked(rounds: Sequence[Looked]) -> str:
+def _asked(rounds: Sequence[SearchRound]) -> str:
     """Say which kinds were asked at which rates."""
     rates: dict[BusKind, list[str]] = {}
     for one in rounds:
@@ -83,8 +85,8 @@ def _asked(rounds: Sequence[Looked]) -> str:
     return "; ".join(f"asked {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
 
 
-def _odd(one: Looked, heard: Container[int]) -> Iterator[str]:
-    """Say what was odd at one rate; heard: the rates at which somebody was understood."""
+def _odd(one: SearchRound, heard: Container[int]) -> Iterator[str]:
+    """Say what was odd at one rate; heard: the rates at which something was understood."""
     twice = {servo.id for servo in one.found if one.found.count(servo) > 1}
     for servo_id in sorted({*one.shared, *twice}):
         yield (

@@ -38,7 +38,7 @@ class StopSearchParams:
     # fmt: on
 
 
-class Stop(NamedTuple):
+class EndStop(NamedTuple):
     """Where a search ended, in unwrapped steps.
 
     kind: "stop", pushed and did not move; "limit", the end of what the servo allows
@@ -66,7 +66,7 @@ class StopSearch:
         self._end = high if direction > 0 else low
         self._room = (low, high)
         self._goal: float | None = None
-        self.found: Stop | None = None
+        self.found: EndStop | None = None
 
     def step(self, position_steps: int, load: float, t_s: float) -> int:
         """Take a measurement, give the goal; after the end the goal that backs off.
@@ -90,15 +90,15 @@ class StopSearch:
         self._goal, self._t_s = nearer(ahead, most, self._end), t_s
         return self._within(self._goal)
 
-    def _judge(self, position_steps: int, load: float, t_s: float) -> Stop | None:
+    def _judge(self, position_steps: int, load: float, t_s: float) -> EndStop | None:
         par = self._params
         still_s = t_s - self._moved_s
         near = (self._end - position_steps) * self._way <= NEAR_DEG * STEPS_PER_DEG
         if near:
-            return Stop(position_steps, "limit", still_s)
+            return EndStop(position_steps, "limit", still_s)
         pushed = abs(load) >= par.touch_share and still_s >= par.touch_ms / 1e3
         if pushed or still_s >= par.longest_push_ms / 1e3:
-            return Stop(position_steps, "stop", still_s)
+            return EndStop(position_steps, "stop", still_s)
         return None
 
     def _within(self, goal: float) -> int:
@@ -112,7 +112,7 @@ Exchange = Callable[[int | None], tuple[int, float, float]]
 
 def search(
     params: StopSearchParams, direction: int, limits: tuple[int, int], exchange: Exchange
-) -> Stop:
+) -> EndStop:
     """Run one search to its end and the way back; gives where the stop is."""
     look = StopSearch(params, direction, *limits)
     goal: int | None = None

@@ -14,7 +14,7 @@ from gazerig.drivers.pca9685.bus import Pca9685Bus
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoSetup
-from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.guardian.guarded_bus import GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import Clock
@@ -111,11 +111,11 @@ class OneHobby:
 
         Raises:
             BusLost: the board does not answer any more.
-            gazerig.robot.calibration.joint_access.Stopped: a person or the system asked for it.
+            CalibrationStopped: a person or the system asked for it.
         """
         why = self._stopped()
         if why is not None:
-            raise Stopped(why)
+            raise CalibrationStopped(why)
         self._clock.sleep_until(self._clock.now_s() + PERIOD_S)
         at = self._read()
         self._bus.write([self._goal])
@@ -125,7 +125,7 @@ class OneHobby:
         """Lead it to where it was sent; gives the pulse in us that it gets in the end.
 
         Raises:
-            BusLost, gazerig.robot.calibration.joint_access.Stopped: see ``look``.
+            BusLost, gazerig.robot.calibration.joint_access.CalibrationStopped: see ``look``.
         """
         way = abs(self._goal - self._read()) / US_STEPS
         end_s = self._clock.now_s() + way / SPEED_US_S + PATIENCE_S

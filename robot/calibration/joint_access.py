@@ -6,12 +6,12 @@ from gazerig.drivers.errors import DriverError, ServoFault
 from gazerig.drivers.servo_models import STEPS_PER_TURN
 from gazerig.robot.calibration.endstop_search import (
     STEPS_PER_DEG,
-    Stop,
+    EndStop,
     StopSearchParams,
     go,
     search,
 )
-from gazerig.robot.calibration.smart_servo_access import SmartServo
+from gazerig.robot.calibration.smart_servo_access import SingleServo
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams
 
@@ -19,7 +19,7 @@ PERIOD_S = 0.02
 """A search looks 50 times a second where the line is quick enough."""
 
 
-class Stopped(DriverError):
+class CalibrationStopped(DriverError):
     """Somebody wants it to end: let go of everything. The message says who."""
 
 
@@ -38,7 +38,7 @@ class SingleJoint:
         self,
         name: str,
         joint: JointParams,
-        servo: SmartServo,
+        servo: SingleServo,
         clock: Clock,
         stopped: Callable[[], str | None],
     ) -> None:
@@ -60,16 +60,16 @@ class SingleJoint:
     # --- driven gently
 
     def enable_torque(self, params: StopSearchParams) -> None:
-        """Switch the torque on where the joint is, weak and slow; see SmartServo."""
+        """Switch the torque on where the joint is, weak and slow; see SingleServo."""
         self.servo.enable_torque(params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG)
 
-    def find_stop(self, params: StopSearchParams, direction: int) -> Stop:
+    def find_stop(self, params: StopSearchParams, direction: int) -> EndStop:
         """Lead it to its stop towards more (1) or fewer (-1) steps, and a little back.
 
         Raises:
             BusLost: it does not answer any more.
             ServoFault: it let go on the way, so where it stood was no stop.
-            Stopped: a person or the system asked for it.
+            CalibrationStopped: a person or the system asked for it.
         """
         stop = search(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
         if not self.servo.torque_is_on():
@@ -86,7 +86,7 @@ class SingleJoint:
     def _exchange(self, goal: int | None) -> tuple[int, float, float]:
         why = self._stopped()
         if why is not None:
-            raise Stopped(why)
+            raise CalibrationStopped(why)
         self._clock.sleep_until(self._at_s + PERIOD_S)
         if goal is not None:
             self.servo.send(goal)

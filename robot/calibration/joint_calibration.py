@@ -62,7 +62,7 @@ class Calibration(NamedTuple):
     max_deg: float
 
 
-class Places(NamedTuple):
+class LinkageFit(NamedTuple):
     """What the rig file must say of a joint behind a push rod; fields as in JointParams.
 
     linkage: each (joint angle in degrees, servo position in steps or us), angles rising
@@ -251,7 +251,7 @@ def applied(joint: JointParams, made: Calibration) -> JointParams:
 def changes(
     name: str,
     joint: JointParams,
-    made: Calibration | Places,
+    made: Calibration | LinkageFit,
     park_deg: Mapping[str, float],
 ) -> dict[str, Value]:
     """Return dotted keys of the rig file and their new values, those alone that differ.

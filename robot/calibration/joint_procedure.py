@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Literal, Protocol
 
 from gazerig.drivers.servo_models import STEPS_PER_TURN
-from gazerig.robot.calibration.endstop_search import Stop, StopSearchParams
+from gazerig.robot.calibration.endstop_search import EndStop, StopSearchParams
 from gazerig.robot.calibration.joint_access import SingleJoint
 from gazerig.robot.calibration.joint_calibration import (
     Calibration,
@@ -34,7 +34,7 @@ class Person(Protocol):
         """Return when they have done what is asked; ``live`` gives the line to show meanwhile.
 
         Raises:
-            gazerig.robot.calibration.joint_access.Stopped: they want it to end.
+            gazerig.robot.calibration.joint_access.CalibrationStopped: they want it to end.
         """
         ...
 
@@ -74,7 +74,7 @@ def by_hand(single: SingleJoint, person: Person, margin_deg: float) -> Calibrati
         gazerig.robot.calibration.joint_calibration.CalibrationRefused: what was marked makes no
             calibration.
         DriverError: the servo does not answer any more.
-        gazerig.robot.calibration.joint_access.Stopped: the person wants it to end.
+        gazerig.robot.calibration.joint_access.CalibrationStopped: the person wants it to end.
     """
     single.servo.disable_torque()
     watched = Watched(single)
@@ -104,7 +104,7 @@ def by_motion(
         gazerig.robot.calibration.joint_calibration.CalibrationRefused: what was found makes no
             calibration.
         DriverError: the servo is not fit for it, or does not answer any more.
-        gazerig.robot.calibration.joint_access.Stopped: the person wants it to end.
+        gazerig.robot.calibration.joint_access.CalibrationStopped: the person wants it to end.
     """
     try:
         marks = _find_stops(single, person, params)
@@ -141,7 +141,7 @@ def _find_stops(single: SingleJoint, person: Person, params: StopSearchParams) -
 
 def _stop(single: SingleJoint, person: Person, params: StopSearchParams, way: int) -> int:
     """Find one stop; gives its position."""
-    stop: Stop = single.find_stop(params, way)
+    stop: EndStop = single.find_stop(params, way)
     if stop.kind == "limit":
         raise CalibrationRefused(
             f"{single.name}: it came to the end of the servo's turn "

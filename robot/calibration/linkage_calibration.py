@@ -11,7 +11,7 @@ from math import degrees
 from gazerig.robot.calibration.joint_calibration import (
     SMALLEST_RANGE_DEG,
     CalibrationRefused,
-    Places,
+    LinkageFit,
     inwards,
     is_lid,
 )
@@ -42,7 +42,7 @@ def likely_angle(joint: JointParams, position: float, one: Place, other: Place) 
     return round(low + share * (high - low), 1) + 0.0
 
 
-def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: float) -> Places:
+def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: float) -> LinkageFit:
     """Make linkage and range of a joint; a lid's range ends at its marked places.
 
     Args:
@@ -72,7 +72,7 @@ def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: f
             f"{name}: only {high - low:.1f} deg are between its ends, more than "
             f"{SMALLEST_RANGE_DEG:g} are needed: mark them farther apart, or lessen the margin"
         )
-    made = Places(linkage, low + 0.0, high + 0.0)
+    made = LinkageFit(linkage, low + 0.0, high + 0.0)
     try:
         replace(joint, **made._asdict())
     except ValueError as error:

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from gazerig.robot.calibration.hobby_access import OneHobby
 from gazerig.robot.calibration.joint_access import SingleJoint
-from gazerig.robot.calibration.joint_calibration import Places, ends_of, is_lid
+from gazerig.robot.calibration.joint_calibration import LinkageFit, ends_of, is_lid
 from gazerig.robot.calibration.joint_procedure import Person, Watched
 from gazerig.robot.calibration.linkage_calibration import (
     Place,
@@ -57,7 +57,7 @@ class Steerer(Person, Protocol):
         """Return when the servo is where it is wanted.
 
         Raises:
-            gazerig.robot.calibration.joint_access.Stopped: they want it to end.
+            gazerig.robot.calibration.joint_access.CalibrationStopped: they want it to end.
         """
         ...
 
@@ -194,7 +194,7 @@ class HandPlacer:
         return self._watched.live()
 
 
-def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> Places:
+def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> LinkageFit:
     """Mark the places of a joint and say their angles.
 
     more: places between each two that are marked; margin_deg: kept from the ends, but for lids
@@ -202,7 +202,7 @@ def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> 
     Raises:
         gazerig.robot.calibration.joint_calibration.CalibrationRefused: they make no linkage.
         DriverError: the servo does not answer any more.
-        gazerig.robot.calibration.joint_access.Stopped: the person wants it to end.
+        gazerig.robot.calibration.joint_access.CalibrationStopped: the person wants it to end.
     """
     placer.begin()
     marked = _lid(placer, person) if is_lid(placer.name) else _turning(placer, person)

@@ -27,7 +27,7 @@ class ServoCheck(NamedTuple):
     homing_offset: int
 
 
-class SmartServo:
+class SingleServo:
     """The servo of one joint.
 
     What it changes in the servo it puts back. Every method raises BusLost where the servo does

@@ -1,7 +1,6 @@
 """The command calibrate joints: zero, sign and range of each joint, found and written down."""
 
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -9,24 +8,25 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from gazerig.config.save import copy_shipped, propose, rig_file, save_rig
+from gazerig.config.save import propose, rig_file
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.calibration.endstop_search import StopSearchParams
-from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.calibration.joint_calibration import Value, changes
 from gazerig.robot.cli.calibrate_joint import (
-    Bench,
     By,
-    How,
+    CalibrationJob,
+    CalibrationOptions,
     Made,
     ZeroBy,
     measure,
     refuse_impossible,
 )
 from gazerig.robot.cli.jog_prompt import SteeringPerson
-from gazerig.robot.cli.ports import MockOption, PortOption, wires
+from gazerig.robot.cli.ports import MockOption, PortOption, rig_ports
 from gazerig.robot.cli.prompts import Lines
+from gazerig.robot.cli.rig_writer import refuse_unwritable, write_found
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
 
 
@@ -89,18 +89,19 @@ def calibrate_joints(
                 _refuse_long_lists(rig, loaded, names)
         search = StopSearchParams(strength=strength)
         span_us = _span(pulses)
-        how = How(by, margin, zero, search, clear_offset, set_middle, span_us, more)
+        how = CalibrationOptions(by, margin, zero, search, clear_offset, set_middle, span_us, more)
         refuse_impossible(loaded, names, how)
         person = SteeringPerson(Lines(answers), stopped, yes)
         try:
-            with wires(loaded, mock, port) as wire:
-                found, refused = measure(Bench(loaded, wire, how, person, stopped), names)
+            with rig_ports(loaded, mock, port) as wire:
+                found, refused = measure(CalibrationJob(loaded, wire, how, person, stopped), names)
             if found:
                 wanted = _wanted(loaded, found)
                 Console().print(_table(rig, wanted))
                 if not dry_run:
-                    _write(rig, wanted, out, person)
-        except Stopped as why:
+                    values = {key: new for key, (_, new) in wanted.items()}
+                    write_found(rig, values, out, person)
+        except CalibrationStopped as why:
             say(f"stopped by {why}: nothing written")
             raise typer.Exit(FAULT) from None
     if refused:
@@ -143,20 +144,6 @@ def _span(pulses: str) -> tuple[float, float]:
         raise SetupError(f"--pulses {pulses}: two pulse widths in us, e.g. 900:2100") from None
 
 
-def refuse_unwritable(rig: str, out: Path | None) -> None:
-    """Find out before anything is calibrated that nothing could be written.
-
-    Raises:
-        gazerig.config.load.ConfigError, SetupError: why, and what to do.
-    """
-    if out is None:
-        save_rig(rig, {}, datetime.now())
-    elif out.exists():
-        raise SetupError(f"--out {out}: there is such a file: give it as RIG instead")
-    elif "/" in rig or rig.endswith((".yaml", ".yml")):
-        raise SetupError(f"--out copies a shipped rig; {rig} is a file of yours: leave --out away")
-
-
 def _wanted(rig: Rig, found: Mapping[str, Made]) -> dict[str, tuple[object, Value]]:
     """Return key -> old and new value for all joints found."""
     wanted: dict[str, tuple[object, Value]] = {}
@@ -188,25 +175,3 @@ def _text(value: object) -> str:
     if not isinstance(value, tuple):
         return f"{value}"
     return "\n".join(f"{angle:g} deg: {at:g}" for angle, at in value)
-
-
-def _write(
-    rig: str,
-    wanted: Mapping[str, tuple[object, Value]],
-    out: Path | None,
-    person: SteeringPerson,
-) -> None:
-    """Write what differs after a yes, and say where the old file is."""
-    if not wanted:
-        say("everything is as the rig file says: nothing to write")
-        return
-    where = rig_file(rig) if out is None else out
-    if not person.agrees(f"write these {len(wanted)} values into {where}?"):
-        say("nothing written")
-        return
-    if out is not None:
-        copy_shipped(rig, out)
-    saved = save_rig(where, {key: new for key, (_, new) in wanted.items()}, datetime.now())
-    for change in saved.changes:
-        say(str(change))
-    say(f"written into {saved.path}; as it was: {saved.backup}")

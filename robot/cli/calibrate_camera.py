@@ -3,7 +3,6 @@
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from datetime import datetime
 from enum import StrEnum
 from math import degrees, radians
 from pathlib import Path
@@ -31,7 +30,9 @@ from gazerig.robot.calibration.camera_procedure import (
 )
 from gazerig.robot.calibration.charuco_page import RULER_MM, write_page
 from gazerig.robot.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
-from gazerig.robot.cli.neck_motion import agrees, go_on, moving_neck
+from gazerig.robot.cli.neck_motion import go_on, moving_neck
+from gazerig.robot.cli.prompts import Lines, TerminalPerson
+from gazerig.robot.cli.rig_writer import refuse_unwritable, write_found
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
 from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
 from gazerig.robot.model.clock import RealClock
@@ -39,8 +40,6 @@ from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import NECK, Kinematics
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
-
-app = typer.Typer()
 
 
 class Paper(StrEnum):
@@ -64,7 +63,6 @@ SquareOption = Annotated[float, typer.Option(metavar="MM", help="Side of a squar
 _BOARD = BoardParams()
 
 
-@app.command("calibrate-board")
 def calibrate_board(
     out: Annotated[Path, typer.Argument(help="File to write, .pdf or .png.")] = Path("board.pdf"),
     paper: Annotated[Paper, typer.Option(help="Paper, laid crosswise.")] = Paper.a4,
@@ -80,7 +78,6 @@ def calibrate_board(
         say(f"and measure the ruler: if it is not {RULER_MM} mm, give --ruler when calibrating")
 
 
-@app.command("calibrate-camera")
 def calibrate_camera(
     rig: RigArgument = "desk",
     what: Annotated[
@@ -116,7 +113,7 @@ def calibrate_camera(
                 "several neck angles tells nothing; use --what lens"
             )
         if not dry_run:
-            _writable(rig, out)
+            refuse_unwritable(rig, out)
         job = _Job(loaded, board, stopped, _kinematics(loaded))
         with _eye(job, camera, mock, seed) as eye:
             found, changes, good = loaded.camera, dict[str, Any](), HandEyeParams()
@@ -129,7 +126,7 @@ def calibrate_camera(
                     changes |= mount_changes(_mount(job, eye, neck, found, good), found)
         Console().print(_table(rig, loaded.camera, changes))
         if not dry_run:
-            _write(job, rig, changes, out, yes)
+            write_found(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
 
 
 def lens_changes(lens: LensCalibration) -> dict[str, Any]:
@@ -338,27 +335,3 @@ def _table(rig: str, camera: CameraParams, changes: dict[str, Any]) -> Table:
 
 def _number(value: Any) -> str:
     return " ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else f"{value}"
-
-
-def _writable(rig: str, out: Path | None) -> None:
-    """Find out before anybody holds a board that nothing could be written."""
-    from gazerig.config.save import save_rig  # type: ignore[import-not-found, unused-ignore]
-
-    if out is None:
-        save_rig(rig, {}, datetime.now())
-    elif out.exists():
-        raise SetupError(f"--out {out}: there is such a file: give it as RIG instead")
-
-
-def _write(job: _Job, rig: str, changes: dict[str, Any], out: Path | None, yes: bool) -> None:
-    """Write what was found after a yes, and say where the old file is."""
-    from gazerig.config.save import copy_shipped, save_rig
-
-    if not agrees(job.stopped, yes, f"write these {len(changes)} values into {out or rig}?"):
-        say("nothing written")
-        return
-    target = copy_shipped(rig, out) if out is not None else rig
-    saved = save_rig(target, changes, datetime.now())
-    for change in saved.changes:
-        say(str(change))
-    say(f"written into {saved.path}; as it was: {saved.backup}")

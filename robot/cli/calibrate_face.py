@@ -4,7 +4,6 @@ import contextlib
 import os
 import sys
 from collections.abc import Callable
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +11,6 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from gazerig.config.save import copy_shipped, rig_file, save_rig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.top_down import TopDown
@@ -23,11 +21,11 @@ from gazerig.robot.app.run_observers import RunObservers, Steer
 from gazerig.robot.app.session import way_out
 from gazerig.robot.calibration.face_calibration import PART_WORDS, FaceCalibration, begun, changes
 from gazerig.robot.calibration.face_steering import FaceSteering
-from gazerig.robot.calibration.joint_access import Stopped
-from gazerig.robot.cli.calibrate import refuse_unwritable
+from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.cli.key_input import BUTTONS, HELP, Keys, LineKeys, PageKeys, TerminalKeys
 from gazerig.robot.cli.ports import MockOption, PortOption
 from gazerig.robot.cli.prompts import Lines, TerminalPerson
+from gazerig.robot.cli.rig_writer import refuse_unwritable, write_found
 from gazerig.robot.cli.terminal import (
     FAULT,
     RigArgument,
@@ -102,8 +100,13 @@ def calibrate_face(
         ).checked()
         try:
             found = _steered(options, loaded, lines, answers is not None, stopped)
-            _write(rig, loaded, found, out, TerminalPerson(lines, stopped, yes))
-        except Stopped as why:
+            values = changes(found)
+            if not values:
+                say("no part was chosen: nothing to write")
+                return
+            Console().print(_table(rig, loaded, found))
+            write_found(rig, values, out, TerminalPerson(lines, stopped, yes))
+        except CalibrationStopped as why:
             say(f"stopped by {why}: nothing written")
             raise typer.Exit(FAULT) from None
 
@@ -118,7 +121,7 @@ def _steered(
     """Let a person steer the gaze from part to part; the rig ends parked, torque off.
 
     Raises:
-        gazerig.robot.calibration.joint_access.Stopped: a signal or a fault ended it.
+        gazerig.robot.calibration.joint_access.CalibrationStopped: a signal or a fault ended it.
         DriverError: port, servos or camera are not as configured.
     """
     idle = rig.gaze.idle
@@ -145,7 +148,7 @@ def _steered(
     finally:
         made.close()
     if stopped() is not None or count.stopped_by.startswith("fault"):
-        raise Stopped(count.stopped_by)
+        raise CalibrationStopped(count.stopped_by)
     return steering.state
 
 
@@ -260,30 +263,6 @@ def shown(steering: FaceSteering) -> str:
         f"{state.at + 1}/{len(PART_WORDS)} {PART_WORDS[state.part]}: {across}, {upright}; "
         f"step {state.step_mm:g} mm"
     )
-
-
-def _write(
-    rig: str, loaded: Rig, found: FaceCalibration, out: Path | None, person: TerminalPerson
-) -> None:
-    """Show what was chosen, write it after a yes, and say where the old file is."""
-    wanted = changes(found)
-    if not wanted:
-        say("no part was chosen: nothing to write")
-        return
-    Console().print(_table(rig, loaded, found))
-    where = rig_file(rig) if out is None else out
-    if not person.agrees(f"write these {len(wanted)} places into {where}?"):
-        say("nothing written")
-        return
-    if out is not None:
-        copy_shipped(rig, out)
-    saved = save_rig(where, dict(wanted), datetime.now())
-    for change in saved.changes:
-        say(str(change))
-    if saved.backup is None:
-        say(f"everything is as {saved.path} says: nothing to write")
-    else:
-        say(f"written into {saved.path}; as it was: {saved.backup}")
 
 
 def _table(rig: str, loaded: Rig, found: FaceCalibration) -> Table:

@@ -13,20 +13,19 @@ from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.calibration.endstop_search import StopSearchParams
 from gazerig.robot.calibration.hobby_access import OneHobby
 from gazerig.robot.calibration.joint_access import SingleJoint
-from gazerig.robot.calibration.joint_calibration import Calibration, CalibrationRefused, Places
+from gazerig.robot.calibration.joint_calibration import Calibration, CalibrationRefused, LinkageFit
 from gazerig.robot.calibration.joint_procedure import by_hand, by_motion
 from gazerig.robot.calibration.linkage_procedure import HandPlacer, HobbyPlacer, by_places
-from gazerig.robot.calibration.smart_servo_access import SmartServo
+from gazerig.robot.calibration.smart_servo_access import SingleServo
 from gazerig.robot.cli.jog_prompt import SteeringPerson
-from gazerig.robot.cli.open_port import opened
-from gazerig.robot.cli.ports import Wires
+from gazerig.robot.cli.ports import RigPorts, opened
 from gazerig.robot.cli.terminal import say
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.power_down import PowerDown
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import RealClock
 
-Made = Calibration | Places
+Made = Calibration | LinkageFit
 
 
 class By(StrEnum):
@@ -43,7 +42,7 @@ class ZeroBy(StrEnum):
     person = "person"
 
 
-class How(NamedTuple):
+class CalibrationOptions(NamedTuple):
     """How to calibrate, as asked on the command line.
 
     pulses_us: hobby servos are never sent outside
@@ -60,29 +59,29 @@ class How(NamedTuple):
     more: int
 
 
-class Measured(NamedTuple):
+class JointResults(NamedTuple):
     """What came of it: by joint, and which joints were refused."""
 
     found: dict[str, Made]
     refused: tuple[str, ...]
 
 
-class Bench(NamedTuple):
+class CalibrationJob(NamedTuple):
     """What calibrating needs beside the joints."""
 
     rig: Rig
-    wire: Wires
-    how: How
+    wire: RigPorts
+    how: CalibrationOptions
     person: SteeringPerson
     stopped: Callable[[], str | None]
 
 
-def measure(bench: Bench, names: Sequence[str]) -> Measured:
+def measure(bench: CalibrationJob, names: Sequence[str]) -> JointResults:
     """Calibrate one joint after the other, bus by bus.
 
     Raises:
         SetupError: a port cannot be opened, or there are no answers left.
-        gazerig.robot.calibration.joint_access.Stopped: somebody wants it to end.
+        gazerig.robot.calibration.joint_access.CalibrationStopped: somebody wants it to end.
     """
     found: dict[str, Made] = {}
     refused: list[str] = []
@@ -94,10 +93,10 @@ def measure(bench: Bench, names: Sequence[str]) -> Measured:
                 refused.append(name)
                 say(f"refused: {error}")
     # In the order of the rig, whatever the buses are called.
-    return Measured({name: found[name] for name in names if name in found}, tuple(refused))
+    return JointResults({name: found[name] for name in names if name in found}, tuple(refused))
 
 
-def refuse_impossible(rig: Rig, names: Sequence[str], how: How) -> None:
+def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -> None:
     """Refuse what the servos of these joints cannot do.
 
     Raises:
@@ -125,20 +124,20 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: How) -> None:
         raise SetupError(f"--pulses {low:g}:{high:g}: must ascend within {least:g}:{most:g} us")
 
 
-def _one(bench: Bench, name: str, bus: str) -> Made:
+def _one(bench: CalibrationJob, name: str, bus: str) -> Made:
     if not bench.rig.joints[name].facts.measured:
         return _hobby(bench, name, bus)
     guardian = _guardian(bench, name, bus)
     with opened(bench.rig, bench.wire, bus, guardian) as port:
         joint = bench.rig.joints[name]
-        servo = SmartServo(name, joint.id, joint.model, port, guardian)
+        servo = SingleServo(name, joint.id, joint.model, port, guardian)
         single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
         bench.person.hand = _hand(bench.wire, bus, joint.id)
         with _off_after(single.who, servo.disable_torque, bench.stopped):
             return _smart(bench, single)
 
 
-def _guardian(bench: Bench, name: str, bus: str) -> Guardian | None:
+def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian | None:
     """Return what switches one joint's servo off, None where its own watchdog does.
 
     A watchdog is armed for calibrating whatever the rig says of it.
@@ -150,7 +149,7 @@ def _guardian(bench: Bench, name: str, bus: str) -> Guardian | None:
     return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
 
 
-def _smart(bench: Bench, single: SingleJoint) -> Made:
+def _smart(bench: CalibrationJob, single: SingleJoint) -> Made:
     how, person = bench.how, bench.person
     if how.clear_offset:
         was = single.servo.clear_offset()
@@ -184,7 +183,7 @@ def _set_middle(single: SingleJoint, person: SteeringPerson) -> None:
     say(f"{single.who}: its place is 2048 now (offset {single.servo.set_middle()}); {_VOID}")
 
 
-def _hobby(bench: Bench, name: str, bus: str) -> Made:
+def _hobby(bench: CalibrationJob, name: str, bus: str) -> Made:
     config = bench.rig.bus_named(bus)
     guardian = _guardian(bench, name, bus)
     beat = guardian.beat if guardian is not None else None
@@ -197,7 +196,7 @@ def _hobby(bench: Bench, name: str, bus: str) -> Made:
         return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)
 
 
-def _hand(wire: Wires, bus: str, servo_id: int) -> Callable[[int], None] | None:
+def _hand(wire: RigPorts, bus: str, servo_id: int) -> Callable[[int], None] | None:
     """Return what turns an emulated servo by some steps; None on real wires."""
     if wire.buses is None:
         return None

@@ -15,13 +15,12 @@ from gazerig.robot.bringup.doctor import maestro as doctor_maestro
 from gazerig.robot.bringup.doctor import pca9685 as doctor_pca9685
 from gazerig.robot.bringup.doctor import run as checkup
 from gazerig.robot.bringup.doctor.checks import apply_fix
-from gazerig.robot.bringup.doctor.findings import BOARD, Finding, Fix, worst
-from gazerig.robot.bringup.doctor.guardian import examine_guardian
-from gazerig.robot.bringup.doctor.run import Done
-from gazerig.robot.bringup.scan_text import as_plain, grouped, summed_up
+from gazerig.robot.bringup.doctor.diagnostics import BOARD, Diagnostic, Fix, worst
+from gazerig.robot.bringup.doctor.run import AppliedFix
+from gazerig.robot.bringup.doctor.text import as_plain, grouped, summed_up
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.cli import progress as bench
-from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, setups_on, wires
+from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports, setups_on
 from gazerig.robot.cli.progress import JsonOption, console, progress, wipe
 from gazerig.robot.cli.suggestions import completed
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors
@@ -47,7 +46,7 @@ def doctor(
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
         tell: Tell = (lambda _: None) if as_json else _tell
-        with wires(model, mock, port) as wired:
+        with rig_ports(model, mock, port) as wired:
             lines = wired.opened_by()
             findings = _examined(model, lines, tell)
             if fix:
@@ -64,13 +63,13 @@ def doctor(
         raise typer.Exit(FAULT)
 
 
-def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Finding]]:
+def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Diagnostic]]:
     """Examine every bus, and tell what was found; gives the findings by bus."""
     findings = {}
     for bus, line in lines.items():
         findings[bus] = _examine(rig, bus, line)
         if not has_watchdog(rig, bus):
-            findings[bus].append(examine_guardian(release_plan(rig, bus, line.port_name)))
+            findings[bus].append(checkup.examine_guardian(release_plan(rig, bus, line.port_name)))
         wipe()
         if len(lines) > 1:
             tell(f"{bus_label(rig, bus)} ({rig.bus_named(bus).kind}, {line.port_name}):")
@@ -78,11 +77,11 @@ def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, l
     return findings
 
 
-def _examine(rig: Rig, bus: str, line: BusPort) -> list[Finding]:
+def _examine(rig: Rig, bus: str, line: BusPort) -> list[Diagnostic]:
     """Examine one bus."""
     config, setups = rig.bus_named(bus), setups_on(rig, bus)
 
-    def behind() -> list[Finding]:
+    def behind() -> list[Diagnostic]:
         board = BOARDS.get(config.kind)
         if board is not None:
             return board(line, config, setups)
@@ -91,12 +90,12 @@ def _examine(rig: Rig, bus: str, line: BusPort) -> list[Finding]:
     return checkup.check_all(line, bench.host, behind)
 
 
-def _maestro(line: BusPort, config: BusConfig, setups: Sequence[ServoSetup]) -> list[Finding]:
+def _maestro(line: BusPort, config: BusConfig, setups: Sequence[ServoSetup]) -> list[Diagnostic]:
     usb = bench.usb_id(line.port_name)
     return doctor_maestro.visit(line, config.maestro, setups, usb)
 
 
-BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoSetup]], list[Finding]]] = {
+BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoSetup]], list[Diagnostic]]] = {
     "maestro": _maestro,
     "pca9685": lambda line, config, setups: doctor_pca9685.visit(line, config.pca9685, setups),
 }
@@ -117,11 +116,11 @@ def _tell(line: str) -> None:
 def _fix(
     rig: Rig,
     lines: Mapping[str, BusPort],
-    findings: Mapping[str, Sequence[Finding]],
+    findings: Mapping[str, Sequence[Diagnostic]],
     tell: Tell,
 ) -> None:
     """Mend what can be, and say each thing."""
-    done: list[Done] = []
+    done: list[AppliedFix] = []
     for bus, line in lines.items():
         done += checkup.fix_latency(line.port_name, bench.host)
         if any(finding.fixes for finding in findings[bus]):
@@ -133,7 +132,7 @@ def _fix(
         tell("nothing that --fix may mend")
 
 
-def _apply(rig: Rig, bus: str, line: BusPort, findings: Sequence[Finding]) -> list[Done]:
+def _apply(rig: Rig, bus: str, line: BusPort, findings: Sequence[Diagnostic]) -> list[AppliedFix]:
     config = rig.bus_named(bus)
     line.setBaudRate(config.baud)
 
@@ -145,7 +144,7 @@ def _apply(rig: Rig, bus: str, line: BusPort, findings: Sequence[Finding]) -> li
     return list(checkup.apply_fixes(write, findings))
 
 
-def show_findings(findings: Sequence[Finding], tell: Tell) -> None:
+def show_findings(findings: Sequence[Diagnostic], tell: Tell) -> None:
     """Tell findings, the worst first, the same one at several servos once."""
     for level, where, what, cure in grouped(findings):
         tell(f"{level} {where}: {what}")

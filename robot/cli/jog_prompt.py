@@ -6,7 +6,7 @@ from collections.abc import Callable
 from math import isfinite
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.calibration.linkage_procedure import Steered
 from gazerig.robot.cli.key_input import TerminalKeys
 from gazerig.robot.cli.prompts import LOOK_S, TerminalPerson
@@ -54,7 +54,7 @@ class SteeringPerson(TerminalPerson):
         """Wait for a line while something is looked after.
 
         Raises:
-            gazerig.robot.calibration.joint_access.Stopped: they want it to end.
+            gazerig.robot.calibration.joint_access.CalibrationStopped: they want it to end.
             SetupError: there are no more lines.
         """
         while True:
@@ -67,14 +67,14 @@ class SteeringPerson(TerminalPerson):
                     "one line an answer (--answers; an empty line is Enter)"
                 ) from None
             if line in ("q", "quit"):
-                raise Stopped("q")
+                raise CalibrationStopped("q")
             if line is not None:
                 return line
 
     def _look(self, live: Callable[[], str], more: str = "") -> None:
         why = self._stopped()
         if why is not None:
-            raise Stopped(why)
+            raise CalibrationStopped(why)
         shown = live()
         if self._live_line:
             status(f"{shown}{more}")
@@ -104,7 +104,7 @@ class SteeringPerson(TerminalPerson):
                 elif key == "enter":
                     return
                 elif key == "end":
-                    raise Stopped("q")
+                    raise CalibrationStopped("q")
                 elif key in ("left", "right"):
                     servo.nudge(STEPS_US[step] if key == "right" else -STEPS_US[step])
                 elif key in ("up", "larger"):

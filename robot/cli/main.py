@@ -14,7 +14,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.file_input import read_limited
 from gazerig.drivers.file_output import write_file
 from gazerig.drivers.serial.list_ports import serial_ports
-from gazerig.robot.cli import bringup_commands as cli_servos
+from gazerig.robot.cli import calibrate_group, doctor, monitor, reboot, scan, setup
 from gazerig.robot.cli import emulate as cli_emulate
 from gazerig.robot.cli import motion as cli_motion
 from gazerig.robot.cli import record as cli_record
@@ -41,8 +41,7 @@ app = typer.Typer(
 )
 for part in (
     cli_run,
-    cli_servos,
-    cli_motion,
+    *(scan, setup, doctor, calibrate_group, cli_motion, monitor, reboot),
     cli_tune,
     cli_record,
     cli_replay,

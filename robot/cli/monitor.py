@@ -15,7 +15,7 @@ from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.serial.port import BusPort
 from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.bringup.monitor import Monitor, Sample, as_json
+from gazerig.robot.bringup.monitor import Monitor, TelemetrySample, as_json
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.bringup.telemetry import (
     MaestroTelemetry,
@@ -24,8 +24,7 @@ from gazerig.robot.bringup.telemetry import (
     Telemetry,
     TelemetryReader,
 )
-from gazerig.robot.cli.open_port import opened
-from gazerig.robot.cli.ports import MockOption, PortOption, Wires, wires
+from gazerig.robot.cli.ports import MockOption, PortOption, RigPorts, opened, rig_ports
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, signals
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.joint import JointParams
@@ -55,7 +54,7 @@ def monitor(
     """Watch all servos; reads alone: nothing is written, torque stays as it is."""
     with clear_errors(rig, port, mock), signals() as stopped:
         found, clock = load_rig(rig), RealClock()
-        with wires(found, mock, port) as wire, _readers(found, wire) as readers:
+        with rig_ports(found, mock, port) as wire, _readers(found, wire) as readers:
             joints = {name: found.joints[name] for name in found.names}
             watch = Monitor(readers, joints, clock.now_s)
             samples = _samples(watch, clock, rate, 0.0 if once else seconds, stopped)
@@ -79,7 +78,7 @@ BOARDS: Mapping[str, Callable[[BusPort, BusConfig], TelemetryReader]] = {
 
 
 @contextlib.contextmanager
-def _readers(rig: Rig, wire: Wires) -> Iterator[dict[str, TelemetryReader]]:
+def _readers(rig: Rig, wire: RigPorts) -> Iterator[dict[str, TelemetryReader]]:
     """Open every bus for reading alone."""
     with contextlib.ExitStack() as ports:
         readers = {}
@@ -100,7 +99,7 @@ def _samples(
     rate: float,
     seconds: float | None,
     stopped: Callable[[], str | None],
-) -> Iterator[Sample]:
+) -> Iterator[TelemetrySample]:
     """Look at absolute slots until the time is over or a signal comes; at least once."""
     start_s = clock.now_s()
     end_s = inf if seconds is None else start_s + seconds
@@ -117,7 +116,7 @@ def _samples(
             return
 
 
-def _table(sample: Sample, joints: Mapping[str, JointParams], rate: float) -> Table:
+def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: float) -> Table:
     """Lay a sample out as a table."""
     hobby = any(not joint.facts.measured for joint in joints.values())
     share = sample.unanswered / sample.asked

@@ -3,7 +3,7 @@
 import contextlib
 import select
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from math import degrees, inf
 from typing import Annotated, NamedTuple
 
@@ -11,26 +11,17 @@ import typer
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.bus_wiring import guarded_rig_bus
-from gazerig.robot.app.rig_limits import lid_ends, limits, park_rad
+from gazerig.robot.app.rig_limits import lid_ends, limits
 from gazerig.robot.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
-from gazerig.robot.bringup.manual_control import JogParams, ManualControl, parked, refuse_beyond
+from gazerig.robot.bringup.manual_control import JogParams, ManualControl, refuse_beyond
 from gazerig.robot.bringup.move_result import PASSING, Moved, Step
-from gazerig.robot.cli import calibrate_group as cli_calibrations
-from gazerig.robot.cli import monitor as cli_monitor
-from gazerig.robot.cli.messages import holding, left_alone
-from gazerig.robot.cli.ports import MockOption, PortOption, Wires, wires
+from gazerig.robot.cli.manual_session import holding, holding_rig
+from gazerig.robot.cli.ports import MockOption, PortOption, rig_ports
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
-from gazerig.robot.control.body import Body
 from gazerig.robot.control.event_text import drawn_together
-from gazerig.robot.control.power_down import PowerDown
-from gazerig.robot.model.clock import RealClock
-from gazerig.robot.safety.guard import Guard
 
 app = typer.Typer()
-app.add_typer(cli_calibrations.app)
-app.add_typer(cli_monitor.app)
 
 # A number below zero is an argument, not an option.
 _NEGATIVE = {"ignore_unknown_options": True}
@@ -152,19 +143,13 @@ def _commanded(
     with (
         clear_errors(way.rig, way.port, way.mock),
         signals() as stopped,
-        wires(rig, way.mock, way.port) as wire,
+        rig_ports(rig, way.mock, way.port) as wire,
     ):
         enter = _enter if hold and sys.stdin.isatty() else _never
-        control = _control(rig, wire, speed, lambda: stopped() or enter())
-        with PowerDown(
-            (lambda again: parked(control, rig.park_deg, again)) if park else None,
-            control.stop,
-            say,
-            stopped,
-            "torque off on all servos",
-            f": {left_alone(rig)}",
-        ) as way_out:
-            way_out.switch_on(control.start)
+        params = JogParams(speed_deg_s=_gentle(rig, speed))
+        watch = _StatusLine().show if sys.stderr.isatty() else None
+        end = lambda: stopped() or enter()  # noqa: E731
+        with holding_rig(rig, wire.paths, params, end, stopped, park, watch) as control:
             _tell(control.body.bus.events())
             say(f"{holding(rig)}; Ctrl-C switches it off")
             yield control
@@ -191,18 +176,12 @@ def _ask_for_fingers(rig: Rig, yes: bool) -> None:
         typer.confirm("Is no hand in the mechanism?", abort=True)
 
 
-def _control(
-    rig: Rig, wire: Wires, speed: float, stopped: Callable[[], str | None]
-) -> ManualControl:
-    body = Body(guarded_rig_bus(rig, wire.paths), rig.joints, park_rad(rig))
-    period_s = 1.0 / JogParams().rate_hz
-    guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=period_s)
+def _gentle(rig: Rig, speed: float) -> float:
+    """Return a speed that the guard's gentle speed allows."""
     gentle = rig.guard.soft_start_speed_deg_s
     if speed > gentle:
         say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
-    params = JogParams(speed_deg_s=min(speed, gentle))
-    watch = _StatusLine().show if sys.stderr.isatty() else None
-    return ManualControl(body, guard, RealClock(), params, stopped, watch)
+    return min(speed, gentle)
 
 
 class _StatusLine:

@@ -3,25 +3,21 @@
 import contextlib
 from collections.abc import Callable, Iterator
 from math import degrees
-from typing import Any
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Angles3
-from gazerig.robot.app.bus_wiring import guarded_rig_bus
-from gazerig.robot.app.rig_limits import limits, park_rad
+from gazerig.robot.bringup.manual_control import JogParams, ManualControl
 from gazerig.robot.calibration.camera_calibration import CameraCalibrationRefused
-from gazerig.robot.cli.messages import left_alone
+from gazerig.robot.cli.manual_session import holding_rig
+from gazerig.robot.cli.ports import rig_ports
+from gazerig.robot.cli.prompts import Lines, TerminalPerson
 from gazerig.robot.cli.terminal import say
-from gazerig.robot.control.body import Body
 from gazerig.robot.control.interrupts import Interrupts
-from gazerig.robot.control.power_down import PowerDown
-from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.kinematics import NECK
-from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
-Stopped = Callable[[], str | None]
+StopReason = Callable[[], str | None]
 """Gives why to stop, None while there is no reason."""
 
 _GENTLE_DEG_S = 15.0
@@ -31,7 +27,9 @@ _SETTLE_S = 0.4
 class JoggedNeck:
     """A ``calibration.camera_procedure.Neck`` that goes through the guard, as jogging does."""
 
-    def __init__(self, control: Any, mock: BoardScene | None, stopped: Stopped) -> None:
+    def __init__(
+        self, control: ManualControl, mock: BoardScene | None, stopped: StopReason
+    ) -> None:
         self._control, self._mock, self._stopped = control, mock, stopped
         self._angles: Angles3 = (0.0, 0.0, 0.0)
 
@@ -62,7 +60,7 @@ class JoggedNeck:
 
 @contextlib.contextmanager
 def moving_neck(
-    rig: Rig, mock: BoardScene | None, port: str | None, stopped: Stopped, yes: bool
+    rig: Rig, mock: BoardScene | None, port: str | None, stopped: StopReason, yes: bool
 ) -> Iterator[JoggedNeck]:
     """Return a neck that moves gently; whatever happens, it ends with the torque off.
 
@@ -71,9 +69,6 @@ def moving_neck(
     Raises:
         SetupError: port or servos are not as configured, or the answer was no.
     """
-    from gazerig.robot.bringup.manual_control import JogParams, ManualControl, parked  # type: ignore[import-not-found, unused-ignore]
-    from gazerig.robot.cli.ports import wires  # type: ignore[import-not-found, unused-ignore]
-
     if any(name not in rig.joints for name in NECK[:2]):
         raise CameraCalibrationRefused(
             "where the camera sits is found by turning the neck left, right, up and down, and "
@@ -85,27 +80,17 @@ def moving_neck(
         mock.hang()
     elif not agrees(stopped, yes, "does the board hang, and is the head free to move?"):
         raise CameraCalibrationRefused("left out as you wished: nothing was written")
-    with wires(rig, mock is not None, port) as wire:
-        body = Body(guarded_rig_bus(rig, wire.paths), rig.joints, park_rad(rig))
-        params = JogParams(speed_deg_s=_GENTLE_DEG_S)
-        period_s = 1.0 / params.rate_hz
-        guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=period_s)
-        control = ManualControl(body, guard, RealClock(), params, stopped)
-        with PowerDown(
-            lambda again: parked(control, rig.park_deg, again),
-            control.stop,
-            say,
-            Interrupts.of(stopped),
-            "torque off on all servos",
-            f": {left_alone(rig)}",
-        ) as way_out:
-            way_out.switch_on(control.start)
-            neck = JoggedNeck(control, mock, stopped)
-            neck.rest(0.1)
-            yield neck
+    params = JogParams(speed_deg_s=_GENTLE_DEG_S)
+    with (
+        rig_ports(rig, mock is not None, port) as wire,
+        holding_rig(rig, wire.paths, params, stopped, Interrupts.of(stopped)) as control,
+    ):
+        neck = JoggedNeck(control, mock, stopped)
+        neck.rest(0.1)
+        yield neck
 
 
-def go_on(stopped: Stopped) -> None:
+def go_on(stopped: StopReason) -> None:
     """Refuse to go on where there is a reason to stop.
 
     Raises:
@@ -116,11 +101,6 @@ def go_on(stopped: Stopped) -> None:
         raise CameraCalibrationRefused(f"stopped by {why}: nothing was written")
 
 
-def agrees(stopped: Stopped, yes: bool, question: str) -> bool:
+def agrees(stopped: StopReason, yes: bool, question: str) -> bool:
     """Ask on the terminal; yes: the answer is known."""
-    from gazerig.robot.cli.prompts import (  # type: ignore[import-not-found, unused-ignore]
-        Lines,
-        TerminalPerson,
-    )
-
-    return bool(TerminalPerson(Lines(None), stopped, yes).agrees(question))
+    return TerminalPerson(Lines(None), stopped, yes).agrees(question)

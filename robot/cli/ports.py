@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from gazerig.config.schema import Rig
-from gazerig.drivers.errors import SetupError
+from gazerig.drivers.errors import PortError, SetupError
 from gazerig.drivers.i2c.port import port_of
 from gazerig.drivers.serial.list_ports import serial_ports
 from gazerig.drivers.serial.port import BusPort
@@ -15,6 +15,8 @@ from gazerig.drivers.serial.port_owner import refuse_owner
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
 from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.cli.progress import to_open
+from gazerig.robot.guardian.guardian import Guardian
 from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.client import PtyBuses
 
@@ -29,7 +31,7 @@ PortOption = Annotated[
 ]
 
 
-class Wires(NamedTuple):
+class RigPorts(NamedTuple):
     """Serial ports by the names of their buses, and what is emulated behind them, if it is."""
 
     paths: Mapping[str, str]
@@ -40,7 +42,7 @@ class Wires(NamedTuple):
         return {name: port_of(path) for name, path in self.paths.items()}
 
     def command(self, text: str, bus: str) -> None:
-        """Let something happen to what is emulated on a bus; does nothing on real wires.
+        """Let something happen to what is emulated on a bus; does nothing on real ports.
 
         Raises:
             ValueError: names the word that is wrong and what would be right.
@@ -50,9 +52,9 @@ class Wires(NamedTuple):
 
 
 @contextlib.contextmanager
-def wires(
+def rig_ports(
     rig: Rig, mock: bool, port: str | None, devices: Mapping[str, Emulated] | None = None
-) -> Iterator[Wires]:
+) -> Iterator[RigPorts]:
     """Return the ports to open; emulated buses end with the block.
 
     devices: what is emulated on some buses instead of the rig's servos
@@ -67,11 +69,11 @@ def wires(
         paths, here = ports_of(rig, port), serial_ports()
         for name, path in paths.items():
             refuse_owner(path, rig.bus_named(name).kind, here)
-        yield Wires(paths, None)
+        yield RigPorts(paths, None)
         return
     with PtyBuses() as buses:
         lines = {**emulated_lines(rig), **(devices or {})}
-        yield Wires(buses.start(lines), buses)
+        yield RigPorts(buses.start(lines), buses)
 
 
 def bus_label(rig: Rig, name: str) -> str:
@@ -85,3 +87,21 @@ def setups_on(rig: Rig, name: str) -> tuple[ServoSetup, ...]:
     """Return what a bus must know of its servos, in the order of the joints."""
     every = dict(zip(rig.names, rig_setups(rig), strict=True))
     return tuple(every[joint] for joint in joints_on(rig, name))
+
+
+@contextlib.contextmanager
+def opened(
+    rig: Rig, ports: RigPorts, bus: str, guardian: Guardian | None = None
+) -> Iterator[BusPort]:
+    """Open the port of the bus of this name at its speed; nothing is sent.
+
+    guardian: is shown a sign of life with all that is sent
+
+    Raises:
+        PortError: it is absent, busy, not permitted, or has no such speed.
+    """
+    baud = rig.bus_named(bus).baud
+    with to_open(ports.paths[bus], guardian.beat if guardian is not None else None) as port:
+        if not port.setBaudRate(baud):
+            raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose another")
+        yield port

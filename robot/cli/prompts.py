@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_input import read_limited
-from gazerig.robot.calibration.joint_access import Stopped
+from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.cli.terminal import say, status
 
 LOOK_S = 0.03
@@ -114,7 +114,7 @@ class TerminalPerson:
         while True:
             why = self._stopped()
             if why is not None:
-                raise Stopped(why)
+                raise CalibrationStopped(why)
             shown = live()
             if self._live_line:
                 status(shown)
@@ -134,7 +134,7 @@ class TerminalPerson:
     def _other(self, line: str, live: Callable[[], str], accepted: tuple[str, ...]) -> None:
         """Obey what is no answer: q, and turning an emulated joint."""
         if line in ("q", "quit"):
-            raise Stopped("q")
+            raise CalibrationStopped("q")
         word, _, number = line.partition(" ")
         if word == "turn" and self.hand is not None and number.lstrip("+-").isdecimal():
             left = int(number)

@@ -15,7 +15,7 @@ from gazerig.robot.bringup import servo_reboot
 from gazerig.robot.bringup.channel_test import sent_home
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.bringup.servo_family import ServoKind
-from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, wires
+from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports
 from gazerig.robot.cli.progress import YesOption, to_open
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say
@@ -47,7 +47,7 @@ def reboot(
             bus, servo_id = _servo(model, text)
             wanted.setdefault(bus, []).append(servo_id)
         again = []
-        with wires(model, mock, port) as wired:
+        with rig_ports(model, mock, port) as wired:
             for bus, ids in wanted.items():
                 config = model.bus_named(bus)
                 with to_open(wired.paths[bus]) as line:

@@ -20,12 +20,12 @@ from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU, is_i2c
 from gazerig.drivers.servo_models import BusKind
-from gazerig.robot.bringup.bus_search import RATES, Looked, found_of, known_kinds, plan, search
+from gazerig.robot.bringup.bus_search import RATES, SearchRound, found_of, known_kinds, plan, search
 from gazerig.robot.bringup.doctor.port import name_ports
 from gazerig.robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.cli import progress as bench
-from gazerig.robot.cli.ports import MockOption, wires
+from gazerig.robot.cli.ports import MockOption, rig_ports
 from gazerig.robot.cli.progress import JsonOption, console
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.suggestions import completed
@@ -69,13 +69,13 @@ def scan(
         if not as_json:
             _show_ports(found_ports)
         with _paths(rig, mock, port, found_ports) as paths:
-            somebody = [
+            answered = [
                 _boards(path, as_json)
                 if i2c or kind == "pca9685"
                 else _one(path, kinds, rates, thorough, kind, as_json)
                 for path, i2c in paths
             ]
-    if not any(somebody):
+    if not any(answered):
         raise typer.Exit(FAULT)
 
 
@@ -89,7 +89,7 @@ def _paths(
         yield [(path, is_i2c(path))]
         return
     model = load_rig(rig or DEFAULT_RIG)
-    with wires(model, mock, port) as wired:
+    with rig_ports(model, mock, port) as wired:
         yield [
             (path, model.bus_named(name).kind == "pca9685") for name, path in wired.paths.items()
         ]
@@ -178,7 +178,7 @@ def _one(
     line = port_of(path)
     try:
         rounds = _search(line, usb, asked, thorough, named == "all")
-        if not thorough and not any(one.somebody for one in rounds):
+        if not thorough and not any(one.answered for one in rounds):
             # Ids that lie far apart answer after a long silence; some not to everybody's ping.
             servos = [row for row in asked if row[0] != "maestro"]
             boards = [one for one in rounds if one.kind == "maestro"]
@@ -187,7 +187,7 @@ def _one(
         line.closePort()
     wished = tuple(dict.fromkeys(row[0] for row in asked))
     _show(rounds, path, wished, as_json)
-    return any(one.somebody for one in rounds)
+    return any(one.answered for one in rounds)
 
 
 def _search(
@@ -196,7 +196,7 @@ def _search(
     asked: Sequence[tuple[BusKind, int]],
     thorough: bool,
     to_the_end: bool,
-) -> list[Looked]:
+) -> list[SearchRound]:
     rounds = []
     errors = Console(stderr=True)
     with Progress(console=errors, transient=True, disable=not errors.is_terminal) as bar:
@@ -215,7 +215,9 @@ def _show_ports(ports: Sequence[SerialPort]) -> None:
         say(f"port {port.device}: {port.description}{f' [{port.usb}]' if port.usb else ''}{alias}")
 
 
-def _show(rounds: Sequence[Looked], where: str, wished: Sequence[BusKind], as_json: bool) -> None:
+def _show(
+    rounds: Sequence[SearchRound], where: str, wished: Sequence[BusKind], as_json: bool
+) -> None:
     boards = [one for one in rounds if one.board is not None]
     found = found_of(rounds)
     if as_json:

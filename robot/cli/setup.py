@@ -16,7 +16,7 @@ from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.bringup import servo_setup
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.bringup.servo_family import ServoKind
-from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, setups_on, wires
+from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports, setups_on
 from gazerig.robot.cli.progress import YesOption, progress, to_open, wipe
 from gazerig.robot.cli.setup_maestro import set_up_board, write_settings
 from gazerig.robot.cli.setup_pca9685 import set_up_boards
@@ -136,7 +136,7 @@ def _step(task: _Task, one: ServoSetup) -> bool:
             return False
         try:
             with (
-                wires(task.rig, task.mock, task.port, fresh) as wired,
+                rig_ports(task.rig, task.mock, task.port, fresh) as wired,
                 to_open(wired.paths[bus]) as line,
             ):
                 return _set_up(line, kind, one, task.config.baud, yes)
@@ -181,7 +181,7 @@ def _maestro(task: _Task) -> list[str]:
     """Say what to set on a board and try its channels; return the joints that were skipped."""
     params, setups = task.config.maestro, task.setups
     say(f"{task.title}: a Pololu Maestro; {len(setups)} of its channels to try.")
-    with wires(task.rig, task.mock, task.port) as wired, to_open(wired.paths[task.bus]) as line:
+    with rig_ports(task.rig, task.mock, task.port) as wired, to_open(wired.paths[task.bus]) as line:
         if task.settings is not None:
             every = setups_on(task.rig, task.bus)
             write_settings(task.settings, params, every, line.port_name)
@@ -193,7 +193,7 @@ def _pca9685(task: _Task) -> list[str]:
     params, setups, every = task.config.pca9685, task.setups, setups_on(task.rig, task.bus)
     key = f"buses.{task.bus}.pca9685" if task.bus else "bus.pca9685"
     say(f"{task.title}: PCA9685; {len(setups)} of its channels to try.")
-    with wires(task.rig, task.mock, task.port) as wired, to_open(wired.paths[task.bus]) as line:
+    with rig_ports(task.rig, task.mock, task.port) as wired, to_open(wired.paths[task.bus]) as line:
         return set_up_boards(line, params, setups, task.joints, every, task.named, key, task.yes)
 
 

@@ -10,14 +10,14 @@ from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.channel_test import FINE_STEPS, Place, walk
+from gazerig.robot.bringup.channel_test import FINE_STEPS, ChannelPosition, walk
 from gazerig.robot.cli.terminal import say, signals
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.joint import JointParams
 
 WIGGLE_DEG = 5.0
 
-Explain = Callable[[ServoSetup, Place], str]
+Explain = Callable[[ServoSetup, ChannelPosition], str]
 """Says why a board's pulse is not where it was sent, and the cure."""
 
 
@@ -49,7 +49,7 @@ def try_channels(
 
 def walked(
     board: Board, setup: ServoSetup, places: Sequence[int], *speed_steps_s: float
-) -> tuple[Place, ...]:
+) -> tuple[ChannelPosition, ...]:
     """Lead a channel over places; whoever asks for the end meanwhile gets it with pulses off.
 
     Raises:

@@ -20,7 +20,7 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.channel_test import FINE_STEPS, Place
+from gazerig.robot.bringup.channel_test import FINE_STEPS, ChannelPosition
 from gazerig.robot.bringup.maestro_settings import clipped, instructions, settings_file
 from gazerig.robot.cli import progress as bench
 from gazerig.robot.cli.setup_channels import rest_steps, try_channels, walked
@@ -63,7 +63,7 @@ def set_up_board(
     return try_channels(board, setups, joints, yes, _explain)
 
 
-def _explain(setup: ServoSetup, place: Place) -> str:
+def _explain(setup: ServoSetup, place: ChannelPosition) -> str:
     return clipped(setup, place.asked, place.got)
 
 

@@ -18,7 +18,7 @@ from gazerig.drivers.pca9685.registers import CHANNELS
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.channel_test import Place, given
+from gazerig.robot.bringup.channel_test import ChannelPosition, given
 from gazerig.robot.bringup.oscillator import free_channel, free_pulse, oscillator_hz
 from gazerig.robot.cli.setup_channels import try_channels
 from gazerig.robot.cli.terminal import say
@@ -67,7 +67,7 @@ def set_up_boards(
     return try_channels(Pca9685Board(line, params), setups, joints, yes, _explain)
 
 
-def _explain(setup: ServoSetup, place: Place) -> str:
+def _explain(setup: ServoSetup, place: ChannelPosition) -> str:
     sent, got = f"{place.asked / US_STEPS:g} us", f"{place.got / US_STEPS:g} us"
     return (
         f"{servo_label(setup)} is sent to {sent} and gets {got}: is another program using the "

@@ -2,11 +2,14 @@
 
 import json
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.drivers.maestro.params import Form, MaestroParams
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
+
+if TYPE_CHECKING:  # a guardian loads no more than one driver
+    from gazerig.drivers.servo_bus.family import Family
 
 
 class ReleasePlan(NamedTuple):
@@ -43,34 +46,60 @@ def decode(text: str) -> tuple[ReleasePlan, ...]:
     )
 
 
-def releaser(plan: ReleasePlan) -> Callable[[BusPort], tuple[int, ...]]:
+Releaser = Callable[[BusPort], tuple[int, ...]]
+
+
+def releaser(plan: ReleasePlan) -> Releaser:
     """Return what lets go of the servos of a plan through a port of its path.
 
-    It opens the port and returns the ids that did not confirm; it raises
-    PortError where the port cannot be opened, BusLost where it
-    went away. All that it needs is imported here, and of the drivers no more than one.
+    It opens the port and returns the ids that did not confirm; it raises PortError where the
+    port cannot be opened, BusLost where it went away. All that it needs is imported here, and of
+    the drivers no more than one.
     """
-    if plan.kind == "feetech":
-        from gazerig.drivers.feetech.family import FEETECH
-        from gazerig.drivers.servo_bus.release import disable_torque
+    return RELEASERS[plan.kind](plan)
 
-        return lambda port: disable_torque(port, FEETECH, plan.baud, plan.ids)
-    if plan.kind == "maestro":
-        from gazerig.drivers.maestro import release as maestro
 
-        params = MaestroParams(plan.baud, plan.protocol, plan.device, plan.crc, plan.channels)
-        return lambda port: maestro.stop_pulses(port, params, plan.ids)
-    if plan.kind == "pca9685":
-        from gazerig.drivers.pca9685 import release as pca9685
-        from gazerig.drivers.pca9685.params import Pca9685Params
-
-        first, *more = plan.addresses
-        boards = Pca9685Params(first, tuple(more))
-        return lambda port: pca9685.stop_pulses(port, boards, plan.ids)
+def _dynamixel(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.dynamixel.family import DYNAMIXEL
+
+    return _smart(plan, DYNAMIXEL)
+
+
+def _feetech(plan: ReleasePlan) -> Releaser:
+    from gazerig.drivers.feetech.family import FEETECH
+
+    return _smart(plan, FEETECH)
+
+
+def _smart(plan: ReleasePlan, family: "Family") -> Releaser:
     from gazerig.drivers.servo_bus.release import disable_torque
 
-    return lambda port: disable_torque(port, DYNAMIXEL, plan.baud, plan.ids)
+    return lambda port: disable_torque(port, family, plan.baud, plan.ids)
+
+
+def _maestro(plan: ReleasePlan) -> Releaser:
+    from gazerig.drivers.maestro.release import stop_pulses
+
+    params = MaestroParams(plan.baud, plan.protocol, plan.device, plan.crc, plan.channels)
+    return lambda port: stop_pulses(port, params, plan.ids)
+
+
+def _pca9685(plan: ReleasePlan) -> Releaser:
+    from gazerig.drivers.pca9685.params import Pca9685Params
+    from gazerig.drivers.pca9685.release import stop_pulses
+
+    first, *more = plan.addresses
+    params = Pca9685Params(first, tuple(more))
+    return lambda port: stop_pulses(port, params, plan.ids)
+
+
+RELEASERS: dict[BusKind, Callable[[ReleasePlan], Releaser]] = {
+    "dynamixel": _dynamixel,
+    "feetech": _feetech,
+    "maestro": _maestro,
+    "pca9685": _pca9685,
+}
+"""By the kind of bus; each imports its own driver alone."""
 
 
 def describe(plan: ReleasePlan) -> str:

@@ -9,11 +9,11 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import SHARED, Found
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Fix
 from gazerig.robot.bringup.doctor.families import CHECKS
-from gazerig.robot.bringup.doctor.findings import Finding, Fix
 from gazerig.robot.bringup.doctor.settings import SETTINGS
 from gazerig.robot.bringup.doctor.state import STATE
-from gazerig.robot.bringup.doctor.subject import FIX, ServoChecks, ServoState, Verdict
+from gazerig.robot.bringup.doctor.subject import FIX, RuleResult, ServoChecks, ServoState
 from gazerig.robot.bringup.servo_family import ServoKind
 
 MOST_NAMED = 6
@@ -21,7 +21,7 @@ MOST_NAMED = 6
 
 def visit(
     port: BusPort, kind: ServoKind, setup: ServoSetup, found: Found, corrupt: int
-) -> list[Finding]:
+) -> list[Diagnostic]:
     """Read one servo and judge it; torque is left as it is.
 
     Raises:
@@ -43,26 +43,26 @@ def take(
     )
 
 
-def examine(state: ServoState) -> list[Finding]:
+def examine(state: ServoState) -> list[Diagnostic]:
     """Judge one servo: all that is wrong; one finding says it where it is well.
 
     One that is not the right one, or not alone with its id, is not judged further.
     """
-    whole: list[Verdict] = [*_identity(state), *_collision(state)]
+    whole: list[RuleResult] = [*_identity(state), *_collision(state)]
     if not whole:
         rules = (_mute,) if state.silent else (_unread, *STATE, *SETTINGS)
         whole = [verdict for rule in rules for verdict in rule(state)]
     findings = [_finding(state, verdict) for verdict in whole]
     if not any(finding.level in ("warn", "error") for finding in findings):
-        findings.insert(0, Finding("ok", _well(state), state.where))
+        findings.insert(0, Diagnostic("ok", _well(state), state.where))
     return findings
 
 
-def _finding(state: ServoState, verdict: Verdict) -> Finding:
+def _finding(state: ServoState, verdict: RuleResult) -> Diagnostic:
     fixes = tuple(
         Fix(state.setup.id, name, value, state.values.get(name)) for name, value in verdict.fixes
     )
-    return Finding(verdict.level, verdict.what, state.where, verdict.remedy, fixes)
+    return Diagnostic(verdict.level, verdict.what, state.where, verdict.remedy, fixes)
 
 
 def _well(state: ServoState) -> str:
@@ -74,9 +74,9 @@ def _well(state: ServoState) -> str:
     )
 
 
-def _identity(state: ServoState) -> Iterator[Verdict]:
+def _identity(state: ServoState) -> Iterator[RuleResult]:
     if state.found.number != state.model.number:
-        yield Verdict(
+        yield RuleResult(
             "error",
             f"is {state.found.model}, the YAML says {state.setup.model}",
             f"connect the right servo and run gazerig setup --joint {state.setup.name}, "
@@ -84,9 +84,9 @@ def _identity(state: ServoState) -> Iterator[Verdict]:
         )
 
 
-def _collision(state: ServoState) -> Iterator[Verdict]:
+def _collision(state: ServoState) -> Iterator[RuleResult]:
     if state.corrupt >= SHARED:
-        yield Verdict(
+        yield RuleResult(
             "error",
             f"{state.corrupt} of 6 answers came in pieces: two servos share id "
             f"{state.setup.id}, or a plug is loose",
@@ -95,9 +95,9 @@ def _collision(state: ServoState) -> Iterator[Verdict]:
         )
 
 
-def _mute(state: ServoState) -> Iterator[Verdict]:
+def _mute(state: ServoState) -> Iterator[RuleResult]:
     if state.checks.ping_only:
-        yield Verdict(
+        yield RuleResult(
             "error",
             "answers pings and nothing else (Status Return Level 0)",
             FIX,
@@ -107,11 +107,11 @@ def _mute(state: ServoState) -> Iterator[Verdict]:
         yield from _unread(state)
 
 
-def _unread(state: ServoState) -> Iterator[Verdict]:
+def _unread(state: ServoState) -> Iterator[RuleResult]:
     names = [name.replace("_", " ") for name, value in state.values.items() if value is None]
     if names:
         named = ", ".join(names) if len(names) <= MOST_NAMED else "its registers"
-        yield Verdict(
+        yield RuleResult(
             "error",
             f"gave no good answer about {named}",
             "check its plug and its neighbours' and try again",

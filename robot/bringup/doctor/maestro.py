@@ -17,7 +17,7 @@ from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.doctor.findings import BOARD, Finding, Fix, Level
+from gazerig.robot.bringup.doctor.diagnostics import BOARD, Diagnostic, Fix, Level
 from gazerig.robot.bringup.maestro_settings import FACTORY_US, wide_range
 
 WHERE = "the board"
@@ -66,7 +66,7 @@ class Board:
 
 def visit(
     port: BusPort, params: MaestroParams, setups: Sequence[ServoSetup], usb: str
-) -> list[Finding]:
+) -> list[Diagnostic]:
     """Ask a board for all it tells and judge it; nothing moves.
 
     Raises:
@@ -111,13 +111,13 @@ def _spoken(params: MaestroParams, found: MaestroFound) -> MaestroParams:
     return replace(params, protocol=form, crc=found.crc)
 
 
-def examine(board: Board) -> list[Finding]:
+def examine(board: Board) -> list[Diagnostic]:
     """Judge a board: all that is wrong; one finding says it where it is well."""
     if board.found is None:
         return [_mute(board)]
     findings = [*_speech(board, board.found), *_state(board.found), *_channels(board)]
     if not any(finding.level in ("warn", "error") for finding in findings):
-        findings.insert(0, Finding("ok", _well(board, board.found), WHERE))
+        findings.insert(0, Diagnostic("ok", _well(board, board.found), WHERE))
     return [*findings, *_untold(board)]
 
 
@@ -130,7 +130,7 @@ def _well(board: Board, found: MaestroFound) -> str:
     )
 
 
-def _mute(board: Board) -> Finding:
+def _mute(board: Board) -> Diagnostic:
     params = board.params
     if board.usb in USB_CHANNELS:
         cure = (
@@ -142,17 +142,17 @@ def _mute(board: Board) -> Finding:
             "has it power? on USB take the first of its two ports and set it to 'USB Dual Port' "
             f"in Pololu's program; on its serial pins check TX, RX, ground and {params.baud} bit/s"
         )
-    return Finding("error", f"no Maestro answers at {params.baud} bit/s", WHERE, cure)
+    return Diagnostic("error", f"no Maestro answers at {params.baud} bit/s", WHERE, cure)
 
 
-def _speech(board: Board, found: MaestroFound) -> Iterator[Finding]:
+def _speech(board: Board, found: MaestroFound) -> Iterator[Diagnostic]:
     """Judge how it wants to be spoken to."""
     params = board.params
     if params.protocol not in found.forms:
         number = (
             f"its device number is not {params.device}; " if params.protocol == "pololu" else ""
         )
-        yield Finding(
+        yield Diagnostic(
             "error",
             f"answers the {found.forms[0]} form only, the YAML says {params.protocol}",
             WHERE,
@@ -160,7 +160,7 @@ def _speech(board: Board, found: MaestroFound) -> Iterator[Finding]:
         )
     if found.crc != params.crc:
         says = "wants a check byte (CRC) after every command" if found.crc else "wants no CRC"
-        yield Finding(
+        yield Diagnostic(
             "error",
             f"{says}, the YAML says crc: {str(params.crc).lower()}",
             WHERE,
@@ -168,7 +168,7 @@ def _speech(board: Board, found: MaestroFound) -> Iterator[Finding]:
             "program",
         )
     if board.size is not None and board.size != params.channels:
-        yield Finding(
+        yield Diagnostic(
             "error",
             f"has {board.size} channels, the YAML says {params.channels}",
             WHERE,
@@ -176,15 +176,15 @@ def _speech(board: Board, found: MaestroFound) -> Iterator[Finding]:
         )
 
 
-def _state(found: MaestroFound) -> Iterator[Finding]:
+def _state(found: MaestroFound) -> Iterator[Diagnostic]:
     """Judge its errors and its script."""
     for name in found.errors:
         cure = CURES.get(name, "look it up in Pololu's guide")
         # Where a timeout is set every pause between two programs is one.
         level: Level = "note" if name == TIMEOUT else "warn"
-        yield Finding(level, f"held an error, cleared now: {name}", WHERE, cure)
+        yield Diagnostic(level, f"held an error, cleared now: {name}", WHERE, cure)
     if found.script:
-        yield Finding(
+        yield Diagnostic(
             "warn",
             "runs a script of its own, which may move servos against the program",
             WHERE,
@@ -193,7 +193,7 @@ def _state(found: MaestroFound) -> Iterator[Finding]:
         )
 
 
-def _channels(board: Board) -> Iterator[Finding]:
+def _channels(board: Board) -> Iterator[Diagnostic]:
     """Judge every channel of the rig."""
     size = board.size or board.params.channels
     for setup in board.setups:
@@ -201,7 +201,7 @@ def _channels(board: Board) -> Iterator[Finding]:
         if setup.id >= size:
             says, cure = f"the board has channels 0..{size - 1} only", "correct its id in the YAML"
         elif setup.id not in board.pulses:
-            yield Finding("note", UNASKED, where, "let all servos go limp and look again")
+            yield Diagnostic("note", UNASKED, where, "let all servos go limp and look again")
             continue
         elif pulse is None:
             says = "the board does not answer about this channel"
@@ -213,19 +213,19 @@ def _channels(board: Board) -> Iterator[Finding]:
             continue
         else:
             continue
-        yield Finding("error", says, where, cure)
+        yield Diagnostic("error", says, where, cure)
 
 
-def _pulse(setup: ServoSetup, pulse: int, where: str) -> Iterator[Finding]:
+def _pulse(setup: ServoSetup, pulse: int, where: str) -> Iterator[Diagnostic]:
     at = f"gets pulses of {pulse / US_STEPS:g} us though no program runs it"
     low, high = setup.min_steps / US_STEPS, setup.max_steps / US_STEPS
     if setup.min_steps <= pulse <= setup.max_steps:
-        yield Finding(
+        yield Diagnostic(
             "warn", at, where, "gazerig home ends with its pulses off; for good set 'On startup "
             "or error' to Off in Pololu's program",
         )  # fmt: skip
     else:
-        yield Finding(
+        yield Diagnostic(
             "error",
             f"{at}, outside its range {low:g}..{high:g} us",
             where,
@@ -233,9 +233,9 @@ def _pulse(setup: ServoSetup, pulse: int, where: str) -> Iterator[Finding]:
         )
 
 
-def _untold(board: Board) -> Iterator[Finding]:
+def _untold(board: Board) -> Iterator[Diagnostic]:
     """Say what no board tells, and what to do about it."""
-    yield Finding(
+    yield Diagnostic(
         "note",
         "hobby servos tell nothing: position, load, temperature and supply cannot be examined",
         "the servos",
@@ -243,14 +243,14 @@ def _untold(board: Board) -> Iterator[Finding]:
     wide = [setup for setup in board.setups if wide_range(setup)]
     for setup in wide:
         low, high = wide_range(setup) or FACTORY_US
-        yield Finding(
+        yield Diagnostic(
             "note",
             f"goes to {setup.min_steps / US_STEPS:g}..{setup.max_steps / US_STEPS:g} us, beyond "
             f"the {FACTORY_US[0]}..{FACTORY_US[1]} us of a new board, which cuts goals silently",
             servo_label(setup),
             f"set its Min to {low} and its Max to {high} in Pololu's program",
         )
-    yield Finding(
+    yield Diagnostic(
         "note",
         "its channels' own ranges and its serial timeout cannot be read over the serial line",
         WHERE,

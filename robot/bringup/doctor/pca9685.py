@@ -14,12 +14,12 @@ from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.doctor.findings import Finding
+from gazerig.robot.bringup.doctor.diagnostics import Diagnostic
 
 WHERE = "the board"
 
 
-def visit(port: BusPort, params: Pca9685Params, setups: Sequence[ServoSetup]) -> list[Finding]:
+def visit(port: BusPort, params: Pca9685Params, setups: Sequence[ServoSetup]) -> list[Diagnostic]:
     """Ask the boards of one bus for all they tell and judge it; nothing moves.
 
     Raises:
@@ -37,17 +37,17 @@ def visit(port: BusPort, params: Pca9685Params, setups: Sequence[ServoSetup]) ->
         except ValueError as error:
             what = str(error).removeprefix(f"channel {setup.id}: ")
             findings.append(
-                Finding("error", what, servo_label(setup), "correct its id or range in the YAML")
+                Diagnostic("error", what, servo_label(setup), "correct its id or range in the YAML")
             )
     try:
         pulses = board.find(fitting, EventLog())
     except ServoMissing as error:
         what, _, remedy = str(error).removeprefix(f"{port.port_name}: ").partition(": ")
-        return [*findings, Finding("error", what, WHERE, remedy)]
+        return [*findings, Diagnostic("error", what, WHERE, remedy)]
     for setup, pulse in zip(fitting, pulses, strict=True):
         findings += _pulse(setup, pulse)
     if not findings:
-        findings.append(Finding("ok", _well(params, pulses), WHERE))
+        findings.append(Diagnostic("ok", _well(params, pulses), WHERE))
     return [*findings, *_untold()]
 
 
@@ -57,28 +57,28 @@ def _well(params: Pca9685Params, pulses: Sequence[int]) -> str:
     return f"answers at {named}; pulses on {given} of {len(pulses)} channels"
 
 
-def _pulse(setup: ServoSetup, pulse: int) -> Iterator[Finding]:
+def _pulse(setup: ServoSetup, pulse: int) -> Iterator[Diagnostic]:
     if not pulse:
         return
     at = f"gets pulses of {pulse / US_STEPS:g} us though no program runs it"
     low, high = setup.min_steps / US_STEPS, setup.max_steps / US_STEPS
     if setup.min_steps <= pulse <= setup.max_steps:
         remedy = "gazerig home ends with its pulses off"
-        yield Finding("warn", at, servo_label(setup), remedy)
+        yield Diagnostic("warn", at, servo_label(setup), remedy)
     else:
         remedy = f"switch the servo supply off, then gazerig reboot {setup.name} ends its pulses"
         what = f"{at}, outside its range {low:g}..{high:g} us"
-        yield Finding("error", what, servo_label(setup), remedy)
+        yield Diagnostic("error", what, servo_label(setup), remedy)
 
 
-def _untold() -> Iterator[Finding]:
+def _untold() -> Iterator[Diagnostic]:
     """Say what no board tells, and what to do about it."""
-    yield Finding(
+    yield Diagnostic(
         "note",
         "hobby servos tell nothing: position, load, temperature and supply cannot be examined",
         "the servos",
     )
-    yield Finding(
+    yield Diagnostic(
         "note",
         "has no watchdog: when the cable or the computer dies it goes on with its last pulses",
         WHERE,

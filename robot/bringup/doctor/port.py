@@ -17,7 +17,7 @@ from gazerig.drivers.serial.list_ports import (
     latency_ms,
     serial_ports,
 )
-from gazerig.robot.bringup.doctor.findings import Finding
+from gazerig.robot.bringup.doctor.diagnostics import Diagnostic
 
 UDEV_FILE = "/etc/udev/rules.d/99-servo-bus.rules"
 UDEV_RULE = (
@@ -43,16 +43,16 @@ def port_facts(device: str, host: Host) -> PortFacts:
     return PortFacts(device, access(device), holders(device, host), serial_ports(host))
 
 
-def examine_port(facts: PortFacts) -> list[Finding]:
+def examine_port(facts: PortFacts) -> list[Diagnostic]:
     """Judge a port; with an error among the findings it cannot be used."""
     trouble = [finding for finding in (_there(facts), _free(facts)) if finding is not None]
     if trouble:
         return trouble[:1]
     lasting = next((p.by_id for p in facts.others if p.device == facts.device and p.by_id), None)
-    findings = [Finding("ok", "is there and may be opened", facts.device)]
+    findings = [Diagnostic("ok", "is there and may be opened", facts.device)]
     if lasting is not None:
         findings.append(
-            Finding("note", "may be called otherwise after replugging", facts.device,
+            Diagnostic("note", "may be called otherwise after replugging", facts.device,
                     f"write {lasting} into the YAML's bus.port")
         )  # fmt: skip
     return findings
@@ -64,10 +64,10 @@ def name_ports(ports: Sequence[SerialPort]) -> str:
     return ", ".join(named) or "none"
 
 
-def _there(facts: PortFacts) -> Finding | None:
+def _there(facts: PortFacts) -> Diagnostic | None:
     device, access = facts.device, facts.access
     if not access.exists:
-        return Finding(
+        return Diagnostic(
             "error",
             "there is no such port",
             device,
@@ -75,33 +75,33 @@ def _there(facts: PortFacts) -> Finding | None:
             "--port or in the YAML's bus.port",
         )
     if not access.serial:
-        return Finding("error", "is no serial port", device, "name one of gazerig scan")
+        return Diagnostic("error", "is no serial port", device, "name one of gazerig scan")
     if access.allowed:
         return None
     again = "log out and in again, this session began before you joined the group"
     cure = again if access.joined else f"sudo usermod -aG {access.group} $USER, then log out and in"
-    return Finding("error", f"may be used by the group {access.group} only", device, cure)
+    return Diagnostic("error", f"may be used by the group {access.group} only", device, cure)
 
 
-def _free(facts: PortFacts) -> Finding | None:
+def _free(facts: PortFacts) -> Diagnostic | None:
     if not facts.holders:
         return None
     named = ", ".join(facts.holders)
-    return Finding("error", f"is held open by {named}", facts.device, "end it first")
+    return Diagnostic("error", f"is held open by {named}", facts.device, "end it first")
 
 
-def examine_latency(device: str, host: Host) -> list[Finding]:
+def examine_latency(device: str, host: Host) -> list[Diagnostic]:
     """Judge the latency timer of an adaptor; nothing where it has none."""
     file = latency_file(device, host)
     if file is None:
         return []
     ms = latency_ms(file)
     if ms is None:
-        return [Finding("note", "its latency timer cannot be read", device, f"look into {file}")]
+        return [Diagnostic("note", "its latency timer cannot be read", device, f"look into {file}")]
     if ms <= WISHED_LATENCY_MS:
-        return [Finding("ok", f"hands answers over after {ms} ms (latency timer)", device)]
+        return [Diagnostic("ok", f"hands answers over after {ms} ms (latency timer)", device)]
     return [
-        Finding(
+        Diagnostic(
             "warn",
             f"keeps short answers back for {ms} ms (latency timer): about "
             f"{1000 // (ms or 1)} readings a second at most",

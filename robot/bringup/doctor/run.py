@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from gazerig.drivers.errors import DriverError, PortError
+from gazerig.drivers.errors import DriverError, PortError, SetupError
 from gazerig.drivers.serial.list_ports import (
     WISHED_LATENCY_MS,
     Host,
@@ -22,9 +22,11 @@ from gazerig.drivers.servo_bus.discovery import Found, any_reply, corrupt, ping,
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.doctor.checks import visit
-from gazerig.robot.bringup.doctor.findings import Finding, Fix, worst
+from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Fix, worst
 from gazerig.robot.bringup.doctor.port import examine_latency, examine_port, port_facts
 from gazerig.robot.bringup.servo_family import ServoKind, Tell
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.guardian.release_plan import ReleasePlan, describe
 
 
 class Presence(NamedTuple):
@@ -42,7 +44,7 @@ class Presence(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class AppliedFix:
     """One thing that ``apply_fixes`` did, or why it could not."""
 
     where: str
@@ -54,7 +56,9 @@ class Done:
         return f"{self.where}: {self.what}"
 
 
-def check_all(port: BusPort, host: Host, examine: Callable[[], list[Finding]]) -> list[Finding]:
+def check_all(
+    port: BusPort, host: Host, examine: Callable[[], list[Diagnostic]]
+) -> list[Diagnostic]:
     """Examine a port and, where it can be used, what is behind it; the port is closed after it.
 
     What goes wrong on the way is among the findings.
@@ -71,14 +75,14 @@ def check_all(port: BusPort, host: Host, examine: Callable[[], list[Finding]]) -
         return [*findings, *examine_latency(device, host), *behind]
     except DriverError as error:
         # The message names port and cure.
-        return [Finding("error", str(error).removeprefix(device).lstrip(": "), device)]
+        return [Diagnostic("error", str(error).removeprefix(device).lstrip(": "), device)]
     finally:
         port.closePort()
 
 
 def check(
     port: BusPort, kind: ServoKind, setups: Sequence[ServoSetup], baud: int, tell: Tell
-) -> list[Finding]:
+) -> list[Diagnostic]:
     """Examine every servo of a bus, and whoever else is on it; torque is left as it is.
 
     Raises:
@@ -93,7 +97,7 @@ def check(
             found, spoilt = presence.there[setup.id], presence.corrupt.get(setup.id, 0)
             findings += visit(port, kind, setup, found, spoilt)
     if presence.there:
-        findings += [Finding("note", note, "the bus") for note in kind.notes]
+        findings += [Diagnostic("note", note, "the bus") for note in kind.notes]
     return findings
 
 
@@ -144,10 +148,10 @@ def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterato
             yield from scan_ids(port, kind.family, other)[0]
 
 
-def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[Finding]:
+def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[Diagnostic]:
     """Judge who is there and who is not."""
     if presence.missing and not presence.there and not presence.elsewhere:
-        yield Finding(
+        yield Diagnostic(
             "error",
             f"no servo answers, at {baud} bit/s or any other rate",
             "the bus",
@@ -158,7 +162,7 @@ def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[F
     for setup in presence.missing:
         yield _missing(setup, at.pop(setup.id, None), presence.corrupt.get(setup.id, 0), baud)
     for found in at.values():
-        yield Finding(
+        yield Diagnostic(
             "warn",
             f"servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the "
             "missing",
@@ -166,7 +170,7 @@ def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[F
             "a new one? connect it alone and run gazerig setup",
         )
     for found in presence.strangers:
-        yield Finding(
+        yield Diagnostic(
             "warn",
             f"servo {found.id} ({found.model}) answers and is not in the YAML",
             "the bus",
@@ -174,23 +178,23 @@ def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[F
         )
 
 
-def _missing(setup: ServoSetup, at: Found | None, spoilt: int, baud: int) -> Finding:
+def _missing(setup: ServoSetup, at: Found | None, spoilt: int, baud: int) -> Diagnostic:
     where = servo_label(setup)
     if at is not None:
-        return Finding(
+        return Diagnostic(
             "error",
             f"answers at {at.baud} bit/s, the rig's rate is {baud}",
             where,
             f"connect it alone and run gazerig setup --joint {setup.name}",
         )
     if spoilt:
-        return Finding(
+        return Diagnostic(
             "error",
             "answers in pieces only: two servos share its id, or a plug is loose",
             where,
             "connect it alone and look with gazerig scan",
         )
-    return Finding(
+    return Diagnostic(
         "error",
         "does not answer",
         where,
@@ -201,7 +205,7 @@ def _missing(setup: ServoSetup, at: Found | None, spoilt: int, baud: int) -> Fin
 # --- fixes
 
 
-def fix_latency(device: str, host: Host) -> list[Done]:
+def fix_latency(device: str, host: Host) -> list[AppliedFix]:
     """Set the adaptor's latency timer where it is too long; needs the right to write it."""
     file = latency_file(device, host)
     was = None if file is None else latency_ms(file)
@@ -209,10 +213,12 @@ def fix_latency(device: str, host: Host) -> list[Done]:
         return []
     done = set_latency(file)
     how = "done" if done else f"not done, {file} may not be written"
-    return [Done(device, f"latency timer {was} -> {WISHED_LATENCY_MS} ms: {how}", done)]
+    return [AppliedFix(device, f"latency timer {was} -> {WISHED_LATENCY_MS} ms: {how}", done)]
 
 
-def apply_fixes(write: Callable[[Fix], str], findings: Iterable[Finding]) -> Iterator[Done]:
+def apply_fixes(
+    write: Callable[[Fix], str], findings: Iterable[Diagnostic]
+) -> Iterator[AppliedFix]:
     """Write what the findings offer, one after the other.
 
     write: writes one, where that is safe; gives "" or why it was not done
@@ -223,4 +229,28 @@ def apply_fixes(write: Callable[[Fix], str], findings: Iterable[Finding]) -> Ite
     for finding in findings:
         for fix in finding.fixes:
             why = write(fix)
-            yield Done(finding.where, f"{fix}: {f'not done, {why}' if why else 'done'}", not why)
+            yield AppliedFix(
+                finding.where, f"{fix}: {f'not done, {why}' if why else 'done'}", not why
+            )
+
+
+# --- the guardian, which stands in for a watchdog that servos lack
+
+
+def examine_guardian(plan: ReleasePlan) -> Diagnostic:
+    """Start a guardian, let it end again, and return what it would do; nothing is sent.
+
+    Args:
+        plan: what it would let go of.
+    """
+    guardian = Guardian((plan,))
+    try:
+        guardian.join(0)
+        guardian.wait_until_ready()
+    except SetupError as error:
+        return Diagnostic("error", str(error), "guardian", "torque stays off until it starts")
+    finally:
+        guardian.leave(0)
+    return Diagnostic(
+        "ok", f"{describe(plan)} within .5 s if the program dies or hangs", "guardian"
+    )

@@ -2,16 +2,16 @@
 
 from collections.abc import Iterator
 
-from gazerig.robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
+from gazerig.robot.bringup.doctor.subject import FIX, Rule, RuleResult, ServoState
 
 VOLTAGE = "input voltage"
 """What every family calls an unfit voltage, in bit 0."""
 
 
-def _firmware(state: ServoState) -> Iterator[Verdict]:
+def _firmware(state: ServoState) -> Iterator[RuleResult]:
     firmware, wanted = state.found.firmware, state.setup.firmware_min
     if firmware < wanted:
-        yield Verdict(
+        yield RuleResult(
             "error",
             f"firmware {firmware}, the YAML wants {wanted}",
             f"update it with {state.checks.program}",
@@ -19,15 +19,15 @@ def _firmware(state: ServoState) -> Iterator[Verdict]:
         return
     for note in state.checks.firmware_notes(state.setup.model):
         if firmware < note.below:
-            yield Verdict(note.level, f"firmware {firmware} {note.text}", note.remedy)
+            yield RuleResult(note.level, f"firmware {firmware} {note.text}", note.remedy)
             return
 
 
-def _baud(state: ServoState) -> Iterator[Verdict]:
+def _baud(state: ServoState) -> Iterator[RuleResult]:
     value, rates = state.values["baud_rate"], state.checks.kind.family.baud_rates
     if value is None or value >= len(rates) or rates[value] == state.found.baud:
         return
-    yield Verdict(
+    yield RuleResult(
         "warn",
         f"answers at {state.found.baud} bit/s, but its Baud Rate is {rates[value]}: after "
         "its next start it will not be heard here",
@@ -35,7 +35,7 @@ def _baud(state: ServoState) -> Iterator[Verdict]:
     )
 
 
-def _wanted(state: ServoState) -> Iterator[Verdict]:
+def _wanted(state: ServoState) -> Iterator[RuleResult]:
     for wanted in state.checks.wanted:
         value = state.values[wanted.register]
         if value is None or wanted.met_by(value):
@@ -43,10 +43,10 @@ def _wanted(state: ServoState) -> Iterator[Verdict]:
         right = value & ~wanted.mask | wanted.value & wanted.mask
         fixes = ((wanted.register, right),) if wanted.remedy == FIX else ()
         remedy = wanted.remedy.format(joint=state.setup.name)
-        yield Verdict(wanted.level, wanted.text(value), remedy, fixes)
+        yield RuleResult(wanted.level, wanted.text(value), remedy, fixes)
 
 
-def _limits(state: ServoState) -> Iterator[Verdict]:
+def _limits(state: ServoState) -> Iterator[RuleResult]:
     low, high = state.values["min_position_limit"], state.values["max_position_limit"]
     least, most = state.setup.min_steps, state.setup.max_steps
     if state.checks.unlimited_at_zero:
@@ -57,14 +57,14 @@ def _limits(state: ServoState) -> Iterator[Verdict]:
     own = f"its own position limits {low}..{high}"
     if state.checks.unlimited_at_zero and low == high == 0:
         text = "has no position limits of its own and many turns"
-        yield Verdict("warn", text, FIX, fixes)
+        yield RuleResult("warn", text, FIX, fixes)
     elif low > least or high < most:
-        yield Verdict("warn", f"{own} cut the YAML's range {least}..{most}", FIX, fixes)
+        yield RuleResult("warn", f"{own} cut the YAML's range {least}..{most}", FIX, fixes)
     else:
-        yield Verdict("note", f"{own} are wider than the YAML's range", FIX, fixes)
+        yield RuleResult("note", f"{own} are wider than the YAML's range", FIX, fixes)
 
 
-def _protection(state: ServoState) -> Iterator[Verdict]:
+def _protection(state: ServoState) -> Iterator[RuleResult]:
     protection = state.checks.protection
     value = state.values[protection.register]
     if value is None:
@@ -74,13 +74,13 @@ def _protection(state: ServoState) -> Iterator[Verdict]:
         return
     text = protection.text.format(errors=", ".join(off), value=value)
     if protection.by_hand is not None:
-        yield Verdict("warn", text, protection.by_hand(state.setup.model))
+        yield RuleResult("warn", text, protection.by_hand(state.setup.model))
     else:
         right = value | sum(protection.errors)
-        yield Verdict("warn", text, FIX, ((protection.register, right),))
+        yield RuleResult("warn", text, FIX, ((protection.register, right),))
 
 
-def _voltage_latch(state: ServoState) -> Iterator[Verdict]:
+def _voltage_latch(state: ServoState) -> Iterator[RuleResult]:
     """Where an unfit voltage takes the torque away until a restart, a moment of it is enough."""
     family, register = state.checks.kind.family, state.checks.protection.register
     value = state.values[register]
@@ -88,7 +88,7 @@ def _voltage_latch(state: ServoState) -> Iterator[Verdict]:
         return
     low, high = state.values["min_voltage_limit"], state.values["max_voltage_limit"]
     limits = f"{(low or 0) / 10.0:.1f}..{(high or 0) / 10.0:.1f} V"
-    yield Verdict(
+    yield RuleResult(
         "note",
         f"a moment outside {limits} makes it limp until it is restarted "
         f"({register.capitalize()} {value})",
@@ -97,11 +97,11 @@ def _voltage_latch(state: ServoState) -> Iterator[Verdict]:
     )
 
 
-def _overload(state: ServoState) -> Iterator[Verdict]:
+def _overload(state: ServoState) -> Iterator[RuleResult]:
     """Where overload protection has a share and a time of its own, both must let it act."""
     share, after = state.values.get("overload_torque"), state.values.get("protection_time")
     if share is not None and after is not None and (share >= 100 or not after):
-        yield Verdict(
+        yield RuleResult(
             "warn",
             "its overload protection cannot act as meant "
             f"(Overload Torque {share} %, Protection Time {after / 100.0:g} s)",
@@ -110,14 +110,14 @@ def _overload(state: ServoState) -> Iterator[Verdict]:
         )
 
 
-def _speed(state: ServoState) -> Iterator[Verdict]:
+def _speed(state: ServoState) -> Iterator[RuleResult]:
     """The YAML's speed lies within the servo's own limit, or what its motor can do."""
     kind = state.checks.kind
     unit_deg_s = kind.family.velocity_unit_steps_s * 360.0 / kind.family.steps_per_turn
     asked = int(state.setup.max_speed_steps_s / kind.family.velocity_unit_steps_s)
     limit = state.values.get("velocity_limit")
     if limit is not None and limit < asked:
-        yield Verdict(
+        yield RuleResult(
             "note",
             f"its Velocity Limit is {limit * unit_deg_s:.0f} deg/s, the YAML asks for "
             f"{asked * unit_deg_s:.0f}",
@@ -125,7 +125,7 @@ def _speed(state: ServoState) -> Iterator[Verdict]:
         )
     fastest_steps_s = state.model.no_load_steps_s
     if "velocity_limit" not in state.values and state.setup.max_speed_steps_s > fastest_steps_s:
-        yield Verdict(
+        yield RuleResult(
             "note",
             f"the YAML asks its shaft for {asked * unit_deg_s:.0f} deg/s; without load and at "
             f"{state.model.rated_v:g} V it turns "

@@ -8,8 +8,8 @@ joint, or a restart. Sources: ROBOTIS e-Manual, X series; Feetech memory table S
 from collections.abc import Iterator
 
 from gazerig.drivers.servo_bus.family import Model
-from gazerig.robot.bringup.doctor.findings import Level
-from gazerig.robot.bringup.doctor.subject import FIX, Rule, ServoState, Verdict
+from gazerig.robot.bringup.doctor.diagnostics import Level
+from gazerig.robot.bringup.doctor.subject import FIX, Rule, RuleResult, ServoState
 
 TRIPPED = 255
 WARM_C = 10
@@ -20,7 +20,7 @@ MEANT = 0.875
 """From this share of a rated voltage on a supply is meant for servos made for that."""
 
 
-def _errors(state: ServoState) -> Iterator[Verdict]:
+def _errors(state: ServoState) -> Iterator[RuleResult]:
     kind = state.checks.kind
     verb = "has latched" if kind.family.faults_latch else "reports"
     for error in kind.family.name_errors(state.values[kind.family.error_register] or 0):
@@ -30,10 +30,10 @@ def _errors(state: ServoState) -> Iterator[Verdict]:
             continue
         if kind.family.faults_latch:
             remedy += "; then gazerig reboot {id}"
-        yield Verdict("error", f"{verb}: {error}", remedy.format(id=state.setup.id))
+        yield RuleResult("error", f"{verb}: {error}", remedy.format(id=state.setup.id))
 
 
-def _voltage(state: ServoState) -> Iterator[Verdict]:
+def _voltage(state: ServoState) -> Iterator[RuleResult]:
     volts = state.values["present_input_voltage"]
     low, high = state.values["min_voltage_limit"], state.values["max_voltage_limit"]
     if volts is None or low is None or high is None:
@@ -41,13 +41,13 @@ def _voltage(state: ServoState) -> Iterator[Verdict]:
     text = f"{volts / 10.0:.1f} V, its limits are {low / 10.0:.1f}..{high / 10.0:.1f} V"
     if not low <= volts <= high:
         remedy = _too_high(state, volts) if volts > high else ""
-        yield Verdict(
+        yield RuleResult(
             "error",
             f"{text}{state.checks.out_of_voltage}",
             remedy or "correct the supply before anything moves",
         )
     elif volts < 10.0 * WEAK * state.model.rated_v:
-        yield Verdict(
+        yield RuleResult(
             "warn",
             f"{text}; made for {state.model.rated_v:g} V, it is slow and weak here",
             "measure at the supply and at this servo: thin wires and long chains lose volts",
@@ -81,28 +81,28 @@ def _raise_limit(model: Model, program: str) -> str:
     return f"set Max Voltage (14) to {model.max_voltage} with {program}"
 
 
-def _temperature(state: ServoState) -> Iterator[Verdict]:
+def _temperature(state: ServoState) -> Iterator[RuleResult]:
     warm, limit = state.values["present_temperature"], state.values["temperature_limit"]
     if warm is None or limit is None or warm < limit - WARM_C:
         return
     level: Level = "error" if warm >= limit else "warn"
-    yield Verdict(level, f"{warm} degC, it switches off above {limit}", "let it cool")
+    yield RuleResult(level, f"{warm} degC, it switches off above {limit}", "let it cool")
 
 
-def _torque(state: ServoState) -> Iterator[Verdict]:
+def _torque(state: ServoState) -> Iterator[RuleResult]:
     if state.values["torque_enable"]:
-        yield Verdict(
+        yield RuleResult(
             "warn",
             "its torque is on though no program runs it; its settings cannot be changed so",
             f"hold the joint, it goes limp: gazerig reboot {state.setup.id}",
         )
 
 
-def _watchdog(state: ServoState) -> Iterator[Verdict]:
+def _watchdog(state: ServoState) -> Iterator[RuleResult]:
     if state.checks.kind.family.watchdog_unit_s is None:
         return
     if state.values["bus_watchdog"] == TRIPPED:
-        yield Verdict(
+        yield RuleResult(
             "warn",
             "its bus watchdog has tripped: it refuses goals (a program ended without notice)",
             FIX,
@@ -110,10 +110,10 @@ def _watchdog(state: ServoState) -> Iterator[Verdict]:
         )
 
 
-def _lock(state: ServoState) -> Iterator[Verdict]:
+def _lock(state: ServoState) -> Iterator[RuleResult]:
     lock = state.checks.kind.family.lock
     if lock is not None and state.values[lock] == 0:
-        yield Verdict(
+        yield RuleResult(
             "warn",
             "its memory is open (Lock 0): whatever is written to its settings stays for good",
             FIX,
@@ -121,11 +121,11 @@ def _lock(state: ServoState) -> Iterator[Verdict]:
         )
 
 
-def _position(state: ServoState) -> Iterator[Verdict]:
+def _position(state: ServoState) -> Iterator[RuleResult]:
     setup, position = state.setup, state.values["present_position"]
     if position is None or setup.min_steps <= position <= setup.max_steps:
         return
-    yield Verdict(
+    yield RuleResult(
         "warn",
         f"stands at step {position}, outside its range {setup.min_steps}..{setup.max_steps}",
         "turn it inside by hand (torque off); if it is inside already, gazerig calibrate "

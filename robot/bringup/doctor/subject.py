@@ -8,13 +8,13 @@ from gazerig.drivers.servo_bus.discovery import Found
 from gazerig.drivers.servo_bus.family import Model
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
-from gazerig.robot.bringup.doctor.findings import Level
+from gazerig.robot.bringup.doctor.diagnostics import Level
 from gazerig.robot.bringup.servo_family import ServoKind
 
 FIX = "gazerig doctor --fix"
 
 
-class Verdict(NamedTuple):
+class RuleResult(NamedTuple):
     """What a rule says of a servo."""
 
     level: Level
@@ -130,4 +130,4 @@ class ServoState:
         return all(value is None for value in self.values.values())
 
 
-Rule = Callable[[ServoState], Iterator[Verdict]]
+Rule = Callable[[ServoState], Iterator[RuleResult]]

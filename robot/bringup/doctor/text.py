@@ -3,13 +3,13 @@
 import re
 from collections.abc import Sequence
 
-from gazerig.robot.bringup.doctor.findings import LEVELS, Finding, Level
+from gazerig.robot.bringup.doctor.diagnostics import LEVELS, Diagnostic, Level
 from gazerig.robot.control.event_text import runs
 
 _JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 
 
-def grouped(findings: Sequence[Finding]) -> list[tuple[Level, str, str, str]]:
+def grouped(findings: Sequence[Diagnostic]) -> list[tuple[Level, str, str, str]]:
     """Return level, places, what and remedy, the worst first; the same at several places once."""
     groups: dict[tuple[Level, str, str], list[str]] = {}
     for finding in findings:
@@ -28,7 +28,7 @@ def together(places: Sequence[str]) -> str:
     return f"{names} ({nouns.pop()}s {runs([int(match[3]) for match in found])})"
 
 
-def as_plain(finding: Finding, bus: str) -> dict[str, object]:
+def as_plain(finding: Diagnostic, bus: str) -> dict[str, object]:
     """Return a finding as JSON can hold it; bus: the name of its bus, "" for the main one."""
     return {
         "bus": bus,
@@ -40,7 +40,7 @@ def as_plain(finding: Finding, bus: str) -> dict[str, object]:
     }
 
 
-def summed_up(findings: Sequence[Finding], rig: str, fixed: bool) -> str:
+def summed_up(findings: Sequence[Diagnostic], rig: str, fixed: bool) -> str:
     """Count findings by level, and offer what --fix may do."""
     counts = [(level, sum(f.level == level for f in findings)) for level in reversed(LEVELS)]
     words = ", ".join(f"{count} {level}" for level, count in counts if count)

@@ -31,7 +31,7 @@ class Fix(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Diagnostic:
     """One thing found.
 
     level: ok, note (worth knowing), warn (works, but not well), error (does not work)
@@ -50,6 +50,6 @@ class Finding:
         return f"{self.level}: {self.where}: {self.what}{f': {self.remedy}' if self.remedy else ''}"
 
 
-def worst(findings: Iterable[Finding]) -> Level:
+def worst(findings: Iterable[Diagnostic]) -> Level:
     """Return the worst level there is, "ok" where nothing was found."""
     return max((finding.level for finding in findings), key=LEVELS.index, default="ok")
