@@ -30,7 +30,9 @@ def test_the_range_lies_inside_what_was_marked(
     way = reach if rising else -reach
     marked = [(0.0, float(zero)), (left, float(zero + way)), (-right, float(zero - way))]
     made = places("eyes_pan", marked, PAN, margin)
-    assert [at for _, at in made.linkage] == sorted((at for _, at in marked), reverse=not rising)
+    assert [at for _, at in made.transmission_points] == sorted(
+        (at for _, at in marked), reverse=not rising
+    )
     assert -right - 0.051 + margin <= made.min_deg < 0.0 < made.max_deg <= left + 0.051 - margin
     assert made.max_deg >= left - margin - 0.151 and made.min_deg <= margin - right + 0.151
     joint = replace(PAN, **made._asdict())

@@ -91,7 +91,7 @@ class Bench:
 def test_eyes_are_measured_and_their_pulses_end() -> None:
     bench = Bench("eyes_pan", "", "", "1800", "", "25", "1210", "", "-24")
     made = bench.measure()
-    assert made.linkage == ((-24.0, 1210.0), (0.0, 1500.0), (25.0, 1800.0))
+    assert made.transmission_points == ((-24.0, 1210.0), (0.0, 1500.0), (25.0, 1800.0))
     assert (made.min_deg, made.max_deg) == (-22.0, 23.0)
     assert bench.pulse() == 0 and bench.place_us() == pytest.approx(1500.0, abs=6.0)
     assert "move eyes_pan to its LEFT end, as far as it goes freely, then press Enter" in bench.said
@@ -102,10 +102,10 @@ def test_eyes_are_measured_and_their_pulses_end() -> None:
 def test_places_between_are_gone_to_and_asked_for() -> None:
     bench = Bench("eyes_tilt", "", "", "1210", "", "", "1790", "", "", "-13.5", "", "")
     made = bench.measure(more=1)
-    assert [at for _, at in made.linkage] == [1790.0, 1650.0, 1510.0, 1360.0, 1210.0]
-    assert made.linkage[1][0] == -13.5 and made.linkage[2] == (0.0, 1510.0)
+    assert [at for _, at in made.transmission_points] == [1790.0, 1650.0, 1510.0, 1360.0, 1210.0]
+    assert made.transmission_points[1][0] == -13.5 and made.transmission_points[2] == (0.0, 1510.0)
     # What is proposed is what the file says of that pulse.
-    assert made.linkage[-1][0] == pytest.approx(22.4, abs=0.2)
+    assert made.transmission_points[-1][0] == pytest.approx(22.4, abs=0.2)
 
 
 def test_a_lid_is_left_shut_so_that_the_other_can_meet_it() -> None:

@@ -395,7 +395,7 @@ def test_a_push_rod_on_a_smart_servo_is_measured_by_hand() -> None:
     bench.script = [0, 250, -490, 120, 240]
     bench.angles = [22.0, -21.0, None, 10.0]
     made = by_places(HandPlacer(single, bench), bench, 1.0, 1)
-    assert [round(at) for _, at in made.linkage] == [1860, 1980, 2100, 2220, 2350]
-    assert [angle for angle, _ in made.linkage] == [-21.0, -10.5, 0.0, 10.0, 22.0]
+    assert [round(at) for _, at in made.transmission_points] == [1860, 1980, 2100, 2220, 2350]
+    assert [angle for angle, _ in made.transmission_points] == [-21.0, -10.5, 0.0, 10.0, 22.0]
     assert (made.min_deg, made.max_deg) == (-20.0, 21.0)
     assert any("turn left_eye_pan until it reads about step 1980" in line for line in bench.said)

@@ -65,10 +65,10 @@ class Calibration(NamedTuple):
 class LinkageFit(NamedTuple):
     """What the rig file must say of a joint behind a push rod; fields as in JointParams.
 
-    linkage: each (joint angle in degrees, servo position in steps or us), angles rising
+    transmission_points: each (joint angle in degrees, servo position in steps or us), angles rising
     """
 
-    linkage: tuple[tuple[float, float], ...]
+    transmission_points: tuple[tuple[float, float], ...]
     min_deg: float
     max_deg: float
 
