@@ -24,7 +24,7 @@ from gazerig.gaze.binocular import (  # noqa: E402
 )
 from gazerig.gaze.head import Head, HeadParams  # noqa: E402
 from gazerig.gaze.lids import LidParams, Lids  # noqa: E402
-from gazerig.gaze.saccade import Saccade, SaccadeParams  # noqa: E402
+from gazerig.gaze.saccade import SaccadeModel, SaccadeParams  # noqa: E402
 from gazerig.gaze.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
 from gazerig.robot.app.assemble import assemble
@@ -72,7 +72,7 @@ def saved(name: str, figure: plt.Figure) -> None:
 def main_sequence() -> None:
     """Duration and peak speed over amplitude, beside human fits."""
     sizes = np.linspace(0.5, 60.0, 120)
-    saccade = Saccade(SaccadeParams())
+    saccade = SaccadeModel(SaccadeParams())
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.6))
     left.plot(sizes, [1e3 * saccade.duration_s(radians(a)) for a in sizes], INK, label="eqs 2-6")
     left.plot(sizes, 21.0 + 2.2 * sizes, HUMAN, ls="--", label="human, 21 + 2.2 A")

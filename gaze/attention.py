@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, scale, sub
-from gazerig.gaze.bottom_up import BottomUp, Pulls
+from gazerig.gaze.bottom_up import BottomUp, SalienceTerms
 from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
 from gazerig.gaze.habituation import Habituation, HabituationParams
 from gazerig.gaze.idle import Idle
-from gazerig.gaze.top_down import TopDown, Wanted
-from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Pull, Target, Vec3
+from gazerig.gaze.top_down import RuleTarget, TopDown
+from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Salience, Target, Vec3
 from gazerig.params import Bounds
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -52,10 +52,10 @@ class _Choice(NamedTuple):
     """
 
     bodies: Bodies
-    motion: Pulls
-    wanted: Wanted | None
+    motion: SalienceTerms
+    rule_target: RuleTarget | None
     rule: Floats
-    interest: Floats
+    habituation: Floats
     total: Floats
 
 
@@ -128,7 +128,7 @@ class Attention:
         if made.total.max(initial=-inf) == -inf:
             return None
         row = self._winner(made, t_s)
-        if made.wanted is not None and row in made.wanted.rows:
+        if made.rule_target is not None and row in made.rule_target.rows:
             self._favoured_id = made.bodies.ids[row]
         return _target(made, row, percept.captured_s)
 
@@ -137,25 +137,27 @@ class Attention:
     ) -> _Choice:
         """Return everything that the decision rests on."""
         n, eye = len(bodies), state.p_world_head_m
-        looks = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
-        motion = self._bottom_up.step(bodies, eye, t_s, self._eye_velocity(eye, t_s), looks, seen)
-        wanted = self.top_down.step(bodies, seen, eye, self._favoured_id)
+        gaze_direction = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
+        motion = self._bottom_up.step(
+            bodies, eye, t_s, self._eye_velocity(eye, t_s), gaze_direction, seen
+        )
+        rule_target = self.top_down.step(bodies, seen, eye, self._favoured_id)
         attended = self._identity[1] if self._identity is not None else -1
-        interest, rule = np.ones(n + 1), np.zeros(n + 1)
-        interest[:n] = self._habituation.step(bodies.ids, bodies.p_world_m, eye, attended, t_s)
+        habituation, rule = np.ones(n + 1), np.zeros(n + 1)
+        habituation[:n] = self._habituation.step(bodies.ids, bodies.p_world_m, eye, attended, t_s)
         amount = np.append(motion.total, 0.0)
-        if wanted is not None:
-            rows = wanted.rows if wanted.point_world_m is None else np.array([n])
-            rule[rows] = wanted.pull
-            amount[rows] = np.maximum(amount[rows], wanted.pull)
-        if wanted is not None and wanted.point_world_m is None:
-            share = self._habituation.for_rule(interest[rows]) * wanted.nearness
-            interest[rows] = share / max(float(share.max()), 1e-9)
-        total = amount * interest
+        if rule_target is not None:
+            rows = rule_target.rows if rule_target.point_world_m is None else np.array([n])
+            rule[rows] = rule_target.salience
+            amount[rows] = np.maximum(amount[rows], rule_target.salience)
+        if rule_target is not None and rule_target.point_world_m is None:
+            share = self._habituation.for_rule(habituation[rows]) * rule_target.nearness
+            habituation[rows] = share / max(float(share.max()), 1e-9)
+        total = amount * habituation
         total[:n][~seen] = -inf
-        if wanted is None or wanted.point_world_m is None:
+        if rule_target is None or rule_target.point_world_m is None:
             total[n] = -inf
-        return _Choice(bodies, motion, wanted, rule, interest, total)
+        return _Choice(bodies, motion, rule_target, rule, habituation, total)
 
     def _eye_velocity(self, p_eye_m: Vec3, t_s: float) -> Vec3:
         """Return how fast the head has carried the eyes since the decision before, m/s."""
@@ -189,27 +191,31 @@ class Attention:
 
 def _target(made: _Choice, row: int, captured_s: float) -> Target:
     """Make the target of a row, with its reason."""
-    pulls = _strongest(made, row)
-    first, wanted = pulls[0], made.wanted
-    moving = first.slide + first.loom + first.spin + first.onset
-    by_rule = wanted is not None and first.rule > 0.0 and first.rule >= moving
+    saliences = _strongest(made, row)
+    first, rule_target = saliences[0], made.rule_target
+    moving = first.translation + first.looming + first.rotation + first.onset
+    by_rule = rule_target is not None and first.rule > 0.0 and first.rule >= moving
     name = first.kind if first.id < 0 else f"{first.kind} {first.id}"
-    if wanted is not None and by_rule:
-        why = f"{name}: rule {wanted.behaviour} {first.rule:.2f}"
+    if rule_target is not None and by_rule:
+        why = f"{name}: rule {rule_target.behaviour} {first.rule:.2f}"
     else:
         why = f"{name}: {_terms(first)}"
-    if wanted is not None and wanted.point_world_m is not None and row == len(made.bodies):
-        p, v = wanted.point_world_m, _STILL
+    if (
+        rule_target is not None
+        and rule_target.point_world_m is not None
+        and row == len(made.bodies)
+    ):
+        p, v = rule_target.point_world_m, _STILL
     else:
         p, v = _vec(made.bodies.p_world_m[row]), _vec(made.bodies.v_world_m_s[row])
     # How far the head goes follows from the amount itself; boredom moves no head.
     amount = max(first.rule, moving)
     return Target(
-        p, v, captured_s, first.kind, first.id, amount, by_rule, None, 0, why, pulls=pulls
+        p, v, captured_s, first.kind, first.id, amount, by_rule, None, 0, why, saliences=saliences
     )
 
 
-def _strongest(made: _Choice, row: int) -> tuple[Pull, ...]:
+def _strongest(made: _Choice, row: int) -> tuple[Salience, ...]:
     """Return the pulls of a row and of the strongest others, term by term."""
     total = made.total
     if len(total) > 64:
@@ -218,23 +224,28 @@ def _strongest(made: _Choice, row: int) -> tuple[Pull, ...]:
     else:
         rows = np.argsort(-total, kind="stable")[:_LISTED]
     others = [other for other in rows.tolist() if other != row and total[other] > -inf]
-    return tuple(_pull(made, each) for each in (row, *others[: _LISTED - 1]))
+    return tuple(_salience(made, each) for each in (row, *others[: _LISTED - 1]))
 
 
-def _pull(made: _Choice, row: int) -> Pull:
+def _salience(made: _Choice, row: int) -> Salience:
     """Write down what pulls to one row."""
-    rule, interest = float(made.rule[row]), float(made.interest[row])
+    rule, habituation = float(made.rule[row]), float(made.habituation[row])
     total = float(made.total[row])
     if row == len(made.bodies):
-        return Pull(-1, "point", 0.0, 0.0, 0.0, 0.0, rule, interest, total)
-    slide, loom, spin, onset = (float(term[row]) for term in made.motion)
+        return Salience(-1, "point", 0.0, 0.0, 0.0, 0.0, rule, habituation, total)
+    translation, looming, rotation, onset = (float(term[row]) for term in made.motion)
     name, kind = made.bodies.ids[row], made.bodies.kinds[row]
-    return Pull(name, kind, slide, loom, spin, onset, rule, interest, total)
+    return Salience(name, kind, translation, looming, rotation, onset, rule, habituation, total)
 
 
-def _terms(pull: Pull) -> str:
+def _terms(salience: Salience) -> str:
     """Write the terms that count: the largest, and others that are no less than a tenth of it."""
-    terms = {"slide": pull.slide, "loom": pull.loom, "spin": pull.spin, "onset": pull.onset}
+    terms = {
+        "translation": salience.translation,
+        "looming": salience.looming,
+        "rotation": salience.rotation,
+        "onset": salience.onset,
+    }
     most = max(terms.values())
     return " + ".join(f"{name} {a:.2f}" for name, a in terms.items() if a >= 0.1 * most)
 

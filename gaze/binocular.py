@@ -15,8 +15,8 @@ from math import radians
 from typing import Annotated, Literal, NamedTuple
 
 from gazerig.gaze.angles import clip
-from gazerig.gaze.channels import Conjugate, Leak, Vergence
-from gazerig.gaze.vestibular import Canals, distance_m, translational_rad_s
+from gazerig.gaze.channels import ConjugateChannel, LeakyIntegrator, VergenceChannel
+from gazerig.gaze.vestibular import SemicircularCanals, distance_m, translational_rad_s
 from gazerig.params import Bounds
 
 
@@ -76,7 +76,7 @@ class BinocularController:
 
     def __init__(self, params: BinocularParams) -> None:
         par = self._params = params
-        self._conjugate = Conjugate(
+        self._conjugate = ConjugateChannel(
             par.gain_1_s,
             par.velocity_gain,
             radians(par.max_error_deg),
@@ -86,9 +86,9 @@ class BinocularController:
             par.lead_ms / 1e3,
             par.fade_ms / 1e3,
         )
-        self._vergence = Vergence(par.converge_1_s, par.diverge_1_s)
-        self._leak = Leak(par.hold_s)
-        self._canals = Canals(par.vor_delay_ms / 1e3, par.storage_s)
+        self._vergence = VergenceChannel(par.converge_1_s, par.diverge_1_s)
+        self._leak = LeakyIntegrator(par.hold_s)
+        self._canals = SemicircularCanals(par.vor_delay_ms / 1e3, par.storage_s)
         self._limit = radians(par.eye_limit_deg)
         self.reset(0.0)
 

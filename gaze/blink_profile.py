@@ -24,7 +24,7 @@ def closure(since_onset_s: float, close_s: float, hold_s: float, open_s: float) 
     return max(0.0, 1.0 - min_jerk(1.0 - (1.0 - s) ** 1.4))
 
 
-class Closing(NamedTuple):
+class LidClosure(NamedTuple):
     """One blink or wink.
 
     onset_s: when it begins; close_s, hold_s, open_s: its times in somebody awake

@@ -7,7 +7,9 @@ import numpy as np
 from gazerig.gaze.lid_params import LidParams
 
 
-def pause_s(params: LidParams, per_min: float, length_s: float, rng: np.random.Generator) -> float:
+def blink_pause_s(
+    params: LidParams, per_min: float, length_s: float, rng: np.random.Generator
+) -> float:
     """Draw the pause from the end of a blink until the next spontaneous one.
 
     per_min: blinks wanted in a minute, 0 is never; length_s: of a blink
@@ -27,7 +29,7 @@ def pause_s(params: LidParams, per_min: float, length_s: float, rng: np.random.G
     return shortest + mean * exp(sqrt(sigma2) * rng.standard_normal() - 0.5 * sigma2)
 
 
-def evokes(params: LidParams, shift_deg: float, rng: np.random.Generator) -> bool:
+def evokes_blink(params: LidParams, shift_deg: float, rng: np.random.Generator) -> bool:
     """Return whether a gaze shift brings a blink with it (Evinger 1994)."""
     if params.gaze_evoked_blink_literal:
         return shift_deg > params.gaze_evoked_blink_literal_deg
@@ -37,12 +39,12 @@ def evokes(params: LidParams, shift_deg: float, rng: np.random.Generator) -> boo
     return float(rng.random()) < 1.0 / (1.0 + against)
 
 
-def depth(params: LidParams, rng: np.random.Generator) -> float:
+def blink_depth(params: LidParams, rng: np.random.Generator) -> float:
     """Draw how far a blink shuts the lid, 1 is entirely."""
     shallow = rng.random() < params.incomplete_share
     return float(rng.uniform(0.70, 0.85)) if shallow else 1.0
 
 
-def doubled(params: LidParams, rng: np.random.Generator) -> bool:
+def is_double_blink(params: LidParams, rng: np.random.Generator) -> bool:
     """Return whether a second blink comes right after this one."""
     return float(rng.random()) < params.double_share

@@ -53,32 +53,32 @@ class BottomUpParams:
     # fmt: on
 
 
-class Terms(NamedTuple):
+class MotionTerms(NamedTuple):
     """The terms of eq 1 for each body: (n,) arrays."""
 
-    slide: Floats
-    loom: Floats
-    spin: Floats
+    translation: Floats
+    looming: Floats
+    rotation: Floats
 
 
-class Pulls(NamedTuple):
+class SalienceTerms(NamedTuple):
     """Amount of attention of each body, term by term: (n,) arrays."""
 
-    slide: Floats
-    loom: Floats
-    spin: Floats
+    translation: Floats
+    looming: Floats
+    rotation: Floats
     onset: Floats
 
     @property
     def total(self) -> Floats:
         """Return A_i, the sum of all terms."""
-        total = self.slide + self.loom
-        total += self.spin
+        total = self.translation + self.looming
+        total += self.rotation
         total += self.onset
         return total
 
 
-def slide_loom_spin(v: Floats, w: Floats, e: Floats) -> Terms:
+def motion_terms(v: Floats, w: Floats, e: Floats) -> MotionTerms:
     """Return the three terms of eq 1 for all bodies at once.
 
     v, w: (n, 3) velocities (m/s) and angular velocities (rad/s)
@@ -89,10 +89,10 @@ def slide_loom_spin(v: Floats, w: Floats, e: Floats) -> Terms:
     return _eq_1(columns(v), columns(w), e / np.maximum(_length(e), 1e-300))
 
 
-def _eq_1(v: Floats, w: Floats, e: Floats) -> Terms:
+def _eq_1(v: Floats, w: Floats, e: Floats) -> MotionTerms:
     """Return the terms of (3, n) vectors, e being of length 1."""
     along = (v * e).sum(axis=0)
-    return Terms(_length(v - along * e), np.abs(along), np.abs((w * e).sum(axis=0)))
+    return MotionTerms(_length(v - along * e), np.abs(along), np.abs((w * e).sum(axis=0)))
 
 
 def _length(v: Floats) -> Floats:
@@ -149,7 +149,7 @@ class BottomUp:
         v_world_eye_m_s: Vec3 = _STILL,
         gaze_world: Vec3 = _AHEAD,
         seen: NDArray[np.bool_] | None = None,
-    ) -> Pulls:
+    ) -> SalienceTerms:
         """Return the smoothed pulls of all bodies, in their order; 0 for those not in view.
 
         Must be called with no bodies, too, or what comes next is not known to be new.
@@ -173,7 +173,7 @@ class BottomUp:
             some = slice(start, start + BLOCK)
             v, w = bodies.v_world_m_s[some], bodies.w_world_rad_s[some]
             if self._params.form == "literal":
-                now[0, some], now[1, some], now[2, some] = slide_loom_spin(v, w, np.asarray(gaze))
+                now[0, some], now[1, some], now[2, some] = motion_terms(v, w, np.asarray(gaze))
             else:
                 rel, v, w = columns(bodies.p_world_m[some]), columns(v), columns(w)
                 rel -= np.array(p_eye)[:, None]
@@ -187,11 +187,11 @@ class BottomUp:
         length = _length(rel)
         raw = _eq_1(v, w, rel / np.maximum(length, 1e-300))
         distance = np.maximum(length, _NEAREST_M)
-        out[0] = raw.slide / (distance * par.translation_reference_rad_s)
-        out[1] = raw.loom / (distance * par.looming_reference_1_s)
-        out[2] = raw.spin / par.rotation_reference_rad_s
+        out[0] = raw.translation / (distance * par.translation_reference_rad_s)
+        out[1] = raw.looming / (distance * par.looming_reference_1_s)
+        out[2] = raw.rotation / par.rotation_reference_rad_s
 
-    def _blend(self, now: Floats, seen: NDArray[np.bool_], t_s: float) -> Pulls:
+    def _blend(self, now: Floats, seen: NDArray[np.bool_], t_s: float) -> SalienceTerms:
         """Blend each body's terms with its own past; a new body starts from nothing."""
         tau, old = self._params.smoothing_s, self._memory
         keep = exp(min(0.0, self._at_s - t_s) / tau) if tau > 0.0 else 0.0
@@ -211,7 +211,7 @@ class BottomUp:
         np.copyto(seen_s, t_s, where=seen)
         self._memory = _Memory(old.ids, smooth, entered_s, seen_s)
         self._at_s = t_s
-        return Pulls(smooth[0], smooth[1], smooth[2], onset)
+        return SalienceTerms(smooth[0], smooth[1], smooth[2], onset)
 
     def _pause(self, t_s: float) -> None:
         """Begin anew where nothing at all was looked at for long: nobody left meanwhile."""

@@ -11,7 +11,7 @@ from math import exp
 from gazerig.gaze.angles import clip
 
 
-class Leak:
+class LeakyIntegrator:
     """Shared neural integrator: holds, or leaks back to straight ahead with T_N."""
 
     def __init__(self, hold_s: float) -> None:
@@ -25,7 +25,7 @@ class Leak:
         return kept * value + self._hold_s * (1.0 - kept) * rate
 
 
-class Conjugate:
+class ConjugateChannel:
     """Velocity wish of both eyes together along one axis.
 
     The delayed retinal error plus the gaze of that moment (efference copy) is where the
@@ -86,7 +86,7 @@ class Conjugate:
         self._smoothed = smoothed
 
 
-class Vergence:
+class VergenceChannel:
     """Velocity wish of the angle between the eyes: first order, diverging slower."""
 
     def __init__(self, converge_1_s: float, diverge_1_s: float) -> None:

@@ -65,7 +65,7 @@ class FieldOfView:
         if self._occlusion:
             rows = np.flatnonzero(seen)
             rel = bodies.p_world_m - np.asarray(state.p_world_head_m)
-            seen[rows[hidden(rel, bodies.radius_m, rows)]] = False
+            seen[rows[occluded(rel, bodies.radius_m, rows)]] = False
         return seen
 
     def _in_field(self, p_world_m: Floats, state: GazeState) -> NDArray[np.bool_]:
@@ -104,7 +104,7 @@ def columns(rows: Floats) -> Floats:
     return rows.T.copy(order="C")
 
 
-def hidden(rel_m: Floats, radius_m: Floats, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+def occluded(rel_m: Floats, radius_m: Floats, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return for each of ``rows`` whether any body's sphere lies wholly before its centre.
 
     rel_m:    (n, 3) centres seen from the eye

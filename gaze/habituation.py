@@ -56,7 +56,7 @@ class Habituation:
         """Find everything interesting again."""
         # Only those below full interest are kept: the ones attended in the last 1/recovery_rate_1_s
         # seconds, a handful however many bodies there are.
-        self._interest: dict[int, float] = {}
+        self._habituation: dict[int, float] = {}
         self._left: list[_Left] = []
         self._at_s = t_s
 
@@ -80,37 +80,37 @@ class Habituation:
         """
         self._habituate(attended_id, max(0.0, t_s - self._at_s))
         self._at_s = t_s
-        interest = np.ones(len(ids))
-        for id, left in self._interest.items():
+        habituation = np.ones(len(ids))
+        for id, left in self._habituation.items():
             if id in ids:
-                interest[ids.index(id)] = left
+                habituation[ids.index(id)] = left
         self._left = [
             one for one in self._left if t_s - one.at_s < 4.0 * self._params.inhibition_of_return_s
         ]
         if self._left:
-            self._avoid(interest, ids, p_world_m, p_world_eye_m, attended_id, t_s)
-        return interest
+            self._avoid(habituation, ids, p_world_m, p_world_eye_m, attended_id, t_s)
+        return habituation
 
-    def for_rule(self, interest: Floats) -> Floats:
+    def for_rule(self, habituation: Floats) -> Floats:
         """Return the interest in bodies that a rule points at: it does not go below the floor."""
         floor = self._params.rule_floor
-        out: Floats = floor + (1.0 - floor) * interest
+        out: Floats = floor + (1.0 - floor) * habituation
         return out
 
     def _habituate(self, attended_id: int, dt_s: float) -> None:
         """Let interest fall in what is attended and rise in the rest."""
         risen = self._params.recovery_rate_1_s * dt_s
-        attended = self._interest.pop(attended_id, 1.0)
-        self._interest = {
-            id: left + risen for id, left in self._interest.items() if left + risen < 1.0
+        attended = self._habituation.pop(attended_id, 1.0)
+        self._habituation = {
+            id: left + risen for id, left in self._habituation.items() if left + risen < 1.0
         }
         attended = max(0.0, attended - self._params.decay_rate_1_s * dt_s)
         if attended_id >= 0 and attended < 1.0:
-            self._interest[attended_id] = attended
+            self._habituation[attended_id] = attended
 
     def _avoid(
         self,
-        interest: Floats,
+        habituation: Floats,
         ids: tuple[int, ...],
         p_world_m: Floats,
         p_eye: Vec3,
@@ -128,7 +128,7 @@ class Habituation:
         factor = (1.0 - par.inhibition_of_return_strength * near).prod(axis=1)
         if attended_id in ids:
             factor[ids.index(attended_id)] = 1.0
-        interest *= factor
+        habituation *= factor
 
 
 def _directions(rel_m: Floats) -> Floats:

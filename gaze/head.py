@@ -87,10 +87,10 @@ class Head:
         self._aside_since_s = t_s
         self._level = head_rad[2] == 0.0
 
-    def offset_rad(self, pull: float) -> float:
+    def offset_rad(self, salience: float) -> float:
         """Return how far short of the target the head stops (eq 7, sign corrected)."""
         par = self._params
-        z = 2.0 * (pull - par.min_salience) / (par.max_salience - par.min_salience) - 1.0
+        z = 2.0 * (salience - par.min_salience) / (par.max_salience - par.min_salience) - 1.0
         full = radians(par.max_offset_deg) / (1.0 + exp(min(700.0, 7.0 * z)))
         return full if par.literal_reach else min(full, self.trigger_rad)
 
@@ -187,7 +187,7 @@ class Head:
         """Return the angle by which the head stops short of the target."""
         par = self._params
         if par.goal_model == "attention":
-            return self.offset_rad(target.pull)
+            return self.offset_rad(target.salience)
         if par.goal_model == "align":
             return (1.0 - par.align) * self.trigger_rad
         arc = angle_between((1.0, 0.0, 0.0), direction(facing))

@@ -206,12 +206,14 @@ class Idle:
         """Make the target of a search or glance, with an identity of its own."""
         self._count += 1
         point = add(self._eye, scale(direction(place), distance_m))
-        pull, name = self._params.rest_salience, -1 - self._count
-        self._now = Target(point, _STILL, t_s, kind, name, pull, True, None, 0, why)
+        salience, name = self._params.rest_salience, -1 - self._count
+        self._now = Target(point, _STILL, t_s, kind, name, salience, True, None, 0, why)
 
     def _resting(self, t_s: float) -> Target:
-        pull = self._params.rest_salience
-        return Target(self._rest, _STILL, t_s, "rest", -1, pull, True, None, 0, "nobody in sight")
+        salience = self._params.rest_salience
+        return Target(
+            self._rest, _STILL, t_s, "rest", -1, salience, True, None, 0, "nobody in sight"
+        )
 
     def _time_s(self, mean_ms: float, rng: np.random.Generator) -> float:
         """Draw a time with a mean and the common spread, no shorter than people's."""

@@ -14,22 +14,22 @@ _DROOP_S = 1.0  # time in which lids sink or rise when the sleepiness changes
 _GLIDE_S = 0.3  # and when what they do at rest is retuned
 
 
-class Pair(NamedTuple):
+class LidPair(NamedTuple):
     """What there is of the upper and of the lower lids, 0..1."""
 
     upper: float
     lower: float
 
 
-_NOTHING = Pair(0.0, 0.0)
+_NOTHING = LidPair(0.0, 0.0)
 
 
-def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> Pair:
+def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> LidPair:
     """Return what goes with a vertical gaze, + is up, and a sleepiness of 0..1."""
     share = params.follow_up_share if eye_pitch_deg > 0.0 else 1.0
     upper = _bounded(params.rest_opening + params.follow_per_deg * share * eye_pitch_deg)
     lower = _bounded(params.lower_rest_opening - params.lower_follow_per_deg * eye_pitch_deg)
-    return Pair(
+    return LidPair(
         _bounded(upper * (1.0 - params.sleepy_droop * sleepiness)),
         _bounded(lower * (1.0 - params.lower_sleepy_rise * sleepiness)),
     )
@@ -52,7 +52,7 @@ class LidsAtRest:
         level = self._params.sleepy_level
         self._droop_from, self._droop_to, self._droop_since_s = level, level, t_s
         self._pitch_deg = 0.0
-        self._shown: Pair | None = None
+        self._shown: LidPair | None = None
         self._left = _NOTHING
         self._retuned_s = t_s
 
@@ -63,7 +63,7 @@ class LidsAtRest:
             self.sleepy(params.sleepy_level, t_s)
         if self._shown is not None:
             upper, lower = openings(params, self._pitch_deg, self.sleepiness(t_s))
-            self._left = Pair(self._shown.upper - upper, self._shown.lower - lower)
+            self._left = LidPair(self._shown.upper - upper, self._shown.lower - lower)
         self._retuned_s = t_s
 
     def sleepy(self, level: float, t_s: float) -> None:
@@ -82,19 +82,19 @@ class LidsAtRest:
         way = min_jerk((t_s - self._droop_since_s) / _DROOP_S)
         return self._droop_from + way * (self._droop_to - self._droop_from)
 
-    def step(self, t_s: float, eye_pitch_deg: float) -> Pair:
+    def step(self, t_s: float, eye_pitch_deg: float) -> LidPair:
         """Return the openings for a vertical gaze."""
         self._pitch_deg = eye_pitch_deg
         wanted = openings(self._params, eye_pitch_deg, self.sleepiness(t_s))
         self._shown = wanted if self._left == _NOTHING else self._glided(wanted, t_s)
         return self._shown
 
-    def _glided(self, wanted: Pair, t_s: float) -> Pair:
+    def _glided(self, wanted: LidPair, t_s: float) -> LidPair:
         """Add what a retune has left over, which goes within a moment."""
         kept = 1.0 - min_jerk((t_s - self._retuned_s) / _GLIDE_S)
         left = self._left
         if kept == 0.0:
             self._left = _NOTHING
-        return Pair(
+        return LidPair(
             _bounded(wanted.upper + kept * left.upper), _bounded(wanted.lower + kept * left.lower)
         )

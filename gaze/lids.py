@@ -12,18 +12,18 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.blink_profile import Closing, closure
-from gazerig.gaze.blink_statistics import depth, doubled, evokes, pause_s
+from gazerig.gaze.blink_profile import LidClosure, closure
+from gazerig.gaze.blink_statistics import blink_depth, blink_pause_s, evokes_blink, is_double_blink
 from gazerig.gaze.lid_params import LidParams as LidParams
-from gazerig.gaze.lid_rest import LidsAtRest, Pair
+from gazerig.gaze.lid_rest import LidPair, LidsAtRest
 
 Side = Literal["left", "right"]
 LidMode = Literal["rest", "conversation"]
 
-_NOT_SHUT = Pair(0.0, 0.0)
+_NOT_SHUT = LidPair(0.0, 0.0)
 
 
-class Openings(NamedTuple):
+class LidOpenings(NamedTuple):
     """How far the lids are open, 0 shut .. 1 open, and whether a blink is under way.
 
     left, right: upper lids; lower_left, lower_right: lower lids
@@ -50,8 +50,8 @@ class Lids:
         """Open the lids and draw the first blink; the mode stays."""
         self.blinks = 0
         self._t_s = t_s
-        self._blink: Closing | None = None
-        self._winks: dict[Side, Closing | None] = {"left": None, "right": None}
+        self._blink: LidClosure | None = None
+        self._winks: dict[Side, LidClosure | None] = {"left": None, "right": None}
         self._redraw = False
         self._rest.reset(t_s)
         self._next_s = t_s + self._pause_s(self._length_s())
@@ -105,7 +105,7 @@ class Lids:
         """
         self._rest.sleepy(level, self._t_s)
 
-    def step(self, t_s: float, eye_pitch_rad: float, shift_rad: float | None) -> Openings:
+    def step(self, t_s: float, eye_pitch_rad: float, shift_rad: float | None) -> LidOpenings:
         """Return the openings of the lids and whether a blink is under way.
 
         shift_rad: size of a gaze shift that begins in this very tick, else None
@@ -119,7 +119,7 @@ class Lids:
         left, right = (_more(blink, _shut(wink, t_s)) for wink in self._winks.values())
         upper, lower = self._rest.step(t_s, degrees(eye_pitch_rad))
         # Closings come out at 1 and a rounding error just before they are done.
-        return Openings(
+        return LidOpenings(
             upper * max(0.0, 1.0 - left.upper),
             upper * max(0.0, 1.0 - right.upper),
             blink.upper > 0.0,
@@ -135,7 +135,7 @@ class Lids:
     def _due(self, t_s: float, shift_rad: float | None) -> bool:
         """Return whether a blink begins now; the dice of a shift are thrown once."""
         par, blink = self._params, self._blink
-        evoked = shift_rad is not None and evokes(par, degrees(abs(shift_rad)), self._rng)
+        evoked = shift_rad is not None and evokes_blink(par, degrees(abs(shift_rad)), self._rng)
         if any(wink is not None and wink.under_way(t_s) for wink in self._winks.values()):
             # Both eyes would shut, and the wink be lost in it.
             self._next_s = max(self._next_s, t_s + par.min_interval_ms / 1e3)
@@ -151,16 +151,18 @@ class Lids:
         par = self._params
         self.blinks += 1
         slow = 1.0 + par.sleepy_slowness * self._rest.sleepiness(t_s)
-        blink = self._closing(t_s, par.hold_ms)._replace(depth=depth(par, self._rng), slow=slow)
+        blink = self._closing(t_s, par.hold_ms)._replace(
+            depth=blink_depth(par, self._rng), slow=slow
+        )
         self._blink = blink
-        double = doubled(par, self._rng)
+        double = is_double_blink(par, self._rng)
         pause_s = par.double_gap_ms / 1e3 if double else self._pause_s(blink.length_s)
         self._next_s = t_s + blink.length_s + pause_s
 
-    def _closing(self, onset_s: float, hold_ms: float) -> Closing:
+    def _closing(self, onset_s: float, hold_ms: float) -> LidClosure:
         """Return a full closing of somebody awake."""
         par = self._params
-        return Closing(
+        return LidClosure(
             onset_s, par.close_ms / 1e3, hold_ms / 1e3, par.open_ms / 1e3, par.lower_close_share
         )
 
@@ -175,18 +177,18 @@ class Lids:
         return par.blinks_per_min if self._mode == "rest" else par.conversation_per_min
 
     def _pause_s(self, length_s: float) -> float:
-        return pause_s(self._params, self._per_min(), length_s, self._rng)
+        return blink_pause_s(self._params, self._per_min(), length_s, self._rng)
 
 
-def _shut(closing: Closing | None, t_s: float) -> Pair:
+def _shut(closing: LidClosure | None, t_s: float) -> LidPair:
     """Return how far a blink or wink has shut the upper and the lower lid, 0..1."""
     shut = 0.0 if closing is None else closing.at(t_s)
     if closing is None or shut == 0.0:
         return _NOT_SHUT
-    return Pair(shut, closing.lower_share * shut)
+    return LidPair(shut, closing.lower_share * shut)
 
 
-def _more(one: Pair, other: Pair) -> Pair:
+def _more(one: LidPair, other: LidPair) -> LidPair:
     if other is _NOT_SHUT:
         return one
-    return Pair(max(one.upper, other.upper), max(one.lower, other.lower))
+    return LidPair(max(one.upper, other.upper), max(one.lower, other.lower))

@@ -14,11 +14,11 @@ import numpy as np
 from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.head import Head
-from gazerig.gaze.lids import Lids, Openings
+from gazerig.gaze.lids import LidOpenings, Lids
 from gazerig.gaze.pursuit import Pursuit
-from gazerig.gaze.saccade import Saccade
-from gazerig.gaze.saccade_trajectory import Flight, scattered
-from gazerig.gaze.saccade_trigger import ShiftParams, ShiftRule
+from gazerig.gaze.saccade import SaccadeModel
+from gazerig.gaze.saccade_trajectory import SaccadeTrajectory, scattered_endpoint
+from gazerig.gaze.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
 from gazerig.gaze.types import (
     Angles2,
     Angles3,
@@ -39,7 +39,7 @@ _MOVING_M_S = 0.05
 
 
 @dataclass(frozen=True)
-class OculomotorParams(ShiftParams):
+class OculomotorParams(SaccadeTriggerParams):
     """When to jump, how to bridge delays, and how exactly to land."""
 
     # fmt: off
@@ -72,7 +72,7 @@ class _Seen(NamedTuple):
     centre: Vec3
 
 
-class Reach(NamedTuple):
+class ReachableGaze(NamedTuple):
     """Where head and eyes come to rest for a point, and where they would have to be for it.
 
     facing_rad, head_rad: (yaw, pitch, roll) that face it, and where the head stops
@@ -95,7 +95,7 @@ class Oculomotor:
         params: OculomotorParams,
         geometry: HeadGeometry,
         eye_limits: tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]],
-        saccade: Saccade,
+        saccade: SaccadeModel,
         pursuit: Pursuit,
         head: Head,
         lids: Lids,
@@ -110,7 +110,7 @@ class Oculomotor:
             ValueError: the landing is to scatter and there are no dice.
         """
         self._rng = rng
-        self._rule = ShiftRule(params, False)
+        self._trigger = SaccadeTrigger(params, False)
         self.retune(params, eye_limits)
         self._geometry = geometry
         self._saccade = saccade
@@ -136,7 +136,7 @@ class Oculomotor:
                 "endpoint_scatter_along and endpoint_scatter_across need dice: give rng"
             )
         self._params, self._scatter, self._eye_limits = params, scatter, eye_limits
-        self._rule.retune(params, any(scatter))
+        self._trigger.retune(params, any(scatter))
 
     def reset(self, t_s: float, state: GazeState) -> None:
         """Begin where head and eyes are."""
@@ -144,9 +144,9 @@ class Oculomotor:
         self._lids.reset(t_s)
         if self._breathing is not None:
             self._breathing.reset(t_s)
-        self._rule.reset(t_s)
+        self._trigger.reset(t_s)
         self._gaze = _meeting_point(state)
-        self._flight: Flight | None = None
+        self._trajectory: SaccadeTrajectory | None = None
         self.saccades = self.fixations = 0
         self._started = True
 
@@ -163,19 +163,19 @@ class Oculomotor:
         facing = self._geometry.facing(seen.point)
         ahead = rotate(R_world_head, (1.0, 0.0, 0.0))
         aside_rad = angle_between(ahead, sub(seen.point, p_head))
-        free_s = self._flight.ends_s if self._flight else t_s
-        self._rule.tell(target.shift, self._head.leads_s(target, aside_rad), free_s, t_s)
+        free_s = self._trajectory.ends_s if self._trajectory else t_s
+        self._trigger.record_shift(target.shift, self._head.leads_s(target, aside_rad), free_s, t_s)
         shift_rad = self._maybe_jump(seen, p_head, t_s)
         self._move_gaze(seen, p_head, t_s, dt_s)
         centre = facing if seen.centre is seen.point else self._geometry.facing(seen.centre)
-        head = self._head.step(target, centre, facing, aside_rad, t_s - self._rule.onset_s, t_s)
+        head = self._head.step(target, centre, facing, aside_rad, t_s - self._trigger.onset_s, t_s)
         wanted = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
         left, right = self._in_range(wanted)
         limited = () if wanted == (left, right) else self._limited(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
         return self._command(self._swayed(head, t_s), left, right, lids, seen, limited)
 
-    def reach(self, target: Target) -> Reach:
+    def reach(self, target: Target) -> ReachableGaze:
         """Return where head and eyes come to rest for a point that stands still."""
         facing = self._geometry.facing(target.p_world_m)
         head = (*self._head.destination_rad(target, facing), 0.0)
@@ -183,7 +183,7 @@ class Oculomotor:
         exact = self._geometry.eyes_on(target.p_world_m, R_world_head, p_head)
         point = self._clear(target.p_world_m, p_head)
         left, right = self._in_range(self._geometry.eyes_on(point, R_world_head, p_head))
-        return Reach((*facing, 0.0), head, exact, (left, right), point != target.p_world_m)
+        return ReachableGaze((*facing, 0.0), head, exact, (left, right), point != target.p_world_m)
 
     @property
     def ranges_rad(self) -> tuple[tuple[Angles2, Angles2], ...]:
@@ -217,12 +217,12 @@ class Oculomotor:
         head: Angles3,
         left: Angles2,
         right: Angles2,
-        lids: Openings,
+        lids: LidOpenings,
         seen: _Seen,
         limited: tuple[Limited, ...],
     ) -> GazeCommand:
         moving = norm(seen.velocity) > _MOVING_M_S
-        phase: Phase = "saccade" if self._flight else "pursue" if moving else "fixate"
+        phase: Phase = "saccade" if self._trajectory else "pursue" if moving else "fixate"
         return GazeCommand(
             head,
             left,
@@ -280,30 +280,30 @@ class Oculomotor:
 
     def _maybe_jump(self, seen: _Seen, p_head: Vec3, t_s: float) -> float | None:
         """Start a saccade when one is due; give its size."""
-        if self._flight is not None:
+        if self._trajectory is not None:
             return None
         slip = self._pursuit.slip(self._gaze, seen.point, seen.velocity, p_head)
-        if not self._rule.due(slip, t_s):
+        if not self._trigger.due(slip, t_s):
             return None
         error = angle_between(sub(self._gaze, p_head), sub(seen.point, p_head))
         end = add(seen.point, scale(seen.velocity, self._saccade.duration_s(error)))
         end = self._clear(end, p_head)
         if self._rng is not None and any(self._scatter):
-            end = scattered(end, self._gaze, p_head, *self._scatter, self._rng)
-        self._flight = Flight(self._saccade, self._gaze, end, p_head, t_s)
+            end = scattered_endpoint(end, self._gaze, p_head, *self._scatter, self._rng)
+        self._trajectory = SaccadeTrajectory(self._saccade, self._gaze, end, p_head, t_s)
         self.saccades += 1
         return error
 
     def _move_gaze(self, seen: _Seen, p_head: Vec3, t_s: float, dt_s: float) -> None:
         """Move the gaze point along the saccade, or after the target."""
-        if self._flight is not None:
-            self._gaze = self._flight.at(p_head, t_s)
-            if self._flight.landed(t_s):
-                self._flight = None
-                self._rule.land(t_s)
+        if self._trajectory is not None:
+            self._gaze = self._trajectory.at(p_head, t_s)
+            if self._trajectory.landed(t_s):
+                self._trajectory = None
+                self._trigger.record_landing(t_s)
                 self.fixations += 1
-        elif not self._rule.waits:
-            closing = not self._rule.corrects
+        elif not self._trigger.waits:
+            closing = not self._trigger.corrects
             self._gaze = self._pursuit.step(
                 self._gaze, seen.point, seen.velocity, p_head, dt_s, closing
             )

@@ -39,7 +39,7 @@ class SaccadeParams:
     # fmt: on
 
 
-class Profile(Protocol):
+class SaccadeProfile(Protocol):
     """What each kind of saccade knows of itself; sizes and angles in radians."""
 
     def duration_s(self, amplitude_rad: float) -> float:
@@ -64,7 +64,7 @@ def min_jerk(s: float) -> float:
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 
-class MinJerk:
+class MinJerkProfile:
     """Minimum jerk with a cap on the speed (Mitake et al., eqs 2-6)."""
 
     def __init__(self, max_speed_rad_s: float, shortest_s: float) -> None:
@@ -99,7 +99,7 @@ class MinJerk:
         return max(0.0, (amplitude_rad - self.largest_uncapped_rad) / self._L)
 
 
-class MainSequence:
+class MainSequenceProfile:
     """Duration and skew of human saccades, the speed capped.
 
     The speed rises like the first half of a minimum-jerk movement, stays at its peak
@@ -155,7 +155,7 @@ def _flank(peak_rad_s: float, length_s: float, t_s: float) -> float:
     return peak_rad_s * whole / MIN_JERK_PEAK * min_jerk(t_s / whole) if whole > 0.0 else 0.0
 
 
-class LiteralFrame:
+class LiteralFrameProfile:
     """0.8 of the remaining way in each frame (Nakamoto & Tsuruno 3.3), at any tick rate.
 
     Done at 1 - 0.2^(t / frame), which is the rule at whole frames. It has no cap.
@@ -183,7 +183,7 @@ class LiteralFrame:
         return amplitude_rad * (1.0 - exp(-self._rate_1_s * t_s))
 
 
-class Saccade:
+class SaccadeModel:
     """Displacement of the eye along the great circle as a function of time."""
 
     def __init__(self, params: SaccadeParams) -> None:
@@ -194,7 +194,7 @@ class Saccade:
         self._profile = _profile(params)
 
     @property
-    def profile(self) -> Profile:
+    def profile(self) -> SaccadeProfile:
         """Return the profile in force, which a saccade under way keeps to its end."""
         return self._profile
 
@@ -211,10 +211,10 @@ class Saccade:
         return self._profile.displacement_rad(amplitude_rad, t_s)
 
 
-def _profile(params: SaccadeParams) -> Profile:
+def _profile(params: SaccadeParams) -> SaccadeProfile:
     """Make the profile that the parameters name."""
     if params.profile == "main_sequence":
-        return MainSequence(params)
+        return MainSequenceProfile(params)
     if params.profile == "literal_frame":
-        return LiteralFrame(params.frame_share, params.frame_ms / 1e3)
-    return MinJerk(radians(params.max_speed_deg_s), params.min_duration_ms / 1e3)
+        return LiteralFrameProfile(params.frame_share, params.frame_ms / 1e3)
+    return MinJerkProfile(radians(params.max_speed_deg_s), params.min_duration_ms / 1e3)

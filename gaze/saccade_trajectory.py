@@ -17,14 +17,16 @@ from gazerig.gaze.angles import (
     sub,
     unit,
 )
-from gazerig.gaze.saccade import Saccade
+from gazerig.gaze.saccade import SaccadeModel
 from gazerig.gaze.types import Vec3
 
 
-class Flight:
+class SaccadeTrajectory:
     """From one point in the world to another in the time that the saccade takes."""
 
-    def __init__(self, saccade: Saccade, start: Vec3, end: Vec3, eye: Vec3, onset_s: float) -> None:
+    def __init__(
+        self, saccade: SaccadeModel, start: Vec3, end: Vec3, eye: Vec3, onset_s: float
+    ) -> None:
         self._profile, self._start, self._end = saccade.profile, start, end
         self._start_way, self._end_way = unit(sub(start, eye)), unit(sub(end, eye))
         self.onset_s = onset_s
@@ -49,7 +51,7 @@ class Flight:
         return t_s >= self.ends_s - 1e-9
 
 
-def scattered(
+def scattered_endpoint(
     end: Vec3, start: Vec3, eye: Vec3, along: float, across: float, rng: np.random.Generator
 ) -> Vec3:
     """Return where a saccade lands whose noise grows with its size (Harris & Wolpert).

@@ -20,7 +20,7 @@ from gazerig.params import Bounds
 
 
 @dataclass(frozen=True)
-class ShiftParams:
+class SaccadeTriggerParams:
     """Thresholds and times of that rule."""
 
     # fmt: off
@@ -35,14 +35,14 @@ class ShiftParams:
     # fmt: on
 
 
-class ShiftRule:
+class SaccadeTrigger:
     """Remembers the events and says when a saccade is due."""
 
-    def __init__(self, params: ShiftParams, scatters: bool) -> None:
+    def __init__(self, params: SaccadeTriggerParams, scatters: bool) -> None:
         self.retune(params, scatters)
         self.reset(0.0)
 
-    def retune(self, params: ShiftParams, scatters: bool) -> None:
+    def retune(self, params: SaccadeTriggerParams, scatters: bool) -> None:
         """Take other thresholds and times; an event that waits for its saccade still does."""
         self._scatters = scatters
         self._smallest_rad = radians(params.smallest_shift_deg)
@@ -61,7 +61,7 @@ class ShiftRule:
         self._erred: bool | None = False
         self.onset_s = t_s
 
-    def tell(self, shift: int, wait_s: float, free_s: float, t_s: float) -> None:
+    def record_shift(self, shift: int, wait_s: float, free_s: float, t_s: float) -> None:
         """Take note of the target's event count.
 
         wait_s: what the eyes wait beyond the latency, because the head goes first
@@ -76,7 +76,7 @@ class ShiftRule:
             # one changes where the saccade goes.
             self._due_s = self.onset_s = max(free_s, t_s + self._latency_s + wait_s)
 
-    def land(self, t_s: float) -> None:
+    def record_landing(self, t_s: float) -> None:
         """Take note of the end of a saccade."""
         self._landed_s = t_s
         self._erred = None if self._scatters else False

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from gazerig.gaze.angles import add, sub
 from gazerig.gaze.scanpath_dwell import LAWS, Draw, dwell_distribution
 from gazerig.gaze.scanpath_models import (
-    FaceLooks,
     FaceTracking,
     MarkovWalk,
     RandomAngles,
+    ScanpathModel,
     SimpleCycle,
 )
 from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
@@ -190,7 +190,7 @@ class Scanpath:
         return self._face
 
 
-def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> FaceLooks:
+def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> ScanpathModel:
     """Make the model by its name."""
     match params.model:
         case "simple":

@@ -22,7 +22,7 @@ SMOOTHINGS = ("none", "laplace", "bootstrap")
 _OVERLAP_S = 0.005
 
 
-class Fixation(NamedTuple):
+class PartFixation(NamedTuple):
     """One look: its part, None where it lay outside all parts, its start and duration."""
 
     part: str | None
@@ -74,7 +74,9 @@ class WalkFit:
     start: str
 
 
-def fit_walk(fixations: Sequence[Fixation], params: FitParams, rng: np.random.Generator) -> WalkFit:
+def fit_walk(
+    fixations: Sequence[PartFixation], params: FitParams, rng: np.random.Generator
+) -> WalkFit:
     """Fit the walk to fixations in the order of time.
 
     Raises:
@@ -103,7 +105,7 @@ def fit_walk(fixations: Sequence[Fixation], params: FitParams, rng: np.random.Ge
     )
 
 
-def _refuse_untrustworthy(fixations: Sequence[Fixation], params: FitParams) -> None:
+def _refuse_untrustworthy(fixations: Sequence[PartFixation], params: FitParams) -> None:
     """Raise ValueError for what cannot be a recording of looks at a face."""
     end_s, start_s = float("-inf"), float("-inf")
     for number, look in enumerate(fixations, 1):
@@ -128,7 +130,7 @@ def _refuse_untrustworthy(fixations: Sequence[Fixation], params: FitParams) -> N
         )
 
 
-def _transitions(fixations: Sequence[Fixation], longest_gap_s: float) -> Floats:
+def _transitions(fixations: Sequence[PartFixation], longest_gap_s: float) -> Floats:
     """Count who follows whom, (8, 8), rows from; a look outside or a long gap breaks the chain."""
     counts = np.zeros((len(PARTS), len(PARTS)))
     for before, after in zip(fixations, fixations[1:], strict=False):

@@ -20,7 +20,7 @@ from gazerig.gaze.scanpath_dwell import Draw
 from gazerig.gaze.types import PARTS, Angles2, Face, Floats, Vec3
 
 
-class Look(NamedTuple):
+class ScanpathStep(NamedTuple):
     """What is looked at on a face: the point, its part where it is one, whether it is new."""
 
     p_world_m: Vec3
@@ -28,7 +28,7 @@ class Look(NamedTuple):
     moved: bool
 
 
-class FaceLooks(Protocol):
+class ScanpathModel(Protocol):
     """A way to look at a face."""
 
     def enter(self) -> None:
@@ -40,11 +40,11 @@ class FaceLooks(Protocol):
         """Return the part looked at, None where it is none, and when that look ends, if known."""
         ...
 
-    def go_on(self, before: "FaceLooks") -> bool:
+    def go_on(self, before: "ScanpathModel") -> bool:
         """Take over the look of another way; tell whether this way knows such a look."""
         ...
 
-    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
         """Return what to look at; ``settled``: the gaze has arrived at the last look."""
         ...
 
@@ -81,7 +81,7 @@ class MarkovWalk:
         """Return the part looked at and when its dwell ends, None before the gaze is there."""
         return self._parts[self._part], self._until_s
 
-    def go_on(self, before: FaceLooks) -> bool:
+    def go_on(self, before: ScanpathModel) -> bool:
         """Take over the part looked at and its dwell; tell whether it is one of these."""
         part, until_s = before.dwell
         if part not in self._parts:
@@ -89,7 +89,7 @@ class MarkovWalk:
         self._part, self._until_s = self._parts.index(part), until_s
         return True
 
-    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
         """Start the dwell on arrival; after it draw until another part comes."""
         before = self._part
         if self._until_s is not None:
@@ -97,7 +97,7 @@ class MarkovWalk:
         elif settled:
             self._until_s = t_s + self.dwell_s(self._part)
         point = face.parts_world_m[self._columns[self._part]]
-        return Look(point, self._parts[self._part], self._part != before)
+        return ScanpathStep(point, self._parts[self._part], self._part != before)
 
     def next_part(self, part: int) -> int:
         """Draw the part that follows ``part`` (both count from 0 in the order given)."""
@@ -142,7 +142,7 @@ class SimpleCycle:
         """Return the part looked at and when its time is over, None before the gaze is there."""
         return self._parts[self._at], self._until_s
 
-    def go_on(self, before: FaceLooks) -> bool:
+    def go_on(self, before: ScanpathModel) -> bool:
         """Take over the part looked at and its dwell; tell whether it is one of these."""
         part, until_s = before.dwell
         if part not in self._parts:
@@ -150,7 +150,7 @@ class SimpleCycle:
         self._at, self._until_s = self._parts.index(part), until_s
         return True
 
-    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
         """Start the time on arrival, go on when it is over."""
         moved = False
         if self._until_s is None:
@@ -160,7 +160,9 @@ class SimpleCycle:
             self._at = (self._at + 1) % len(self._parts)
             self._until_s = None
             moved = True
-        return Look(face.parts_world_m[self._columns[self._at]], self._parts[self._at], moved)
+        return ScanpathStep(
+            face.parts_world_m[self._columns[self._at]], self._parts[self._at], moved
+        )
 
 
 class FaceTracking:
@@ -174,13 +176,13 @@ class FaceTracking:
         """Return the nose, for ever."""
         return "N", None
 
-    def go_on(self, before: FaceLooks) -> bool:
+    def go_on(self, before: ScanpathModel) -> bool:
         """Return whether the nose was looked at before."""
         return before.dwell[0] == "N"
 
-    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
         """Return the centre."""
-        return Look(face.p_world_m, "N", False)
+        return ScanpathStep(face.p_world_m, "N", False)
 
 
 class RandomAngles:
@@ -207,7 +209,7 @@ class RandomAngles:
         """Return no part, and when the interval is over."""
         return None, self._until_s
 
-    def go_on(self, before: FaceLooks) -> bool:
+    def go_on(self, before: ScanpathModel) -> bool:
         """Take over angles and interval of another such way, as far as both are allowed."""
         if not isinstance(before, RandomAngles):
             return False
@@ -216,7 +218,7 @@ class RandomAngles:
         self._until_s = before._until_s
         return True
 
-    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> Look:
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
         """Jump when the interval is over."""
         if self._until_s is None:
             self._until_s = t_s + self._interval_s()
@@ -226,7 +228,7 @@ class RandomAngles:
             self._until_s += self._interval_s()
         to_face = sub(face.p_world_m, p_world_head_m)
         way = rotate(rotation((*yaw_pitch(to_face), 0.0)), direction(self._offset_rad))
-        return Look(add(p_world_head_m, scale(way, norm(to_face))), None, moved)
+        return ScanpathStep(add(p_world_head_m, scale(way, norm(to_face))), None, moved)
 
     def _angles(self) -> Angles2:
         yaw, pitch = self._rng.uniform(-self._angle_rad, self._angle_rad, 2).tolist()

@@ -80,7 +80,7 @@ class TopDownParams:
             raise ValueError(f"behaviour {self.behaviour!r} has no rule; rules: {known}")
 
 
-class Wanted(NamedTuple):
+class RuleTarget(NamedTuple):
     """What the rule in force points at.
 
     rows:     (k,) rows of the bodies wanted; none for a place
@@ -92,7 +92,7 @@ class Wanted(NamedTuple):
     rows: NDArray[np.intp]
     nearness: Floats
     point_world_m: Vec3 | None
-    pull: float
+    salience: float
     behaviour: str
 
 
@@ -141,7 +141,7 @@ class TopDown:
         seen: NDArray[np.bool_],
         p_world_eye_m: Vec3,
         favoured_id: int = -1,
-    ) -> Wanted | None:
+    ) -> RuleTarget | None:
         """Return what the rule points at among the bodies in view, None where nothing.
 
         seen: (n,) which bodies are in view
@@ -154,7 +154,7 @@ class TopDown:
         if len(rows) == 0 and rule.point_world_m is None:
             return None
         near = self._nearness(bodies, rows, p_world_eye_m, favoured_id)
-        return Wanted(rows, near, rule.point_world_m, rule.salience, self.behaviour)
+        return RuleTarget(rows, near, rule.point_world_m, rule.salience, self.behaviour)
 
     def _nearness(
         self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3, favoured_id: int

@@ -105,7 +105,7 @@ class Percept:
         return t_s - self.captured_s
 
 
-class Pull(NamedTuple):
+class Salience(NamedTuple):
     """What pulls the gaze to one body, term by term (Mitake et al., eq 1 and the rules).
 
     slide, loom, spin: the three terms of eq 1; onset: of having just come into view
@@ -116,12 +116,12 @@ class Pull(NamedTuple):
 
     id: int
     kind: str
-    slide: float
-    loom: float
-    spin: float
+    translation: float
+    looming: float
+    rotation: float
     onset: float
     rule: float
-    interest: float
+    habituation: float
     total: float
 
 
@@ -145,13 +145,13 @@ class Target(NamedTuple):
     at_s: float
     kind: str
     id: int
-    pull: float
+    salience: float
     top_down: bool
     part: str | None
     shift: int
     why: str
     centre_world_m: Vec3 | None = None
-    pulls: tuple[Pull, ...] = ()
+    saliences: tuple[Salience, ...] = ()
 
 
 class GazeState(NamedTuple):

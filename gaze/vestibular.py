@@ -11,7 +11,7 @@ from math import cos, degrees, exp, inf, sin
 from gazerig.gaze.types import Angles2, Angles3
 
 
-class Canals:
+class SemicircularCanals:
     """Head rate as the reflex receives it: delayed, and without what never changes.
 
     A high-pass in the place of the semicircular canals and their velocity storage; it

@@ -10,11 +10,11 @@ import pytest
 
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.attention import Attention, AttentionParams
-from gazerig.gaze.bottom_up import BottomUp, BottomUpParams, slide_loom_spin
+from gazerig.gaze.bottom_up import BottomUp, BottomUpParams, motion_terms
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
 from gazerig.gaze.idle import Idle, IdleParams
 from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
-from gazerig.gaze.types import Bodies, GazeState, Percept, Pull, Target
+from gazerig.gaze.types import Bodies, GazeState, Percept, Salience, Target
 
 IDENTITY = rotation((0.0, 0.0, 0.0))
 
@@ -61,15 +61,15 @@ def attention(**params: float) -> Attention:
 def test_e45_eq_1_does_not_depend_on_the_length_of_e() -> None:
     rng = np.random.default_rng(1)
     v, w, e = rng.normal(size=(3, 40, 3))
-    once, fivefold = slide_loom_spin(v, w, e), slide_loom_spin(v, w, 5.0 * e)
+    once, fivefold = motion_terms(v, w, e), motion_terms(v, w, 5.0 * e)
     for a, b in zip(once, fivefold, strict=True):
         assert np.abs(a - b).max() <= 1e-9
 
 
-def test_terms_of_eq_1_are_slide_loom_and_spin() -> None:
+def test_terms_of_eq_1_are_translation_looming_and_rotation() -> None:
     v, w = np.array([[1.0, 2.0, 0.0]]), np.array([[3.0, 0.0, 4.0]])
-    slide, loom, spin = slide_loom_spin(v, w, np.array([2.0, 0.0, 0.0]))
-    assert (slide[0], loom[0], spin[0]) == pytest.approx((2.0, 1.0, 3.0))
+    translation, looming, rotation = motion_terms(v, w, np.array([2.0, 0.0, 0.0]))
+    assert (translation[0], looming[0], rotation[0]) == pytest.approx((2.0, 1.0, 3.0))
 
 
 def test_far_motion_pulls_less_than_near_motion() -> None:
@@ -118,17 +118,17 @@ def waving(t: float, speed: float) -> Percept:
 def test_the_face_wins_over_a_resting_hand_and_loses_to_a_waving_one() -> None:
     model = attention()
     still = model.choose(waving(0.0, 0.05), looking(), 0.0)
-    assert (still.kind, still.top_down, still.pull) == ("face", True, 0.5)
+    assert (still.kind, still.top_down, still.salience) == ("face", True, 0.5)
     moved = model.choose(waving(0.5, 1.0), looking(), 0.5)
     assert (moved.kind, moved.top_down) == ("hand", False)
     assert moved.shift == still.shift + 1
-    assert "slide" in moved.why and "rule wait" in still.why
+    assert "translation" in moved.why and "rule wait" in still.why
 
 
 def test_nearly_equal_pulls_do_not_flicker() -> None:
     model, kinds = attention(), []
     for k in range(600):
-        speed = 0.2 * (1.05 if k % 2 else 0.95)  # its pull swings about the face's 0.5
+        speed = 0.2 * (1.05 if k % 2 else 0.95)  # its salience swings about the face's 0.5
         kinds.append(model.choose(waving(k / 30, speed), looking(), k / 30).kind)
     assert sum(a != b for a, b in zip(kinds[:60], kinds[1:60], strict=False)) <= 1
     stays = [len(list(same)) / 30 for _, same in groupby(kinds)]
@@ -179,7 +179,7 @@ def test_behaviours_follow_their_rules() -> None:
     chosen = model.choose(
         percept(0.1, FACE, body(9, "attack_target", (0.8, -0.2, 0.0))), looking(), 0.1
     )
-    assert (chosen.id, chosen.pull, chosen.top_down) == (9, 0.9, True)
+    assert (chosen.id, chosen.salience, chosen.top_down) == (9, 0.9, True)
     with pytest.raises(ValueError, match="no rule for behaviour 'dance'; rules: attack"):
         model.top_down.behave("dance")
     with pytest.raises(ValueError, match="has no rule"):
@@ -256,11 +256,11 @@ def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
     seen = bodies(body(1, "x", (5, 3, 0), (1, 2, 0)), body(2, "x", (1, 0, 0), (1, 2, 0)))
     seen = replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0], [3.0, 0, 4.0]]))
     for gaze in ((1.0, 0.0, 0.0), (7.0, 0.0, 0.0)):
-        pulls = model.step(seen, (0, 0, 0), 0.0, (1.0, 1.0, 1.0), gaze)
-        for term, value in zip(pulls, (2.0, 1.0, 3.0, 0.0), strict=True):
+        saliences = model.step(seen, (0, 0, 0), 0.0, (1.0, 1.0, 1.0), gaze)
+        for term, value in zip(saliences, (2.0, 1.0, 3.0, 0.0), strict=True):
             assert term.tolist() == [value, value]
     aside = model.step(seen, (0, 0, 0), 0.0, gaze_world=(0.0, 1.0, 0.0))
-    assert (aside.slide[0], aside.loom[0], aside.spin[0]) == (1.0, 2.0, 0.0)
+    assert (aside.translation[0], aside.looming[0], aside.rotation[0]) == (1.0, 2.0, 0.0)
 
 
 def test_retinal_form_is_relative_to_the_moving_eye() -> None:
@@ -269,7 +269,7 @@ def test_retinal_form_is_relative_to_the_moving_eye() -> None:
     with_it = model.step(seen, (0, 0, 0), 0.0, (0, 1, 0))
     assert with_it.total.tolist() == [0.0, 1.0]  # what stands still slides by 0.5 rad/s
     coming = model.step(seen, (0, 0, 0), 0.0, (2, 0, 0))
-    assert coming.loom.tolist() == [2.0, 2.0]
+    assert coming.looming.tolist() == [2.0, 2.0]
 
 
 def test_the_heads_own_motion_makes_what_stands_still_slide() -> None:
@@ -277,9 +277,9 @@ def test_the_heads_own_motion_makes_what_stands_still_slide() -> None:
     here, there = looking(), looking()._replace(p_world_head_m=(0.0, 0.01, 0.0))
     model.choose(percept(0.0, FACE), here, 0.0)
     moved = model.choose(percept(0.05, FACE), there, 0.05)
-    assert moved.pulls[0].slide == pytest.approx(0.2 / 0.5, rel=0.01)
+    assert moved.saliences[0].translation == pytest.approx(0.2 / 0.5, rel=0.01)
     model.choose(percept(1.0, FACE), here, 1.0)  # too long ago to tell a speed
-    assert model.choose(percept(1.0, FACE), here, 1.0).pulls[0].slide == 0.0
+    assert model.choose(percept(1.0, FACE), here, 1.0).saliences[0].translation == 0.0
 
 
 def test_what_has_just_come_into_view_pulls_and_that_wears_off() -> None:
@@ -308,7 +308,7 @@ def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset
     model = BottomUp(BottomUpParams(smoothing_s=1.0))
     moving = bodies(body(1, "hand", (1, 0, 0), (0, 1, 0)))
     for k in range(21):
-        before = model.step(moving, (0, 0, 0), k / 10).slide[0]
+        before = model.step(moving, (0, 0, 0), k / 10).translation[0]
     gone = 2.0
     while (gone := gone + 0.05) < 2.0 + gap_s - 1e-9:
         if how == "missed":
@@ -318,7 +318,7 @@ def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset
     back = model.step(moving, (0, 0, 0), 2.0 + gap_s)
     assert back.onset.tolist() == [onset]
     if how == "missed":
-        assert bool(back.slide[0] > 0.5 * before) is (onset == 0.0)
+        assert bool(back.translation[0] > 0.5 * before) is (onset == 0.0)
 
 
 def test_nothing_is_new_after_a_pause_of_the_camera() -> None:
@@ -333,21 +333,21 @@ def test_arrays_remember_what_a_memory_body_by_body_would() -> None:
     """Bodies come, go, and change places in the list; each keeps its own low-pass."""
     rng = np.random.default_rng(5)
     model, tau = BottomUp(BottomUpParams(smoothing_s=0.2)), 0.2
-    known: dict[int, tuple[float, float, float]] = {}  # id -> smoothed slide, entered, seen
+    known: dict[int, tuple[float, float, float]] = {}  # id -> smoothed translation, entered, seen
     for k in range(200):
         t = k * 0.03
         ids = rng.permutation(40)[: rng.integers(0, 40)].tolist()
         speeds = rng.uniform(0, 2, len(ids)).tolist()
         rows = [body(i, "x", (1, 0, 0), (0, v, 0)) for i, v in zip(ids, speeds, strict=True)]
-        pulls = model.step(bodies(*rows), (0, 0, 0), t)
+        saliences = model.step(bodies(*rows), (0, 0, 0), t)
         for row, (i, v) in enumerate(zip(ids, speeds, strict=True)):
             past, entered, seen = known.get(i, (0.0, 0.0, -9.0))
             if t - seen > 0.3:
                 past, entered = 0.0, t if t > 0.3 else float("-inf")
             keep = exp(-0.03 / tau) if k else 1.0
             known[i] = (keep * past + (1 - keep) * v / 0.5, entered, t)
-            assert pulls.slide[row] == pytest.approx(known[i][0], abs=1e-12)
-            assert pulls.onset[row] == pytest.approx(exp((entered - t) / 0.5))
+            assert saliences.translation[row] == pytest.approx(known[i][0], abs=1e-12)
+            assert saliences.onset[row] == pytest.approx(exp((entered - t) / 0.5))
 
 
 def test_many_bodies_at_once_are_as_one_by_one() -> None:
@@ -365,8 +365,8 @@ def test_many_bodies_at_once_are_as_one_by_one() -> None:
         assert view.visible(alone, state)[0] == seen[i] and one == pytest.approx(total[i])
 
 
-def by(look_at: str, pull: float = 0.9, **point: tuple[float, float, float]) -> Attention:
-    rule = Rule(look_at, pull, **point)
+def by(look_at: str, salience: float = 0.9, **point: tuple[float, float, float]) -> Attention:
+    rule = Rule(look_at, salience, **point)
     model = attention()
     model.top_down = TopDown(TopDownParams(behaviour="wait", rules={"wait": rule}))
     return model
@@ -375,7 +375,7 @@ def by(look_at: str, pull: float = 0.9, **point: tuple[float, float, float]) -> 
 def test_a_rule_may_name_one_body() -> None:
     crowd = percept(0.0, FACE, body(7, "face", (2.0, 0.5, 0.0)))
     target = by("id:7").choose(crowd, looking(), 0.0)
-    assert (target.id, target.pull, target.top_down) == (7, 0.9, True)
+    assert (target.id, target.salience, target.top_down) == (7, 0.9, True)
     assert by("id:8").choose(crowd, looking(), 0.0).top_down is False
 
 
@@ -383,7 +383,11 @@ def test_a_rule_may_name_a_place_with_or_without_bodies_about() -> None:
     for seen in (percept(0.0), percept(0.0, FACE)):
         target = by("point", point_world_m=(1.0, 0.5, 0.6)).choose(seen, looking(), 0.0)
         assert (target.kind, target.id, target.p_world_m) == ("point", -1, (1.0, 0.5, 0.6))
-        assert (target.top_down, target.pull, target.why) == (True, 0.9, "point: rule wait 0.90")
+        assert (target.top_down, target.salience, target.why) == (
+            True,
+            0.9,
+            "point: rule wait 0.90",
+        )
     model = by("point", point_world_m=(1.0, 0.5, 0.6))
     model.choose(waving(0.0, 0.0), looking(), 0.0)
     assert model.choose(waving(0.5, 2.0), looking(), 0.5).kind == "hand"
@@ -421,24 +425,24 @@ def test_every_decision_carries_the_pulls_of_the_winner_and_the_next_three() -> 
     model = attention()
     rows = [body(k, "hand", (1.0, 0.1 * k, 0.0), (0.0, 0.02 * k, 0.0)) for k in range(2, 9)]
     target = model.choose(percept(0.0, FACE, *rows), looking(), 0.0)
-    assert [pull.id for pull in target.pulls] == [1, 8, 7, 6]
-    face, hand = target.pulls[:2]
-    assert face == Pull(1, "face", 0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 0.5)
+    assert [salience.id for salience in target.saliences] == [1, 8, 7, 6]
+    face, hand = target.saliences[:2]
+    assert face == Salience(1, "face", 0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 0.5)
     d = hypot(1.0, 0.8)
-    assert hand.slide == pytest.approx(0.16 / d / d / 0.5)
-    assert hand.loom == pytest.approx(0.16 * 0.8 / d / d / 0.5)
-    for pull in target.pulls:
-        moving = pull.slide + pull.loom + pull.spin + pull.onset
-        assert pull.total == pytest.approx(max(moving, pull.rule) * pull.interest)
-    assert len(model.choose(percept(0.1, FACE), looking(), 0.1).pulls) == 1
+    assert hand.translation == pytest.approx(0.16 / d / d / 0.5)
+    assert hand.looming == pytest.approx(0.16 * 0.8 / d / d / 0.5)
+    for salience in target.saliences:
+        moving = salience.translation + salience.looming + salience.rotation + salience.onset
+        assert salience.total == pytest.approx(max(moving, salience.rule) * salience.habituation)
+    assert len(model.choose(percept(0.1, FACE), looking(), 0.1).saliences) == 1
 
 
 def test_the_winner_comes_first_even_while_it_is_only_favoured() -> None:
     model = attention()
     model.choose(waving(0.0, 0.0), looking(), 0.0)
     kept = model.choose(waving(0.1, 2.0), looking(), 0.1)
-    assert (kept.kind, kept.pulls[0].kind) == ("face", "face")
-    assert kept.pulls[1].total > kept.pulls[0].total
+    assert (kept.kind, kept.saliences[0].kind) == ("face", "face")
+    assert kept.saliences[1].total > kept.saliences[0].total
 
 
 def test_the_strongest_of_a_crowd_are_listed_in_order() -> None:
@@ -446,15 +450,15 @@ def test_the_strongest_of_a_crowd_are_listed_in_order() -> None:
     rows = [body(k, "x", (2.0, 0.0, 0.0), (0.0, v, 0.0)) for k, v in enumerate(rng.random(500))]
     target = attention().choose(percept(0.0, *rows), looking(), 0.0)
     speeds = sorted((row[3][1] for row in rows), reverse=True)
-    assert [pull.slide for pull in target.pulls] == pytest.approx(speeds[:4])
+    assert [salience.translation for salience in target.saliences] == pytest.approx(speeds[:4])
 
 
 def test_boredom_changes_the_comparison_and_moves_no_head() -> None:
     model = attention()
     looks = [model.choose(waving(k / 30, 1.0), looking(), k / 30) for k in range(60)]
     assert {look.kind for look in looks} == {"hand"}
-    assert looks[-1].pull == pytest.approx(looks[0].pull)
-    assert looks[-1].pulls[0].interest == pytest.approx(1.0 - 0.2 * 59 / 30)
+    assert looks[-1].salience == pytest.approx(looks[0].salience)
+    assert looks[-1].saliences[0].habituation == pytest.approx(1.0 - 0.2 * 59 / 30)
 
 
 def test_a_target_that_leaves_the_field_is_left() -> None:

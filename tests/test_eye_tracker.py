@@ -18,7 +18,7 @@ from gazerig.gaze.head import Head, HeadParams
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
 from gazerig.gaze.pursuit import Pursuit, PursuitParams
-from gazerig.gaze.saccade import Saccade, SaccadeParams
+from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
@@ -77,7 +77,7 @@ def look_about(seed: int, saccade: SaccadeParams) -> Trace:
         OculomotorParams(eye_lag_ms=1000.0 / RATE_HZ),
         kinematics,
         ((span, span), (span, span)),
-        Saccade(saccade),
+        SaccadeModel(saccade),
         Pursuit(PursuitParams()),
         Head(HeadParams(), radians(35.0), (neck, neck)),
         Lids(LidParams(), np.random.default_rng(0)),

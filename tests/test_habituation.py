@@ -117,7 +117,7 @@ def test_what_is_attended_is_not_avoided_and_strength_0_avoids_nothing() -> None
 
 def test_a_single_still_face_is_never_left() -> None:
     targets = watch(bodies("face", (1, 0, 0)), 120.0)
-    assert {(t.id, t.kind, t.pull, t.shift) for t in targets} == {(1, "face", 0.5, 1)}
+    assert {(t.id, t.kind, t.salience, t.shift) for t in targets} == {(1, "face", 0.5, 1)}
 
 
 def test_a_still_thing_beside_a_face_does_not_profit_from_boredom() -> None:
@@ -129,7 +129,7 @@ def test_two_faces_share_the_gaze_without_flicker() -> None:
     share, stays = shares(targets), stays_s(targets)
     assert min(share.values()) > 0.4 and set(share) == {1, 2}
     assert len(stays) > 20 and min(stays) > 1.0 and max(stays) < 6.0
-    assert {t.pull for t in targets} == {0.5}  # the rule's constant, whoever is looked at
+    assert {t.salience for t in targets} == {0.5}  # the rule's constant, whoever is looked at
 
 
 def test_without_habituation_two_faces_do_not_share() -> None:

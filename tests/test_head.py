@@ -17,8 +17,8 @@ def head(eye_deg: float = 55.0, params: HeadParams | None = None) -> Head:
     return Head(params or HeadParams(min_salience=0.0, max_salience=1.0), radians(eye_deg), NECK)
 
 
-def goal_deg(model: Head, yaw: float, pull: float, pitch: float = 0.0) -> tuple[float, float]:
-    goal = model.goal_rad((radians(yaw), radians(pitch)), model.offset_rad(pull))
+def goal_deg(model: Head, yaw: float, salience: float, pitch: float = 0.0) -> tuple[float, float]:
+    goal = model.goal_rad((radians(yaw), radians(pitch)), model.offset_rad(salience))
     return degrees(goal[0]), degrees(goal[1])
 
 
@@ -156,13 +156,13 @@ def test_larger_head_movements_are_faster(size: float, peak: float) -> None:
     assert np.diff(trace).max() / 0.005 == pytest.approx(peak, abs=1.5)
 
 
-def turned(params: HeadParams, yaw: float, pull: Callable[[float], float]) -> Floats:
-    """Return the head's yaws of 4 s with a face at a yaw whose pull changes; degrees."""
+def turned(params: HeadParams, yaw: float, salience: Callable[[float], float]) -> Floats:
+    """Return the head's yaws of 4 s with a face at a yaw whose salience changes; degrees."""
     model, yaws = head(35.0, params), [0.0]
     place = (radians(yaw), 0.0)
     for k in range(800):
         t = k * 0.005
-        target = Target((1, 0, 0), (0, 0, 0), t, "face", 1, pull(t), False, None, 0, "")
+        target = Target((1, 0, 0), (0, 0, 0), t, "face", 1, salience(t), False, None, 0, "")
         yaws.append(model.step(target, place, place, abs(place[0] - yaws[-1]), 1.0, t)[0])
     return np.degrees(yaws)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.gaze.lids import LidParams, Lids, Openings, Side
+from gazerig.gaze.lids import LidOpenings, LidParams, Lids, Side
 from gazerig.gaze.types import GazeCommand
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 
@@ -31,7 +31,7 @@ def changed(params: LidParams, **changes: float) -> LidParams:
     return LidParams(**{**vars(params), **changes})
 
 
-def blinked(model: Lids, t_s: float, pitch_deg: float = 0.0) -> Openings:
+def blinked(model: Lids, t_s: float, pitch_deg: float = 0.0) -> LidOpenings:
     """Begin a blink at a time and give the openings while it is shut."""
     assert not model.step(t_s, radians(pitch_deg), radians(90.0)).blink
     shut = model.step(t_s + SHUT_S, radians(pitch_deg), None)
@@ -117,7 +117,7 @@ def test_lids_that_meet_have_their_joints_at_the_calibrated_ends() -> None:
     kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), ends, ends)
     shut, level = blinked(lids(), 1.0, -25.0), lids().step(0.0, 0.0, None)
 
-    def joints(openings: Openings) -> dict[str, float]:
+    def joints(openings: LidOpenings) -> dict[str, float]:
         left, right, blink, lower_left, lower_right = openings
         command = GazeCommand(
             (0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0), left, right, "fixate", blink,

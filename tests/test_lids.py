@@ -11,7 +11,7 @@ from gazerig.gaze.head import Head, HeadParams
 from gazerig.gaze.lids import LidMode, LidParams, Lids, Side
 from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
 from gazerig.gaze.pursuit import Pursuit, PursuitParams
-from gazerig.gaze.saccade import Saccade, SaccadeParams
+from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.types import Target
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
@@ -136,7 +136,7 @@ def test_e53_no_blink_storm_with_the_head_held_aside(literal: bool) -> None:
         OculomotorParams(),
         kinematics,
         ((span, span), (span, span)),
-        Saccade(SaccadeParams()),
+        SaccadeModel(SaccadeParams()),
         Pursuit(PursuitParams()),
         Head(HeadParams(), radians(55.0), (span, span)),
         lids(2, gaze_evoked_blink_literal=literal),

@@ -32,7 +32,7 @@ from gazerig.gaze.head import Head, HeadParams
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
 from gazerig.gaze.pursuit import Pursuit, PursuitParams
-from gazerig.gaze.saccade import Saccade, SaccadeParams
+from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.types import Angles2, GazeCommand, GazeState, Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
@@ -77,7 +77,7 @@ class Rig:
             params,
             self.kinematics,
             ((span, span), (span, span)),
-            Saccade(saccade),
+            SaccadeModel(saccade),
             Pursuit(PursuitParams()),
             Head(head, radians(eye_deg), (neck, neck)),
             Lids(LidParams(), np.random.default_rng(0)),
@@ -112,10 +112,10 @@ class Rig:
 
 
 def still(
-    yaw_deg: float, pull: float = 1.0, top_down: bool = False, pitch_deg: float = 0.0
+    yaw_deg: float, salience: float = 1.0, top_down: bool = False, pitch_deg: float = 0.0
 ) -> Callable[[float], Target]:
     point = scale(direction((radians(yaw_deg), radians(pitch_deg))), 10.0)
-    ahead = Target((10.0, 0, 0), (0, 0, 0), 0.0, "thing", 0, pull, top_down, None, 1, "")
+    ahead = Target((10.0, 0, 0), (0, 0, 0), 0.0, "thing", 0, salience, top_down, None, 1, "")
     there = ahead._replace(p_world_m=point, id=1, shift=2)
     return lambda t: there if t >= 0.1 else ahead
 
@@ -147,7 +147,7 @@ def test_e15_head_start_rule(size: float, top_down: bool) -> None:
 
 @pytest.mark.parametrize("size", range(5, 85, 5))
 def test_e16_every_target_is_reached_with_a_small_eye_range(size: float) -> None:
-    trace = Rig(eye_deg=20.0).run(still(size, pull=0.2), 3.0)
+    trace = Rig(eye_deg=20.0).run(still(size, salience=0.2), 3.0)
     assert trace.error[-1] <= 0.5
 
 
@@ -333,15 +333,15 @@ def _any_target(rng: np.random.Generator, at_s: float, shift: int) -> Target:
     eye=st.floats(15, 55),
     yaw=st.floats(-80, 80),
     pitch=st.floats(-30, 30),
-    pull=st.floats(0, 3),
+    salience=st.floats(0, 3),
     seed=st.integers(0, 2**32 - 1),
 )
 def test_e16_any_eye_range_and_timing_reaches_the_target(
-    eye: float, yaw: float, pitch: float, pull: float, seed: int
+    eye: float, yaw: float, pitch: float, salience: float, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
     rig = Rig(eye_deg=eye, geometry=DESK)
-    where, t = still(yaw, pull, bool(seed % 2), pitch), 0.0
+    where, t = still(yaw, salience, bool(seed % 2), pitch), 0.0
     for _ in range(600):
         dt = float(rng.choice((0.002, 0.005, 0.005, 0.010, 0.030)))
         t += dt
@@ -371,10 +371,14 @@ def test_e19_no_eye_beyond_its_limit_and_no_head_beyond_its_range() -> None:
 
 
 @settings(max_examples=16, deadline=None)
-@given(yaw=st.floats(-70, 70), pitch=st.floats(-30, 30), pull=st.floats(0, 3), top=st.booleans())
-def test_gaze_lands_on_any_still_target(yaw: float, pitch: float, pull: float, top: bool) -> None:
+@given(
+    yaw=st.floats(-70, 70), pitch=st.floats(-30, 30), salience=st.floats(0, 3), top=st.booleans()
+)
+def test_gaze_lands_on_any_still_target(
+    yaw: float, pitch: float, salience: float, top: bool
+) -> None:
     rig = Rig(eye_deg=35.0, geometry=DESK)
-    trace = rig.run(still(yaw, pull, top, pitch), 2.5)
+    trace = rig.run(still(yaw, salience, top, pitch), 2.5)
     assert trace.error[-1] <= 0.5
     speeds = [
         angle_between(a.gaze_point_world_m, b.gaze_point_world_m) / DT

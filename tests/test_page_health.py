@@ -10,8 +10,8 @@ import viser
 from desk import JOINTS
 from six_joints import SIX, TELLS_NOTHING, of_six
 
-from gazerig.gaze.types import Pull
-from gazerig.robot.dashboard.attention_panel import pulls, winner
+from gazerig.gaze.types import Salience
+from gazerig.robot.dashboard.attention_panel import saliences, winner
 from gazerig.robot.dashboard.commanded_pose import GhostView
 from gazerig.robot.dashboard.head_model import HeadView
 from gazerig.robot.dashboard.html import AMBER, RED
@@ -142,20 +142,20 @@ def test_loop_figures_are_told_and_coloured_when_late() -> None:
 
 def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:
     tugs = (
-        Pull(4, "thing", 0.41, 0.0, 0.0, 0.0, 0.0, 1.0, 0.41),
-        Pull(1, "<b>", 0.02, 0.0, 0.0, 0.0, 0.5, 0.6, 0.3),
+        Salience(4, "thing", 0.41, 0.0, 0.0, 0.0, 0.0, 1.0, 0.41),
+        Salience(1, "<b>", 0.02, 0.0, 0.0, 0.0, 0.5, 0.6, 0.3),
     )
-    shot = replace(snapshot(), pulls=tugs, character="shy", conversation="listen")
-    said = pulls(shot)
+    shot = replace(snapshot(), saliences=tugs, character="shy", conversation="listen")
+    said = saliences(shot)
     assert said.index("thing 4") < said.index("&lt;b&gt; 1")
-    assert "slide 0.41" in said and "slide 0.02 rule 0.50" in said
-    assert "loom 0.00</div>" not in said
+    assert "translation 0.41" in said and "translation 0.02 rule 0.50" in said
+    assert "looming 0.00</div>" not in said
     assert "0.60 &times;&ensp;0.30" in said
     named = winner(shot)
     for words in ("thing &lt;4&gt;", "slide &lt;0.4&gt;", "behaviour: wait", "character: shy",
                   "conversation: listen"):  # fmt: skip
         assert words in named
-    assert "wanders" in pulls(snapshot())
+    assert "wanders" in saliences(snapshot())
 
 
 def as_it_is(shot: Snapshot) -> Snapshot:

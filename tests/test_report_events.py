@@ -8,7 +8,7 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.lids import LidParams, Lids
-from gazerig.gaze.saccade import Saccade as Jumps
+from gazerig.gaze.saccade import SaccadeModel as Jumps
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.types import Vec3
 from gazerig.robot.analysis.blink_finder import BlinkFinder

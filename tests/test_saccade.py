@@ -5,9 +5,9 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from gazerig.gaze.saccade import MinJerk, Saccade, SaccadeParams, min_jerk
+from gazerig.gaze.saccade import MinJerkProfile, SaccadeModel, SaccadeParams, min_jerk
 
-SACCADE = Saccade(SaccadeParams())
+SACCADE = SaccadeModel(SaccadeParams())
 
 
 def at(amplitude_deg: float, *times_ms: float) -> list[float]:
@@ -15,7 +15,9 @@ def at(amplitude_deg: float, *times_ms: float) -> list[float]:
 
 
 def test_e1_largest_amplitude_below_the_cap() -> None:
-    assert degrees(MinJerk(8.7266, 0.05).largest_uncapped_rad) == pytest.approx(13.333, abs=0.001)
+    assert degrees(MinJerkProfile(8.7266, 0.05).largest_uncapped_rad) == pytest.approx(
+        13.333, abs=0.001
+    )
 
 
 def test_e2_small_saccade() -> None:
@@ -67,13 +69,13 @@ def test_min_jerk_is_held_at_its_ends() -> None:
     assert [min_jerk(s) for s in (-1.0, 0.0, 0.5, 1.0, 2.0)] == [0.0, 0.0, 0.5, 1.0, 1.0]
 
 
-HUMAN = Saccade(SaccadeParams(profile="main_sequence"))
-FRAMES = Saccade(SaccadeParams(profile="literal_frame"))
+HUMAN = SaccadeModel(SaccadeParams(profile="main_sequence"))
+FRAMES = SaccadeModel(SaccadeParams(profile="literal_frame"))
 
 
 @pytest.mark.parametrize("saccade", [SACCADE, HUMAN])
 @pytest.mark.parametrize("size", [12.0, 15.0, 20.0, 30.0, 40.0])
-def test_e9_duration_within_the_human_band(saccade: Saccade, size: float) -> None:
+def test_e9_duration_within_the_human_band(saccade: SaccadeModel, size: float) -> None:
     duration = saccade.duration_s(radians(size)) * 1e3
     assert 0.75 * (21.0 + 2.2 * size) <= duration <= 1.25 * (25.0 + 2.4 * size)
 
@@ -90,7 +92,7 @@ def test_human_profile_keeps_the_band_for_small_ones_too(size: float) -> None:
 @pytest.mark.parametrize("cap", [100.0, 300.0, 500.0])
 @pytest.mark.parametrize("size", [0.1, 1.0, 5.0, 10.0, 20.0, 50.0, 90.0])
 def test_human_profile_is_smooth_capped_and_ends_on_its_amplitude(cap: float, size: float) -> None:
-    saccade = Saccade(SaccadeParams(profile="main_sequence", max_speed_deg_s=cap))
+    saccade = SaccadeModel(SaccadeParams(profile="main_sequence", max_speed_deg_s=cap))
     duration = saccade.duration_s(radians(size))
     times = np.linspace(-0.1 * duration, 1.1 * duration, 6001)
     angles = np.degrees([saccade.displacement_rad(radians(size), t) for t in times])
@@ -124,7 +126,7 @@ def test_literal_frames_leave_a_fifth_at_each_and_do_not_know_the_tick() -> None
         assert degrees(done) == pytest.approx(10.0 * (1.0 - 0.2**frames))
     # 20.7, 10.4, 6.9 ms: time constants at 30, 60 and 90 pictures a second.
     for rate, constant in ((30.0, 20.7), (60.0, 10.4), (90.0, 6.9)):
-        saccade = Saccade(SaccadeParams(profile="literal_frame", frame_ms=1e3 / rate))
+        saccade = SaccadeModel(SaccadeParams(profile="literal_frame", frame_ms=1e3 / rate))
         assert saccade.displacement_rad(1.0, constant / 1e3) == pytest.approx(0.632, abs=0.002)
     assert degrees(FRAMES.peak_speed_rad_s(radians(10.0))) == pytest.approx(1450.0, rel=0.01)
 

@@ -7,20 +7,20 @@ import pytest
 
 from gazerig.config.load import load, shipped
 from gazerig.gaze.scanpath import ScanpathParams, Walk, markov_walk, normalised
-from gazerig.gaze.scanpath_fit import FitParams, Fixation, fit_walk
+from gazerig.gaze.scanpath_fit import FitParams, PartFixation, fit_walk
 from gazerig.gaze.types import PARTS
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 
 
-def walked(count: int, seed: int = 1, dwell_distribution: str = "gamma") -> list[Fixation]:
+def walked(count: int, seed: int = 1, dwell_distribution: str = "gamma") -> list[PartFixation]:
     """Fixations of the known walk, 20 ms of flight between them."""
     params = ScanpathParams(min_dwell_ms=0.0, dwell_distribution=dwell_distribution)
     walk = markov_walk(params, WALK, np.random.default_rng(seed))
     part, t_s, out = 5, 0.0, []
     for _ in range(count):
         dwell_s = walk.dwell_s(part)
-        out.append(Fixation(PARTS[part], t_s, dwell_s))
+        out.append(PartFixation(PARTS[part], t_s, dwell_s))
         t_s += dwell_s + 0.02
         part = walk.next_part(part)
     return out
@@ -71,12 +71,12 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
 
 def test_counts_are_of_neighbours_on_the_face_only() -> None:
     looks = [
-        Fixation("N", 0.0, 0.2),
-        Fixation("RE", 0.25, 0.2),
-        Fixation(None, 0.5, 0.1),
-        Fixation("LE", 0.65, 0.2),  # after a look elsewhere
-        Fixation("LE", 0.9, 0.2),  # a refixation
-        Fixation("M", 2.0, 0.2),  # after a long gap
+        PartFixation("N", 0.0, 0.2),
+        PartFixation("RE", 0.25, 0.2),
+        PartFixation(None, 0.5, 0.1),
+        PartFixation("LE", 0.65, 0.2),  # after a look elsewhere
+        PartFixation("LE", 0.9, 0.2),  # a refixation
+        PartFixation("M", 2.0, 0.2),  # after a long gap
     ]
     fitted = fit_walk(looks, FitParams(fewest=5, fewest_dwells=2, resamples=100), dice())
     n, re, le = (PARTS.index(part) for part in ("N", "RE", "LE"))
@@ -98,7 +98,7 @@ def test_same_dice_give_the_same_fit() -> None:
 def test_what_cannot_be_trusted_is_refused() -> None:
     looks, params = walked(100), FitParams(resamples=100)
 
-    def refused(changed: list[Fixation], why: str, params: FitParams = params) -> None:
+    def refused(changed: list[PartFixation], why: str, params: FitParams = params) -> None:
         with pytest.raises(ValueError, match=why):
             fit_walk(changed, params, dice())
 
@@ -109,7 +109,7 @@ def test_what_cannot_be_trusted_is_refused() -> None:
     refused([f._replace(duration_s=1000.0 * f.duration_s) for f in looks], "check the units")
     refused([*looks[:60], looks[60]._replace(duration_s=float("nan"))], "fixation 61: .*finite")
     refused([looks[0]._replace(part="NOSE"), *looks[1:]], "fixation 1: no part 'NOSE'")
-    staring = [Fixation("N", 0.3 * k, 0.25) for k in range(60)]
+    staring = [PartFixation("N", 0.3 * k, 0.25) for k in range(60)]
     refused(staring, "no transition leads away from chin", replace(params, smoothing="none"))
-    apart = [Fixation("N", 3.0 * k, 0.25) for k in range(60)]
+    apart = [PartFixation("N", 3.0 * k, 0.25) for k in range(60)]
     refused(apart, "no two fixations on the face follow each other")

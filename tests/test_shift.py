@@ -5,24 +5,24 @@ from math import radians
 import pytest
 
 from gazerig.gaze.pursuit import Slip
-from gazerig.gaze.saccade_trigger import ShiftParams, ShiftRule
+from gazerig.gaze.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
 
 
 def slip(error_deg: float, slip_deg_s: float = 0.0) -> Slip:
     return Slip((0.0, radians(error_deg), 0.0), (0.0, radians(slip_deg_s), 0.0))
 
 
-def settled(params: ShiftParams | None = None, scatters: bool = False) -> ShiftRule:
+def settled(params: SaccadeTriggerParams | None = None, scatters: bool = False) -> SaccadeTrigger:
     """Return a rule that has answered its first event and landed at 0."""
-    rule = ShiftRule(params or ShiftParams(), scatters)
-    rule.tell(1, 0.0, -1.0, -1.0)
+    rule = SaccadeTrigger(params or SaccadeTriggerParams(), scatters)
+    rule.record_shift(1, 0.0, -1.0, -1.0)
     assert not rule.due(slip(0.0), 0.0)
     assert not rule.waits
-    rule.land(0.0)
+    rule.record_landing(0.0)
     return rule
 
 
-def first_s(rule: ShiftRule, seen: Slip, until_s: float = 1.0) -> float | None:
+def first_s(rule: SaccadeTrigger, seen: Slip, until_s: float = 1.0) -> float | None:
     times = (k / 1000 for k in range(1, round(until_s * 1000)))
     return next((t for t in times if rule.due(seen, t)), None)
 
@@ -46,17 +46,17 @@ def test_a_target_that_slips_away_is_caught_up_with() -> None:
 
 def test_new_target_jumps_at_once_unless_it_is_nearly_there() -> None:
     rule = settled()
-    rule.tell(2, 0.0, 0.05, 0.05)
+    rule.record_shift(2, 0.0, 0.05, 0.05)
     assert rule.due(slip(1.0), 0.05)
-    rule.tell(3, 0.0, 0.06, 0.06)
+    rule.record_shift(3, 0.0, 0.06, 0.06)
     assert not rule.due(slip(0.2), 0.06)
     assert not rule.waits
 
 
 def test_latency_counts_from_the_first_unanswered_event() -> None:
-    rule = settled(ShiftParams(latency_ms=200.0))
-    rule.tell(2, 0.0, 0.1, 0.1)
-    rule.tell(3, 0.0, 0.25, 0.25)
+    rule = settled(SaccadeTriggerParams(latency_ms=200.0))
+    rule.record_shift(2, 0.0, 0.1, 0.1)
+    rule.record_shift(3, 0.0, 0.25, 0.25)
     assert rule.waits
     assert rule.onset_s == pytest.approx(0.3)
     assert not rule.due(slip(5.0), 0.299)
@@ -66,9 +66,9 @@ def test_latency_counts_from_the_first_unanswered_event() -> None:
 
 def test_an_event_in_flight_is_due_at_the_landing() -> None:
     rule = settled()
-    rule.tell(2, 0.0, 0.14, 0.1)
+    rule.record_shift(2, 0.0, 0.14, 0.1)
     assert rule.onset_s == pytest.approx(0.14)
-    rule.land(0.14)
+    rule.record_landing(0.14)
     assert rule.due(slip(5.0), 0.14)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from gazerig.gaze.angles import angle_between, compose, direction, rotate, rotate_back, rotation
 from gazerig.gaze.vestibular import (
-    Canals,
+    SemicircularCanals,
     distance_m,
     gate,
     near_gain,
@@ -40,7 +40,7 @@ def test_parallel_eyes_see_far_but_not_for_ever() -> None:
 
 
 def test_canals_delay_and_begin_at_rest() -> None:
-    canals = Canals(0.010, 0.0)
+    canals = SemicircularCanals(0.010, 0.0)
     assert [canals.step(rate, 0.005) for rate in (1.0, 2.0, 3.0, 4.0)] == [0.0, 0.0, 1.0, 2.0]
 
 

@@ -9,7 +9,14 @@ import numpy as np
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing, write_file
 from gazerig.gaze.scanpath import Walk
-from gazerig.gaze.scanpath_fit import SMOOTHINGS, FitParams, Fixation, Interval, WalkFit, fit_walk
+from gazerig.gaze.scanpath_fit import (
+    SMOOTHINGS,
+    FitParams,
+    Interval,
+    PartFixation,
+    WalkFit,
+    fit_walk,
+)
 from gazerig.gaze.types import PART_NAMES, PARTS
 from gazerig.robot.analysis.eye_tracker_csv import Samples, read_recording
 from gazerig.robot.analysis.fixations import (
@@ -24,7 +31,7 @@ from gazerig.robot.analysis.fixations import (
 class _Source(NamedTuple):
     """The fixations of a recording, and in words where they come from."""
 
-    fixations: tuple[Fixation, ...]
+    fixations: tuple[PartFixation, ...]
     notes: tuple[str, ...]
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.scanpath_fit import Fixation
+from gazerig.gaze.scanpath_fit import PartFixation
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.params import Bounds
 from gazerig.robot.analysis.eye_tracker_csv import FixationTable, Samples
@@ -82,7 +82,7 @@ class _Found(NamedTuple):
 
 def fixations_of(
     samples: Samples, boxes: PartBoxes, params: FixationParams
-) -> tuple[Fixation, ...]:
+) -> tuple[PartFixation, ...]:
     """Find the fixations and the part each lies on.
 
     Raises:
@@ -103,10 +103,12 @@ def fixations_of(
         if len(run) > least:
             found += _dispersed(t_s[run], places[run], least, widest)
     joined = _joined(found, 0.5 * widest, pause_s)
-    return tuple(Fixation(boxes.part_at(f.x, f.y), f.start_s, f.end_s - f.start_s) for f in joined)
+    return tuple(
+        PartFixation(boxes.part_at(f.x, f.y), f.start_s, f.end_s - f.start_s) for f in joined
+    )
 
 
-def labelled(table: FixationTable, boxes: PartBoxes | None) -> tuple[Fixation, ...]:
+def labelled(table: FixationTable, boxes: PartBoxes | None) -> tuple[PartFixation, ...]:
     """Return the fixations of a table, by their labels or else by the boxes they lie in.
 
     Raises:
@@ -115,7 +117,7 @@ def labelled(table: FixationTable, boxes: PartBoxes | None) -> tuple[Fixation, .
     if not table.labelled and boxes is None:
         raise SetupError("fixations without a part column need the rectangles of the parts")
     return tuple(
-        Fixation(
+        PartFixation(
             row.part if table.labelled or boxes is None else boxes.part_at(*row.p),
             row.start_s,
             row.duration_s,

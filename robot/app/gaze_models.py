@@ -13,7 +13,7 @@ from gazerig.gaze.idle import Idle
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.pursuit import Pursuit
-from gazerig.gaze.saccade import Saccade
+from gazerig.gaze.saccade import SaccadeModel
 from gazerig.gaze.top_down import TopDown
 from gazerig.robot.app.rig_limits import eye_limits, head_limits, lid_ends
 from gazerig.robot.model.kinematics import Kinematics
@@ -57,7 +57,7 @@ def deciders(rig: Rig, idle_dice: np.random.Generator) -> Deciders:
 class Movers(NamedTuple):
     """What moves eyes and head."""
 
-    saccade: Saccade
+    saccade: SaccadeModel
     pursuit: Pursuit
     head: Head
     breathing: Breathing
@@ -67,7 +67,7 @@ def movers(rig: Rig) -> Movers:
     """Return what moves eyes and head."""
     gaze = rig.gaze
     return Movers(
-        Saccade(gaze.saccade),
+        SaccadeModel(gaze.saccade),
         Pursuit(gaze.pursuit),
         Head(gaze.head, *head_limits(rig)),
         Breathing(gaze.breathing),

@@ -23,7 +23,7 @@ from gazerig.gaze.idle import Idle
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.pursuit import Pursuit
-from gazerig.gaze.saccade import Saccade
+from gazerig.gaze.saccade import SaccadeModel
 from gazerig.gaze.scanpath import Scanpath, Walk
 from gazerig.gaze.top_down import TopDown
 from gazerig.robot.app.camera_factory import retune_camera
@@ -66,7 +66,7 @@ class Components(NamedTuple):
     scanpath: Scanpath
     aversion: Aversion
     oculomotor: Oculomotor
-    saccade: Saccade
+    saccade: SaccadeModel
     pursuit: Pursuit
     head: Head
     breathing: Breathing

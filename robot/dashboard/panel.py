@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import viser
 
-from gazerig.robot.dashboard.attention_panel import pulls, winner
+from gazerig.robot.dashboard.attention_panel import saliences, winner
 from gazerig.robot.dashboard.dwell_chart import Dwell
 from gazerig.robot.dashboard.event_timeline import Timeline
 from gazerig.robot.dashboard.gaze_map import FaceMap
@@ -50,7 +50,7 @@ class PanelView:
             self._winner = gui.add_html(frame("nothing yet"), order=1)
             gui.add_html(frame(heading("the last 30 seconds")), order=2)
             self._strip = gui.add_html("", order=3)
-            self._pulls = gui.add_html("", order=4)
+            self._saliences = gui.add_html("", order=4)
         self._traces_view = TracesView(gui, window.add_tab("traces"))
         self._statistics = window.add_tab("statistics")
         with self._statistics:
@@ -94,7 +94,7 @@ class PanelView:
         if self._shown % _WORDS_EVERY == 0:
             self._status.content = status(snapshot)
             self._winner.content = winner(snapshot)
-            self._pulls.content = pulls(snapshot)
+            self._saliences.content = saliences(snapshot)
             self._health.content = health(snapshot)
             self._of_what.content = of_what(snapshot)
         if self._shown % _TRACES_EVERY == 0:

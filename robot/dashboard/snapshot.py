@@ -173,7 +173,7 @@ def snapshot(
         rate_hz=rate_hz,
         health=health,
         behaviour=behaviour,
-        pulls=target.pulls,
+        saliences=target.saliences,
         seeing=seeing,
         permitted_rad=tick.verdict.command_rad,
         target_kind=target.kind,

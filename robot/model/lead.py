@@ -87,7 +87,7 @@ class Lead:
         puppet = self.puppet(t_s)
         if puppet is None:
             return target
-        return puppet._replace(shift=target.shift + self._shifts, pulls=target.pulls)
+        return puppet._replace(shift=target.shift + self._shifts, saliences=target.saliences)
 
     def puppet(self, t_s: float) -> Target | None:
         """Return the point that a person chose, None where nobody did."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from gazerig.gaze.types import Mat3, Pull, Vec3
+from gazerig.gaze.types import Mat3, Salience, Vec3
 
 JOINTS = (
     "left_eye_pan",
@@ -260,7 +260,7 @@ class Snapshot:
         where the rig has none
     target_name: e.g. "face 3: left eye"; why: why it won
     rate_hz: control rate of the last second; health: bus figures in words
-    behaviour: the behaviour in force; pulls: what pulls the gaze, strongest first
+    behaviour: the behaviour in force; saliences: of the winner and the next bodies, highest first
     seeing: age of the picture, distances and what they rest on, still things that seem to move
     target_kind, target_id, target_part: the target as in gaze.types.Target
     character, conversation: those in force, "" where nobody says
@@ -293,7 +293,7 @@ class Snapshot:
     rate_hz: float
     health: str
     behaviour: str = ""
-    pulls: tuple[Pull, ...] = ()
+    saliences: tuple[Salience, ...] = ()
     seeing: str = ""
     permitted_rad: JointAngles = ()
     target_kind: str = ""

@@ -59,14 +59,14 @@ _JOINTS = _object(
     measured=_says(_list(_YES), "false: its servo tells nothing, this is its goal moved by known "
                    "speeds; empty: all are measured"),
 )  # fmt: skip
-_PULL = _object(
-    id=_WHOLE, kind=_TEXT, slide=_NUMBER, loom=_NUMBER, spin=_NUMBER, onset=_NUMBER, rule=_NUMBER,
-    interest=_NUMBER, total=_NUMBER,
+_SALIENCE = _object(
+    id=_WHOLE, kind=_TEXT, translation=_NUMBER, looming=_NUMBER, rotation=_NUMBER, onset=_NUMBER,
+    rule=_NUMBER, habituation=_NUMBER, total=_NUMBER,
 )  # fmt: skip
 _TARGET = _object(
-    p_world_m=_NUMBERS, v_world_m_s=_NUMBERS, at_s=_NUMBER, kind=_TEXT, id=_WHOLE, pull=_NUMBER,
+    p_world_m=_NUMBERS, v_world_m_s=_NUMBERS, at_s=_NUMBER, kind=_TEXT, id=_WHOLE, salience=_NUMBER,
     top_down=_YES, part={"type": ["string", "null"]}, shift=_WHOLE, why=_TEXT,
-    centre_world_m={"type": ["array", "null"], "items": _NUMBER}, pulls=_list(_PULL),
+    centre_world_m={"type": ["array", "null"], "items": _NUMBER}, saliences=_list(_SALIENCE),
 )  # fmt: skip
 _GAZE_STATE = _object(
     head_rad=_NUMBERS, head_rate_rad_s=_NUMBERS, eye_left_rad=_NUMBERS, eye_right_rad=_NUMBERS,
@@ -98,7 +98,7 @@ _TICK = _says(
             "lids 0 shut .. 1 open, 1 where there is none",
         ),
         percept={"type": ["integer", "null"], "description": "number of the /rig/percept in force"},
-        target=_says(_TARGET, "where to look and why, the strongest pulls term by term"),
+        target=_says(_TARGET, "where to look and why, the highest saliences term by term"),
         gaze=_says(_GAZE_COMMAND, "what the models wish"),
         wish_rad=_says(_NUMBERS, "joint angles wished for"),
         verdict=_says(_VERDICT, "what the guard let through; wish_rad null: that of the tick"),

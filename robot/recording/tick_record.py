@@ -12,7 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Limited, Percept, Pull, Target
+from gazerig.gaze.types import (
+    Bodies,
+    Face,
+    GazeCommand,
+    GazeState,
+    Limited,
+    Percept,
+    Salience,
+    Target,
+)
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import as_json as order_as_json
 from gazerig.robot.model.commands import from_recording as order_from_json
@@ -60,6 +69,12 @@ class Moment(NamedTuple):
 _ONCE_ALL = tuple([name for name in JOINTS if not name.startswith("eyes_") and "lower" not in name])
 """The joints of a recording that does not name them: every rig had these."""
 
+_FORMER = {
+    "pull": "salience", "pulls": "saliences", "slide": "translation", "loom": "looming",
+    "spin": "rotation", "interest": "habituation",
+}  # fmt: skip
+"""Fields of a target in recordings of before -> their names now."""
+
 _HEARD: dict[str, type[Heard]] = {"engaged": Engaged, "measured": Measured, "refused": Refused}
 _HEARD_NAMES = {kind: name for name, kind in _HEARD.items()}
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
@@ -76,7 +91,7 @@ def flat(tick: Tick, percept_number: int | None, dt_s: float, before: tuple[Hear
     percept_number: which of the percepts handed over the tick went by
     """
     target = tick.target
-    pulls = [tuple(pull) for pull in target.pulls]
+    saliences = [tuple(salience) for salience in target.saliences]
     verdict = tick.verdict
     return (
         tick.t_s,
@@ -84,7 +99,7 @@ def flat(tick: Tick, percept_number: int | None, dt_s: float, before: tuple[Hear
         percept_number,
         tuple(tick.joints),
         tuple(tick.pose),
-        (*target[:-1], pulls),
+        (*target[:-1], saliences),
         tuple(tick.gaze),
         tick.wish_rad,
         # Nearly always the very same value: written once.
@@ -112,7 +127,7 @@ def as_json(values: Flat) -> Json:
         "percept": percept,
         "target": {
             **_named(Target, target),
-            "pulls": [_named(Pull, pull) for pull in target[-1]],
+            "saliences": [_named(Salience, salience) for salience in target[-1]],
         },
         "gaze": {
             **_named(GazeCommand, gaze),
@@ -148,8 +163,9 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
     if verdict["wish_rad"] is None:
         verdict["wish_rad"] = wish
     verdict.setdefault("joints", _ONCE_ALL)
-    target = data["target"]
-    target["pulls"] = tuple([Pull(**pull) for pull in target["pulls"]])
+    target = _present_names(data["target"])
+    saliences = [Salience(**_present_names(one)) for one in target["saliences"]]
+    target["saliences"] = tuple(saliences)
     tick = Tick(
         data["t_s"],
         _made(JointState, data["joints"]),
@@ -167,6 +183,11 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
     )
     before = tuple([_heard(one) for one in data.get("before", ())])
     return Moment(tick, data["dt_s"], before)
+
+
+def _present_names(data: Json) -> Json:
+    """Return fields under their present names, however old the recording is."""
+    return {_FORMER.get(name, name): value for name, value in data.items()}
 
 
 def flat_percept(number: int, percept: Percept) -> Flat:
