@@ -7,7 +7,7 @@ from gazerig.sim_mock.faults.active import ActiveFaults
 from gazerig.sim_mock.replies import Piece
 
 
-class Reply(NamedTuple):
+class DeviceReply(NamedTuple):
     """What an instruction is answered with; ``end``: where it ended among the bytes sent."""
 
     end: int
@@ -54,7 +54,7 @@ class Device(Protocol):
         """True if a client at this baud rate is understood."""
         ...
 
-    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Reply]:
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
         """Take bytes off the wire and give what is answered to each instruction in them."""
         ...
 

@@ -4,10 +4,10 @@ from gazerig.gaze.angles import add, angle_between, rotate, rotation, scale, sub
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, GazeState, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
-from gazerig.sim_mock.scenes.scene import Person
+from gazerig.sim_mock.scenes.scene import ScenePerson
 
 
-def true_part(person: Person, part: str | None) -> Vec3:
+def true_part(person: ScenePerson, part: str | None) -> Vec3:
     """Return where a part of a person's face truly is; None: the tip of the nose."""
     if part is None:
         return person.p_world_face_m

@@ -16,7 +16,7 @@ Dynamixel servos, is 0 unless asked for.
 
 from collections import deque
 
-from gazerig.sim_mock.device import Device, Reply
+from gazerig.sim_mock.device import Device, DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
 from gazerig.sim_mock.replies import Piece
 
@@ -83,24 +83,24 @@ class ServoLine:
         self._queue_late(replies, self.device.now_s())
         return self.arrived()
 
-    def _disturbed(self, replies: list[Reply]) -> list[Reply]:
+    def _disturbed(self, replies: list[DeviceReply]) -> list[DeviceReply]:
         """Let noise strike the answers, and a line with a memory say the last ones again first."""
         wire, now_s = self.device.faults.wire, self.device.now_s()
         said = b"".join(piece.data for reply in replies for piece in reply.pieces)
         before, self._said = self._said, said or self._said
         replies = [
-            Reply(r.end, [p._replace(data=wire.roughened(p.data, now_s)) for p in r.pieces])
+            DeviceReply(r.end, [p._replace(data=wire.roughened(p.data, now_s)) for p in r.pieces])
             for r in replies
         ]
         if said and before and wire.take("repeat", None, now_s) is not None:
             first = replies[0]
-            replies[0] = Reply(first.end, [Piece(NOBODY, before), *first.pieces])
+            replies[0] = DeviceReply(first.end, [Piece(NOBODY, before), *first.pieces])
         return replies
 
-    def _any_late(self, replies: list[Reply]) -> bool:
+    def _any_late(self, replies: list[DeviceReply]) -> bool:
         return any(piece.late_s for reply in replies for piece in reply.pieces)
 
-    def _queue_late(self, replies: list[Reply], now_s: float) -> None:
+    def _queue_late(self, replies: list[DeviceReply], now_s: float) -> None:
         """Queue answers that take no time but what they wait beyond the ordinary."""
         due_s = max(now_s, self._late[-1][0] if self._late else now_s)
         for reply in replies:
@@ -108,7 +108,9 @@ class ServoLine:
                 due_s += piece.late_s
                 self._late.append((due_s, piece.data))
 
-    def _on_the_wire(self, data: bytes, replies: list[Reply], baud: int, now_s: float) -> None:
+    def _on_the_wire(
+        self, data: bytes, replies: list[DeviceReply], baud: int, now_s: float
+    ) -> None:
         """Queue answers as they pass the line."""
         byte_s = BITS_PER_BYTE / baud
         start_s = max(now_s, self._host_free_s)

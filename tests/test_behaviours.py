@@ -17,7 +17,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.registry import scenes
-from gazerig.sim_mock.scenes.scene import Event, Person, Scene, Thing, there_and_back
+from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing, there_and_back
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -231,8 +231,8 @@ class Distracted:
     def __init__(self, way_m: Vec3) -> None:
         self._way_m = way_m
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
-        return (Person((1.0, 0.01 * sin(t_s), 0.22), (pi, 0.0), None),)
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+        return (ScenePerson((1.0, 0.01 * sin(t_s), 0.22), (pi, 0.0), None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         moved = sum(there_and_back(t_s - start_s, 0.15, 0.0, 0.15) for start_s in self.starts_s)

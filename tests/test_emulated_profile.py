@@ -9,12 +9,12 @@ from gazerig.sim_mock.smart_servo.profile import (
     STEP,
     TRAPEZOID,
     TRIANGLE,
-    Profile,
+    PositionProfile,
     SpeedProfile,
 )
 
 
-def path(made: Profile, most: int = 200_000, stride: int = 1) -> list[float]:
+def path(made: PositionProfile, most: int = 200_000, stride: int = 1) -> list[float]:
     """Return all positions until the profile is done, or up to a stride more."""
     out = [made.r]
     while made.running:
@@ -38,7 +38,7 @@ def speeds(positions: list[float]) -> list[float]:
     ],
 )
 def test_the_shapes_of_the_manual(cruise, ramp, kind, ms):
-    made = Profile(0.0)
+    made = PositionProfile(0.0)
     made.by_velocity(1000.0, cruise, ramp)
     assert made.kind == kind
     positions = path(made)
@@ -51,7 +51,7 @@ def test_the_shapes_of_the_manual(cruise, ramp, kind, ms):
 @pytest.mark.parametrize(("total", "ramp"), [(500, 0), (500, 100), (500, 250), (500, 400)])
 @pytest.mark.parametrize("goal", [7.0, 1000.0, -3000.0])
 def test_a_time_based_profile_takes_its_time_whatever_the_distance(total, ramp, goal):
-    made = Profile(0.0)
+    made = PositionProfile(0.0)
     made.by_time(goal, total, ramp)
     assert made.kind == (RECTANGLE if ramp == 0 else TRAPEZOID if ramp < 250 else TRIANGLE)
     positions = path(made)
@@ -68,7 +68,7 @@ FLOATS = st.floats(-5000, 5000)
 def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
     first, second, after, cruise, ramp
 ):
-    made = Profile(0.0)
+    made = PositionProfile(0.0)
     made.by_velocity(first, cruise, ramp)
     positions = [0.0, *made.ahead(after + 1)]
     made.by_velocity(second, cruise, ramp)
@@ -84,7 +84,7 @@ def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
 @given(st.lists(st.integers(1, 40), min_size=1, max_size=40), FLOATS, FLOATS)
 @settings(max_examples=60, deadline=None)
 def test_in_one_go_or_in_steps_is_the_same(pieces, goal, later):
-    once, often = Profile(5.0), Profile(5.0)
+    once, often = PositionProfile(5.0), PositionProfile(5.0)
     for made in (once, often):
         made.by_velocity(goal, 2.0, 0.01)
     whole = once.ahead(sum(pieces))

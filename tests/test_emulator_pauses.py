@@ -8,8 +8,8 @@ from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
 from gazerig.sim_mock.smart_servo.motor import PAUSE_MS, Loop, Shaft, long_pause
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
-from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
-from gazerig.sim_mock.smart_servo.protection import Protection
+from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
+from gazerig.sim_mock.smart_servo.protection import ServoProtection
 
 HOUR_S = 3600.0
 GOAL, GOAL_SPEED, MODE = 42, 46, 33
@@ -19,7 +19,7 @@ GOAL, GOAL_SPEED, MODE = 42, 46, 33
 def lived_ms(monkeypatch):
     """Count the milliseconds that shafts live through, and the checks of protections."""
     count = [0]
-    run, check = Shaft.run, Protection.check
+    run, check = Shaft.run, ServoProtection.check
 
     def counted(shaft, ticks):
         count[0] += 0 if shaft.quiet else ticks
@@ -30,7 +30,7 @@ def lived_ms(monkeypatch):
         return check(protection, *words)
 
     monkeypatch.setattr(Shaft, "run", counted)
-    monkeypatch.setattr(Protection, "check", checked)
+    monkeypatch.setattr(ServoProtection, "check", checked)
     return count
 
 
@@ -129,7 +129,7 @@ def test_profiles_go_on_at_once_as_they_do_step_by_step(ramp, skipped):
 
 
 def _led(ramp):
-    made = Profile(0.0)
+    made = PositionProfile(0.0)
     made.by_velocity(5000.0, 1.0, ramp)
     return made
 

@@ -35,7 +35,7 @@ from gazerig.sim_mock.cameras.rendered import (
     draw_scene,
     smeared,
 )
-from gazerig.sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 WIDTH, HEIGHT = 640, 400
 LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)
@@ -67,10 +67,10 @@ class Still:
     ) -> None:
         self._people, self._things, self._v = people, things, v
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         places = [tuple(a + t_s * b for a, b in zip(p, self._v, strict=True)) for p in self._people]
         return tuple(
-            Person(p, (float(np.arctan2(-p[1], -p[0])), 0.0), None)  # type: ignore[arg-type]
+            ScenePerson(p, (float(np.arctan2(-p[1], -p[0])), 0.0), None)  # type: ignore[arg-type]
             for p in places
         )
 
@@ -148,11 +148,11 @@ def test_the_room_stays_where_it_is_when_the_head_turns() -> None:
 def test_whoever_is_behind_or_in_the_lens_is_not_drawn() -> None:
     canvas = canvas_at()
     for x in (-1.0, -0.05, 0.0, 0.02):
-        draw_person(canvas, Person((x, 0.0, 0.0), (0.0, 0.0), None), 0)
+        draw_person(canvas, ScenePerson((x, 0.0, 0.0), (0.0, 0.0), None), 0)
     draw_thing(canvas, Thing(1, "thing", (-1.0, 0.0, 0.0), 0.1))
     assert np.isfinite(canvas.depth_m).mean() < 0.5  # at most a shoulder
     empty = canvas_at()
-    draw_person(empty, Person((-1.0, 0.0, 0.0), (0.0, 0.0), None), 0)
+    draw_person(empty, ScenePerson((-1.0, 0.0, 0.0), (0.0, 0.0), None), 0)
     assert not empty.picture.any()
 
 
@@ -337,9 +337,9 @@ def test_people_who_pass_each_other_keep_their_identities_through_pixels(
     mtcnn: MtcnnDetector,
 ) -> None:
     class Passing(Still):
-        def people(self, t_s: float) -> tuple[Person, ...]:
-            left = Person((1.3, 0.5 - 0.5 * t_s, 0.1), (np.pi, 0.0), None)
-            right = Person((1.9, 0.7 * t_s - 0.7, 0.16), (np.pi, 0.0), None)
+        def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+            left = ScenePerson((1.3, 0.5 - 0.5 * t_s, 0.1), (np.pi, 0.0), None)
+            right = ScenePerson((1.9, 0.7 * t_s - 0.7, 0.16), (np.pi, 0.0), None)
             return left, right
 
     percepts = watched(mtcnn, Passing(), 2.0)

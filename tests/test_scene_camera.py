@@ -7,7 +7,7 @@ from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
-from gazerig.sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -22,8 +22,8 @@ class Still:
     def __init__(self, things: tuple[Thing, ...], later: tuple[Thing, ...] = ()) -> None:
         self._things, self._later = things, later
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
-        return (Person((1.0, 0.0, 0.0), (np.pi, 0.0), (0.8, 0.2, 0.0)),)
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+        return (ScenePerson((1.0, 0.0, 0.0), (np.pi, 0.0), (0.8, 0.2, 0.0)),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         return self._things if t_s < 0.5 else self._later + self._things

@@ -16,7 +16,7 @@ from gazerig.robot.app import assemble as assembling
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 GONE_S, BACK_S, END_S = 2.0, 9.0, 12.0
 LOST, FOUND = "camera lost: trying it again", "camera back after 7.0 s"
@@ -30,9 +30,9 @@ class Passer:
     round_s = 100.0
     behaviours: tuple[str, ...] = ()
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         y = 0.8 - 0.25 * t_s
-        return (Person((1.2, y, 0.2), (float(np.arctan2(-y, -1.2)), 0.0), None),)
+        return (ScenePerson((1.2, y, 0.2), (float(np.arctan2(-y, -1.2)), 0.0), None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         return ()
@@ -47,9 +47,9 @@ class Passer:
 class BackAndForth(Passer):
     """A scene: somebody who is aside and steps to and fro in it."""
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         y = 0.35 + 0.1 * float(np.sin(2.0 * t_s))
-        return (Person((1.2, y, 0.2), (float(np.arctan2(-y, -1.2)), 0.0), None),)
+        return (ScenePerson((1.2, y, 0.2), (float(np.arctan2(-y, -1.2)), 0.0), None),)
 
 
 @dataclass

@@ -11,7 +11,7 @@ from gazerig.robot.app import assemble as assembling
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 SECONDS = 3.0
 
@@ -26,7 +26,7 @@ class Room:
     def __init__(self, ball: bool) -> None:
         self._ball = ball
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         return ()
 
     def things(self, t_s: float) -> tuple[Thing, ...]:

@@ -18,7 +18,7 @@ from gazerig.robot.cli.terminal import clear_errors, complete_rig
 from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
 from gazerig.sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.line import BusSettings
-from gazerig.sim_mock.pty.server import Settings, run
+from gazerig.sim_mock.pty.server import ServerSettings, run
 from gazerig.sim_mock.pty.server import say as say_line
 
 app = typer.Typer()
@@ -149,7 +149,7 @@ def emulate(
             )
             for name, one in devices.items()
         ]
-        served = Settings(_chosen(buses, case or []), until_eof)
+        served = ServerSettings(_chosen(buses, case or []), until_eof)
         try:
             run(served, _plain if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
         except ValueError as error:

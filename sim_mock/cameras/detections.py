@@ -21,7 +21,7 @@ from gazerig.params import Bounds
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.intrinsics import project
-from gazerig.sim_mock.scenes.scene import Person, Scene, Thing
+from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _FARTHEST_FACE_M = 4.0
 _HAND_RADIUS_M = 0.07
@@ -115,7 +115,7 @@ class SceneCamera:
             t_s, self._number, par.width_px, par.height_px, tuple(faces), tuple(blobs)
         )
 
-    def _face(self, person: Person, R: Mat3, p: Vec3) -> DetectedFace | None:
+    def _face(self, person: ScenePerson, R: Mat3, p: Vec3) -> DetectedFace | None:
         """Project the landmarks; no detector finds what is cut off, far or turned away."""
         noise = self._rng.normal(0.0, self._params.landmark_noise_px, (5, 2))
         missed = self._rng.random() < self._params.missed_share

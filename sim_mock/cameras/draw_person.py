@@ -17,7 +17,7 @@ from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.sim_mock.cameras.canvas import Bytes, Colour, Floats, Picture3d, Sheet
-from gazerig.sim_mock.scenes.scene import Person, Thing
+from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
 
 class Looks(NamedTuple):
@@ -44,7 +44,7 @@ _AROUND = np.linspace(0.0, 2.0 * pi, 40, endpoint=False)
 _TORSO_TOP_M, _TORSO_HEIGHT_M, _TORSO_WIDTH_M, _TORSO_BEHIND_M = -0.075, 0.80, 0.46, 0.10
 
 
-def draw_person(canvas: Picture3d, person: Person, number: int) -> None:
+def draw_person(canvas: Picture3d, person: ScenePerson, number: int) -> None:
     """Draw a person; people with the same number look the same."""
     looks = LOOKS[number % len(LOOKS)]
     yaw, pitch = person.face_yaw_pitch_rad

@@ -33,7 +33,7 @@ from gazerig.sim_mock.dynamixel.modes import (
 from gazerig.sim_mock.smart_servo.drive import Drive
 from gazerig.sim_mock.smart_servo.motor import LIMP, flicker
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
-from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
+from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 TRIPPED = 255
 """Bus Watchdog (98) reads so after it has stopped the servo."""
@@ -127,7 +127,7 @@ class DynamixelDrive(Drive):
         """Lead the profile to a goal position; the same goal again changes nothing."""
         shaft = self.shaft
         profile, to = shaft.profile, float(self._side * (goal - self._shift))
-        if isinstance(profile, Profile) and to != profile.goal:
+        if isinstance(profile, PositionProfile) and to != profile.goal:
             if self._by_time:
                 profile.by_time(to, self._speed, self._ramp)
             else:

@@ -38,7 +38,7 @@ from gazerig.sim_mock.dynamixel.memory import (
 from gazerig.sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
 from gazerig.sim_mock.dynamixel.write_rules import GOALS, Rules
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
-from gazerig.sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
 ALERT = 0x80
 WATCHDOG_UNIT_MS = 20
@@ -53,7 +53,7 @@ _GOAL_AT, _GOAL_SIZE = 116, 4
 _IDENTITY = struct.Struct("<HB")
 
 
-class DynamixelServo(SmartServo):
+class DynamixelServo(EmulatedServo):
     """One Dynamixel servo on the chain.
 
     Raises:

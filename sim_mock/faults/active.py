@@ -19,7 +19,7 @@ BABBLE_MOST = 2000
 
 
 @dataclass
-class Fault:
+class LineFault:
     """One thing that goes wrong.
 
     servo_id: whose answers, None for everybody's
@@ -48,12 +48,12 @@ class ActiveFaults:
 
     def __init__(self, seed: int, header: bytes) -> None:
         self._header = header
-        self._faults: list[Fault] = []
+        self._faults: list[LineFault] = []
         self._rng = Random(seed)
         self._babbled_s = 0.0
         self.any = False
 
-    def add(self, fault: Fault) -> None:
+    def add(self, fault: LineFault) -> None:
         """Let a fault begin."""
         self._faults.append(fault)
         self.any = True
@@ -70,7 +70,7 @@ class ActiveFaults:
         self.any = bool(self._faults)
         return before - len(self._faults)
 
-    def listed(self, now_s: float) -> tuple[Fault, ...]:
+    def listed(self, now_s: float) -> tuple[LineFault, ...]:
         """Return the faults in force, oldest first."""
         self._forget(now_s)
         return tuple(self._faults)
@@ -79,7 +79,7 @@ class ActiveFaults:
         """True if a fault of this kind is in force."""
         return self.any and any(f.kind == kind and f.lasts(now_s) for f in self._faults)
 
-    def take(self, kind: str, servo_id: int | None, now_s: float) -> Fault | None:
+    def take(self, kind: str, servo_id: int | None, now_s: float) -> LineFault | None:
         """Find a fault that hits this servo now and count it as used once."""
         for fault in self._faults:
             if fault.kind != kind or fault.servo_id not in (None, servo_id):
@@ -207,7 +207,7 @@ class ActiveFaults:
             out.append(Piece(NOBODY, self._noise(after)))
         return out
 
-    def _noise(self, fault: Fault) -> bytes:
+    def _noise(self, fault: LineFault) -> bytes:
         return self._rng.randbytes(8) if fault.data is None else fault.data
 
     def babble(self, now_s: float) -> bytes:

@@ -10,8 +10,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
-from gazerig.sim_mock.device import Reply
-from gazerig.sim_mock.faults.active import NOBODY, ActiveFaults, Fault
+from gazerig.sim_mock.device import DeviceReply
+from gazerig.sim_mock.faults.active import NOBODY, ActiveFaults, LineFault
 from gazerig.sim_mock.faults.grammar import Commands
 from gazerig.sim_mock.replies import Piece
 
@@ -99,7 +99,7 @@ class LineFaults(ABC):
         if servo_id is not None:
             self._chain.here(servo_id)
         until_s = None if seconds is None else self._chain.now_s() + seconds
-        self.wire.add(Fault(kind, servo_id, numbers, data, count, until_s))
+        self.wire.add(LineFault(kind, servo_id, numbers, data, count, until_s))
         span = "" if count is None else f" {count} times"
         span += "" if seconds is None else f" for {seconds:g} s"
         return says + (span or " until cleared")
@@ -138,12 +138,12 @@ class LineFaults(ABC):
         ]
         return json.dumps({"servos": self.reports(), **self.board(), "faults": faults})
 
-    def around(self, replies: list[Reply], data: bytes) -> list[Reply]:
+    def around(self, replies: list[DeviceReply], data: bytes) -> list[DeviceReply]:
         """Let the host hear itself and a babbling node, where the line has such faults."""
         now_s = self._chain.now_s()
         if self.wire.on("echo", now_s):
-            replies.insert(0, Reply(len(data), [Piece(NOBODY, data)]))
+            replies.insert(0, DeviceReply(len(data), [Piece(NOBODY, data)]))
         babble = self.wire.babble(now_s)
         if babble:
-            replies.insert(0, Reply(0, [Piece(NOBODY, babble)]))
+            replies.insert(0, DeviceReply(0, [Piece(NOBODY, babble)]))
         return replies

@@ -24,7 +24,7 @@ from gazerig.sim_mock.feetech.tables import PWM, SERVO, STEP, WHEEL
 from gazerig.sim_mock.smart_servo.drive import Drive
 from gazerig.sim_mock.smart_servo.motor import LIMP, Loop, flicker
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
+from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 CURRENT_UNIT_A = CURRENT_UNIT_MA / 1000.0
 RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
@@ -114,13 +114,13 @@ class FeetechDrive(Drive):
     def moving(self) -> bool:
         """True if it is on its way, or turned."""
         profile = self.shaft.profile
-        led = self.torque and isinstance(profile, Profile) and profile.running
+        led = self.torque and isinstance(profile, PositionProfile) and profile.running
         return led or abs(self.shaft.v * self._scale * 1000.0 / self._speed_unit) > self._threshold
 
     def target(self) -> int:
         """Return the position it is led to, in the registers' terms."""
         profile = self.shaft.profile
-        if self.torque and isinstance(profile, Profile):
+        if self.torque and isinstance(profile, PositionProfile):
             return round((profile.goal + self._shift) * self._scale)
         return self.memory.get("goal_position")
 
@@ -238,7 +238,7 @@ class FeetechDrive(Drive):
             goal = max(self._range[0], min(self._range[1], goal))
         return goal / self._scale - self._shift
 
-    def _lead(self, profile: Profile, to: float, asked: tuple[int, ...]) -> None:
+    def _lead(self, profile: PositionProfile, to: float, asked: tuple[int, ...]) -> None:
         """Lead the profile to a place, in a time or at goal speed and acceleration."""
         ramp, _, time_ms, speed = asked
         cruise = abs(signed(speed, 15)) * self._speed_unit / self._scale / 1000.0

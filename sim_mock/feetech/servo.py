@@ -20,7 +20,7 @@ from gazerig.sim_mock.feetech.quirks import FeetechQuirks
 from gazerig.sim_mock.feetech.tables import model_and_table
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE
-from gazerig.sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
 MIDDLE = 2048
 TIME_UNIT_S = 0.01
@@ -37,7 +37,7 @@ _SENSED = {"little": struct.Struct("<HHHBBBBBHH"), "big": struct.Struct(">HHHBBB
 """56 position, speed, load, voltage, temperature, registered, status, moving, target, current."""
 
 
-class FeetechServo(SmartServo):
+class FeetechServo(EmulatedServo):
     """One Feetech servo on the chain.
 
     The spec's ``firmware`` is the number behind 3; its ``quirks`` are those of Dynamixel

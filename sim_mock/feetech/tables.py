@@ -17,7 +17,7 @@ SERVO, WHEEL, PWM, STEP = 0, 1, 2, 3
 """Operating modes (33)."""
 
 
-class Register(NamedTuple):
+class FeetechRegister(NamedTuple):
     """One register; ``sign``: the bit its sign stands in, None where it has none."""
 
     name: str
@@ -27,87 +27,91 @@ class Register(NamedTuple):
     sign: int | None = None
 
 
-def _with(registers: tuple[Register, ...], **initial: int) -> tuple[Register, ...]:
+def _with(registers: tuple[FeetechRegister, ...], **initial: int) -> tuple[FeetechRegister, ...]:
     """Return registers with other start values."""
     return tuple(r._replace(initial=initial.get(r.name, r.initial)) for r in registers)
 
 
 _KEPT = (
-    Register("id", 5, initial=1),
-    Register("baud_rate", 6),
-    Register("return_delay_time", 7, initial=250),  # [R]; 2 us
-    Register("status_return_level", 8, initial=1),
-    Register("min_position_limit", 9, 2),
-    Register("max_position_limit", 11, 2, 4095),
-    Register("temperature_limit", 13, initial=70),
-    Register("max_voltage_limit", 14, initial=80),
-    Register("min_voltage_limit", 15, initial=40),
-    Register("max_torque", 16, 2, 1000),
-    Register("phase", 18, initial=12),  # [R]: speeds in steps/s, speed 0 is the highest
-    Register("unloading_condition", 19, initial=0x2C),  # [R]: overheat, overcurrent, overload
-    Register("led_alarm_condition", 20, initial=0x2F),  # [R]
-    Register("position_p_gain", 21, initial=32),  # [R]
-    Register("position_d_gain", 22, initial=32),  # [R]
-    Register("position_i_gain", 23),
-    Register("minimum_startup_force", 24, 2, 16),  # [R]
-    Register("cw_dead_zone", 26, initial=1),
-    Register("ccw_dead_zone", 27, initial=1),
+    FeetechRegister("id", 5, initial=1),
+    FeetechRegister("baud_rate", 6),
+    FeetechRegister("return_delay_time", 7, initial=250),  # [R]; 2 us
+    FeetechRegister("status_return_level", 8, initial=1),
+    FeetechRegister("min_position_limit", 9, 2),
+    FeetechRegister("max_position_limit", 11, 2, 4095),
+    FeetechRegister("temperature_limit", 13, initial=70),
+    FeetechRegister("max_voltage_limit", 14, initial=80),
+    FeetechRegister("min_voltage_limit", 15, initial=40),
+    FeetechRegister("max_torque", 16, 2, 1000),
+    FeetechRegister("phase", 18, initial=12),  # [R]: speeds in steps/s, speed 0 is the highest
+    FeetechRegister(
+        "unloading_condition", 19, initial=0x2C
+    ),  # [R]: overheat, overcurrent, overload
+    FeetechRegister("led_alarm_condition", 20, initial=0x2F),  # [R]
+    FeetechRegister("position_p_gain", 21, initial=32),  # [R]
+    FeetechRegister("position_d_gain", 22, initial=32),  # [R]
+    FeetechRegister("position_i_gain", 23),
+    FeetechRegister("minimum_startup_force", 24, 2, 16),  # [R]
+    FeetechRegister("cw_dead_zone", 26, initial=1),
+    FeetechRegister("ccw_dead_zone", 27, initial=1),
 )
 _STS_KEPT = (
     *_KEPT,
-    Register("protection_current", 28, 2, 500),  # [R]; 6.5 mA
-    Register("angular_resolution", 30, initial=1),
-    Register("position_offset", 31, 2, sign=11),
-    Register("operating_mode", 33),
-    Register("protective_torque", 34, initial=20),
-    Register("protection_time", 35, initial=200),
-    Register("overload_torque", 36, initial=80),
-    Register("velocity_p_gain", 37, initial=10),  # [R]
-    Register("overcurrent_time", 38, initial=200),
-    Register("velocity_i_gain", 39, initial=200),  # [A]
+    FeetechRegister("protection_current", 28, 2, 500),  # [R]; 6.5 mA
+    FeetechRegister("angular_resolution", 30, initial=1),
+    FeetechRegister("position_offset", 31, 2, sign=11),
+    FeetechRegister("operating_mode", 33),
+    FeetechRegister("protective_torque", 34, initial=20),
+    FeetechRegister("protection_time", 35, initial=200),
+    FeetechRegister("overload_torque", 36, initial=80),
+    FeetechRegister("velocity_p_gain", 37, initial=10),  # [R]
+    FeetechRegister("overcurrent_time", 38, initial=200),
+    FeetechRegister("velocity_i_gain", 39, initial=200),  # [A]
     # Set in the factory.
-    Register("moving_threshold", 80, initial=1),  # [A]
-    Register("dts", 81),
-    Register("velocity_unit_factor", 82, initial=1),
-    Register("hts", 83),
-    Register("max_velocity_limit", 84),  # 50 steps/s, as the model is
-    Register("max_acceleration", 85, initial=254),  # [R]
-    Register("acceleration_factor", 86, initial=1),
+    FeetechRegister("moving_threshold", 80, initial=1),  # [A]
+    FeetechRegister("dts", 81),
+    FeetechRegister("velocity_unit_factor", 82, initial=1),
+    FeetechRegister("hts", 83),
+    FeetechRegister("max_velocity_limit", 84),  # 50 steps/s, as the model is
+    FeetechRegister("max_acceleration", 85, initial=254),  # [R]
+    FeetechRegister("acceleration_factor", 86, initial=1),
 )
 _SCS_KEPT = (
     # What STS servos have there is assumed of these, too [A].
     *_with(_KEPT, max_position_limit=1023, unloading_condition=0x24, led_alarm_condition=0x25),
-    Register("protective_torque", 37, initial=20),
-    Register("protection_time", 38, initial=200),
-    Register("overload_torque", 39, initial=80),
-    Register("pwm_step", 78),
-    Register("moving_threshold", 79, initial=1),  # [A]
-    Register("dts", 80),
-    Register("min_velocity_limit", 81),
-    Register("max_velocity_limit", 82),  # 50 steps/s, as the model is
+    FeetechRegister("protective_torque", 37, initial=20),
+    FeetechRegister("protection_time", 38, initial=200),
+    FeetechRegister("overload_torque", 39, initial=80),
+    FeetechRegister("pwm_step", 78),
+    FeetechRegister("moving_threshold", 79, initial=1),  # [A]
+    FeetechRegister("dts", 80),
+    FeetechRegister("min_velocity_limit", 81),
+    FeetechRegister("max_velocity_limit", 82),  # 50 steps/s, as the model is
 )
 _RAM = (
-    Register("torque_enable", 40),
-    Register("acceleration", 41),
-    Register("goal_position", 42, 2, sign=15),
-    Register("goal_time", 44, 2),  # where a duty drives the motor the duty, its sign in bit 10
-    Register("goal_speed", 46, 2, sign=15),
+    FeetechRegister("torque_enable", 40),
+    FeetechRegister("acceleration", 41),
+    FeetechRegister("goal_position", 42, 2, sign=15),
+    FeetechRegister(
+        "goal_time", 44, 2
+    ),  # where a duty drives the motor the duty, its sign in bit 10
+    FeetechRegister("goal_speed", 46, 2, sign=15),
 )
 _FIXED = (
-    Register("firmware_major", 0, initial=3),
-    Register("firmware_minor", 1),
-    Register("endianness", 2),
-    Register("model_number", 3, 2),
-    Register("registered_instruction", 64),
+    FeetechRegister("firmware_major", 0, initial=3),
+    FeetechRegister("firmware_minor", 1),
+    FeetechRegister("endianness", 2),
+    FeetechRegister("model_number", 3, 2),
+    FeetechRegister("registered_instruction", 64),
 )
 _ABSENT_FROM_SCS = (
-    Register("protection_current", 256, 2, 0xFFFF),
-    Register("position_offset", 258, 2),
-    Register("operating_mode", 260),
-    Register("overcurrent_time", 261, initial=255),
-    Register("torque_limit", 262, 2, 1000),
-    Register("velocity_p_gain", 264, initial=10),
-    Register("velocity_i_gain", 265, initial=200),
+    FeetechRegister("protection_current", 256, 2, 0xFFFF),
+    FeetechRegister("position_offset", 258, 2),
+    FeetechRegister("operating_mode", 260),
+    FeetechRegister("overcurrent_time", 261, initial=255),
+    FeetechRegister("torque_limit", 262, 2, 1000),
+    FeetechRegister("velocity_p_gain", 264, initial=10),
+    FeetechRegister("velocity_i_gain", 265, initial=200),
 )
 
 
@@ -125,12 +129,12 @@ class Table(NamedTuple):
     baud_rates: bit/s by the value of their register
     """
 
-    kept: tuple[Register, ...]
-    ram: tuple[Register, ...]
+    kept: tuple[FeetechRegister, ...]
+    ram: tuple[FeetechRegister, ...]
     lock_at: int
     highest: Mapping[int, int]
-    fixed: tuple[Register, ...] = _FIXED
-    absent: tuple[Register, ...] = ()
+    fixed: tuple[FeetechRegister, ...] = _FIXED
+    absent: tuple[FeetechRegister, ...] = ()
     order: Literal["little", "big"] = "little"
     turn_steps: float = 4096.0
     last_step: int | None = None
@@ -140,7 +144,7 @@ class Table(NamedTuple):
 
 STS = Table(
     kept=_STS_KEPT,
-    ram=(*_RAM, Register("torque_limit", 48, 2), Register("lock", 55, initial=1)),
+    ram=(*_RAM, FeetechRegister("torque_limit", 48, 2), FeetechRegister("lock", 55, initial=1)),
     lock_at=55,
     highest={5: HIGHEST_ID, 6: len(BAUD_RATES) - 1, 33: STEP},
 )
@@ -157,7 +161,7 @@ def _scs(
     model = FeetechModel(name, number, round(turn_steps), 70, 40, 80, stall_nm, 6.0, stall_a, rpm)
     table = Table(
         kept=_SCS_KEPT,
-        ram=(*_RAM, Register("lock", 48, initial=1)),
+        ram=(*_RAM, FeetechRegister("lock", 48, initial=1)),
         lock_at=48,
         highest={5: HIGHEST_ID, 6: len(_SCS_BAUD_RATES) - 1},
         absent=_ABSENT_FROM_SCS,

@@ -8,7 +8,7 @@ and scripts but for the one that a fault starts. Source: Pololu Maestro User's G
 
 from collections.abc import Callable, Sequence
 
-from gazerig.sim_mock.device import Reply
+from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
 from gazerig.sim_mock.maestro.body import Body
@@ -160,7 +160,7 @@ class MaestroBoard:
         replies = self.exchange(data, client_baud)
         return b"".join(piece.data for reply in replies for piece in reply.pieces)
 
-    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Reply]:
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
         """Take bytes off the wire and give what is answered to each command in them."""
         self.body.advance()
         came = self._what_comes(data, client_baud)
@@ -168,7 +168,7 @@ class MaestroBoard:
         for heard in self._ear.feed(came):
             pieces = self._execute(heard)
             if pieces:
-                replies.append(Reply(missing + heard.end, pieces))
+                replies.append(DeviceReply(missing + heard.end, pieces))
         return self.faults.around(replies, data) if self._wire.any else replies
 
     def _what_comes(self, data: bytes, client_baud: int | None) -> bytes:

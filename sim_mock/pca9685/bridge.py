@@ -9,7 +9,7 @@ NXP, SC18IM700 data sheet, rev. 2 (10 August 2007).
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from gazerig.sim_mock.device import Reply
+from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
 from gazerig.sim_mock.faults.hobby import HobbyFaults
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
@@ -109,7 +109,7 @@ class Bridge:
 
     # --- bytes
 
-    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Reply]:
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
         """Take bytes off the wire and return what is answered to each command in them."""
         self.body.advance()
         came = data
@@ -120,7 +120,7 @@ class Bridge:
         missing, replies = len(data) - len(came), []
         for end, pieces in self._commands(came):
             if pieces:
-                replies.append(Reply(missing + end, pieces))
+                replies.append(DeviceReply(missing + end, pieces))
         return self.faults.around(replies, data) if self._wire.any else replies
 
     def _commands(self, came: bytes) -> Iterator[tuple[int, list[Piece]]]:

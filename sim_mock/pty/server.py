@@ -26,21 +26,21 @@ from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
 
 
 @dataclass(frozen=True)
-class Settings:
+class ServerSettings:
     """What to emulate; until_eof: end when standard input does."""
 
     buses: tuple[BusSettings, ...]
     until_eof: bool = False
 
 
-class Stopped(Exception):
+class ServerStopped(Exception):
     """SIGTERM or Ctrl-C came."""
 
 
 class Server:
     """Serves every bus on a terminal of its own until told to stop."""
 
-    def __init__(self, settings: Settings, say: Callable[[str], None]) -> None:
+    def __init__(self, settings: ServerSettings, say: Callable[[str], None]) -> None:
         self._settings = settings
         self._say = say
         warn = None if settings.until_eof else _warn
@@ -119,7 +119,7 @@ def _warn(text: str) -> None:
     sys.stderr.write(text + "\n")
 
 
-def run(settings: Settings, say: Callable[[str], None], heed_ctrl_c: bool) -> None:
+def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool) -> None:
     """Serve until SIGTERM, Ctrl-C where it is heeded, or the end of standard input.
 
     Raises:
@@ -130,7 +130,7 @@ def run(settings: Settings, say: Callable[[str], None], heed_ctrl_c: bool) -> No
     def stop(number: int, frame: FrameType | None) -> None:
         for server in servers:
             server.over = True
-        raise Stopped
+        raise ServerStopped
 
     signal.signal(signal.SIGTERM, stop)
     signal.signal(signal.SIGINT, stop if heed_ctrl_c else signal.SIG_IGN)
@@ -141,7 +141,7 @@ def run(settings: Settings, say: Callable[[str], None], heed_ctrl_c: bool) -> No
         for line in server.lines:
             say(line.where())
         server.serve(sys.stdin.fileno() if sys.stdin is not None else None)
-    except (Stopped, BrokenPipeError):
+    except (ServerStopped, BrokenPipeError):
         return
 
 
@@ -151,14 +151,14 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
-def settings_of(told: Mapping[str, Any]) -> Settings:
+def settings_of(told: Mapping[str, Any]) -> ServerSettings:
     """Return the settings that travelled as JSON.
 
     Raises:
         ValueError, TypeError: there is no such device, or it has no such setting.
     """
     buses = [BusSettings(**{**bus, "device": unpacked(bus["device"])}) for bus in told["buses"]]
-    return Settings(tuple(buses), told.get("until_eof", False))
+    return ServerSettings(tuple(buses), told.get("until_eof", False))
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ from math import atan2, pi, sin, tan
 from typing import NamedTuple
 
 from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, Key, Person, Thing, between, there_and_back
+from gazerig.sim_mock.scenes.scene import Event, Key, ScenePerson, Thing, between, there_and_back
 
 HEAD_M: Vec3 = (0.04, 0.0, 0.13)
 HALF_FIELD_RAD = 34.5 / 180.0 * pi
@@ -89,10 +89,10 @@ class Boxing:
     round_s = _ROUND_S
     behaviours: tuple[str, ...] = ("wait", "guard", "attack")
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return the opponent, whose hands are things of their own."""
         face, turn = _opponent(t_s)
-        return (Person(face, turn, None),)
+        return (ScenePerson(face, turn, None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return both fists, and the hand from aside and the planner's targets while they last."""

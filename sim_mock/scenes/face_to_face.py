@@ -11,7 +11,7 @@ and Cook), away by some 14 deg and mostly sideways. Not modelled: a child's smal
 from math import atan2, hypot, pi, sin
 
 from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, Key, Person, Thing, between
+from gazerig.sim_mock.scenes.scene import Event, Key, ScenePerson, Thing, between
 
 HEAD_M: Vec3 = (0.04, 0.0, 0.13)
 
@@ -63,7 +63,7 @@ class FaceToFace:
     round_s = _ROUND_S
     behaviours: tuple[str, ...] = ()
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return the one person."""
         (x, y, z), (yaw, nod) = between(_KEYS, t_s % _ROUND_S)
         face = (
@@ -73,7 +73,7 @@ class FaceToFace:
         )
         to_head = (HEAD_M[0] - face[0], HEAD_M[1] - face[1], HEAD_M[2] - face[2])
         down = atan2(to_head[2], hypot(to_head[0], to_head[1]))
-        return (Person(face, (yaw, nod + down), None),)
+        return (ScenePerson(face, (yaw, nod + down), None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return nothing: person and robot are by themselves."""

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple, Protocol
 from gazerig.gaze.types import Angles2, Vec3
 
 
-class Person(NamedTuple):
+class ScenePerson(NamedTuple):
     """One person at one instant.
 
     p_world_face_m: tip of the nose
@@ -66,7 +66,7 @@ class Scene(Protocol):
     round_s: float
     behaviours: tuple[str, ...]
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return everybody present, who may be far outside every field of view."""
         ...
 

@@ -7,7 +7,7 @@ still: no sway, no glance aside, no blink.
 from math import atan2, hypot
 
 from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 HEAD_M: Vec3 = (0.04, 0.0, 0.13)
 FACE_M: Vec3 = (0.95, 0.06, 0.24)
@@ -22,10 +22,10 @@ class SitsStill:
     round_s = _ROUND_S
     behaviours: tuple[str, ...] = ()
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return the one person."""
         x, y, z = (a - b for a, b in zip(HEAD_M, FACE_M, strict=True))
-        return (Person(FACE_M, (atan2(y, x), atan2(z, hypot(x, y))), None),)
+        return (ScenePerson(FACE_M, (atan2(y, x), atan2(z, hypot(x, y))), None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return nothing."""

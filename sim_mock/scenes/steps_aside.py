@@ -8,7 +8,7 @@ much as shoes on a floor give. Peak speed 2.0 m/s, 105 deg/s as seen by the robo
 from math import cos, radians, sin
 
 from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, Key, Person, Thing, between
+from gazerig.sim_mock.scenes.scene import Event, Key, ScenePerson, Thing, between
 
 HEAD_M: Vec3 = (0.04, 0.0, 0.13)
 STEP_AT_S, STEP_BACK_AT_S, STEP_S = 2.0, 6.0, 0.7
@@ -40,10 +40,10 @@ class StepsAside:
     round_s = _ROUND_S
     behaviours: tuple[str, ...] = ()
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return the one person."""
         face, turn = between(_KEYS, t_s % _ROUND_S)
-        return (Person(face, turn, None),)
+        return (ScenePerson(face, turn, None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return nothing."""

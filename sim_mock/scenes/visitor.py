@@ -3,7 +3,7 @@
 from math import pi, sin
 
 from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, Key, Person, Thing, between
+from gazerig.sim_mock.scenes.scene import Event, Key, ScenePerson, Thing, between
 
 # One round: arrive, talk, move left, turn the head, wave, step aside, leave, come back.
 _ROUND_S = 44.0
@@ -34,7 +34,7 @@ class Visitor:
     round_s = _ROUND_S
     behaviours: tuple[str, ...] = ()
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return the one visitor, who may be far outside every field of view."""
         phase = t_s % _ROUND_S
         face, turn = between(_KEYS, phase)
@@ -44,7 +44,7 @@ class Visitor:
             0.004 * sin(2 * pi * 0.31 * t_s + 2.0),
         )
         face = (face[0] + sway[0], face[1] + sway[1], face[2] + sway[2])
-        return (Person(face, turn, self._hand(phase, face)),)
+        return (ScenePerson(face, turn, self._hand(phase, face)),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return nothing: the visitor's own hand belongs to the visitor."""

@@ -6,7 +6,7 @@ The face is turned to the robot all the way, as of somebody who looks while pass
 from math import atan2
 
 from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, Person, Thing
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 WALK_M_S, FAR_M = 1.0, 1.5
 HALF_WAY_M = 1.1
@@ -40,12 +40,12 @@ class WalksPast:
     round_s = _ROUND_S
     behaviours: tuple[str, ...] = ()
 
-    def people(self, t_s: float) -> tuple[Person, ...]:
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return the one person, who stands, walks to the left, stands and walks back."""
         phase = t_s % _ROUND_S
         there = _along(phase - _TURN_S) - _along(phase - 2.0 * _TURN_S - _WAY_S)
         x, y = _HEAD_AHEAD_M + FAR_M, HALF_WAY_M * (2.0 * there - 1.0)
-        return (Person((x, y, _UP_M), (atan2(-y, -x), 0.0), None),)
+        return (ScenePerson((x, y, _UP_M), (atan2(-y, -x), 0.0), None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return nothing."""

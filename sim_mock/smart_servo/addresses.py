@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from typing import Generic, TypeVar
 
-from gazerig.sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
-S = TypeVar("S", bound=SmartServo)
+S = TypeVar("S", bound=EmulatedServo)
 
 
 class Addresses(Generic[S]):
@@ -40,6 +40,6 @@ class Addresses(Generic[S]):
         return [*self.by_id.values(), *(twin for pair in self.twins.values() for twin in pair)]
 
 
-def hears(servo: SmartServo, client_baud: int | None) -> bool:
+def hears(servo: EmulatedServo, client_baud: int | None) -> bool:
     """True if a servo and a client at this baud rate (None: any) understand each other."""
     return client_baud is None or servo.baud == client_baud

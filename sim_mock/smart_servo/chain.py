@@ -7,7 +7,7 @@ client whose baud rate is not a servo's neither hears it nor is heard.
 from collections.abc import Callable, Iterable
 from typing import Any, Generic, TypeVar
 
-from gazerig.sim_mock.device import Reply
+from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
 from gazerig.sim_mock.faults.grammar import Commands
 from gazerig.sim_mock.replies import BROADCAST, Answer, Piece, merge
@@ -23,12 +23,12 @@ from gazerig.sim_mock.smart_servo.framing import (
 from gazerig.sim_mock.smart_servo.instructions import GroupRead, GroupWrite, InstructionSet
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, decided
-from gazerig.sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
 TWIN_AWAY_STEPS = 257
 """A second servo with a taken id stands so far from the first, so that they differ."""
 
-S = TypeVar("S", bound=SmartServo)
+S = TypeVar("S", bound=EmulatedServo)
 Q = TypeVar("Q", bound=ChainQuirks)
 
 
@@ -178,7 +178,7 @@ class ServoChain(Generic[S, Q]):
         replies = self.exchange(data, client_baud)
         return b"".join([piece[1] for reply in replies for piece in reply[1]])
 
-    def exchange(self, data: bytes, client_baud: int | None = None) -> list[Reply]:
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
         """Take bytes off the wire and return what is answered to each instruction in them."""
         now_s = self._now_s = self.now_s()
         self._now_ms = whole_ms(now_s)
@@ -191,14 +191,14 @@ class ServoChain(Generic[S, Q]):
         if not self._by_id:
             return self._garbage(data)
         found = self._framing.feed(data, now_s)
-        replies = [Reply(i.end, pieces) for i in found if (pieces := self._execute(i))]
+        replies = [DeviceReply(i.end, pieces) for i in found if (pieces := self._execute(i))]
         return self.faults.around(replies, data) if self._wire.any else replies
 
-    def _garbage(self, data: bytes) -> list[Reply]:
+    def _garbage(self, data: bytes) -> list[DeviceReply]:
         """Answer a client that no servo understands: nothing, or the ruins of its own bytes."""
         if self.quirks.wrong_baud == "silence" or not data:
             return []
-        return [Reply(len(data), [Piece(NOBODY, bytes(b & 0x6E | 0x80 for b in data[::2]))])]
+        return [DeviceReply(len(data), [Piece(NOBODY, bytes(b & 0x6E | 0x80 for b in data[::2]))])]
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Let the addressed servos carry out one instruction; return what they send."""

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.motor import Motor, Shaft
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
-from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
+from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 
 class Noise(NamedTuple):
@@ -64,7 +64,7 @@ class Drive(ABC):
     def _lead_from_here(self, by_speed: bool) -> None:
         """Let a profile, of speeds or of positions, begin where the shaft is."""
         shaft = self.shaft
-        shaft.start(SpeedProfile(shaft.x, shaft.v) if by_speed else Profile(shaft.x))
+        shaft.start(SpeedProfile(shaft.x, shaft.v) if by_speed else PositionProfile(shaft.x))
 
     def _set_goal_here(self) -> None:
         """Make the goal position the present one."""

@@ -13,7 +13,7 @@ from gazerig.sim_mock.faults.verbs import (
     packet_verbs,
 )
 from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, cases_of
-from gazerig.sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
 
 class Chain(Protocol):
@@ -21,7 +21,7 @@ class Chain(Protocol):
 
     now_s: Callable[[], float]
 
-    def here(self, servo_id: int) -> SmartServo:
+    def here(self, servo_id: int) -> EmulatedServo:
         """Return a servo by id, brought up to now."""
         ...
 
@@ -45,7 +45,7 @@ class ServoFaults(LineFaults):
         super().__init__(chain, commands, seed, header)
         self.chain = chain
 
-    def servos(self, servo_id: int | None) -> list[SmartServo]:
+    def servos(self, servo_id: int | None) -> list[EmulatedServo]:
         """Return a servo, or all (None), brought up to now."""
         ids = self.chain.ids() if servo_id is None else (servo_id,)
         return [self.chain.here(one) for one in ids]
@@ -112,7 +112,7 @@ def commands_of(
         "overheat": Verb(_fails("overheating"), (one,), "the motor is too hot"),
         "encoder": Verb(_fails("encoder"), (one,), "the angle sensor is broken"),
         "shock": Verb(_fails("electrical shock"), (one,), "latch the electrical shock error"),
-        "brown-out": Verb(_suffers(SmartServo.restart, "{who} restarts"), (one,),
+        "brown-out": Verb(_suffers(EmulatedServo.restart, "{who} restarts"), (one,),
                           "restart as a dip of the supply makes it: no status tells"),
         "reset": Verb(_reset, (one,), f"as from the factory: {reset}"),
         "voltage": Verb(_has("supply_v", "V"), (some, Word("V", number(0.0, 30.0, "volts"))),
@@ -124,10 +124,10 @@ def commands_of(
                       "jam the joint where it is"),
         "free": Verb(_suffers(lambda servo: servo.hold_fast(False), "{who} is free"), (some,),
                      "let a jammed joint go"),
-        "load": Verb(_suffers(SmartServo.pull, "{who} carries {:g} Nm"),
+        "load": Verb(_suffers(EmulatedServo.pull, "{who} carries {:g} Nm"),
                      (some, Word("NM", number(-100.0, 100.0, "Nm"))),
                      "hang a constant torque on the joint"),
-        "turn": Verb(_suffers(SmartServo.turn, "{who} was turned by {:g} steps"),
+        "turn": Verb(_suffers(EmulatedServo.turn, "{who} was turned by {:g} steps"),
                      (some, Word("STEPS", number(-1e6, 1e6, "steps"))), "turn the joint by hand"),
         **closing_verbs(one),
     }

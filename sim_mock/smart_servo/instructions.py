@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Generic, Literal, TypeVar
 
 from gazerig.sim_mock.smart_servo.framing import ACTION, PING, READ, REBOOT, REG_WRITE, WRITE
-from gazerig.sim_mock.smart_servo.servo import SmartServo
+from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
 Result = tuple[int, bytes]
 """Error number and parameters of an answer."""
@@ -16,7 +16,7 @@ GroupRead = tuple[int, int, int]
 GroupWrite = tuple[int, int, bytes]
 """Id, address, data of one servo's part of a group write."""
 
-S = TypeVar("S", bound=SmartServo)
+S = TypeVar("S", bound=EmulatedServo)
 
 
 class InstructionSet(Generic[S]):
@@ -86,6 +86,6 @@ class InstructionSet(Generic[S]):
         return take(self.address_of(params), params[self._address_bytes :]), b""
 
 
-def _reboot(servo: SmartServo, params: bytes) -> Result:
+def _reboot(servo: EmulatedServo, params: bytes) -> Result:
     servo.restart()
     return 0, b""

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Generic, Protocol, TypeVar
 
 
-class Place(Protocol):
+class RegisterPlace(Protocol):
     """Where a register is."""
 
     @property
@@ -24,7 +24,7 @@ class Place(Protocol):
         ...
 
 
-R = TypeVar("R", bound=Place)
+R = TypeVar("R", bound=RegisterPlace)
 
 
 class ServoMemory(ABC, Generic[R]):

@@ -11,7 +11,7 @@ from math import inf, pi, sin
 from typing import NamedTuple, Protocol
 
 from gazerig.sim_mock.smart_servo.physics import Physics
-from gazerig.sim_mock.smart_servo.profile import Profile, SpeedProfile
+from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 STEPS_PER_TURN = 4096
 """Resolution of the encoder on the shaft; a make may count otherwise in its registers."""
@@ -150,7 +150,7 @@ class Shaft:
         self.supply = self.volts = (physics.supply_v or model.rated_v) / model.rated_v
         self._loop = LIMP
         self._held = False
-        self.profile: Profile | SpeedProfile = Profile(position_steps)
+        self.profile: PositionProfile | SpeedProfile = PositionProfile(position_steps)
         self.place(position_steps)
 
     # --- from outside
@@ -160,7 +160,7 @@ class Shaft:
         x = min(max(float(position_steps), self._low_high[0]), self._low_high[1])
         self.x = self.joint = x
         self.v = self._rv = self.u = self.effort = self._integral = 0.0
-        if isinstance(self.profile, Profile):
+        if isinstance(self.profile, PositionProfile):
             self.profile.rest(x)
         if self._held:
             self.hold_fast(True)
@@ -200,7 +200,7 @@ class Shaft:
         """Go on after the profile was given something new."""
         self.quiet = False
 
-    def start(self, profile: Profile | SpeedProfile) -> None:
+    def start(self, profile: PositionProfile | SpeedProfile) -> None:
         """Switch on: no memory of earlier errors; ``profile`` leads."""
         self.profile = profile
         self._rv = self._integral = 0.0
@@ -209,7 +209,7 @@ class Shaft:
     def let_go(self) -> None:
         """Switch off: the motor has no current and does not brake."""
         self.drive(LIMP)
-        self.profile = Profile(self.x)
+        self.profile = PositionProfile(self.x)
         self.u = self.effort = self._integral = 0.0
         self.quiet = False
 

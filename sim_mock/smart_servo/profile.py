@@ -12,7 +12,7 @@ STEP, RECTANGLE, TRIANGLE, TRAPEZOID = 0, 1, 2, 3
 """Profile types as bits 4-5 of Moving Status (123) name them."""
 
 
-class Profile:
+class PositionProfile:
     """Position and speed that the shaft should have.
 
     r, v: position in steps and speed in steps/ms now

@@ -44,7 +44,7 @@ def warmed(now_c: float, final_c: float, thermal_s: float, checks: int) -> float
     return now_c
 
 
-class Protection:
+class ServoProtection:
     """Temperature of the motor and how long it has been overloaded.
 
     ambient_c: degC, may be changed at any time

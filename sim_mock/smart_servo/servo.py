@@ -13,7 +13,7 @@ from gazerig.sim_mock.smart_servo.framing import PING, READ, REBOOT
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.motor import Motor, long_pause
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec, checked
-from gazerig.sim_mock.smart_servo.protection import CHECK_MS, Limits, Protection
+from gazerig.sim_mock.smart_servo.protection import CHECK_MS, Limits, ServoProtection
 
 RETURN_DELAY_UNIT_S = 2e-6
 
@@ -27,7 +27,7 @@ class ServoModel(Motor, Protocol):
         ...
 
 
-class SmartServo(ABC):
+class EmulatedServo(ABC):
     """One servo on the chain. Its clock counts the chain's whole milliseconds.
 
     A make sets ``model``, ``memory``, ``drive`` and ``baud_rates`` before this class's constructor.
@@ -69,7 +69,7 @@ class SmartServo(ABC):
         self._physics = checked(Physics(*spec.physics))
         self.firmware = spec.firmware
         self.shaft = self.drive.shaft
-        self.protection = Protection(self.model, self._physics, self._limits())
+        self.protection = ServoProtection(self.model, self._physics, self._limits())
         self.on_address: Callable[[], None] = lambda: None
         self._address: object = None
         self._ms = self._booted_ms = self._deaf_until_ms = now_ms
