@@ -24,7 +24,7 @@ def stuck(**physics):
     """A servo that pushes against a jammed joint."""
     bench = Bench(**physics)
     bench.put(64, 1, 1)
-    bench.servo.hold_fast()
+    bench.servo.jam()
     bench.put(116, 4, 4000)
     return bench
 
@@ -36,7 +36,7 @@ def test_a_jammed_joint_overloads_after_its_time_and_only_a_reboot_clears_it():
     bench.at(1600)
     assert (bench.get(70), bench.get(64), bench.servo.error_flag) == (0x20, 0, 0x80)
     assert (bench.get(124, 2), bench.get(126, 2)) == (0, 0)
-    bench.servo.hold_fast(False)
+    bench.servo.jam(False)
     assert bench.put(64, 1, 1) == 0
     assert bench.get(64) == 0
     bench.servo.restart()
@@ -62,7 +62,7 @@ def test_shutdown_decides_what_takes_the_torque():
     bench = Bench()
     bench.put(63, 1, 0)
     bench.put(64, 1, 1)
-    bench.servo.hold_fast()
+    bench.servo.jam()
     bench.put(116, 4, 4000)
     bench.at(3000)
     assert (bench.get(70), bench.get(64), bench.servo.error_flag) == (0x20, 1, 0x80)

@@ -139,7 +139,7 @@ def test_live_registers_tell_the_motion():
 def test_a_joint_that_cannot_follow_reports_a_following_error():
     bench = Bench("xl330-m077", 1000)
     bench.engage(1900)
-    bench.servo.hold_fast()
+    bench.servo.jam()
     bench.now_s = 0.5
     assert bench.read(123, 1) == 0b001000
 

@@ -97,10 +97,10 @@ def test_in_one_go_or_in_steps_is_the_same(pieces, goal, later):
 
 def test_a_speed_profile_ramps_and_ends():
     made = SpeedProfile(0.0, 0.0)
-    made.aim(2.0, 0.01)
+    made.set_goal(2.0, 0.01)
     positions = made.ahead(300)
     assert made.v == 2.0 and made.running
     assert speeds(positions)[:3] == pytest.approx([0.02, 0.03, 0.04])
-    made.aim(0.0, 0.0)
+    made.set_goal(0.0, 0.0)
     assert made.ahead(2) == [positions[-1]] * 2
     assert not made.running

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.drivers.dynamixel.control_table import MODELS
-from gazerig.sim_mock.smart_servo.motor import LIMP, Loop, Shaft
+from gazerig.sim_mock.smart_servo.motor import DISABLED, Loop, Shaft
 from gazerig.sim_mock.smart_servo.physics import Physics, checked
 
 DEG = 4096.0 / 360.0
@@ -24,7 +24,7 @@ def shaft(model: str = "xl330-m077", loop: Loop = Loop(p=P, d=D), **physics) -> 
 def go(made: Shaft, goal: float, ms: int, cruise: float = 0.0, ramp: float = 0.0) -> list[float]:
     """Lead to a goal; give the position after every millisecond."""
     made.profile.by_velocity(goal, cruise, ramp)
-    made.wake()
+    made.resume()
     return run(made, ms)
 
 
@@ -47,7 +47,7 @@ def test_speed_and_stall_torque_scale_with_the_voltage():
     weak = shaft(loop=Loop(bias=1.0), supply_v=3.7, **SMOOTH)
     run(weak, 1500)
     assert weak.speed_steps_s / 4096 * 60 == pytest.approx(383 * 3.7 / 5.0, rel=1e-3)
-    weak.hold_fast(True)
+    weak.jam(True)
     weak.run(2)
     assert weak.effort == pytest.approx(0.74)
 
@@ -82,7 +82,7 @@ def test_i_removes_the_steady_error():
 
 
 def test_the_i_part_does_not_wind_up_beyond_the_limit():
-    made = shaft(loop=Loop(p=P, i=0.01, d=D, u_most=0.5), stop_high_steps=100.0)
+    made = shaft(loop=Loop(p=P, i=0.01, d=D, u_max=0.5), stop_high_steps=100.0)
     go(made, 4000, 3000)
     back = go(made, 0, 300)
     assert back[-1] < 60
@@ -113,9 +113,9 @@ def test_the_second_feed_forward_gain_shortens_the_lag_of_acceleration():
 
 
 def test_pwm_limit_and_slope_bound_the_output():
-    made = shaft(loop=Loop(p=P, d=D, u_most=0.3, slew=0.01))
+    made = shaft(loop=Loop(p=P, d=D, u_max=0.3, slew=0.01))
     made.profile.step(3000)
-    made.wake()
+    made.resume()
     before = 0.0
     for _ in range(200):
         made.run(1)
@@ -127,9 +127,9 @@ def test_pwm_limit_and_slope_bound_the_output():
 @given(limit=st.floats(0.0, 1.0), goal=st.floats(-4000, 4000), load=st.floats(-0.3, 0.3))
 @settings(max_examples=40, deadline=None)
 def test_the_current_limit_holds_always(limit, goal, load):
-    made = shaft(loop=Loop(p=4 * P, d=D, t_most=limit), load_nm=load)
+    made = shaft(loop=Loop(p=4 * P, d=D, torque_max=limit), load_nm=load)
     made.profile.step(goal)
-    made.wake()
+    made.resume()
     for _ in range(60):
         made.run(1)
         assert abs(made.effort) <= limit + 1e-12
@@ -139,7 +139,7 @@ def test_the_current_limit_holds_always(limit, goal, load):
 
 
 def test_nothing_moves_without_cause():
-    for loop in (LIMP, Loop(p=P, d=D), Loop(p=P, i=0.001, d=D)):
+    for loop in (DISABLED, Loop(p=P, d=D), Loop(p=P, i=0.001, d=D)):
         made = shaft(loop=loop)
         run(made, 3)
         assert (made.x, made.v, made.quiet) == (0.0, 0.0, True)
@@ -150,7 +150,7 @@ def test_nothing_moves_without_cause():
 def test_without_torque_friction_takes_the_speed_and_never_adds_any():
     made = shaft(loop=Loop(bias=1.0))
     run(made, 100)
-    made.let_go()
+    made.disable()
     speeds = []
     for _ in range(3000):
         made.run(1)
@@ -167,16 +167,16 @@ def test_friction_stops_a_servo_short_of_its_goal_as_real_ones():
 
 
 def test_a_load_below_friction_is_held_without_torque_and_a_larger_one_falls_to_the_stop():
-    held = shaft(loop=LIMP, load_nm=0.006)
-    falls = shaft(loop=LIMP, load_nm=0.02, stop_high_steps=500.0)
+    held = shaft(loop=DISABLED, load_nm=0.006)
+    falls = shaft(loop=DISABLED, load_nm=0.02, stop_high_steps=500.0)
     assert run(held, 1000)[-1] == 0.0
     assert run(falls, 1000)[-1] == 500.0
     assert falls.quiet and falls.v == 0.0
 
 
 def test_gravity_pulls_away_from_upright_and_back_to_hanging():
-    top = shaft(loop=LIMP, gravity_nm=0.1, upright_steps=-300.0)
-    hanging = shaft(loop=LIMP, gravity_nm=-0.1, upright_steps=-300.0)
+    top = shaft(loop=DISABLED, gravity_nm=0.1, upright_steps=-300.0)
+    hanging = shaft(loop=DISABLED, gravity_nm=-0.1, upright_steps=-300.0)
     assert run(top, 300)[-1] > 300
     assert run(hanging, 300)[-1] < -100
 
@@ -192,10 +192,10 @@ def test_stops_are_never_passed_and_a_stalled_motor_draws_its_stall_current():
 def test_a_jammed_joint_stays_until_it_is_freed():
     made = shaft()
     go(made, 100, 20)
-    made.hold_fast(True)
+    made.jam(True)
     at = made.x
     assert go(made, 1000, 200)[-1] == at
-    made.hold_fast(False)
+    made.jam(False)
     assert run(made, 500)[-1] > at + 500
 
 
@@ -215,7 +215,7 @@ def test_the_joint_lags_behind_the_encoder_by_half_the_play():
 
 
 def test_a_hand_turns_a_limp_shaft_and_a_driven_one_springs_back():
-    limp, driven = shaft(loop=LIMP), shaft()
+    limp, driven = shaft(loop=DISABLED), shaft()
     for made in (limp, driven):
         run(made, 5)
         made.turn(100.0)
@@ -260,7 +260,7 @@ def test_in_one_go_or_in_steps_is_the_same(pieces, gain, goal):
     once, often = (shaft(loop=loop, load_nm=0.02, gravity_nm=0.01) for _ in range(2))
     for made in (once, often):
         made.profile.by_velocity(goal, 3.0, 0.02)
-        made.wake()
+        made.resume()
     once.run(sum(pieces))
     for piece in pieces:
         often.run(piece)

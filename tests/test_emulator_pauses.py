@@ -97,14 +97,14 @@ def test_a_dynamixel_that_moved_and_idled_answers_and_is_there(lived_ms):
     servo = DynamixelServo(ServoSpec(1, "xl330-m077", 1000.0, physics=Physics(gravity_nm=0.01)), 0)
     servo.memory.set("torque_enable", 1)
     servo._switch(True)
-    servo.drive.aim(2000)
+    servo.drive.set_goal(2000)
     servo.advance(100, 100)
     lived_ms[0] = 0
     servo.advance(3_600_100, 100)
     assert lived_ms[0] < 5_000
     assert servo.position_steps == pytest.approx(2000, abs=20)
     # From there on it is as it always was.
-    servo.drive.aim(1500)
+    servo.drive.set_goal(1500)
     servo.advance(3_602_000, 3_600_100)
     assert servo.position_steps == pytest.approx(1500, abs=20)
 
@@ -136,7 +136,7 @@ def _led(ramp):
 
 def _spun(ramp):
     made = SpeedProfile(0.0, 0.0)
-    made.aim(2.0, ramp)
+    made.set_goal(2.0, ramp)
     return made
 
 

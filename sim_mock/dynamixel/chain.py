@@ -59,7 +59,7 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
             BULK_WRITE: lambda params: self._write_all(bulk_writes(params)),
         }
 
-    def _adopt(self, quirks: DynamixelQuirks) -> None:
+    def _apply_quirks(self, quirks: DynamixelQuirks) -> None:
         self._framing.strict = quirks.stuffing == "strict"
 
     def _obeys_broadcast(self, servo: DynamixelServo, code: int, params: bytes) -> bool:

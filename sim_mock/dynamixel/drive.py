@@ -31,7 +31,7 @@ from gazerig.sim_mock.dynamixel.modes import (
     loop_of,
 )
 from gazerig.sim_mock.smart_servo.drive import Drive
-from gazerig.sim_mock.smart_servo.motor import LIMP, flicker
+from gazerig.sim_mock.smart_servo.motor import DISABLED, flicker
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
@@ -64,17 +64,17 @@ class DynamixelDrive(Drive):
         unit = model.current_unit_ma
         # Models without a current sensor report load in 0.1 %.
         self._current_full = model.stall_current_a * 1000.0 / unit if unit else 1000.0
-        self._most = LARGEST if unit else 1000
+        self._max_current = LARGEST if unit else 1000
         super().__init__(memory, model, spec)
 
     def boot(self) -> None:
         """Begin without torque, within one turn, with goals where a mode begins."""
         self.torque = False
-        self.shaft.let_go()
+        self.shaft.disable()
         self.mode = self.memory.get("operating_mode")
-        self.locate()
+        self.wrap_to_one_turn()
         self.reset_goals()
-        self.settle()
+        self.apply_settings()
 
     # --- readings
 
@@ -99,7 +99,7 @@ class DynamixelDrive(Drive):
             return 0, 0, at
         amps, speed = flicker(now_ms, *self._noise)
         amps += round(current)
-        return max(-self._most, min(self._most, amps)), speed, at
+        return max(-self._max_current, min(self._max_current, amps)), speed, at
 
     def live(self, tick_ms: int, now_ms: int) -> Live:
         """Return what the profile does."""
@@ -123,7 +123,7 @@ class DynamixelDrive(Drive):
 
     # --- goals
 
-    def aim(self, goal: int) -> None:
+    def set_goal(self, goal: int) -> None:
         """Lead the profile to a goal position; the same goal again changes nothing."""
         shaft = self.shaft
         profile, to = shaft.profile, float(self._side * (goal - self._shift))
@@ -132,25 +132,25 @@ class DynamixelDrive(Drive):
                 profile.by_time(to, self._speed, self._ramp)
             else:
                 profile.by_velocity(to, self._speed * _SPEED_UNIT, self._ramp * _RAMP_UNIT)
-            shaft.wake()
+            shaft.resume()
 
-    def spin(self, speed: int) -> None:
+    def set_goal_velocity(self, speed: int) -> None:
         """Lead the profile to a goal velocity."""
         profile = self.shaft.profile
         if isinstance(profile, SpeedProfile):
             ramp = 0.0 if self._by_time else self._ramp * _RAMP_UNIT
-            profile.aim(self._side * speed * _SPEED_UNIT, ramp)
-            self.shaft.wake()
+            profile.set_goal(self._side * speed * _SPEED_UNIT, ramp)
+            self.shaft.resume()
 
     def halt(self) -> None:
         """Stand still under torque, here and now, until a new goal comes."""
         shaft = self.shaft
         if isinstance(shaft.profile, SpeedProfile):
-            shaft.profile.aim(0.0, 0.0)
+            shaft.profile.set_goal(0.0, 0.0)
         else:
             shaft.profile.rest(shaft.x)
-        self.settle()
-        shaft.wake()
+        self.apply_settings()
+        shaft.resume()
 
     # --- torque and mode
 
@@ -160,8 +160,8 @@ class DynamixelDrive(Drive):
         if on and not was:
             self._start()
         elif not on and was:
-            self.shaft.let_go()
-        self.settle()
+            self.shaft.disable()
+        self.apply_settings()
 
     def _start(self) -> None:
         """Let the profile begin where the shaft is, and follow the goal there is."""
@@ -169,11 +169,11 @@ class DynamixelDrive(Drive):
         self._wrap_by_itself()
         if self._quirks.goal_at_torque_on:
             self._set_goal_here()
-        self.settle()
+        self.apply_settings()
         if self.mode in POSITION_MODES:
-            self.aim(self.memory.get("goal_position"))
+            self.set_goal(self.memory.get("goal_position"))
         elif self.mode == VELOCITY:
-            self.spin(self.memory.get("goal_velocity"))
+            self.set_goal_velocity(self.memory.get("goal_velocity"))
 
     def _wrap_by_itself(self) -> None:
         """Let the position jump by a turn, as some firmware does with a homing offset."""
@@ -191,7 +191,7 @@ class DynamixelDrive(Drive):
             self.memory.set(name, gain)
         for name in ("feedforward_1st_gain", "feedforward_2nd_gain"):
             self.memory.set(name, 0)
-        self.locate()
+        self.wrap_to_one_turn()
         self.reset_goals()
 
     def reset_goals(self) -> None:
@@ -208,7 +208,7 @@ class DynamixelDrive(Drive):
 
     # --- origin
 
-    def locate(self) -> None:
+    def wrap_to_one_turn(self) -> None:
         """Bring the position into one turn, as power-on and a change of mode do."""
         self._side = -1 if self.memory.get("drive_mode") & REVERSE else 1
         self._offset = self._homing()
@@ -219,7 +219,7 @@ class DynamixelDrive(Drive):
         """Move the origin with the homing offset, or turn the direction round."""
         side = -1 if self.memory.get("drive_mode") & REVERSE else 1
         if side != self._side:
-            self.locate()
+            self.wrap_to_one_turn()
         else:
             offset = self._homing()
             self._shift += offset - self._offset
@@ -244,7 +244,7 @@ class DynamixelDrive(Drive):
         """Turn the shaft by hand, in the registers' direction."""
         self.shaft.turn(self._side * steps)
 
-    def settle(self) -> None:
+    def apply_settings(self) -> None:
         """Take over what the registers say now."""
         get = self.memory.get
         self.follows = self.torque and self.mode in POSITION_MODES
@@ -252,5 +252,5 @@ class DynamixelDrive(Drive):
         timed = get("firmware_version") >= BY_TIME_SINCE
         self._by_time = timed and bool(get("drive_mode") & BY_TIME)
         halted = self.memory.bytes[_WATCHDOG_AT] == TRIPPED
-        loop = loop_of(get, self._model, self._side) if self.torque else LIMP
+        loop = loop_of(get, self._model, self._side) if self.torque else DISABLED
         self.shaft.drive(loop._replace(bias=0.0) if halted else loop)

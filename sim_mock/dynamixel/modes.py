@@ -48,19 +48,19 @@ def loop_of(get: Get, model: Model, side: int) -> Loop:
         slew = get("pwm_slope") * PWM_SLOPE_V_MS[model.rated_v > 5.0] / model.rated_v
     limit = get("pwm_limit") / PWM_FULL
     if mode == PWM:
-        return Loop(bias=side * get("goal_pwm") / PWM_FULL, u_most=limit, slew=slew)
+        return Loop(bias=side * get("goal_pwm") / PWM_FULL, u_max=limit, slew=slew)
     limit = min(limit, abs(get("goal_pwm")) / PWM_FULL)
-    t_most = _torque_limit(get, model) if mode in (CURRENT, CURRENT_POSITION) else inf
+    torque_max = _torque_limit(get, model) if mode in (CURRENT, CURRENT_POSITION) else inf
     if mode == CURRENT:
         goal = side * get("goal_current")
         bias = FAR_BEYOND if goal > 0 else -FAR_BEYOND if goal < 0 else 0.0
-        return Loop(bias=bias, u_most=limit, t_most=t_most, slew=slew)
+        return Loop(bias=bias, u_max=limit, torque_max=torque_max, slew=slew)
     if mode == VELOCITY:
         per_step_ms = 1000.0 / VELOCITY_UNIT_STEPS_S / PWM_FULL
         return Loop(
             d=get("velocity_p_gain") / 128.0 * per_step_ms,
             vi=get("velocity_i_gain") / 65536.0 * per_step_ms,
-            u_most=limit,
+            u_max=limit,
             slew=slew,
         )
     return Loop(
@@ -69,8 +69,8 @@ def loop_of(get: Get, model: Model, side: int) -> Loop:
         d=get("position_d_gain") / 16.0 / PWM_FULL,
         f1=get("feedforward_1st_gain") / 4.0 / PWM_FULL,
         f2=get("feedforward_2nd_gain") / 4.0 / PWM_FULL,
-        u_most=limit,
-        t_most=t_most,
+        u_max=limit,
+        torque_max=torque_max,
         slew=slew,
     )
 

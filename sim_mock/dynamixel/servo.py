@@ -98,17 +98,17 @@ class DynamixelServo(EmulatedServo):
         startup = self.memory.get("startup_configuration") if self._new else 0
         if startup & RESTORES_RAM:
             self._backup.recall(self.memory, eeprom=False)
-            self._settle()
+            self._apply_settings()
         if startup & STARTS_WITH_TORQUE:
             self.memory.set("torque_enable", 1)
             self._switch(True)
 
-    def _settle(self) -> None:
+    def _apply_settings(self) -> None:
         """Apply settings that have changed."""
         shadow = self.memory.get("secondary_id")
         self.shadow_id = None if shadow >= SHADOW_OFF else shadow
-        super()._settle()
-        self._rules.settle()
+        super()._apply_settings()
+        self._rules.apply_settings()
 
     def _protect_from(self, bits: int) -> None:
         """Latch what is wrong."""
@@ -165,7 +165,7 @@ class DynamixelServo(EmulatedServo):
         if error:
             return error
         self.memory.bytes[_GOAL_AT : _GOAL_AT + _GOAL_SIZE] = data
-        self.drive.aim(value)
+        self.drive.set_goal(value)
         return 0
 
     def _act(self, name: str, value: int) -> None:
@@ -181,7 +181,7 @@ class DynamixelServo(EmulatedServo):
             drive.shift_origin()
         elif name in GOALS:
             self._command(name, value)
-        self._settle()
+        self._apply_settings()
 
     def _command(self, name: str, value: int) -> None:
         """Follow a new goal, where the mode is driven by it."""
@@ -191,9 +191,9 @@ class DynamixelServo(EmulatedServo):
             self.memory.set("torque_enable", 1)
             self._switch(True)
         elif self.torque and name == "goal_position":
-            self.drive.aim(value)
+            self.drive.set_goal(value)
         elif self.torque and name == "goal_velocity":
-            self.drive.spin(value)
+            self.drive.set_goal_velocity(value)
 
     def _switch(self, on: bool) -> None:
         """Switch the torque; a latched error keeps it off."""
@@ -247,7 +247,7 @@ class DynamixelServo(EmulatedServo):
         self._backup.recall(self.memory, eeprom=True)
         self.restart()
         self._backup.recall(self.memory, eeprom=False)
-        self._settle()
+        self._apply_settings()
         return 0
 
     # --- errors

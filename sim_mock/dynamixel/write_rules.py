@@ -28,7 +28,7 @@ class Rules:
         self._drive = drive
         self.goal_range = (0, 0)
 
-    def settle(self) -> None:
+    def apply_settings(self) -> None:
         """Take over what the registers say now."""
         get = self._memory.get
         self.goal_range = -MULTI_TURN_STEPS, MULTI_TURN_STEPS

@@ -24,9 +24,9 @@ class FeetechChain(ServoChain[FeetechServo, FeetechQuirks]):
         HIGHEST_ID, FeetechQuirks, without=("shock",), reset="id 1, 1000000 bit/s"
     )
 
-    def _adopt(self, quirks: FeetechQuirks) -> None:
+    def _apply_quirks(self, quirks: FeetechQuirks) -> None:
         for servo in self.servos:
-            servo.adopt(quirks)
+            servo.apply_quirks(quirks)
 
     def _ping_all(self) -> list[Answer]:
         """Return the answers to a ping to all as the quirks say: in order, mixed, or none."""

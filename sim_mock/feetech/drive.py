@@ -22,7 +22,7 @@ from gazerig.sim_mock.feetech.memory import FeetechMemory
 from gazerig.sim_mock.feetech.packets import signed
 from gazerig.sim_mock.feetech.tables import PWM, SERVO, STEP, WHEEL
 from gazerig.sim_mock.smart_servo.drive import Drive
-from gazerig.sim_mock.smart_servo.motor import LIMP, Loop, flicker
+from gazerig.sim_mock.smart_servo.motor import DISABLED, Loop, flicker
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
@@ -41,7 +41,7 @@ GOALS = {"little": struct.Struct("<BHHH"), "big": struct.Struct(">BHHH")}
 DAMPED = 2
 """Torque (40): the windings are shorted, which brakes."""
 
-BRAKED = Loop(u_most=0.0)
+BRAKED = Loop(u_max=0.0)
 P_SHARE, I_SHARE, D_SHARE = 1 / 1600, 1 / 1.6e6, 1 / 64
 SPEED_P_SHARE, SPEED_I_SHARE = 1 / 50, 1 / 40_000
 """What a unit of each gain makes of steps, steps times ms, and steps/ms: shares of full duty."""
@@ -78,13 +78,13 @@ class FeetechDrive(Drive):
     def boot(self) -> None:
         """Begin without torque, within one turn."""
         self.torque = self.damped = False
-        self.most = 1.0
+        self.max_duty = 1.0
         self.mode = self._wanted_mode()
-        self._asked: tuple[int, ...] = ()
+        self._goals_followed: tuple[int, ...] = ()
         self._offset = self.memory.get("position_offset")
-        self.shaft.let_go()
-        self._locate()
-        self.settle()
+        self.shaft.disable()
+        self._wrap_to_one_turn()
+        self.apply_settings()
 
     # --- readings
 
@@ -126,7 +126,7 @@ class FeetechDrive(Drive):
 
     # --- settings
 
-    def settle(self) -> None:
+    def apply_settings(self) -> None:
         """Take over what the registers say now."""
         get = self.memory.get
         phase, low, high = get("phase"), get("min_position_limit"), get("max_position_limit")
@@ -141,10 +141,10 @@ class FeetechDrive(Drive):
             self._shift += self._offset - offset
             self._offset = offset
             if not self.counts_turns:
-                self._locate()
+                self._wrap_to_one_turn()
         if self._wanted_mode() != self.mode:
             self._change_mode(self._wanted_mode())
-        self.tune()
+        self.apply_gains()
 
     def _wanted_mode(self) -> int:
         """Return the mode of its register, or of its limits where a series has none."""
@@ -153,26 +153,26 @@ class FeetechDrive(Drive):
             return PWM
         return get("operating_mode")
 
-    def tune(self) -> None:
+    def apply_gains(self) -> None:
         """Take over gains, torque limit and, in mode PWM, the duty."""
-        self.shaft.drive(self._loop() if self.torque else BRAKED if self.damped else LIMP)
+        self.shaft.drive(self._loop() if self.torque else BRAKED if self.damped else DISABLED)
 
     def _loop(self) -> Loop:
         get = self.memory.get
-        most = min(get("torque_limit") / FULL, self.most, 1.0)
+        most = min(get("torque_limit") / FULL, self.max_duty, 1.0)
         if self.mode == PWM:
-            return Loop(bias=signed(get("goal_time"), 10) / FULL, u_most=most)
+            return Loop(bias=signed(get("goal_time"), 10) / FULL, u_max=most)
         if self.mode == WHEEL:
             damping, sum_up = (
                 SPEED_P_SHARE * get("velocity_p_gain"),
                 SPEED_I_SHARE * get("velocity_i_gain"),
             )
-            return Loop(d=damping, vi=sum_up, u_most=most)
+            return Loop(d=damping, vi=sum_up, u_max=most)
         return Loop(
             p=P_SHARE * get("position_p_gain"),
             i=I_SHARE * get("position_i_gain"),
             d=D_SHARE * get("position_d_gain"),
-            u_most=most,
+            u_max=most,
         )
 
     def _change_mode(self, mode: int) -> None:
@@ -190,25 +190,25 @@ class FeetechDrive(Drive):
         self.damped = value == DAMPED
         if self.torque and not was:
             if not self.counts_turns:
-                self._locate()
+                self._wrap_to_one_turn()
             if from_here:
                 self._set_goal_here()
             self._begin()
         elif was and not self.torque:
-            self.shaft.let_go()
-        self.tune()
+            self.shaft.disable()
+        self.apply_gains()
 
     def _begin(self) -> None:
         """Let a profile begin where the shaft is."""
-        self._asked = ()
+        self._goals_followed = ()
         self._lead_from_here(self.mode == WHEEL)
-        self.tune()
+        self.apply_gains()
         if self.mode != STEP:
             self.follow()
 
     # --- goals
 
-    def timed(self, obeyed: bool) -> None:
+    def obey_goal_time(self, obeyed: bool) -> None:
         """Choose whether Goal Time means anything."""
         self._timed = obeyed
 
@@ -220,25 +220,25 @@ class FeetechDrive(Drive):
         profile = self.shaft.profile
         if isinstance(profile, SpeedProfile):
             speed = signed(asked[3], 15) * self._speed_unit / self._scale / 1000.0
-            profile.aim(max(-self._top, min(self._top, speed)), asked[0] * RAMP_UNIT)
-            self.shaft.wake()
+            profile.set_goal(max(-self._top, min(self._top, speed)), asked[0] * RAMP_UNIT)
+            self.shaft.resume()
         elif self.mode == PWM:
-            self.tune()
+            self.apply_gains()
         elif self.mode == SERVO:
-            place = self._place(signed(asked[1], 15))
-            if asked != self._asked or place != profile.goal:
-                self._asked = asked
-                self._lead(profile, place, asked)
+            place = self._goal_of_shaft(signed(asked[1], 15))
+            if asked != self._goals_followed or place != profile.goal:
+                self._goals_followed = asked
+                self._plan_path(profile, place, asked)
         elif self.mode == STEP and new_goal:
-            self._lead(profile, profile.goal + signed(asked[1], 15) / self._scale, asked)
+            self._plan_path(profile, profile.goal + signed(asked[1], 15) / self._scale, asked)
 
-    def _place(self, goal: int) -> float:
+    def _goal_of_shaft(self, goal: int) -> float:
         """Return where a goal position is, within the limits."""
         if self._range is not None:
             goal = max(self._range[0], min(self._range[1], goal))
         return goal / self._scale - self._shift
 
-    def _lead(self, profile: PositionProfile, to: float, asked: tuple[int, ...]) -> None:
+    def _plan_path(self, profile: PositionProfile, to: float, asked: tuple[int, ...]) -> None:
         """Lead the profile to a place, in a time or at goal speed and acceleration."""
         ramp, _, time_ms, speed = asked
         cruise = abs(signed(speed, 15)) * self._speed_unit / self._scale / 1000.0
@@ -248,11 +248,11 @@ class FeetechDrive(Drive):
             profile.by_time(to, time_ms, 0.0)
         else:
             profile.by_velocity(to, min(cruise or self._top, self._top), ramp * RAMP_UNIT)
-        self.shaft.wake()
+        self.shaft.resume()
 
     # --- origin
 
-    def _locate(self) -> None:
+    def _wrap_to_one_turn(self) -> None:
         """Bring the position into one turn, as power-on does."""
         turns = 0 if self._last is not None else (self.shaft.x - self._offset) // TURN
         self._shift = -self._offset - int(turns) * TURN
@@ -263,12 +263,12 @@ class FeetechDrive(Drive):
             return
         offset = (round(self.shaft.x) - to + TURN // 2) % TURN - TURN // 2
         self.memory.keep("position_offset", offset)
-        self.settle()
+        self.apply_settings()
         self._set_goal_here()
 
     def forget_turns(self) -> None:
         """Begin to count turns anew; under torque it stays where it is."""
-        self._locate()
+        self._wrap_to_one_turn()
         self._set_goal_here()
         if self.torque:
             self._begin()

@@ -59,7 +59,7 @@ class FeetechServo(EmulatedServo):
         self.baud_rates = self.table.baud_rates
         self.memory = FeetechMemory(self.model, spec.id, spec.firmware, self.table)
         self.drive = FeetechDrive(self.memory, self.model, spec)
-        self.adopt(FeetechQuirks())
+        self.apply_quirks(FeetechQuirks())
         super().__init__(spec, now_ms)
 
     def _load_limits(self) -> tuple[float, ...]:
@@ -72,15 +72,15 @@ class FeetechServo(EmulatedServo):
             get("overcurrent_time") * TIME_UNIT_S,
         )
 
-    def adopt(self, quirks: FeetechQuirks) -> None:
+    def apply_quirks(self, quirks: FeetechQuirks) -> None:
         """Do from now on what these quirks say."""
         self.quirks = quirks
         self.mute_reboot = quirks.reboot == "mute"
-        self.drive.timed(quirks.goal_time == "obey")
+        self.drive.obey_goal_time(quirks.goal_time == "obey")
 
-    def _settle(self) -> None:
+    def _apply_settings(self) -> None:
         """Apply settings that have changed."""
-        super()._settle()
+        super()._apply_settings()
         self.answers_groups = self.table.sync_read
         self.drive.follow()
         self._protect()
@@ -100,8 +100,8 @@ class FeetechServo(EmulatedServo):
         if wrong & ~OVERLOAD and drive.torque:
             self.memory.set("torque_enable", 0)
             drive.switch(0, False)
-        drive.most = self.memory.get("protective_torque") / 100.0 if wrong & OVERLOAD else 1.0
-        drive.tune()
+        drive.max_duty = self.memory.get("protective_torque") / 100.0 if wrong & OVERLOAD else 1.0
+        drive.apply_gains()
 
     # --- reading
 
@@ -151,11 +151,11 @@ class FeetechServo(EmulatedServo):
         if not written:
             return 0
         if written[0] < EEPROM_END or written[-1] >= FACTORY_AT:
-            self._settle()
+            self._apply_settings()
         if TORQUE_AT in written:
             self._switch(memory.get("torque_enable"))
         if written[0] < LIMIT_END and written[-1] >= GOALS_AT:
-            self.drive.tune()
+            self.drive.apply_gains()
             self._command(GOAL_AT in written, goal)
         return 0
 

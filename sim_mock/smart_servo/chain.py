@@ -80,7 +80,7 @@ class ServoChain(Generic[S, Q]):
         }
         for servo in self.servos:
             servo.on_address = self._readdressed
-        self._adopt(self.quirks)
+        self._apply_quirks(self.quirks)
         self.refresh()
 
     # --- who is there
@@ -127,7 +127,7 @@ class ServoChain(Generic[S, Q]):
             twin.memory.keep(name, first.memory.get(name))
         twin.on_address = self._readdressed
         self.servos = (*self.servos, twin)
-        self._adopt(self.quirks)
+        self._apply_quirks(self.quirks)
         self.refresh()
 
     def choose(self, case: str, value: str) -> None:
@@ -144,7 +144,7 @@ class ServoChain(Generic[S, Q]):
             return
         self.quirks = decided(self.quirks, case, value)
         self._framing.gap_s = self.quirks.packet_gap_s
-        self._adopt(self.quirks)
+        self._apply_quirks(self.quirks)
 
     def positions_steps(self) -> tuple[float, ...]:
         """Return the true positions now, in the order of ``servos``."""
@@ -160,7 +160,7 @@ class ServoChain(Generic[S, Q]):
         """Build a status packet."""
         raise NotImplementedError
 
-    def _adopt(self, quirks: Q) -> None:
+    def _apply_quirks(self, quirks: Q) -> None:
         """Do from now on what these quirks say."""
 
     def _obeys_broadcast(self, servo: S, code: int, params: bytes) -> bool:
@@ -231,7 +231,7 @@ class ServoChain(Generic[S, Q]):
         own = self.status(answer[0], answer[1], answer[2])
         return own if answer.twin is None else merge(own, self._packet(answer.twin))
 
-    def _silent(self, servo_id: int) -> bool:
+    def _is_muted(self, servo_id: int) -> bool:
         """True if a fault keeps this servo from answering."""
         return self._wire.any and self._wire.take("lose", servo_id, self._now_s) is not None
 
@@ -248,7 +248,7 @@ class ServoChain(Generic[S, Q]):
         for shadow in shadows:
             if self._for_shadows(code, params):
                 self._answer(shadow, code, params)
-        return None if answer is None or self._silent(servo_id) else answer
+        return None if answer is None or self._is_muted(servo_id) else answer
 
     def _answer(self, servo: S, code: int, params: bytes) -> Answer | None:
         """Let one servo carry out an instruction; return its answer, None where it is silent."""
@@ -274,7 +274,7 @@ class ServoChain(Generic[S, Q]):
         answer = None if servo is None else self._seen(servo, address, length)
         for twin in self._twins.get(servo_id, ()) if self._twins else ():
             answer = _both(answer, self._seen(twin, address, length))
-        return None if answer is None or self._silent(servo_id) else answer
+        return None if answer is None or self._is_muted(servo_id) else answer
 
     def _seen(self, servo: S, address: int, length: int) -> Answer | None:
         if not servo.advance(self._now_ms, self._fed_ms) or not servo.answers_groups:

@@ -49,7 +49,7 @@ class Drive(ABC):
         """Begin as after power-on: without torque, within one turn."""
 
     @abstractmethod
-    def settle(self) -> None:
+    def apply_settings(self) -> None:
         """Apply what the registers say now."""
 
     @property

@@ -71,12 +71,12 @@ class Loop(NamedTuple):
     f1: float = 0.0
     f2: float = 0.0
     bias: float = 0.0
-    u_most: float = 1.0
-    t_most: float = inf
+    u_max: float = 1.0
+    torque_max: float = inf
     slew: float = inf
 
 
-LIMP = Loop(u_most=0.0, t_most=0.0)
+DISABLED = Loop(u_max=0.0, torque_max=0.0)
 
 PAUSE_MS = 10_000
 """A time without any packet that is longer is not lived through millisecond by millisecond."""
@@ -148,7 +148,7 @@ class Shaft:
         self._play = physics.play_deg * STEPS_PER_TURN / 720.0
         self._sag = min(SAG_MOST, physics.supply_ohm * model.stall_current_a / model.rated_v)
         self.supply = self.volts = (physics.supply_v or model.rated_v) / model.rated_v
-        self._loop = LIMP
+        self._loop = DISABLED
         self._held = False
         self.profile: PositionProfile | SpeedProfile = PositionProfile(position_steps)
         self.place(position_steps)
@@ -163,7 +163,7 @@ class Shaft:
         if isinstance(self.profile, PositionProfile):
             self.profile.rest(x)
         if self._held:
-            self.hold_fast(True)
+            self.jam(True)
         self.quiet = False
 
     def turn(self, steps: float) -> None:
@@ -171,13 +171,13 @@ class Shaft:
         self.x = min(max(self.x + steps, self._low), self._high)
         self.quiet = False
 
-    def hold_fast(self, stuck: bool) -> None:
+    def jam(self, stuck: bool) -> None:
         """Jam the joint where it is, or free it."""
         self._held = stuck
         self._low, self._high = (self.x, self.x) if stuck else self._low_high
         self.quiet = False
 
-    def pull(self, share: float) -> None:
+    def set_load(self, share: float) -> None:
         """Set the constant torque on the joint as a share of the stall torque."""
         self._load = self._accel * share
         self.quiet = False
@@ -193,10 +193,10 @@ class Shaft:
         """Take over what the controller is set to."""
         if loop != self._loop:
             self._loop = loop
-            self._integral = max(-loop.u_most, min(loop.u_most, self._integral))
+            self._integral = max(-loop.u_max, min(loop.u_max, self._integral))
             self.quiet = False
 
-    def wake(self) -> None:
+    def resume(self) -> None:
         """Go on after the profile was given something new."""
         self.quiet = False
 
@@ -206,9 +206,9 @@ class Shaft:
         self._rv = self._integral = 0.0
         self.quiet = False
 
-    def let_go(self) -> None:
+    def disable(self) -> None:
         """Switch off: the motor has no current and does not brake."""
-        self.drive(LIMP)
+        self.drive(DISABLED)
         self.profile = PositionProfile(self.x)
         self.u = self.effort = self._integral = 0.0
         self.quiet = False
@@ -218,14 +218,14 @@ class Shaft:
         if self.quiet or ticks <= 0:
             return
         loop, profile = self._loop, self.profile
-        kp, ki, kd, vi, f1, kf2, bias, u_most, t_most, slew = loop
+        kp, ki, kd, vi, f1, kf2, bias, u_max, torque_max, slew = loop
         x, v, u, t, i, joint = self.x, self.v, self.u, self.effort, self._integral, self.joint
         was = x, u, i, joint, self.volts
         accel, drag, free, dry, rate = self._accel, self._drag, self._free, self._dry, self._rate
         load, gravity, play = self._load, self._gravity, self._play
         low, high, supply, sag, volts = self._low, self._high, self.supply, self._sag, self.volts
         before, rv = profile.r, self._rv
-        u_least = -u_most
+        u_least = -u_max
         integrating = ki != 0.0 or vi != 0.0
         path = profile.ahead(ticks)
         # Where there is no speed to follow, D brakes only.
@@ -254,31 +254,31 @@ class Shaft:
                 v = 0.0
             earlier = u
             u = c - k * v
-            clipped = not (u_least <= u <= u_most and -slew <= u - earlier <= slew)
+            clipped = not (u_least <= u <= u_max and -slew <= u - earlier <= slew)
             if clipped:
                 if u > earlier:
                     u = earlier + slew if u > earlier + slew else u
                 else:
                     u = earlier - slew if u < earlier - slew else u
-                u = u_most if u > u_most else u_least if u < u_least else u
+                u = u_max if u > u_max else u_least if u < u_least else u
                 w = pull + push * u
                 v = (w - dry) / drag if w > dry else (w + dry) / drag if w < -dry else 0.0
             t = u * volts - v * rate
-            if not -t_most <= t <= t_most:
+            if not -torque_max <= t <= torque_max:
                 clipped = True
-                t = t_most if t > t_most else -t_most
+                t = torque_max if t > torque_max else -torque_max
                 w = pull + accel * t
                 v = (w - dry) / free if w > dry else (w + dry) / free if w < -dry else 0.0
-                u = (t + v * rate) / volts if volts > 0.0 and t_most > 0.0 else 0.0
+                u = (t + v * rate) / volts if volts > 0.0 and torque_max > 0.0 else 0.0
             x += v
             if not low <= x <= high:
                 x = high if x > high else low
                 v = 0.0
-                u = min(max(c, earlier - slew, u_least), earlier + slew, u_most)
+                u = min(max(c, earlier - slew, u_least), earlier + slew, u_max)
                 t = u * volts
-                if t > t_most or t < -t_most:
-                    t = t_most if t > t_most else -t_most
-                    u = t / volts if volts > 0.0 and t_most > 0.0 else 0.0
+                if t > torque_max or t < -torque_max:
+                    t = torque_max if t > torque_max else -torque_max
+                    u = t / volts if volts > 0.0 and torque_max > 0.0 else 0.0
             power = u * t
             volts = supply - sag * power if power > 0.0 else supply
             if integrating and not clipped:
@@ -286,10 +286,10 @@ class Shaft:
                     i += vi * (rv - v)
                 elif r - x > RESOLUTION or x - r > RESOLUTION:
                     i += ki * (r - x)
-                if i > u_most:
-                    i = u_most
-                elif i < -u_most:
-                    i = -u_most
+                if i > u_max:
+                    i = u_max
+                elif i < -u_max:
+                    i = -u_max
             if not -play <= x - joint <= play:
                 joint = x - play if x > joint else x + play
         self._rv = rv

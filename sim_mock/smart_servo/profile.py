@@ -172,7 +172,7 @@ class SpeedProfile:
         self.kind = STEP
         self.running = False
 
-    def aim(self, speed: float, ramp: float) -> None:
+    def set_goal(self, speed: float, ramp: float) -> None:
         """Lead to a speed (steps/ms) with a ramp (steps/ms2, 0: at once)."""
         self.goal = speed
         self._ramp = ramp

@@ -34,7 +34,7 @@ class Limits(NamedTuple):
     current_s: float = inf
 
 
-def warmed(now_c: float, final_c: float, thermal_s: float, checks: int) -> float:
+def temperature_after(now_c: float, final_c: float, thermal_s: float, checks: int) -> float:
     """Return the temperature of a motor after some checks; up to a minute as one by one."""
     share = CHECK_S / thermal_s
     if checks * CHECK_S > 60.0:
@@ -69,7 +69,9 @@ class ServoProtection:
         """
         physics, limits = self._physics, self.limits
         target = self.ambient_c + physics.stall_rise_c * effort * effort
-        self.temperature_c = warmed(self.temperature_c, target, physics.thermal_s, checks)
+        self.temperature_c = temperature_after(
+            self.temperature_c, target, physics.thermal_s, checks
+        )
         effort = abs(effort)
         heavy = effort > 0.0 and effort >= limits.overload_share * volts - 1e-11
         self._heavy_checks = self._heavy_checks + checks if heavy else 0

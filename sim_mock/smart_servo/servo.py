@@ -84,9 +84,9 @@ class EmulatedServo(ABC):
         self.errors = 0
         self.protection.restart()
         self.drive.boot()
-        self._settle()
+        self._apply_settings()
 
-    def _settle(self) -> None:
+    def _apply_settings(self) -> None:
         """Apply settings that have changed."""
         get = self.memory.get
         self._calm = False
@@ -94,7 +94,7 @@ class EmulatedServo(ABC):
         self.status_level = get("status_return_level")
         self.answers_groups = self.status_level >= self.read_level
         self.protection.limits = self._limits()
-        self.drive.settle()
+        self.drive.apply_settings()
         address = self.id, self.baud, self.return_delay_s, self.shadow_id
         if address != self._address:
             self._address = address
@@ -243,7 +243,7 @@ class EmulatedServo(ABC):
             known = ", ".join(map(str, self.baud_rates))
             raise ValueError(f"baud {baud}: {self.model.name} knows {known}")
         self.memory.keep("baud_rate", self.baud_rates.index(baud))
-        self._settle()
+        self._apply_settings()
 
     # --- from outside
 
@@ -294,13 +294,13 @@ class EmulatedServo(ABC):
         """Turn the joint by hand, in the registers' direction; under torque it fights back."""
         self.drive.turn(steps)
 
-    def hold_fast(self, stuck: bool = True) -> None:
+    def jam(self, stuck: bool = True) -> None:
         """Jam the joint where it is, or free it."""
-        self.shaft.hold_fast(stuck)
+        self.shaft.jam(stuck)
 
-    def pull(self, load_nm: float) -> None:
+    def set_load(self, load_nm: float) -> None:
         """Hang a constant torque on the joint, as a spring or a cable does, from now on."""
-        self.shaft.pull(load_nm / self.model.stall_torque_nm)
+        self.shaft.set_load(load_nm / self.model.stall_torque_nm)
 
     @property
     def supply_v(self) -> float:
