@@ -71,7 +71,7 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
         assert np.unique(found.picture).tolist() == [10 * k]
         assert np.unique(found.depth_m).tolist() == [0.5 + k]
         assert not found.picture.flags.writeable and not found.depth_m.flags.writeable
-        assert found.lens == (60.0, 60.0, 32.0, 24.0)
+        assert found.lens == Intrinsics(60.0, 60.0, 32.0, 24.0)
         assert before_s < found.captured_s <= time.monotonic()
         numbers.add(found.number)
         time.sleep(0.01)
