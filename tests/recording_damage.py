@@ -25,7 +25,7 @@ from gazerig.robot.recording.gaze_angles import trace_of
 from gazerig.robot.recording.read import RunRecording, used
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
-from gazerig.robot.recording.snapshot_index import Frames
+from gazerig.robot.recording.snapshot_index import SnapshotIndex
 
 HEAD = 9
 
@@ -169,7 +169,7 @@ def _exported(file: Path) -> object:
 def _shown(file: Path) -> object:
     with used(file):
         found = RunRecording(file)
-        frames = Frames(found.ticks(), found.pictures(), found.info.rate_hz)
+        frames = SnapshotIndex(found.ticks(), found.pictures(), found.info.rate_hz)
     try:
         return len(frames)
     finally:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gazerig.robot.perception.data_association import FORBIDDEN, likeliest_pairs
+from gazerig.robot.perception.data_association import FORBIDDEN, assign
 
 PRICES = st.sampled_from([0.0, 1.0, 2.5, 7.0, FORBIDDEN])
 COSTS = st.tuples(st.integers(1, 4), st.integers(1, 4)).flatmap(
@@ -29,7 +29,7 @@ def cheapest(costs: np.ndarray) -> tuple[int, float]:
 
 @given(COSTS)
 def test_as_many_as_can_be_for_the_least(costs: np.ndarray) -> None:
-    pairs = likeliest_pairs(costs)
+    pairs = assign(costs)
     most, least = cheapest(costs)
     assert len(pairs) == most
     assert sum(costs[i, j] for i, j in pairs) == least
@@ -37,6 +37,6 @@ def test_as_many_as_can_be_for_the_least(costs: np.ndarray) -> None:
 
 
 def test_nobody_and_nothing_are_no_pairs() -> None:
-    assert likeliest_pairs(np.zeros((0, 3))) == likeliest_pairs(np.zeros((2, 0))) == []
-    assert likeliest_pairs(np.zeros((0,))) == []
-    assert likeliest_pairs(np.full((2, 2), FORBIDDEN)) == []
+    assert assign(np.zeros((0, 3))) == assign(np.zeros((2, 0))) == []
+    assert assign(np.zeros((0,))) == []
+    assert assign(np.full((2, 2), FORBIDDEN)) == []

@@ -11,7 +11,7 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
 from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.analysis.behaviour_score import Behaviours
+from gazerig.robot.analysis.behaviour_score import BehaviourScore
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
@@ -38,7 +38,7 @@ def scored(
     seconds: float = 10.0,
     first_s: float = 5.0,
 ) -> dict[str, dict[str, float | int | None]]:
-    score = Behaviours(events, 10.0)
+    score = BehaviourScore(events, 10.0)
     for slot in range(round(seconds * 200) + 1):
         score.note(tick(first_s + slot * 0.005, *looks(slot * 0.005)))
     return score.figures()
@@ -105,7 +105,7 @@ class Lived:
     """A scene as a robot lived through it: its ticks, and the scene's time of each."""
 
     def __init__(self, made: Assembly, scene: Scene, seconds: float) -> None:
-        self.score = Behaviours(scene.events(), scene.round_s)
+        self.score = BehaviourScore(scene.events(), scene.round_s)
         self.scene_s: list[float] = []
         self.ticks: list[Tick] = []
         self._scene, self._top_down = scene, made.robot.attention.top_down

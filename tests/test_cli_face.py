@@ -27,7 +27,7 @@ from gazerig.robot.app.run_observers import only_stops
 from gazerig.robot.cli import calibrate_face as cli_face
 from gazerig.robot.cli.calibrate_group import app
 from gazerig.robot.cli.key_input import BUTTONS, PageKeys, key_and_count, keys_of
-from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Resume, Stop
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 ROOT = Path(__file__).parents[1]
@@ -383,7 +383,7 @@ def test_what_is_on_the_buttons_is_what_keys_there_are() -> None:
 
 
 def test_while_buttons_lead_the_page_can_only_stop_and_resume() -> None:
-    given: list[Order] = []
+    given: list[Command] = []
     order = only_stops(given.append)
     order(Stop("a test"))
     order(Resume())

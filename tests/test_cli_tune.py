@@ -28,7 +28,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.cli.entry_point import QUICK, is_quick
 from gazerig.robot.cli.entry_point import main as quick_main
 from gazerig.robot.cli.lead import app as lead_app
@@ -37,8 +37,8 @@ from gazerig.robot.cli.tune import app, read_pairs, read_value, state_lines
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.loop import run as run_loop
 from gazerig.robot.model import stop_latch
-from gazerig.robot.remote.client import RunningRig, running
-from gazerig.robot.remote.live_server import LiveControl
+from gazerig.robot.remote.client import RobotClient, running
+from gazerig.robot.remote.live_server import LiveServer
 
 GAZERIG = (
     "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.entry_point import main; main()"
@@ -60,8 +60,8 @@ def serve(path: Path) -> None:
         print(line, file=sys.stderr, flush=True)
 
     about = {"rig": str(path), "pid": os.getpid()}
-    tuning = Tuning(made.live, robot.order, str(path))
-    live = LiveControl(robot, tuning, (ConfigError,), made.clock, about, say)
+    tuning = ParamStore(made.live, robot.order, str(path))
+    live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, say)
 
     def watch(tick: Tick) -> None:
         live.note(tick)
@@ -131,7 +131,7 @@ def rig() -> Iterator[Running]:
 def as_before(rig: Running, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(rig.path.parent))
     yield
-    with RunningRig.connect(rig.process.pid) as found:
+    with RobotClient.connect(rig.process.pid) as found:
         found.revert()
         found.resume(confirmed=True)
         found.look_freely()
@@ -167,7 +167,7 @@ def whole_gazerig(*words: str, **environ: str) -> Done:
 
 
 def held(key: str) -> Any:
-    with RunningRig.connect() as rig:
+    with RobotClient.connect() as rig:
         return rig.get(key)[key]
 
 
@@ -280,11 +280,11 @@ def test_revert_tells_what_it_takes_back() -> None:
 def test_stop_and_resume() -> None:
     done = gazerig("stop", "finger")
     assert done.returncode == 0 and "torque is off" in done.stderr
-    with RunningRig.connect() as rig:
+    with RobotClient.connect() as rig:
         assert rig.status()["stopped"] == "finger"
     unsure = gazerig("resume")  # nobody there to say that no hand is in it
     assert unsure.returncode != 0 and "no hand" in unsure.stdout + unsure.stderr
-    with RunningRig.connect() as rig:
+    with RobotClient.connect() as rig:
         assert rig.status()["stopped"] == "finger"
     assert gazerig("resume", "--yes").returncode == 0
     assert "nothing to resume" in gazerig("resume").stderr
@@ -325,7 +325,7 @@ def a_rig_beside() -> Iterator[subprocess.Popen[str]]:
 def test_look_and_character() -> None:
     done = gazerig("look", "1", "-0.2", "0.3", "--stay")
     assert done.returncode == 0 and "it looks there, until: gazerig look free" in done.stderr
-    with RunningRig.connect() as rig:
+    with RobotClient.connect() as rig:
         assert rig.status()["why"] == "somebody chose this point"
     assert gazerig("look", "free").returncode == 0
     done = gazerig("look", "there")
@@ -336,7 +336,7 @@ def test_look_and_character() -> None:
 
 
 def test_ask_lists_the_menus_and_chooses_from_them() -> None:
-    with RunningRig.connect() as rig:
+    with RobotClient.connect() as rig:
         present, *others = rig.menus()["conversation"]
     lines = gazerig("ask").stdout.splitlines()
     assert any(line.startswith("behaviour: ") for line in lines)
@@ -367,7 +367,7 @@ def test_what_cannot_be_asked_for_is_refused_with_what_can(
 
 def test_status_says_what_the_rig_does() -> None:
     said = gazerig("status").stdout
-    with RunningRig.connect() as rig:
+    with RobotClient.connect() as rig:
         assert f"rig: {rig.status()['rig']}, process {rig.pid}\n" in said
     assert "looks at: " in said and "guard: " in said and "neck_yaw" in said
     assert "all saved" in said and "STOPPED" not in said
@@ -383,7 +383,7 @@ def test_a_rig_that_has_just_begun_or_is_held_up_says_so() -> None:
     begun = {"rig": "desk", "pid": 7, "ticks": 0, "stopped": "", "said": []}
     assert state_lines(begun) == ["rig: desk, process 7", "it has just been started: nothing is "
                                   "known yet"]  # fmt: skip
-    with RunningRig.connect() as rig:
+    with RobotClient.connect() as rig:
         now = rig.status()
     assert not any("held up" in line for line in state_lines({**now, "age_s": 0.1}))
     assert "the loop is held up: what follows is 2.5 s old" in state_lines({**now, "age_s": 2.5})

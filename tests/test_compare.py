@@ -20,8 +20,8 @@ from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import chance, compare, corrected, differences_of
 from gazerig.robot.report.norm_bands import BY_KEY
-from gazerig.robot.report.run_header import About
-from gazerig.robot.report.statistics import Measured, mean, median
+from gazerig.robot.report.run_header import RunHeader
+from gazerig.robot.report.statistics import MeasuredValue, mean, median
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -29,9 +29,9 @@ SECONDS = 16.0
 DICE = np.random.default_rng(11)
 
 
-def rates(mean_s: float, count: int, seed: int) -> Measured:
+def rates(mean_s: float, count: int, seed: int) -> MeasuredValue:
     dice = np.random.default_rng(seed)
-    return Measured("visit", dice.lognormal(np.log(mean_s), 0.6, count), mean)
+    return MeasuredValue("visit", dice.lognormal(np.log(mean_s), 0.6, count), mean)
 
 
 def test_what_differs_is_more_than_chance() -> None:
@@ -51,21 +51,21 @@ def test_the_same_is_chance_nineteen_times_of_twenty() -> None:
 
 
 def test_another_spread_is_found_where_the_middle_is_the_same() -> None:
-    narrow = Measured("vergence", DICE.normal(0.0, 0.1, 300), median)
-    wide = Measured("vergence", DICE.normal(0.0, 0.6, 300), median)
+    narrow = MeasuredValue("vergence", DICE.normal(0.0, 0.1, 300), median)
+    wide = MeasuredValue("vergence", DICE.normal(0.0, 0.6, 300), median)
     (found,) = differences_of([narrow], [wide])
     assert found.chance_shape < 0.001 and found.word == "more than chance"
 
 
 def test_too_few_events_tell_nothing() -> None:
-    few = Measured("visit", np.full(BY_KEY["visit"].least - 1, 9.0), mean)
+    few = MeasuredValue("visit", np.full(BY_KEY["visit"].least - 1, 9.0), mean)
     (found,) = differences_of([few], [rates(0.3, 200, 1)])
     assert found.word == "too few events" and np.isnan(found.difference)
-    assert differences_of([few], [Measured("rate", np.ones(40), mean)]) == ()
+    assert differences_of([few], [MeasuredValue("rate", np.ones(40), mean)]) == ()
 
 
 def test_dealing_out_again_gives_the_chance_of_a_known_case() -> None:
-    a, b = Measured("visit", np.zeros(4), mean), Measured("visit", np.ones(4), mean)
+    a, b = MeasuredValue("visit", np.zeros(4), mean), MeasuredValue("visit", np.ones(4), mean)
     # of the 70 ways to deal 8 events out, 2 are as extreme
     assert chance(a, b, np.random.default_rng(0)) == pytest.approx(2 / 70, abs=0.012)
     assert chance(a, a, np.random.default_rng(0)) == 1.0
@@ -144,7 +144,7 @@ def test_a_run_against_itself_differs_in_nothing(
     soft: Path, few_drawings: int, tmp_path: Path
 ) -> None:
     ticks = list(RunRecording(soft).ticks())
-    abouts = About("this", duration_s=SECONDS), About("again", duration_s=SECONDS)
+    abouts = RunHeader("this", duration_s=SECONDS), RunHeader("again", duration_s=SECONDS)
     told: list[str] = []
     found = compare(
         (ticks, ticks), abouts, tmp_path / "same.html", lambda words, share: told.append(words)

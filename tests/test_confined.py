@@ -10,8 +10,8 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import Tuning
-from gazerig.robot.dashboard.request_handler import PageHear
+from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.dashboard.request_handler import PageRequestHandler
 
 
 @pytest.fixture
@@ -58,8 +58,8 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig = home / "mine.yaml"
     rig.write_text(Path("config/rigs/desk.yaml").read_text(encoding="utf-8"), encoding="utf-8")
     made = assemble(load_rig(str(rig)), RunOptions(True, True, 0, "visitor"))
-    tuning = Tuning(made.live, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
-    hear = PageHear(
+    tuning = ParamStore(made.live, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
+    hear = PageRequestHandler(
         made.robot.order, tuning, refusals=(ConfigError,), confined=tuning.confined
     )  # fmt: skip
     before = sorted(os.listdir(tmp_path))

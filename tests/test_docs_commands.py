@@ -16,7 +16,7 @@ from command_line import options, parse, typed
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, each_of_papers, spans
 
 from gazerig.robot.control.loop import Robot
-from gazerig.robot.remote.client import RunningRig
+from gazerig.robot.remote.client import RobotClient
 from gazerig.sim_mock.dynamixel.chain import DynamixelChain
 from gazerig.sim_mock.feetech.chain import FeetechChain
 from gazerig.sim_mock.maestro.faults import COMMANDS as MAESTRO
@@ -179,7 +179,7 @@ def test_python_of_a_paper_imports_what_there_is(block: Block) -> None:
             case ast.Attribute(ast.Name(name), attribute) if name in here:
                 assert hasattr(here[name], attribute), ast.unparse(node)
             case ast.Call(ast.Attribute(ast.Name("rig"), method), args, keywords):
-                call = inspect.signature(getattr(RunningRig, method))
+                call = inspect.signature(getattr(RobotClient, method))
                 call.bind(None, *args, **{str(k.arg): k.value for k in keywords})
 
 

@@ -25,16 +25,24 @@ from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
-from gazerig.robot.recording.export_bids import About, label_of, write_bids
+from gazerig.robot.recording.export_bids import DatasetDescription, label_of, write_bids
 from gazerig.robot.recording.export_csv import EVENTS, columns, write_csv
-from gazerig.robot.recording.gaze_angles import Trace, in_space, trace_of
-from gazerig.robot.recording.gaze_labels import Labels, Stretch, labels_of, lag_of, stretches_of
+from gazerig.robot.recording.gaze_angles import GazeAngles, in_space, trace_of
+from gazerig.robot.recording.gaze_labels import (
+    LabelledInterval,
+    Labels,
+    labels_of,
+    lag_of,
+    stretches_of,
+)
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 RATE_HZ = 200.0
 SETTLED_S = 3.0  # at the start the guard lets the eyes follow the plan only slowly
-ABOUT = About("desk", "face-to-face", RATE_HZ, "2026-01-01T00:00:00+00:00", "gazerig 0")
+ABOUT = DatasetDescription(
+    "desk", "face-to-face", RATE_HZ, "2026-01-01T00:00:00+00:00", "gazerig 0"
+)
 
 
 def seen(scene: str, seconds: float) -> list[Tick]:
@@ -56,9 +64,9 @@ class Run:
 
     def __init__(self, ticks: Sequence[Tick]) -> None:
         self.ticks = ticks
-        self.trace: Trace = trace_of(ticks)
+        self.trace: GazeAngles = trace_of(ticks)
         self.labels: Labels = labels_of(self.trace)
-        self.stretches: tuple[Stretch, ...] = stretches_of(self.trace, self.labels)
+        self.stretches: tuple[LabelledInterval, ...] = stretches_of(self.trace, self.labels)
 
     def onsets_s(self, event: str) -> np.ndarray:
         return np.array([s.onset_s for s in self.stretches if s.event == event])

@@ -6,7 +6,7 @@ import pytest
 
 from gazerig.gaze.angles import rotation, sub, unit
 from gazerig.robot.analysis.gaze_on_face import on_face
-from gazerig.robot.app.scripted_behaviour import Planner
+from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
 
 NOSE = (1.0, 0.2, 0.25)
 TOWARDS = rotation((radians(180.0), 0.0, 0.0))
@@ -37,7 +37,7 @@ def test_lines_along_the_plane_or_from_behind_meet_nothing() -> None:
 
 def test_the_planner_asks_once_for_each_change() -> None:
     asked: list[tuple[str, str]] = []
-    plan = Planner(
+    plan = ScriptedBehaviour(
         lambda t: None if t < 1 else "guard" if t < 2 else "wait", lambda *a: asked.append(a)
     )
     for k in range(40):

@@ -10,15 +10,15 @@ import pytest
 from gazerig.config.load import ConfigError, Fault
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.model.clock import SimulatedClock
-from gazerig.robot.model.commands import Order
+from gazerig.robot.model.commands import Command
 from gazerig.robot.remote.client import running
-from gazerig.robot.remote.live_server import LiveControl
+from gazerig.robot.remote.live_server import LiveServer
 
 
 class Robot:
     """Takes orders and does nothing."""
 
-    def order(self, order: Order) -> None:
+    def order(self, order: Command) -> None:
         raise ValueError("nothing moves here")
 
     def menus(self) -> dict[str, tuple[str, ...]]:
@@ -54,7 +54,7 @@ class Rig:
         self.path.write_text("first\n", encoding="utf-8")
         self.tuning = FileOnly(self.path)
         self.said: list[str] = []
-        self.live = LiveControl(
+        self.live = LiveServer(
             Robot(),
             self.tuning,  # type: ignore[arg-type]
             (ConfigError,),

@@ -15,7 +15,7 @@ import pytest
 from gazerig.config.save import copy_shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.remote.client import NoRig, Refused, RunningRig, running
+from gazerig.robot.remote.client import NoRobotError, RequestRejected, RobotClient, running
 from gazerig.robot.remote.socket_io import folder, sockets
 
 RATE = "loop.rate_hz"
@@ -47,12 +47,12 @@ class Run:
                 env=dict(os.environ),
             )
 
-    def connected(self) -> RunningRig:
+    def connected(self) -> RobotClient:
         for _ in range(600):
             assert self.process.poll() is None, self.words()
             try:
-                rig = RunningRig.connect(self.process.pid)
-            except NoRig:
+                rig = RobotClient.connect(self.process.pid)
+            except NoRobotError:
                 time.sleep(0.05)
                 continue
             if rig.status()["ticks"]:
@@ -92,7 +92,7 @@ def test_it_is_tuned_stopped_and_goes_on(run: Run) -> None:
         assert rig.status()["why"] == "somebody chose this point"
         rig.stop("finger")
         assert rig.status()["stopped"] == "finger"
-        with pytest.raises(Refused, match="holds at least 2 s"):
+        with pytest.raises(RequestRejected, match="holds at least 2 s"):
             rig.resume()
         time.sleep(2.1)
         rig.resume()

@@ -25,9 +25,9 @@ from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.track_params import TrackParams
-from gazerig.robot.model.types import Verdict
+from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Sighting, Tracker
+from gazerig.robot.perception.tracker import LocalisedDetection, Tracker
 from gazerig.sim_mock.scenes.visitor import Visitor
 
 
@@ -128,7 +128,7 @@ class SlowRobot:
     def tick(self, t_s: float, dt_s: float) -> Any:
         self.times.append((t_s, dt_s))
         self.clock.sleep_until(t_s + self.cost_s(len(self.times)))
-        return SimpleNamespace(verdict=Verdict((), "ok", ()))
+        return SimpleNamespace(verdict=GuardResult((), "ok", ()))
 
 
 def test_slots_are_absolute_and_overruns_are_skipped_not_caught_up() -> None:
@@ -204,7 +204,7 @@ def test_e56_own_parts_move_and_turn_with_the_face(turn_deg: float, aside_m: flo
     own = {code: (-0.03, 0.02 * i - 0.07, 0.05 - 0.015 * i) for i, code in enumerate(PARTS)}
     perception = Perception(MOUNT, 69.0, Tracker(TrackParams()), own)
     nose, R = (1.0, aside_m, 0.25), rotation((radians(180.0 + turn_deg), 0.0, 0.0))
-    sighting = Sighting("face", nose, R, 0.1, 0.0, 0.9)
+    sighting = LocalisedDetection("face", nose, R, 0.1, 0.0, 0.9)
     (track,) = Tracker(TrackParams()).step([sighting], (0.0, 0.0, 0.2), 0.0)
     face = perception._face(track)
     eye = (0.0, 0.0, 0.2)

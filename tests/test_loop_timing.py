@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from gazerig.robot.dashboard.loop_timing import OVER_S, LoopTiming
-from gazerig.robot.model.types import Timing
+from gazerig.robot.model.types import LoopFigures
 
 
-def timed(times_s: list[float], rate_hz: float = 200.0) -> Timing:
+def timed(times_s: list[float], rate_hz: float = 200.0) -> LoopFigures:
     timing = LoopTiming(rate_hz)
     for t_s in times_s:
         timing.note(t_s)

@@ -17,9 +17,9 @@ from gazerig.robot.app.session import leave
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import (
     Ask,
+    Command,
     Jog,
     LookAt,
-    Order,
     Renew,
     Resume,
     Stop,
@@ -51,7 +51,7 @@ class Running:
         )
         return self.ticks[began:]
 
-    def order(self, order: Order) -> None:
+    def order(self, order: Command) -> None:
         """Ask."""
         self.made.robot.order(order)
 
@@ -71,7 +71,7 @@ def running() -> Iterator[Running]:
         made.close()
 
 
-ORDERS: list[Order] = [
+ORDERS: list[Command] = [
     Ask("lids", "sleepy"),
     LookAt((1.0, 0.2, 0.3)),
     LookAt(None),
@@ -87,7 +87,7 @@ ORDERS: list[Order] = [
 
 
 @pytest.mark.parametrize("order", ORDERS, ids=str)
-def test_orders_cross_processes_as_json(order: Order) -> None:
+def test_orders_cross_processes_as_json(order: Command) -> None:
     import json
 
     assert from_json(json.loads(json.dumps(as_json(order)))) == order
@@ -254,7 +254,7 @@ def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
 # Who may resume, and when
 
 
-def replied(running: Running, order: Order, seconds: float = 0.006) -> str:
+def replied(running: Running, order: Command, seconds: float = 0.006) -> str:
     """Ask, run on, and give why it was refused."""
     ticket = running.made.robot.order(order)
     running.go(seconds)

@@ -33,7 +33,7 @@ from websockets.sync.client import connect
 
 from gazerig.gaze.types import PART_NAMES, PARTS
 from gazerig.robot.dashboard.camera_overlay import encode
-from gazerig.robot.dashboard.page_process import Page, pack, unpack
+from gazerig.robot.dashboard.page_process import PageProcess, pack, unpack
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 T = TypeVar("T")
@@ -163,8 +163,8 @@ def free_port() -> int:
 
 
 @contextmanager
-def running_page(port: int | None = None) -> Iterator[tuple[Page, str]]:
-    page = Page("127.0.0.1", free_port() if port is None else port)
+def running_page(port: int | None = None) -> Iterator[tuple[PageProcess, str]]:
+    page = PageProcess("127.0.0.1", free_port() if port is None else port)
     page.open()
     try:
         yield page, wait_for(page.url, "the page's address")
@@ -279,7 +279,7 @@ def debugging_port(folder: Path) -> int:
 
 
 @contextmanager
-def feeding(page: Page, source: Callable[[float], Snapshot]) -> Iterator[None]:
+def feeding(page: PageProcess, source: Callable[[float], Snapshot]) -> Iterator[None]:
     """Feed the page from a thread, as a running rig does."""
     done = threading.Event()
     jpeg = encode(PICTURE)

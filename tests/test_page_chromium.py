@@ -25,7 +25,7 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.dashboard.page_main import _HALF_WIDTH as HALF_WIDTH
@@ -59,7 +59,7 @@ class Rig:
     def __init__(self, host: str = "127.0.0.1") -> None:
         made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
         self.made, self.robot = made, made.robot
-        self.tuning = Tuning(made.live, self.robot.order, "desk")
+        self.tuning = ParamStore(made.live, self.robot.order, "desk")
         self.said: list[str] = []
         # Not fast: the page is for real time, of which these ticks are a slow imitation.
         options = RunOptions(page=f"{host}:{free_port()}")

@@ -21,14 +21,29 @@ from gazerig.config.knobs import knobs, values
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
 from gazerig.robot.dashboard.control_tabs import LeadView
-from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, TELL, Ear, overtaken, telling, told, urgent
-from gazerig.robot.dashboard.jog_panel import MEASURED, RECKONED, JogView, measured_table
-from gazerig.robot.dashboard.outbox import Teller
+from gazerig.robot.dashboard.inbox import (
+    MESSAGE_BYTES,
+    TELL,
+    Inbox,
+    overtaken,
+    telling,
+    told,
+    urgent,
+)
+from gazerig.robot.dashboard.jog_panel import MEASURED, RECKONED, JogPanel, measured_table
+from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.page_main import News, drain
-from gazerig.robot.dashboard.page_process import CHOICES, EVERYBODY, KNOBS, VALUES, WORDS, Page
+from gazerig.robot.dashboard.page_process import (
+    CHOICES,
+    EVERYBODY,
+    KNOBS,
+    VALUES,
+    WORDS,
+    PageProcess,
+)
 from gazerig.robot.dashboard.param_control import (
-    KnobControl,
-    PageKnob,
+    PageParam,
+    ParamControl,
     hint,
     knob_from,
     label,
@@ -37,10 +52,10 @@ from gazerig.robot.dashboard.param_control import (
     step_of,
     written,
 )
-from gazerig.robot.dashboard.param_feed import TuningFeed
+from gazerig.robot.dashboard.param_feed import ParamFeed
 from gazerig.robot.dashboard.param_panel import found, group_of
-from gazerig.robot.dashboard.request_handler import PAGE, PageHear
-from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Stop, Value, as_json, from_json
+from gazerig.robot.dashboard.request_handler import PAGE, PageRequestHandler
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value, as_json, from_json
 from gazerig.robot.model.types import Snapshot
 from gazerig.robot.remote.request_handler import plain
 
@@ -79,10 +94,10 @@ def wait_for(ready: Callable[[], object], what: str) -> None:
 @contextmanager
 def linked(
     hear: Callable[[dict[str, object]], str | None] | None = None,
-) -> Iterator[tuple[Page, socket.socket]]:
+) -> Iterator[tuple[PageProcess, socket.socket]]:
     """A page's rig side and the socket that its process would hold."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    page = Page("127.0.0.1", 8080, hear)
+    page = PageProcess("127.0.0.1", 8080, hear)
     page.join(ours)
     with theirs:
         yield page, theirs
@@ -106,7 +121,7 @@ def test_what_is_asked_is_heard_and_answered() -> None:
         return "refused: too far" if "pick" in data else None
 
     with linked(hear) as (_, theirs):
-        teller = Teller(theirs)
+        teller = Outbox(theirs)
         assert teller.order(Ask("behaviour", "guard"), "7")
         assert sent(theirs) == (WORDS, ["7", None])
         assert teller.ask({"pick": {"x": 0.5, "y": 0.5}}, "8:tuning")
@@ -124,7 +139,7 @@ def test_a_request_that_goes_wrong_leaves_ears_for_a_stop() -> None:
         return None
 
     with linked(hear) as (_, theirs):
-        teller = Teller(theirs)
+        teller = Outbox(theirs)
         teller.ask({"pick": {}}, "7")
         kind, (who, words) = sent(theirs)
         assert (kind, who) == (WORDS, "7") and "a fault in this program" in words
@@ -144,7 +159,7 @@ def test_a_stop_does_not_wait_behind_what_takes_long() -> None:
         return None
 
     with linked(hear) as (_, theirs):
-        teller = Teller(theirs)
+        teller = Outbox(theirs)
         teller.ask({"tune": {"revert": True}}, "7")
         teller.order(Stop("a test"), "7")
         wait_for(lambda: heard, "the stop")
@@ -162,7 +177,7 @@ def test_of_a_slider_that_is_dragged_the_last_word_counts() -> None:
         return None
 
     with linked(hear) as (_, theirs):
-        teller = Teller(theirs)
+        teller = Outbox(theirs)
         for value in range(50):
             teller.ask({"tune": {"set": {"gaze.head.lag_ms": value}}}, "7")
         teller.ask({"tune": {"save": None}}, "7")
@@ -189,7 +204,7 @@ def test_only_the_same_change_by_the_same_person_is_overtaken() -> None:
 def test_answers_wait_until_the_page_has_room() -> None:
     with linked(lambda data: "x" * 15_000) as (page, theirs):
         for number in range(40):
-            Teller(theirs).order(Ask("behaviour", str(number)), str(number))
+            Outbox(theirs).order(Ask("behaviour", str(number)), str(number))
         said = []
         wait_for(lambda: len(page._owed) > 0, "a full socket")
         for _ in range(40):
@@ -201,7 +216,7 @@ def test_answers_wait_until_the_page_has_room() -> None:
 def test_a_rig_that_takes_nothing_holds_up_nobody() -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
-        teller = Teller(theirs)
+        teller = Outbox(theirs)
         taken = [teller.ask({"pick": "x" * 10_000}, "7") for _ in range(300)]
         assert taken[0] and not taken[-1]
         assert not teller.ask({"pick": "x" * MESSAGE_BYTES}, "7")
@@ -224,7 +239,7 @@ def test_the_ear_tells_once_that_the_page_is_gone() -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setblocking(False)
     with ours:
-        ear = Ear(ours, lambda message: None, lambda: lost.append(True))
+        ear = Inbox(ours, lambda message: None, lambda: lost.append(True))
         theirs.close()
         wait_for(lambda: lost, "the end")
         ear.close()
@@ -270,7 +285,7 @@ class OneKnob:
         self.value = 1.0
         return ()
 
-    def knobs(self) -> tuple[PageKnob, ...]:
+    def knobs(self) -> tuple[PageParam, ...]:
         return tuple(KNOB._replace(key=f"a.{n}") for n in range(100))
 
     def values(self) -> dict[str, Value]:
@@ -292,26 +307,26 @@ class OneKnob:
         return self.values()
 
 
-KNOB = PageKnob("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
+KNOB = PageParam("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
 
 
 class Heard(NamedTuple):
-    hear: PageHear
-    orders: list[Order]
+    hear: PageRequestHandler
+    orders: list[Command]
     tuning: OneKnob
     saved: list[Path]
 
 
 @pytest.fixture
 def heard() -> Heard:
-    orders: list[Order] = []
+    orders: list[Command] = []
     saved: list[Path] = []
     tuning = OneKnob()
 
     def point(x: float, y: float) -> Vec3 | None:
         return (1.0, x, y) if x < 0.9 else None
 
-    hear = PageHear(
+    hear = PageRequestHandler(
         orders.append,
         tuning,
         point,
@@ -380,7 +395,7 @@ def test_the_feed_tells_all_once_and_then_what_changed() -> None:
         sent.append((message[:1], json.loads(message[1:])))
         return True
 
-    feed = TuningFeed(send, tuning)
+    feed = ParamFeed(send, tuning)
     feed.step()
     assert len(sent) == 5  # the page was full; nothing is lost
     room[0] = 100
@@ -414,7 +429,7 @@ class Mouth:
     def __init__(self) -> None:
         self.told: list[tuple[object, str]] = []
 
-    def order(self, order: Order, who: str) -> bool:
+    def order(self, order: Command, who: str) -> bool:
         self.told.append((order, who))
         return True
 
@@ -451,9 +466,9 @@ def test_menus_become_buttons_that_ask(server: viser.ViserServer) -> None:
     assert "behaviour <b>&lt;b&gt;</b>" in lead._words.content
 
 
-def jogging(server: viser.ViserServer) -> tuple[JogView, Mouth]:
+def jogging(server: viser.ViserServer) -> tuple[JogPanel, Mouth]:
     mouth = Mouth()
-    view = JogView(server.gui, server.gui.add_tab_group().add_tab("joints"), mouth)  # type: ignore[arg-type]
+    view = JogPanel(server.gui, server.gui.add_tab_group().add_tab("joints"), mouth)  # type: ignore[arg-type]
     ends = {f"joints.{j}.{end}_deg": v for j in JOINTS for end, v in (("min", -30), ("max", 40.0))}
     view.values(ends)
     return view, mouth
@@ -510,7 +525,7 @@ def test_what_nobody_measured_has_a_column_of_its_own() -> None:
 
 def test_sliders_are_those_of_the_rig(server: viser.ViserServer) -> None:
     mouth = Mouth()
-    view = JogView(server.gui, server.gui.add_tab_group().add_tab("joints"), mouth)  # type: ignore[arg-type]
+    view = JogPanel(server.gui, server.gui.add_tab_group().add_tab("joints"), mouth)  # type: ignore[arg-type]
     rig = values(load_rig("maker"))
     view.values(rig)
     assert tuple(view._sliders) == SIX
@@ -576,8 +591,8 @@ def test_a_slider_makes_room_where_null_comes_into_force(server: viser.ViserServ
     knob = KNOB._replace(optional=True)
     tab = server.gui.add_tab_group().add_tab("null")
     with tab:
-        slider = KnobControl(server.gui, knob, 1.0, False, ignore, ignored, 0.0)
-        typed = KnobControl(server.gui, knob, None, False, ignore, ignored, 1.0)
+        slider = ParamControl(server.gui, knob, 1.0, False, ignore, ignored, 0.0)
+        typed = ParamControl(server.gui, knob, None, False, ignore, ignored, 1.0)
     assert slider.can_show(2.0) and not slider.can_show(None)
     assert typed.can_show(None) and typed.can_show(2.0)
     typed.show(2.0, False)
@@ -599,7 +614,7 @@ def test_every_parameter_of_every_rig_becomes_a_control(
         for knob in places:
             if knob.kind in ("list", "mapping") or knob.key.startswith("joints."):
                 value = json.loads(json.dumps(plain(now[knob.key])))
-                control = KnobControl(server.gui, knob, value, False, ignore, refused.append, 0.0)
+                control = ParamControl(server.gui, knob, value, False, ignore, refused.append, 0.0)
                 control.show(value, True)
                 assert hint(knob).startswith(knob.key)
                 if control._form is not None:

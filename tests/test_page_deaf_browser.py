@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from gazerig.robot.dashboard.camera_overlay import encode
-from gazerig.robot.dashboard.page_process import Page
+from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.model.commands import Stop, as_json
 from gazerig.robot.model.types import Snapshot
 
@@ -102,7 +102,7 @@ class Rig:
             trial.bind(("127.0.0.1", 0))
             self.port = trial.getsockname()[1]
         self.heard: list[dict[str, object]] = []
-        self.page = Page("127.0.0.1", self.port, self.heard.append)
+        self.page = PageProcess("127.0.0.1", self.port, self.heard.append)
         self.snapshot = SNAPSHOT
         self.rounds = 0
         self._over = threading.Event()

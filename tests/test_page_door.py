@@ -21,12 +21,12 @@ from page_visitor import LOOKING
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from gazerig.robot.dashboard.auth_proxy import MOST_LINES, Door
+from gazerig.robot.dashboard.auth_proxy import MOST_LINES, AuthProxy
 from gazerig.robot.dashboard.browser_requests import from_browser
-from gazerig.robot.dashboard.browsers import Places
+from gazerig.robot.dashboard.browsers import TabLimits
 from gazerig.robot.dashboard.connection_limits import MOST as MOST_CONNECTIONS
 from gazerig.robot.dashboard.stop_channel import StopListener, StopSender
-from gazerig.robot.dashboard.token_bucket import Rate
+from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.dashboard.viser_server import FROM_BROWSER_BYTES, browser_of, open_server
 
 PATIENCE_S = 20.0
@@ -74,7 +74,7 @@ class Rig:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._listener = StopListener(ours, self.stop)
         self._sender = theirs
-        self.door = Door(
+        self.door = AuthProxy(
             host, port, folder / "page.sock", self.take, StopSender(theirs), TOKEN
         )  # fmt: skip
         self.door.open()
@@ -450,7 +450,7 @@ def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
 
 def test_a_place_is_left_by_the_browser_with_the_most() -> None:
     async def crowd() -> list[str]:
-        places, left = Places(3), []
+        places, left = TabLimits(3), []
         with ExitStack() as stack:
             for name in ("a", "b", "b", "c", "d"):
                 leave = stack.enter_context(places.take(name))
@@ -461,7 +461,7 @@ def test_a_place_is_left_by_the_browser_with_the_most() -> None:
 
 
 def test_a_rate_lets_a_burst_pass_and_then_so_many_a_second() -> None:
-    rate = Rate(10.0, 5.0)
+    rate = TokenBucket(10.0, 5.0)
     assert [rate.take(0.0) for _ in range(7)] == [True] * 5 + [False] * 2
     assert sum(rate.take(0.001 * n) for n in range(1000)) == pytest.approx(10, abs=1)
     assert rate.take(1e6) and rate.wait_s(1e6) == 0.0

@@ -10,10 +10,10 @@ from desk import JOINTS
 from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis.heatmap_face import on_canvas
 from gazerig.robot.analysis.human_norms import fastest_peak, slowest_peak
-from gazerig.robot.dashboard.dwell_chart import BIN_S, BINS, Dwell
+from gazerig.robot.dashboard.dwell_chart import BIN_S, BINS, DwellChart
 from gazerig.robot.dashboard.event_timeline import STRIP_S, Timeline
-from gazerig.robot.dashboard.gaze_map import HIGH_PX, SHRINK, WIDE_PX, FaceMap, gaze_on_face
-from gazerig.robot.dashboard.main_sequence_chart import KEPT, MainSequence
+from gazerig.robot.dashboard.gaze_map import HIGH_PX, SHRINK, WIDE_PX, GazeMap, gaze_on_face
+from gazerig.robot.dashboard.main_sequence_chart import KEPT, MainSequenceChart
 from gazerig.robot.dashboard.view_frusta import field_edge
 from gazerig.robot.model.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
 
@@ -90,7 +90,7 @@ def circles(drawn: str) -> np.ndarray:
 
 
 def test_a_dot_a_saccade_in_both_pictures_the_newest_marked() -> None:
-    sequence = MainSequence()
+    sequence = MainSequenceChart()
     for size in (4.0, 8.0):
         sequence.note(SeenSaccade(0.0, 0.04, size, 25.0 * size))
     drawn = sequence.drawing()
@@ -103,7 +103,7 @@ def test_a_dot_a_saccade_in_both_pictures_the_newest_marked() -> None:
 
 def test_a_saccade_like_peoples_lies_in_their_range() -> None:
     def inside(speed_deg_s: float) -> bool:
-        sequence = MainSequence()
+        sequence = MainSequenceChart()
         sequence.note(SeenSaccade(0.0, 0.045, 10.0, speed_deg_s))
         drawn = sequence.drawing()
         (outline,) = re.findall(r"<polygon points='([^']+)'", drawn)[:1]
@@ -118,7 +118,7 @@ def test_a_saccade_like_peoples_lies_in_their_range() -> None:
 
 
 def test_only_the_newest_saccades_are_drawn_but_all_are_counted() -> None:
-    sequence = MainSequence()
+    sequence = MainSequenceChart()
     for _ in range(KEPT + 50):
         sequence.note(SeenSaccade(0.0, 0.04, 5.0, 200.0))
     drawn = sequence.drawing()
@@ -130,7 +130,7 @@ def test_only_the_newest_saccades_are_drawn_but_all_are_counted() -> None:
 
 
 def test_shares_are_of_the_time_on_parts() -> None:
-    dwell = Dwell()
+    dwell = DwellChart()
     assert dwell.shares() == {}
     for part, seconds in (("LE", 0.3), ("LE", 0.3), ("M", 0.2), (None, 5.0)):
         dwell.note(SeenFixation(0.0, seconds, part))
@@ -142,7 +142,7 @@ def test_shares_are_of_the_time_on_parts() -> None:
 
 
 def test_rests_are_counted_by_length_and_the_long_ones_together() -> None:
-    dwell = Dwell()
+    dwell = DwellChart()
     for seconds in (0.05, 0.25, 0.27, 99.0):
         dwell.note(SeenFixation(0.0, seconds, "N"))
     drawn = dwell.drawing()
@@ -173,7 +173,7 @@ def test_a_face_that_moves_is_met_where_it_is_by_now() -> None:
 
 
 def test_the_map_is_brightest_where_the_gaze_was() -> None:
-    heat = FaceMap()
+    heat = GazeMap()
     for k in range(51):
         heat.note(looking(0.04 * k))
     assert heat.seconds == pytest.approx(2.0)
@@ -186,7 +186,7 @@ def test_the_map_is_brightest_where_the_gaze_was() -> None:
 
 
 def test_a_pause_adds_no_time() -> None:
-    heat = FaceMap()
+    heat = GazeMap()
     for t_s in (0.0, 5.0, 1.0):
         heat.note(looking(t_s))
     assert heat.seconds == 0.0

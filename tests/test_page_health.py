@@ -12,13 +12,13 @@ from six_joints import SIX, TELLS_NOTHING, of_six
 
 from gazerig.gaze.types import Salience
 from gazerig.robot.dashboard.attention_panel import saliences, winner
-from gazerig.robot.dashboard.commanded_pose import GhostView
-from gazerig.robot.dashboard.head_model import HeadView
+from gazerig.robot.dashboard.commanded_pose import CommandedPoseView
+from gazerig.robot.dashboard.head_model import HeadModel
 from gazerig.robot.dashboard.html import AMBER, RED
-from gazerig.robot.dashboard.joint_charts import Traces, TracesView
-from gazerig.robot.dashboard.outbox import Teller
-from gazerig.robot.dashboard.overlays import Layers, LayersView
-from gazerig.robot.dashboard.page_main import News, View
+from gazerig.robot.dashboard.joint_charts import JointCharts, JointSeries
+from gazerig.robot.dashboard.outbox import Outbox
+from gazerig.robot.dashboard.overlays import OverlayChoices, OverlayPanel
+from gazerig.robot.dashboard.page_main import News, PageView
 from gazerig.robot.dashboard.panel import PanelView
 from gazerig.robot.dashboard.servo_health import (
     NO_FEEDBACK,
@@ -29,14 +29,14 @@ from gazerig.robot.dashboard.servo_health import (
     strain_of_voltage,
 )
 from gazerig.robot.model.types import (
-    Ghost,
+    CommandedPose,
+    LoopFigures,
     SeenCamera,
     SeenFixation,
     SeenSaccade,
     ServoLimits,
     Servos,
     Snapshot,
-    Timing,
     Trail,
 )
 
@@ -58,8 +58,8 @@ def snapshot(t_s: float = 1.0) -> Snapshot:
         p_world_target_m=(1.0, 0.0, 0.14), target_name="thing <4>", why="slide <0.4>",
         phase="pursue", level="ok", reasons=(), faces=(), bodies=(), rate_hz=200.0,
         health="bus ok", behaviour="wait", servos=WELL,
-        timing=Timing(200.0, 0.04, 0.21, 0.9, 0, 3, 5.0), picture_age_s=0.06,
-        ghost=Ghost(AHEAD, (0.03, 0.0, 0.14), eyes, sight, (0.8, 0.8)),
+        timing=LoopFigures(200.0, 0.04, 0.21, 0.9, 0, 3, 5.0), picture_age_s=0.06,
+        ghost=CommandedPose(AHEAD, (0.03, 0.0, 0.14), eyes, sight, (0.8, 0.8)),
         camera=SeenCamera(AHEAD, (0.05, 0.0, 0.18), 1.2, 1.6), field_deg=(100.0, 60.0, 60.0, 75.0),
         trail=(Trail(t_s, REST, REST, REST),),
         events=(SeenSaccade(0.5, 0.05, 5.0, 180.0), SeenFixation(0.2, 0.3, "LE")),
@@ -135,7 +135,7 @@ def test_loop_figures_are_told_and_coloured_when_late() -> None:
     for words in ("200.0 Hz", "0.04 ms", "0.21 ms", "0.90 ms", "3 slots overrun", "60 ms</b> old"):
         assert words in said
     assert AMBER not in said
-    late = replace(snapshot(), timing=Timing(200.0, 0.1, 2.0, 4.0, 2, 2, 5.0))
+    late = replace(snapshot(), timing=LoopFigures(200.0, 0.1, 2.0, 4.0, 2, 2, 5.0))
     assert health(late).count(f"background:{AMBER}") == 2
     assert "no picture yet" in health(replace(snapshot(), picture_age_s=None))
 
@@ -246,7 +246,7 @@ def test_who_comes_late_sees_all_panels_as_they_are_now(
     people: dict[int, object] = {}
     monkeypatch.setattr(server, "get_clients", lambda: people)
     button = Nobody()
-    view = View(server, Teller(None), button.tell)  # type: ignore[arg-type]
+    view = PageView(server, Outbox(None), button.tell)  # type: ignore[arg-type]
     view.show(News((replace(snapshot(1.0), target_name="the first"),), None, ended=False))
     for k in range(20):  # nobody looks
         view.show(News((snapshot(1.1 + 0.1 * k),), None, ended=False))
@@ -262,8 +262,8 @@ def test_who_comes_late_sees_all_panels_as_they_are_now(
 
 
 def test_the_menu_of_traces_is_that_of_the_rig(server: viser.ViserServer) -> None:
-    traces = Traces()
-    view = TracesView(server.gui, server.gui.add_tab_group().add_tab("traces"))
+    traces = JointSeries()
+    view = JointCharts(server.gui, server.gui.add_tab_group().add_tab("traces"))
     traces.add(snapshot(1.0))
     view.show(traces)
     assert view._what.options == ("yaw", "pitch", "left eye", "right eye", "neck")
@@ -282,7 +282,7 @@ def test_the_menu_of_traces_is_that_of_the_rig(server: viser.ViserServer) -> Non
 
 
 def test_the_head_has_the_lids_and_the_neck_that_the_rig_has(server: viser.ViserServer) -> None:
-    view, ghost = HeadView(server.scene), GhostView(server.scene)
+    view, ghost = HeadModel(server.scene), CommandedPoseView(server.scene)
     handles = server.scene._handle_from_node_name
 
     def drawn(shot: Snapshot) -> set[str]:
@@ -316,7 +316,7 @@ def test_the_head_has_the_lids_and_the_neck_that_the_rig_has(server: viser.Viser
 
 
 def test_a_head_without_a_neck_stands_on_a_post(server: viser.ViserServer) -> None:
-    view = HeadView(server.scene)
+    view = HeadModel(server.scene)
     view.show(replace(of_six(snapshot()), p_world_head_m=(0.1, 0.05, 0.12)))
     (x, y, _), (fx, fy, _) = view._post.position, view._foot.position
     assert (x, y) == (fx, fy) and y == pytest.approx(0.05)
@@ -329,16 +329,18 @@ def test_a_head_without_a_neck_stands_on_a_post(server: viser.ViserServer) -> No
 
 
 def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> None:
-    view = LayersView(server.scene)
+    view = OverlayPanel(server.scene)
 
     def seen() -> set[str]:
         nodes = {"ghost": "/ghost", "camera": "/camera", "eyes": "/field_left"}
         handles = server.scene._handle_from_node_name
         return {name for name, node in nodes.items() if node in handles and handles[node].visible}
 
-    view.show(snapshot(), Layers(ghost=True, camera=True, eyes=True))
+    view.show(snapshot(), OverlayChoices(ghost=True, camera=True, eyes=True))
     assert seen() == {"ghost", "camera", "eyes"}
-    view.show(snapshot(), Layers(ghost=False, camera=True, eyes=False))
+    view.show(snapshot(), OverlayChoices(ghost=False, camera=True, eyes=False))
     assert seen() == {"camera"}
-    view.show(replace(snapshot(), ghost=None, camera=None, field_deg=None), Layers(eyes=True))
+    view.show(
+        replace(snapshot(), ghost=None, camera=None, field_deg=None), OverlayChoices(eyes=True)
+    )
     assert seen() == set()

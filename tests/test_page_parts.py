@@ -23,8 +23,8 @@ from gazerig.robot.dashboard.camera_overlay import (
 from gazerig.robot.dashboard.joint_charts import (
     GROUPS,
     MOST_POINTS,
-    Group,
-    Traces,
+    ChartGroup,
+    JointSeries,
     groups_of,
     mean_deg,
 )
@@ -118,7 +118,7 @@ def moving(t_s: float, slope_deg: float = 1.0) -> Snapshot:
 
 
 def test_traces_keep_half_a_minute_and_start_anew_with_the_clock() -> None:
-    traces = Traces()
+    traces = JointSeries()
     for tick in range(4500):
         traces.add(moving(0.01 * tick))
     ago_s, angles_deg = traces.table(30.0)
@@ -157,7 +157,7 @@ def test_traces_are_of_the_joints_that_are_there() -> None:
         ("left_upper_lid", "right_upper_lid"),
         ("left_lower_lid", "right_lower_lid"),
     ]
-    assert six["left eye"][0] == Group("both eyes, yaw, + left", ("eyes_pan",))
+    assert six["left eye"][0] == ChartGroup("both eyes, yaw, + left", ("eyes_pan",))
     assert six["right eye"][-1].joints == ("right_lower_lid",)
     assert groups_of(()) == {}
     mixed = groups_of(("left_eye_pan", "right_eye_pan", "eyes_tilt"))
@@ -165,7 +165,7 @@ def test_traces_are_of_the_joints_that_are_there() -> None:
 
 
 def test_traces_take_the_joints_of_the_rig_that_is_shown() -> None:
-    traces = Traces()
+    traces = JointSeries()
     traces.add(moving(1.0))
     traces.add(of_six(snapshot(2.0)))
     ago_s, angles_deg = traces.table(30.0)

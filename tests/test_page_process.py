@@ -20,7 +20,7 @@ from desk import JOINTS
 from page_visitor import LOOKING, Visitor, said
 
 from gazerig.robot.dashboard.page_main import free_port as first_free_port
-from gazerig.robot.dashboard.page_process import Page
+from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.model.types import SeenFace, Snapshot
 
 T = TypeVar("T")
@@ -69,8 +69,8 @@ def free_port() -> int:
 
 
 @contextmanager
-def running_page(port: int | None = None) -> Iterator[tuple[Page, str]]:
-    page = Page("127.0.0.1", free_port() if port is None else port)
+def running_page(port: int | None = None) -> Iterator[tuple[PageProcess, str]]:
+    page = PageProcess("127.0.0.1", free_port() if port is None else port)
     page.open()
     try:
         yield page, wait_for(page.url, "the page's address")
@@ -79,7 +79,7 @@ def running_page(port: int | None = None) -> Iterator[tuple[Page, str]]:
 
 
 @pytest.fixture(scope="module")
-def shared() -> Iterator[tuple[Page, str, int]]:
+def shared() -> Iterator[tuple[PageProcess, str, int]]:
     """A page that found its port busy, its address, and that port; one test closes it."""
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
@@ -124,7 +124,7 @@ def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
 
 
 def test_unopened_page_drops() -> None:
-    page = Page("127.0.0.1", 8080)
+    page = PageProcess("127.0.0.1", 8080)
     page.show(SNAPSHOT)
     page.show_picture(b"jpeg")
     assert (page.dropped, page.pictures_dropped, page.url(), page.notice()) == (1, 1, None, None)
@@ -132,7 +132,7 @@ def test_unopened_page_drops() -> None:
 
 
 def test_more_than_the_page_can_show_is_passed_over() -> None:
-    page = Page("127.0.0.1", 8080)
+    page = PageProcess("127.0.0.1", 8080)
     for tick in range(200):
         page.show(replace(SNAPSHOT, t_s=5.0 + 0.005 * tick))
     assert page.dropped == 100  # every second one was offered, and dropped as nothing is open
@@ -143,7 +143,7 @@ def test_more_than_the_page_can_show_is_passed_over() -> None:
 # A page for the four that follow.
 
 
-def test_busy_port_moves_on_and_says_so(shared: tuple[Page, str, int]) -> None:
+def test_busy_port_moves_on_and_says_so(shared: tuple[PageProcess, str, int]) -> None:
     page, url, busy = shared
     port = urlsplit(url).port
     assert port is not None and port > busy
@@ -152,7 +152,7 @@ def test_busy_port_moves_on_and_says_so(shared: tuple[Page, str, int]) -> None:
 
 
 def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(
-    shared: tuple[Page, str, int],
+    shared: tuple[PageProcess, str, int],
 ) -> None:
     page, url, _ = shared
     page.notice()
@@ -168,7 +168,7 @@ def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(
     assert page_process(os.getpid()) == process
 
 
-def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[Page, str, int]) -> None:
+def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[PageProcess, str, int]) -> None:
     page = shared[0]
     times_s = itertools.count(100.0)
 
@@ -194,7 +194,7 @@ def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[Page, str, in
     assert page.url() is not None
 
 
-def test_close_ends_even_a_frozen_page(shared: tuple[Page, str, int]) -> None:
+def test_close_ends_even_a_frozen_page(shared: tuple[PageProcess, str, int]) -> None:
     page = shared[0]
     process = page_process(os.getpid())
     assert process is not None
@@ -244,7 +244,7 @@ def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
             slow.wait(PATIENCE_S)  # what is asked for takes for ever
         return None
 
-    page = Page("127.0.0.1", free_port(), hear)
+    page = PageProcess("127.0.0.1", free_port(), hear)
     page.open()
     try:
         visitor = Visitor(wait_for(page.url, "the page's address"))
@@ -264,8 +264,8 @@ def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
 
 PARENT = """
 import os, sys, time
-from gazerig.robot.dashboard.page_process import Page
-page = Page("127.0.0.1", int(sys.argv[1]))
+from gazerig.robot.dashboard.page_process import PageProcess
+page = PageProcess("127.0.0.1", int(sys.argv[1]))
 page.open()
 while page.url() is None:
     time.sleep(0.02)
@@ -293,7 +293,7 @@ def test_page_ends_when_the_parent_is_killed(habit: str) -> None:
 
 
 def test_address_of_another_machine_is_refused_in_words() -> None:
-    page = Page("192.0.2.1", 8080)
+    page = PageProcess("192.0.2.1", 8080)
     page.open()
     words = wait_for(page.notice, "the notice")
     assert "cannot open 192.0.2.1 port 8080" in words and page.gone

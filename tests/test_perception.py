@@ -16,7 +16,11 @@ from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.track_params import TrackParams
-from gazerig.robot.perception.egomotion_residual import HeadTurnResidual, Seen, turning_rad_s
+from gazerig.robot.perception.egomotion_residual import (
+    EgomotionResidual,
+    TrackedPoint,
+    turning_rad_s,
+)
 from gazerig.robot.perception.localisation import Box, Reading
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -204,9 +208,9 @@ def test_what_is_no_number_is_not_taken_in(bad: float) -> None:
         assert np.isfinite(values).all()
 
 
-def turning_head(late_s: float, moves: bool = False) -> HeadTurnResidual:
+def turning_head(late_s: float, moves: bool = False) -> EgomotionResidual:
     """Let a head turn there and back before something still, with pictures that lie in time."""
-    residual = HeadTurnResidual()
+    residual = EgomotionResidual()
     rng = np.random.default_rng(0)
 
     def yaw(t_s: float) -> float:
@@ -220,7 +224,7 @@ def turning_head(late_s: float, moves: bool = False) -> HeadTurnResidual:
         # Placed by the pose at t though it was taken earlier.
         off = yaw(t) - yaw(t - late_s) + rng.normal(0.0, 2e-4) + (0.5 * t if moves else 0.0)
         place = (2.0 * np.cos(off), 2.0 * np.sin(off), 0.1)
-        residual.step(t, turn, (0.0, 0.0, 0.0), [Seen(7, place, 0.0)])
+        residual.step(t, turn, (0.0, 0.0, 0.0), [TrackedPoint(7, place, 0.0)])
     return residual
 
 

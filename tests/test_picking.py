@@ -12,7 +12,7 @@ from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Bodies, Face, Percept, Vec3
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.click_to_look import USUAL_M, Picking, distance_m
+from gazerig.robot.dashboard.click_to_look import USUAL_M, ClickToLook, distance_m
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
@@ -24,7 +24,7 @@ WIDTH, HEIGHT = 640, 480
 
 def looking(
     head_rad: tuple[float, float, float], percept: Percept | None, depth: np.ndarray | None = None
-) -> tuple[Picking, CameraMount, PoseHistory]:
+) -> tuple[ClickToLook, CameraMount, PoseHistory]:
     """A head that was turned so when the picture was taken, and has turned on since."""
     kinematics = Kinematics(
         GeometryParams(pitch_axis_height_mm=90.0, eyes_ahead_mm=30.0, eyes_above_mm=50.0),
@@ -36,7 +36,7 @@ def looking(
         poses.remember(t_s, head_rad)
     poses.remember(1.1, (head_rad[0] + 0.3, 0.0, 0.0))
     mount = CameraMount(CAMERA)
-    picking = Picking(mount, poses, lambda: CAMERA)
+    picking = ClickToLook(mount, poses, lambda: CAMERA)
     found = Detections(1.0, 1, WIDTH, HEIGHT, (), (), None, depth, None)
     picking.note(cast(Tick, SimpleNamespace(detections=found, percept=percept)))
     return picking, mount, poses
@@ -61,7 +61,7 @@ def test_without_a_picture_there_is_nothing_to_pick() -> None:
         JOINTS,
         {"left_upper_lid": (0.0, 0.5), "right_upper_lid": (0.0, 0.5)},
     )
-    picking = Picking(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)
+    picking = ClickToLook(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)
     assert picking.point(0.5, 0.5) is None
     picking.note(cast(Tick, SimpleNamespace(detections=None, percept=None)))
     assert picking.point(0.5, 0.5) is None

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.robot.dashboard.page_process import SPEEDS
-from gazerig.robot.recording.playback_clock import STEPS, Mark, Player
+from gazerig.robot.recording.playback_clock import STEPS, Mark, PlaybackClock
 
 MARKS = (
     Mark(1.0, "saccade", "saccade to face"),
@@ -16,11 +16,11 @@ MARKS = (
 )
 
 
-def made() -> Player:
-    return Player(10.0, MARKS)
+def made() -> PlaybackClock:
+    return PlaybackClock(10.0, MARKS)
 
 
-def at(player: Player, now_s: float) -> float:
+def at(player: PlaybackClock, now_s: float) -> float:
     return player.state(now_s).at_s
 
 

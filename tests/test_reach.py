@@ -18,7 +18,7 @@ from gazerig.robot.control.loop import run
 from gazerig.robot.control.reachability import look_reply
 from gazerig.robot.model.commands import Jog, LookAt
 from gazerig.robot.model.gaze_error import gaze_error
-from gazerig.robot.model.reply import Reply
+from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import JointAngles, JointState
 
 RIGS = ("desk", "feetech", "maker")
@@ -34,7 +34,7 @@ def target_at(point: Vec3) -> Target:
     return Target(point, (0.0, 0.0, 0.0), 0.0, "puppet", -1, 1.0, True, None, 1, "a test")
 
 
-def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[Reply, float]:
+def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[CommandReply, float]:
     """Return the reply, and the gaze error in deg of ideal joints that followed for a while."""
     rig = loaded(name)
     kinematics, oculomotor = gaze_parts(rig, 0)
@@ -86,7 +86,7 @@ def test_behind_the_head_the_ends_are_named() -> None:
     (yaw,) = [one for one in reply.joints if one.joint == "neck_yaw"]
     assert abs(yaw.asked_rad) > 3.0 and abs(yaw.done_rad) == pytest.approx(radians(70.0))
     assert "deg beside it: " in reply.words() and "neck_yaw stays at" in reply.words()
-    assert Reply.from_json(reply.as_json()).words() == reply.words()
+    assert CommandReply.from_json(reply.as_json()).words() == reply.words()
 
 
 def test_a_rig_without_a_neck_says_so() -> None:

@@ -29,9 +29,15 @@ from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote import socket_server as server_module
-from gazerig.robot.remote.budget import Budget, Rate
-from gazerig.robot.remote.client import NoRig, Refused, RigGone, RunningRig, running
-from gazerig.robot.remote.request_handler import Pulse, Requests
+from gazerig.robot.remote.budget import Budget, RequestRate
+from gazerig.robot.remote.client import (
+    ConnectionLost,
+    NoRobotError,
+    RequestRejected,
+    RobotClient,
+    running,
+)
+from gazerig.robot.remote.request_handler import Pulse, RequestHandler
 from gazerig.robot.remote.socket_io import REQUEST_BYTES
 from gazerig.robot.remote.socket_server import RemoteServer
 
@@ -192,13 +198,13 @@ def errors() -> list[str]:
 
 
 @pytest.fixture
-def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RunningRig]:
+def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
     tuning = SecondTuning(beat.robot.order)
     about = {"rig": "desk", "pid": os.getpid()}
-    requests = Requests(beat.robot, tuning, beat.pulse, about, (Broken,))
+    requests = RequestHandler(beat.robot, tuning, beat.pulse, about, (Broken,))
     server = RemoteServer(requests, errors.append)
     server.open()
-    with RunningRig.connect() as connected:
+    with RobotClient.connect() as connected:
         yield connected
     if not server_closed(server):
         server.close()
@@ -228,7 +234,7 @@ def hung_up(end: socket.socket) -> bool:
 # What can be asked
 
 
-def test_values_rules_and_changes(rig: RunningRig) -> None:
+def test_values_rules_and_changes(rig: RobotClient) -> None:
     assert rig.get() == {RATE: 200.0, BLINKS: 17.0}
     assert rig.get("gaze.") == {BLINKS: 17.0}
     assert rig.knob(RATE).high == 1000.0 and rig.knob(RATE).group == "loop"
@@ -244,8 +250,8 @@ def test_values_rules_and_changes(rig: RunningRig) -> None:
     assert rig.get(BLINKS) == {BLINKS: 17.0}
 
 
-def test_a_broken_rule_is_told_in_full_and_nothing_changes(rig: RunningRig) -> None:
-    with pytest.raises(Refused) as refused:
+def test_a_broken_rule_is_told_in_full_and_nothing_changes(rig: RobotClient) -> None:
+    with pytest.raises(RequestRejected) as refused:
         rig.set_many({RATE: 1e9, BLINKS: -1.0})
     assert str(refused.value).splitlines() == [
         f"{RATE}: 1000000000.0 breaks the rule",
@@ -255,28 +261,28 @@ def test_a_broken_rule_is_told_in_full_and_nothing_changes(rig: RunningRig) -> N
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), object(), b"1"])
-def test_what_has_no_json_is_refused_before_it_is_sent(rig: RunningRig, value: Value) -> None:
-    with pytest.raises(Refused, match="finite numbers"):
+def test_what_has_no_json_is_refused_before_it_is_sent(rig: RobotClient, value: Value) -> None:
+    with pytest.raises(RequestRejected, match="finite numbers"):
         rig.set(RATE, value)
     assert rig.get(RATE) == {RATE: 200.0}
 
 
-def test_unknown_key_and_character(rig: RunningRig) -> None:
-    with pytest.raises(Refused, match="unknown key"):
+def test_unknown_key_and_character(rig: RobotClient) -> None:
+    with pytest.raises(RequestRejected, match="unknown key"):
         rig.knob("loop.rate")
     assert rig.characters() == ("bold", "shy")
     rig.character("shy")
-    with pytest.raises(Refused, match="no character 'brave'"):
+    with pytest.raises(RequestRejected, match="no character 'brave'"):
         rig.character("brave")
 
 
-def test_when_set_returns_the_loop_has_it(rig: RunningRig, beat: Beat) -> None:
+def test_when_set_returns_the_loop_has_it(rig: RobotClient, beat: Beat) -> None:
     rig.set(RATE, 150.0)
     assert any(Tune(((RATE, 150.0),)) in tick.orders for tick in beat.ticks)
     assert "tuned 1" in rig.status()["said"]
 
 
-def test_the_first_tick_after_set_has_it(rig: RunningRig, beat: Beat) -> None:
+def test_the_first_tick_after_set_has_it(rig: RobotClient, beat: Beat) -> None:
     beat.hold.set()
     asking = threading.Thread(target=rig.set, args=(RATE, 140.0))
     try:
@@ -291,7 +297,7 @@ def test_the_first_tick_after_set_has_it(rig: RunningRig, beat: Beat) -> None:
     assert beat.ticks[held].orders == (Tune(((RATE, 140.0),)),)
 
 
-def test_looking_jogging_and_asking(rig: RunningRig, beat: Beat) -> None:
+def test_looking_jogging_and_asking(rig: RobotClient, beat: Beat) -> None:
     rig.look_at(1.0, 0.2, 0.1, stay=True)
     assert rig.status()["why"] == "somebody chose this point"
     assert beat.ticks[-1].target.p_world_m == (1.0, 0.2, 0.1)
@@ -307,7 +313,7 @@ def test_looking_jogging_and_asking(rig: RunningRig, beat: Beat) -> None:
     rig.ask("conversation", "none")
 
 
-def test_stop_and_resume(rig: RunningRig, beat: Beat) -> None:
+def test_stop_and_resume(rig: RobotClient, beat: Beat) -> None:
     rig.stop("finger")
     status = rig.status()
     assert status["stopped"] == "finger" and status["level"] == "limp"
@@ -327,9 +333,9 @@ def test_stop_and_resume(rig: RunningRig, beat: Beat) -> None:
     ],
 )
 def test_orders_that_cannot_be_meant(
-    rig: RunningRig, ask: Callable[[RunningRig], None], words: str
+    rig: RobotClient, ask: Callable[[RobotClient], None], words: str
 ) -> None:
-    with pytest.raises(Refused, match=words):
+    with pytest.raises(RequestRejected, match=words):
         ask(rig)
 
 
@@ -337,11 +343,11 @@ def test_orders_that_cannot_be_meant(
 
 
 def test_a_loop_that_hangs_is_told_to_who_stops(
-    folder: Path, beat: Beat, errors: list[str], rig: RunningRig
+    folder: Path, beat: Beat, errors: list[str], rig: RobotClient
 ) -> None:
     beat.hold.set()
     try:
-        with pytest.raises(Refused, match="emergency stop"):
+        with pytest.raises(RequestRejected, match="emergency stop"):
             rig.stop()
     finally:
         beat.hold.clear()
@@ -350,7 +356,7 @@ def test_a_loop_that_hangs_is_told_to_who_stops(
 
 
 def test_a_servo_that_refuses_torque_is_named(
-    rig: RunningRig, beat: Beat, monkeypatch: pytest.MonkeyPatch
+    rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse() -> None:
         raise SetupError("neck_yaw: overload; gazerig reboot")
@@ -358,15 +364,15 @@ def test_a_servo_that_refuses_torque_is_named(
     rig.stop("test")
     with monkeypatch.context() as patch:
         patch.setattr(beat.robot.body, "take_hold", refuse)
-        with pytest.raises(Refused, match="still stopped: neck_yaw: overload"):
+        with pytest.raises(RequestRejected, match="still stopped: neck_yaw: overload"):
             rig.resume()
     rig.resume()
 
 
 def test_an_error_of_the_program_is_told_to_both_sides_and_the_rest_goes_on(
-    rig: RunningRig, errors: list[str]
+    rig: RobotClient, errors: list[str]
 ) -> None:
-    with pytest.raises(RigGone, match="KeyError"):
+    with pytest.raises(ConnectionLost, match="KeyError"):
         rig.set("bug", 5.0)
     assert "KeyError" in errors[0]
     assert rig.get(RATE) == {RATE: 200.0}
@@ -396,7 +402,7 @@ def test_an_error_of_the_program_is_told_to_both_sides_and_the_rest_goes_on(
     ],
 )
 def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(
-    rig: RunningRig, folder: Path, line: bytes, words: str
+    rig: RobotClient, folder: Path, line: bytes, words: str
 ) -> None:
     with raw(folder) as end:
         end.sendall(line)
@@ -407,7 +413,7 @@ def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(
         assert line_of(end) == {"ok": ["bold", "shy"]}
 
 
-def test_a_huge_request_is_refused_and_hung_up_on(rig: RunningRig, folder: Path) -> None:
+def test_a_huge_request_is_refused_and_hung_up_on(rig: RobotClient, folder: Path) -> None:
     with raw(folder) as end:
         with contextlib.suppress(ConnectionError):
             end.sendall(b"x" * (REQUEST_BYTES + 70_000))
@@ -416,7 +422,7 @@ def test_a_huge_request_is_refused_and_hung_up_on(rig: RunningRig, folder: Path)
 
 
 def test_an_endless_request_is_refused_and_hung_up_on(
-    rig: RunningRig, folder: Path, monkeypatch: pytest.MonkeyPatch
+    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gazerig.robot.remote.socket_server._REST_S", 0.2)
     with raw(folder) as end:
@@ -438,7 +444,7 @@ def test_an_endless_request_is_refused_and_hung_up_on(
         assert "no end of the line" in answer["refused"]
 
 
-def test_two_requests_in_one_piece_get_two_answers(rig: RunningRig, folder: Path) -> None:
+def test_two_requests_in_one_piece_get_two_answers(rig: RobotClient, folder: Path) -> None:
     with raw(folder) as end:
         end.sendall(b'{"do": "characters"}\n{"do": "get", "prefix": "loop"}\n')
         with end.makefile("rb") as file:
@@ -447,7 +453,7 @@ def test_two_requests_in_one_piece_get_two_answers(rig: RunningRig, folder: Path
 
 
 def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
-    rig: RunningRig, folder: Path, beat: Beat, monkeypatch: pytest.MonkeyPatch
+    rig: RobotClient, folder: Path, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gazerig.robot.remote.socket_server._TAKES_S", 0.2)
     with raw(folder) as end:
@@ -462,11 +468,11 @@ def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
 # Several at once
 
 
-def test_two_programs_at_once(rig: RunningRig, beat: Beat) -> None:
+def test_two_programs_at_once(rig: RobotClient, beat: Beat) -> None:
     refused: list[str] = []
 
     def work(value: float) -> None:
-        with RunningRig.connect() as mine:
+        with RobotClient.connect() as mine:
             for step in range(20):
                 mine.set(BLINKS, value + step)
                 if not mine.get(BLINKS):
@@ -490,7 +496,7 @@ def test_two_programs_at_once(rig: RunningRig, beat: Beat) -> None:
 
 
 def test_one_who_holds_a_half_request_does_not_hold_up_another(
-    rig: RunningRig, folder: Path
+    rig: RobotClient, folder: Path
 ) -> None:
     with raw(folder) as end:
         end.sendall(b'{"do": ')
@@ -501,14 +507,14 @@ def test_one_who_holds_a_half_request_does_not_hold_up_another(
         assert "ok" in line_of(end)
 
 
-def test_who_was_quiet_longest_makes_room(rig: RunningRig, folder: Path) -> None:
+def test_who_was_quiet_longest_makes_room(rig: RobotClient, folder: Path) -> None:
     """Whoever comes to stop the head is let in, however many programs hang around."""
     with contextlib.ExitStack() as stack:
         ends = [stack.enter_context(raw(folder)) for _ in range(15)]
         ends[-1].sendall(b'{"do": "characters"}\n')
         assert "ok" in line_of(ends[-1])  # all are in by now
         rig.get(RATE)  # and this one was heard last
-        with RunningRig.connect() as stopper:
+        with RobotClient.connect() as stopper:
             stopper.stop("many around")
             stopper.resume()
         assert hung_up(ends[0])
@@ -520,7 +526,7 @@ def test_who_was_quiet_longest_makes_room(rig: RunningRig, folder: Path) -> None
 # The socket
 
 
-def test_the_socket_is_the_owners_alone(rig: RunningRig, folder: Path) -> None:
+def test_the_socket_is_the_owners_alone(rig: RobotClient, folder: Path) -> None:
     path = folder / f"{os.getpid()}.sock"
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
@@ -528,7 +534,7 @@ def test_the_socket_is_the_owners_alone(rig: RunningRig, folder: Path) -> None:
 
 
 def open_server() -> RemoteServer:
-    beat_less = Requests(None, None, Pulse(RealClock()), {})  # type: ignore[arg-type]
+    beat_less = RequestHandler(None, None, Pulse(RealClock()), {})  # type: ignore[arg-type]
     return RemoteServer(beat_less, lambda _: None)
 
 
@@ -616,9 +622,9 @@ def test_without_a_runtime_folder_it_is_one_of_the_user_in_tmp(tmp_path: Path) -
 LISTENS = """
 import os, sys
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.remote.request_handler import Pulse, Requests
+from gazerig.robot.remote.request_handler import Pulse, RequestHandler
 from gazerig.robot.remote.socket_server import RemoteServer
-server = RemoteServer(Requests(None, None, Pulse(RealClock()), {}), print)
+server = RemoteServer(RequestHandler(None, None, Pulse(RealClock()), {}), print)
 server.open()
 print("open", flush=True)
 sys.stdin.read()
@@ -647,8 +653,8 @@ def test_a_killed_rig_leaves_a_socket_that_is_no_rig_and_that_the_next_removes(
         pass
     dead = folder / f"{killed.pid}.sock"
     assert dead.exists() and running() == []
-    with pytest.raises(NoRig, match="no rig is running: start one with gazerig run"):
-        RunningRig.connect()
+    with pytest.raises(NoRobotError, match="no rig is running: start one with gazerig run"):
+        RobotClient.connect()
     server = open_server()
     path = server.open()
     assert not dead.exists() and path.exists()
@@ -674,24 +680,24 @@ def test_a_new_rig_takes_over_the_socket_of_a_dead_one_with_its_number(folder: P
     server.close()
 
 
-def test_several_rigs_are_named_and_chosen_by_process(folder: Path, rig: RunningRig) -> None:
+def test_several_rigs_are_named_and_chosen_by_process(folder: Path, rig: RobotClient) -> None:
     with listening() as other:
-        with pytest.raises(NoRig) as which:
-            RunningRig.connect()
+        with pytest.raises(NoRobotError) as which:
+            RobotClient.connect()
         assert f"{os.getpid()} (desk)" in str(which.value) and str(other.pid) in str(which.value)
         assert "\n" not in str(which.value)
-        with RunningRig.connect(os.getpid()) as mine:
+        with RobotClient.connect(os.getpid()) as mine:
             assert mine.pid == os.getpid()
-        with pytest.raises(NoRig, match=f"no rig runs as process 1: .*{other.pid}"):
-            RunningRig.connect(1)
+        with pytest.raises(NoRobotError, match=f"no rig runs as process 1: .*{other.pid}"):
+            RobotClient.connect(1)
 
 
 def test_a_rig_that_ends_while_asked_is_gone_in_words(folder: Path) -> None:
     with listening() as other:
-        rig = RunningRig.connect()
+        rig = RobotClient.connect()
         other.kill()
         other.wait()
-        with pytest.raises(RigGone, match=f"process {other.pid}\\) has ended or hung up"):
+        with pytest.raises(ConnectionLost, match=f"process {other.pid}\\) has ended or hung up"):
             rig.get()
         rig.close()
 
@@ -701,9 +707,9 @@ def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
 ) -> None:
     monkeypatch.setattr("gazerig.robot.remote.client._ANSWER_S", 0.1)
     folder.mkdir(mode=0o700)
-    with remote_socket.listen(folder / "77.sock"), RunningRig.connect() as rig:
+    with remote_socket.listen(folder / "77.sock"), RobotClient.connect() as rig:
         for _ in range(2):
-            with pytest.raises(RigGone, match="does not answer|has ended or hung up"):
+            with pytest.raises(ConnectionLost, match="does not answer|has ended or hung up"):
                 rig.get()
 
 
@@ -711,10 +717,10 @@ def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
 
 
 def test_a_program_leads_while_it_lives_and_is_named(
-    rig: RunningRig, beat: Beat, monkeypatch: pytest.MonkeyPatch
+    rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(lead, "HEARTBEAT_S", 10.0)  # simulated: time goes faster here
-    with RunningRig.connect(who="a show") as show:
+    with RobotClient.connect(who="a show") as show:
         reply = show.look_at(-1.0, 0.0, 0.3)
         assert 60.0 < reply.error_deg < 90.0 and "neck_yaw stays at" in reply.words()
         assert show.leads
@@ -727,20 +733,20 @@ def test_a_program_leads_while_it_lives_and_is_named(
     assert beat.ticks[-1].led == "" and rig.status()["led"] == ""
 
 
-def test_nobody_passes_himself_off_as_another(rig: RunningRig, folder: Path) -> None:
+def test_nobody_passes_himself_off_as_another(rig: RobotClient, folder: Path) -> None:
     with raw(folder) as end:
         order = {"order": "stop", "why": "x", "who": "the page"}
         end.sendall(json.dumps({"do": "order", "order": order}).encode() + b"\n")
         assert "ok" in line_of(end)
     said = rig.status()["said"]
     assert any(f"stopped by the page (process {os.getpid()})" in words for words in said)
-    with pytest.raises(Refused, match="another may only resume who confirms"):
+    with pytest.raises(RequestRejected, match="another may only resume who confirms"):
         rig.resume()
     rig.resume(confirmed=True)
 
 
 def test_programs_of_other_users_are_hung_up_on(
-    rig: RunningRig, folder: Path, monkeypatch: pytest.MonkeyPatch
+    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stranger = remote_socket.Peer(1, os.getuid() + 1)
     rig.get(RATE)  # let in
@@ -752,7 +758,7 @@ def test_programs_of_other_users_are_hung_up_on(
 
 
 def test_processor_time_is_shared_out() -> None:
-    budget = Budget(Rate(0.1, 0.5), 100.0)
+    budget = Budget(RequestRate(0.1, 0.5), 100.0)
     budget.spend(0.5, 100.0)
     assert budget.wait_s(100.0) == 0.0
     budget.spend(0.2, 100.0)
@@ -764,13 +770,13 @@ def test_processor_time_is_shared_out() -> None:
 
 
 def test_who_takes_too_much_waits_and_is_refused_but_a_stop_goes_through(
-    rig: RunningRig, monkeypatch: pytest.MonkeyPatch
+    rig: RobotClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rig.get(RATE)  # let in with the usual rate
-    monkeypatch.setattr(server_module, "EACH", Rate(1e-6, 0.0))
-    with RunningRig.connect() as greedy:
+    monkeypatch.setattr(server_module, "EACH", RequestRate(1e-6, 0.0))
+    with RobotClient.connect() as greedy:
         greedy.get()
-        with pytest.raises(Refused, match="too many requests: ask again in"):
+        with pytest.raises(RequestRejected, match="too many requests: ask again in"):
             greedy.get()
         greedy.stop("all the same")
     assert rig.status()["stopped"] == "all the same"

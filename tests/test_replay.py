@@ -26,12 +26,12 @@ from gazerig.robot.dashboard.replay import ReplayView, clock, event_list, strip
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.recording.gaze_angles import trace_of
-from gazerig.robot.recording.playback_clock import State
+from gazerig.robot.recording.playback_clock import PlaybackState
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.replay import Replay, introduction
 from gazerig.robot.recording.run_info import RunInfo, versions
-from gazerig.robot.recording.snapshot_index import Frames
+from gazerig.robot.recording.snapshot_index import SnapshotIndex
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -66,10 +66,10 @@ def ticks() -> list[Tick]:
 
 
 @pytest.fixture
-def frames(ticks: list[Tick]) -> Iterator[Frames]:
+def frames(ticks: list[Tick]) -> Iterator[SnapshotIndex]:
     start_s = ticks[0].t_s
     pictures = [(start_s + at_s, b"jpeg at %d" % at_s) for at_s in (1, 3, 5)]
-    made = Frames(ticks, pictures, RATE_HZ)
+    made = SnapshotIndex(ticks, pictures, RATE_HZ)
     yield made
     made.close()
 
@@ -96,12 +96,14 @@ class Screen:
         return [json.loads(body) for body in self.of(REPLAY)]
 
 
-def shown(replay: Replay, screen: Screen, clock: SimulatedClock, seconds: float) -> list[State]:
+def shown(
+    replay: Replay, screen: Screen, clock: SimulatedClock, seconds: float
+) -> list[PlaybackState]:
     """Run for some seconds of the watcher's clock; give the states."""
-    states: list[State] = []
+    states: list[PlaybackState] = []
     until_s = clock.now_s() + seconds
 
-    def over(state: State) -> bool:
+    def over(state: PlaybackState) -> bool:
         states.append(state)
         return clock.now_s() >= until_s - 1e-9
 
@@ -112,7 +114,9 @@ def shown(replay: Replay, screen: Screen, clock: SimulatedClock, seconds: float)
 # --- frames
 
 
-def test_the_snapshot_of_a_time_is_the_last_one_before(frames: Frames, ticks: list[Tick]) -> None:
+def test_the_snapshot_of_a_time_is_the_last_one_before(
+    frames: SnapshotIndex, ticks: list[Tick]
+) -> None:
     start_s = ticks[0].t_s
     assert frames.duration_s == pytest.approx(ticks[-1].t_s - start_s)
     assert len(frames) == pytest.approx(50 * SECONDS, abs=2)
@@ -123,7 +127,7 @@ def test_the_snapshot_of_a_time_is_the_last_one_before(frames: Frames, ticks: li
 
 
 def test_a_snapshot_is_what_the_live_page_would_have_shown(
-    frames: Frames, ticks: list[Tick]
+    frames: SnapshotIndex, ticks: list[Tick]
 ) -> None:
     snapshot = unpack(frames.message(frames.at(4.0)))
     tick = next(t for t in ticks if t.t_s == snapshot.t_s)
@@ -132,18 +136,20 @@ def test_a_snapshot_is_what_the_live_page_would_have_shown(
     assert snapshot.behaviour == "wait" and snapshot.rate_hz == pytest.approx(200.0, rel=0.01)
 
 
-def test_pictures_come_with_their_time(frames: Frames) -> None:
+def test_pictures_come_with_their_time(frames: SnapshotIndex) -> None:
     assert frames.picture_at(0.9) is None
     found = [frames.picture(frames.picture_at(s)) for s in (1.0, 2.9, 3.1, 99.0)]
     assert found == [b"jpeg at 1", b"jpeg at 1", b"jpeg at 3", b"jpeg at 5"]
 
 
-def test_ten_minutes_stay_small(frames: Frames) -> None:
+def test_ten_minutes_stay_small(frames: SnapshotIndex) -> None:
     # 100 MB for ten minutes would still be fine.
     assert frames.packed_bytes / frames.duration_s * 600.0 < 100e6
 
 
-def test_saccades_blinks_and_orders_can_be_stepped_to(frames: Frames, ticks: list[Tick]) -> None:
+def test_saccades_blinks_and_orders_can_be_stepped_to(
+    frames: SnapshotIndex, ticks: list[Tick]
+) -> None:
     last = ticks[-1].gaze
     kinds = [mark.kind for mark in frames.marks]
     assert kinds.count("saccade") == last.saccades > 10
@@ -157,20 +163,20 @@ def test_a_guard_that_holds_is_an_event_once(ticks: list[Tick]) -> None:
         tick._replace(verdict=tick.verdict._replace(level="hold", reasons=("all: old picture",)))
         for tick in ticks[810:820]
     ]
-    marks = Frames([*ticks[800:810], *held, *ticks[820:830]], (), RATE_HZ).marks
+    marks = SnapshotIndex([*ticks[800:810], *held, *ticks[820:830]], (), RATE_HZ).marks
     words = [m.words for m in marks if m.words.startswith("guard")]
     assert words == ["guard: hold (all: old picture)"]
 
 
 def test_a_recording_without_ticks_says_so() -> None:
     with pytest.raises(SetupError, match="holds no tick"):
-        Frames((), (), RATE_HZ)
+        SnapshotIndex((), (), RATE_HZ)
 
 
 # --- what goes to the page
 
 
-def test_it_shows_its_first_picture_and_waits(frames: Frames, ticks: list[Tick]) -> None:
+def test_it_shows_its_first_picture_and_waits(frames: SnapshotIndex, ticks: list[Tick]) -> None:
     screen, time_ = Screen(), SimulatedClock(50.0)
     states = shown(Replay(frames, time_), screen, time_, 2.0)
     assert states[-1].at_s == 0.0 and not states[-1].playing
@@ -182,7 +188,7 @@ def test_it_shows_its_first_picture_and_waits(frames: Frames, ticks: list[Tick])
 
 
 def test_playing_shows_all_snapshots_in_order_and_each_picture_once(
-    frames: Frames, ticks: list[Tick]
+    frames: SnapshotIndex, ticks: list[Tick]
 ) -> None:
     screen, time_ = Screen(), SimulatedClock()
     replay = Replay(frames, time_)
@@ -195,7 +201,7 @@ def test_playing_shows_all_snapshots_in_order_and_each_picture_once(
     assert screen.states()[-1]["playing"] is False
 
 
-def test_fast_forward_leaves_nothing_out(frames: Frames, ticks: list[Tick]) -> None:
+def test_fast_forward_leaves_nothing_out(frames: SnapshotIndex, ticks: list[Tick]) -> None:
     screen, time_ = Screen(), SimulatedClock()
     replay = Replay(frames, time_)
     replay.ask({"speed": 8.0})
@@ -205,7 +211,9 @@ def test_fast_forward_leaves_nothing_out(frames: Frames, ticks: list[Tick]) -> N
     assert len(set(times)) == len(frames) and times == sorted(times)
 
 
-def test_a_round_that_comes_late_sends_some_on_the_way(frames: Frames, ticks: list[Tick]) -> None:
+def test_a_round_that_comes_late_sends_some_on_the_way(
+    frames: SnapshotIndex, ticks: list[Tick]
+) -> None:
     screen, time_ = Screen(), SimulatedClock()
     replay = Replay(frames, time_)
     replay.ask({"play": True})
@@ -219,7 +227,7 @@ def events_of(screen: Screen) -> list[object]:
     return [e for m in screen.messages if m[:1] == SNAPSHOT for e in unpack(m).events]
 
 
-def test_every_eye_movement_is_told_once_as_it_plays(frames: Frames) -> None:
+def test_every_eye_movement_is_told_once_as_it_plays(frames: SnapshotIndex) -> None:
     screen, time_ = Screen(), SimulatedClock()
     replay = Replay(frames, time_)
     replay.ask({"play": True})
@@ -229,7 +237,9 @@ def test_every_eye_movement_is_told_once_as_it_plays(frames: Frames) -> None:
     assert told == [e for n in range(len(frames)) for e in unpack(frames.message(n)).events]
 
 
-def test_after_a_leap_the_page_is_told_what_led_there(frames: Frames, ticks: list[Tick]) -> None:
+def test_after_a_leap_the_page_is_told_what_led_there(
+    frames: SnapshotIndex, ticks: list[Tick]
+) -> None:
     screen, time_ = Screen(), SimulatedClock()
     replay = Replay(frames, time_)
     replay.show(screen, 0.0)
@@ -252,7 +262,7 @@ def test_after_a_leap_the_page_is_told_what_led_there(frames: Frames, ticks: lis
         assert sum(s > place_s - 1.4 for s in at_s) == pytest.approx(140, abs=3)
 
 
-def test_nothing_is_recalled_while_the_slider_is_in_the_hand(frames: Frames) -> None:
+def test_nothing_is_recalled_while_the_slider_is_in_the_hand(frames: SnapshotIndex) -> None:
     screen, time_ = Screen(), SimulatedClock()
     replay = Replay(frames, time_)
     for place_s in (5.0, 1.0, 4.0, 2.0, 4.5, 0.5):
@@ -262,19 +272,19 @@ def test_nothing_is_recalled_while_the_slider_is_in_the_hand(frames: Frames) -> 
     assert all(not unpack(m).trail for m in screen.messages if m[:1] == SNAPSHOT)
 
 
-def test_what_is_recalled_fits_into_a_message(frames: Frames, ticks: list[Tick]) -> None:
+def test_what_is_recalled_fits_into_a_message(frames: SnapshotIndex, ticks: list[Tick]) -> None:
     long = [
         tick._replace(t_s=tick.t_s + k * (SECONDS + 0.01), gaze=tick.gaze)
         for k in range(4) for tick in ticks
     ]  # fmt: skip
-    whole = Frames(long, (), RATE_HZ)
+    whole = SnapshotIndex(long, (), RATE_HZ)
     assert len(whole.recalled(0, len(whole) - 1)) < MESSAGE_BYTES
     rows = unpack(whole.recalled(0, len(whole) - 1)).trail
     assert rows[-1].t_s - rows[0].t_s == pytest.approx(10.0, abs=0.1)
     whole.close()
 
 
-def test_a_leap_shows_only_where_it_lands(frames: Frames, ticks: list[Tick]) -> None:
+def test_a_leap_shows_only_where_it_lands(frames: SnapshotIndex, ticks: list[Tick]) -> None:
     screen, time_ = Screen(), SimulatedClock()
     replay = Replay(frames, time_)
     replay.show(screen, 0.0)
@@ -288,7 +298,9 @@ def test_a_leap_shows_only_where_it_lands(frames: Frames, ticks: list[Tick]) -> 
         assert state["at_s"] == state["sought_s"] == seek_s
 
 
-def test_what_a_full_page_did_not_take_comes_later(frames: Frames, ticks: list[Tick]) -> None:
+def test_what_a_full_page_did_not_take_comes_later(
+    frames: SnapshotIndex, ticks: list[Tick]
+) -> None:
     screen, time_ = Screen(), SimulatedClock()
     replay = Replay(frames, time_)
     screen.full = True
@@ -302,7 +314,7 @@ def test_what_a_full_page_did_not_take_comes_later(frames: Frames, ticks: list[T
     assert screen.of(PICTURE) == [b"jpeg at 3"]
 
 
-def test_the_page_is_told_once_what_there_is_and_in_one_message(frames: Frames) -> None:
+def test_the_page_is_told_once_what_there_is_and_in_one_message(frames: SnapshotIndex) -> None:
     screen, time_ = Screen(), SimulatedClock()
     replay = Replay(frames, time_)
     replay.ask({"play": True})
@@ -315,7 +327,7 @@ def test_the_page_is_told_once_what_there_is_and_in_one_message(frames: Frames) 
     assert len(json.dumps(introduction(crowded))) < 190_000  # type: ignore[arg-type]
 
 
-def test_requests_are_obeyed_or_refused_in_words(frames: Frames) -> None:
+def test_requests_are_obeyed_or_refused_in_words(frames: SnapshotIndex) -> None:
     replay = Replay(frames, SimulatedClock())
     assert replay.hear({"replay": {"seek_s": 2.0}}) is None
     assert replay.hear({"replay": {"step": "next saccade"}}) is None
@@ -400,7 +412,9 @@ def test_a_slider_in_the_hand_is_not_pulled_back(shelf: Shelf) -> None:
     assert shelf.handle("time, s").value == 6.5
 
 
-def test_a_player_takes_every_place_the_slider_can_ask_for(shelf: Shelf, frames: Frames) -> None:
+def test_a_player_takes_every_place_the_slider_can_ask_for(
+    shelf: Shelf, frames: SnapshotIndex
+) -> None:
     replay = Replay(frames, SimulatedClock())
     shelf.by_hand("time, s", 3.725)
     (_, asked) = shelf.asked[0]
@@ -478,7 +492,7 @@ def test_a_replay_knows_how_the_recorded_rig_was_built(
 ) -> None:
     built = cli_replay._built(RunRecording(recorded).info.config_yaml)
     recording = RunRecording(recorded)
-    frames = Frames(recording.ticks(), recording.pictures(), RATE_HZ, "shy", built)
+    frames = SnapshotIndex(recording.ticks(), recording.pictures(), RATE_HZ, "shy", built)
     shown = unpack(frames.message(frames.at(1.5)))
     assert shown.ghost is not None and shown.character == "shy" and shown.trail
     assert cli_replay._built("name: desk\n") is None
@@ -546,7 +560,7 @@ def test_what_cannot_be_done_is_one_line(arguments: tuple[str, ...], words: str)
     assert len(output.strip().splitlines()) == 1
 
 
-def test_poses_survive_the_packing(frames: Frames, ticks: list[Tick]) -> None:
+def test_poses_survive_the_packing(frames: SnapshotIndex, ticks: list[Tick]) -> None:
     first = unpack(frames.message(0))
     assert first.R_world_head == ticks[0].pose.R_world_head
     assert abs(first.measured_rad[6] - radians(-12.0)) < radians(0.2)

@@ -16,7 +16,8 @@ from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.event_detector import Blink, Commanded, Fixation, Saccade
+from gazerig.robot.analysis.blink_finder import BlinkEvent
+from gazerig.robot.analysis.event_detector import Commanded, FixationEvent, SaccadeEvent
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.report import app, page_file
@@ -26,25 +27,25 @@ from gazerig.robot.report import norm_bands as bands
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import differences_of
 from gazerig.robot.report.compare_page import compare_page
-from gazerig.robot.report.gaze_trace import Gathered, Gathering, Row
+from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
 from gazerig.robot.report.page import band_words, gauge, number, report_page
 from gazerig.robot.report.plotting import COLOURS, Shown, png
 from gazerig.robot.report.reference_walk import own, published
 from gazerig.robot.report.report import DRAWINGS, found, measured, report_of
-from gazerig.robot.report.run_header import About
-from gazerig.robot.report.statistics import Finding, Measured, judged, mean, median
+from gazerig.robot.report.run_header import RunHeader
+from gazerig.robot.report.statistics import MeasuredValue, MeasureResult, judged, mean, median
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 RIG = load_rig("desk")
 SLOWER = replace(RIG, loop=replace(RIG.loop, rate_hz=100.0))
 """Half the ticks: a minute of them is what takes longest here."""
-EMPTY = Gathered(np.zeros((0, len(Row._fields))), (), (), ())
+EMPTY = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
 
 
-def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> Gathered:
+def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> GazeTrace:
     """Gather a simulated run."""
-    made, gathering = assemble(rig, RunOptions(True, True, 0, scene, **choice)), Gathering()  # type: ignore[arg-type]
+    made, gathering = assemble(rig, RunOptions(True, True, 0, scene, **choice)), GazeTraceBuilder()  # type: ignore[arg-type]
     made.robot.start(made.clock)
     over: Callable[[float], str | None] = lambda s: "over" if s > seconds else None  # noqa: E731
     run(made.robot, made.clock, made.loop, over, gathering.note)
@@ -54,15 +55,15 @@ def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> Gathere
 
 
 @pytest.fixture(scope="module")
-def walking() -> Gathered:
+def walking() -> GazeTrace:
     return looked("face-to-face", 60.0, SLOWER)
 
 
-def verdicts(run: Gathered) -> dict[str, Finding]:
+def verdicts(run: GazeTrace) -> dict[str, MeasureResult]:
     return {finding.band.key: finding for finding in found(run)}
 
 
-def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(walking: Gathered) -> None:
+def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(walking: GazeTrace) -> None:
     seen = verdicts(walking)
     for key in ("on_parts", "eyes_share", "visit", "never_taken", "heat", "part_share", "rate",
                 "below_15", "peak_small", "rest_error", "left_mm", "right_mm", "in_cone",
@@ -72,7 +73,7 @@ def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(walking: Gathered) 
         assert seen[key].low95 <= seen[key].value <= seen[key].high95
 
 
-def test_what_the_paper_makes_other_than_people_is_outside(walking: Gathered) -> None:
+def test_what_the_paper_makes_other_than_people_is_outside(walking: GazeTrace) -> None:
     seen = verdicts(walking)
     assert seen["duration_small"].verdict == "outside"
     assert seen["duration_small"].measured.asked < 0.3  # and so it was asked for
@@ -99,17 +100,17 @@ def test_one_point_is_too_few_or_outside() -> None:
     assert not any(seen[key].verdict == "pass" for key in ("part_share", "heat", "peak_small"))
 
 
-def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -> Gathered:
+def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -> GazeTrace:
     """Make a run of saccades: amplitude, duration in ms, peak, time of the peak."""
     every = tuple(
-        Saccade(0.4 * n, d / 1e3, a, v, at, Commanded(0.4 * n, d / 1e3, a, v))
+        SaccadeEvent(0.4 * n, d / 1e3, a, v, at, Commanded(0.4 * n, d / 1e3, a, v))
         for n, (a, d, v, at) in enumerate(saccades)
     )
-    shuts = tuple(Blink(3.0 * n, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0) for n in range(blinks))
-    rows = np.full((600, len(Row._fields)), np.nan)
+    shuts = tuple(BlinkEvent(3.0 * n, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0) for n in range(blinks))
+    rows = np.full((600, len(TraceRow._fields)), np.nan)
     rows[:, 0] = np.arange(600) * 0.05
     rows[:, -1] = 0.0
-    return Gathered(rows, every, (), shuts, shuts)
+    return GazeTrace(rows, every, (), shuts, shuts)
 
 
 def human_saccades(faster: float = 1.0, longer: float = 1.0) -> list[tuple[float, ...]]:
@@ -142,7 +143,7 @@ def test_blinks_of_a_human_shape_pass_and_are_counted_by_the_minute() -> None:
 def test_too_few_events_are_no_pass_and_nothing_is_too_few() -> None:
     band = bands.BY_KEY["rate"]
     ones = np.full(band.least - 1, 0.4)
-    few = judged(Measured("rate", ones, mean), band)
+    few = judged(MeasuredValue("rate", ones, mean), band)
     assert few.verdict == "too few events" and np.isnan(few.low95)
     assert {finding.verdict for finding in found(EMPTY)} == {"too few events"}
 
@@ -150,10 +151,12 @@ def test_too_few_events_are_no_pass_and_nothing_is_too_few() -> None:
 def test_a_verdict_rests_on_the_band_alone() -> None:
     band = bands.BY_KEY["vergence"]
     for value, verdict in ((0.99, "pass"), (-0.99, "pass"), (1.01, "outside"), (-1.01, "outside")):
-        assert judged(Measured("vergence", np.full(40, value), median), band).verdict == verdict
+        assert (
+            judged(MeasuredValue("vergence", np.full(40, value), median), band).verdict == verdict
+        )
 
 
-def test_every_measure_has_its_band_and_every_band_its_source(walking: Gathered) -> None:
+def test_every_measure_has_its_band_and_every_band_its_source(walking: GazeTrace) -> None:
     keys = [measure.key for measure in measured(walking)]
     assert len(set(keys)) == len(keys) and set(keys) <= set(bands.BY_KEY)
     for mode in ("talk", "listen", "think", "none"):
@@ -186,13 +189,13 @@ def test_the_rigs_own_walk_knows_its_floor() -> None:
     assert model.visits(0, 300, dice).min() >= RIG.gaze.scanpath.min_dwell_ms / 1e3
 
 
-def fixed(parts: list[int], seconds: float = 0.3) -> Gathered:
+def fixed(parts: list[int], seconds: float = 0.3) -> GazeTrace:
     """Make a run that looks at one part after the other."""
     every = tuple(
-        Fixation(n * seconds, seconds, PARTS[part], True, 1, "face", PARTS[part])
+        FixationEvent(n * seconds, seconds, PARTS[part], True, 1, "face", PARTS[part])
         for n, part in enumerate(parts)
     )
-    return Gathered(np.zeros((0, len(Row._fields))), (), every, ())
+    return GazeTrace(np.zeros((0, len(TraceRow._fields))), (), every, ())
 
 
 def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:
@@ -206,9 +209,9 @@ def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:
     assert back["transitions"].value > 1.5 * forth["transitions"].value
 
 
-def test_the_whole_report_is_written(walking: Gathered, tmp_path: Path) -> None:
+def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None:
     told: list[tuple[str, float]] = []
-    about = About(
+    about = RunHeader(
         "a <run>", (("rig", "desk"),), frozenset({"saccade min_jerk"}), warnings=("cut & short",)
     )
     out = tmp_path / "deep" / "report.html"
@@ -233,8 +236,8 @@ def test_the_whole_report_is_written(walking: Gathered, tmp_path: Path) -> None:
 HOSTILE = "<img src=x onerror=alert(1)> $\\frac{$"
 
 
-def test_names_are_never_markup_nor_formulas(walking: Gathered) -> None:
-    about = About(HOSTILE, (("rig", HOSTILE), (HOSTILE, "x")), warnings=(HOSTILE,))
+def test_names_are_never_markup_nor_formulas(walking: GazeTrace) -> None:
+    about = RunHeader(HOSTILE, (("rig", HOSTILE), (HOSTILE, "x")), warnings=(HOSTILE,))
     findings = build.found(walking)
     shown = [Shown(HOSTILE, walking, colour) for colour in COLOURS]
     for drawing in DRAWINGS[:3]:
@@ -257,16 +260,18 @@ def test_an_empty_run_and_a_bad_place_are_told_in_one_line(
 ) -> None:
     monkeypatch.setattr(build, "DRAWINGS", build.DRAWINGS[:1])  # all are drawn elsewhere
     with pytest.raises(SetupError, match="0 ticks are nothing to report on"):
-        build.read([], About("empty"), lambda words, share: None)
+        build.read([], RunHeader("empty"), lambda words, share: None)
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(SetupError, match="name another file"):
-        report_of(EMPTY, About("x"), tmp_path / "file" / "r.html", lambda words, share: None)
+        report_of(EMPTY, RunHeader("x"), tmp_path / "file" / "r.html", lambda words, share: None)
 
 
 def test_numbers_are_short() -> None:
     values = {0.0: "0", 0.123456: "0.12", 1.5: "1.5", 20.0: "20", 123.4: "123", -0.002: "-0.002"}
     assert {value: number(value) for value in values} == values
-    place = gauge(judged(Measured("vergence", np.full(40, 9.0), median), bands.BY_KEY["vergence"]))
+    place = gauge(
+        judged(MeasuredValue("vergence", np.full(40, 9.0), median), bands.BY_KEY["vergence"])
+    )
     assert place.value == 100.0 and place.band_from == pytest.approx(30.0)
 
 

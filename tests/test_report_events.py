@@ -11,13 +11,13 @@ from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.saccade import SaccadeModel as Jumps
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.types import Vec3
-from gazerig.robot.analysis.blink_finder import BlinkFinder
-from gazerig.robot.analysis.event_detector import Blink, Fixation, GazeEvents, Saccade
+from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
+from gazerig.robot.analysis.event_detector import EventDetector, FixationEvent, SaccadeEvent
 from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.report.gaze_trace import Gathered, Gathering
+from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -37,8 +37,8 @@ def ticks() -> list[Tick]:
 
 
 @pytest.fixture(scope="module")
-def gathered(ticks: list[Tick]) -> Gathered:
-    gathering = Gathering()
+def gathered(ticks: list[Tick]) -> GazeTrace:
+    gathering = GazeTraceBuilder()
     for tick in ticks:
         gathering.note(tick)
     return gathering.gathered()
@@ -123,7 +123,7 @@ def test_an_eye_that_swings_back_has_landed_where_it_turned() -> None:
     assert first.duration_s < 0.085
 
 
-def blinks(openings: list[tuple[float, float, float]]) -> list[Blink]:
+def blinks(openings: list[tuple[float, float, float]]) -> list[BlinkEvent]:
     finder = BlinkFinder()
     return [blink for row in openings if (blink := finder.note(*row)) is not None]
 
@@ -152,7 +152,7 @@ def test_a_wink_a_droop_and_a_glance_down_are_no_blinks() -> None:
     assert blinks(shallow) == []
 
 
-def test_the_run_is_told_as_the_models_know_it(ticks: list[Tick], gathered: Gathered) -> None:
+def test_the_run_is_told_as_the_models_know_it(ticks: list[Tick], gathered: GazeTrace) -> None:
     asked = ticks[-1].gaze
     found = [s for s in gathered.saccades if s.commanded is not None]
     assert len(found) == pytest.approx(asked.saccades, rel=0.04)
@@ -167,7 +167,7 @@ def test_the_run_is_told_as_the_models_know_it(ticks: list[Tick], gathered: Gath
     assert all(f.duration_s > 0.03 for f in gathered.fixations)
 
 
-def test_an_independent_judge_finds_the_same_saccades(gathered: Gathered) -> None:
+def test_an_independent_judge_finds_the_same_saccades(gathered: GazeTrace) -> None:
     pymovements = pytest.importorskip("pymovements")
     t = 1e3 * gathered.column("t")
     ms = np.arange(int(t[0]) + 1, int(t[-1]))
@@ -192,18 +192,18 @@ def test_what_is_not_measured_or_stopped_makes_no_events(ticks: list[Tick]) -> N
     missing = [
         tick._replace(joints=tick.joints._replace(missing=("left_eye_pan",))) for tick in ticks
     ]
-    events = GazeEvents()
+    events = EventDetector()
     found = [event for tick in missing[:4000] for event in events.note(tick)]
-    assert not any(isinstance(event, Saccade | Fixation) for event in found)
-    events = GazeEvents()
+    assert not any(isinstance(event, SaccadeEvent | FixationEvent) for event in found)
+    events = EventDetector()
     stopped = [tick._replace(stopped="somebody did") for tick in ticks[:4000]]
     assert [event for tick in stopped for event in events.note(tick)] == []
 
 
 def test_events_come_soon(ticks: list[Tick]) -> None:
-    events = GazeEvents()
+    events = EventDetector()
     late_s = []
     for tick in ticks:
-        late_s += [tick.t_s - e.end_s for e in events.note(tick) if isinstance(e, Saccade)]
+        late_s += [tick.t_s - e.end_s for e in events.note(tick) if isinstance(e, SaccadeEvent)]
     assert len(late_s) > 80
     assert max(late_s) < 0.2 and median(late_s) < 0.03

@@ -15,19 +15,24 @@ from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Percept
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.resimulate import Rerun, recorded_rig, rerun
+from gazerig.robot.app.resimulate import Resimulation, recorded_rig, rerun
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Resume, Stop, Tune
-from gazerig.robot.recording.playback_devices import PlayedBody
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
+from gazerig.robot.recording.playback_devices import PlaybackBody
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text
 from gazerig.robot.recording.run_writer import RunWriter
-from gazerig.robot.recording.tick_record import Engaged, Measured, Moment, Refused
+from gazerig.robot.recording.tick_record import (
+    MeasuredJoints,
+    TickRecord,
+    TorqueEnabled,
+    TorqueRefused,
+)
 
 NECK_YAW = 6
-Asked = dict[int, tuple[Order, ...]]
+Asked = dict[int, tuple[Command, ...]]
 
 PUPPET: Asked = {
     40: (Ask("conversation", "talk"), Ask("lids", "wink left")),
@@ -93,7 +98,7 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
 
 
 class Again(NamedTuple):
-    found: Rerun
+    found: Resimulation
     ticks: list[Tick]
     path: Path
 
@@ -152,7 +157,7 @@ def test_with_other_dice_it_differs(once: Once) -> None:
 def test_the_last_bit_of_one_joint_is_seen(once: Once, monkeypatch: pytest.MonkeyPatch) -> None:
     real = RunRecording.moments
 
-    def bent(self: RunRecording) -> Iterator[Moment]:
+    def bent(self: RunRecording) -> Iterator[TickRecord]:
         for number, moment in enumerate(real(self)):
             if number == 20:
                 joints = moment.tick.joints
@@ -259,10 +264,14 @@ def test_a_refused_resumption_is_refused_again() -> None:
     made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
     made.robot.start(made.clock)
     tick = made.robot.tick(0.005, 0.005)
-    body = PlayedBody(made.robot.body)
+    body = PlaybackBody(made.robot.body)
     goals, other = (0.1,) * 9, tick.joints._replace(position_rad=(0.2,) * 9)
     body.play(
-        Moment(tick, 0.005, (Refused("servo 7 is mute"), Engaged(goals), Measured(0.0, other)))
+        TickRecord(
+            tick,
+            0.005,
+            (TorqueRefused("servo 7 is mute"), TorqueEnabled(goals), MeasuredJoints(0.0, other)),
+        )
     )
     with pytest.raises(SetupError, match="servo 7 is mute"):
         body.take_hold()

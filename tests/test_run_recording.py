@@ -32,7 +32,7 @@ from gazerig.robot.cli.terminal import BAD_INPUT, FAULT, _writer
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.dashboard.camera_overlay import encode
 from gazerig.robot.model import stop_latch
-from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Resume, Stop, Tune
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.picture_encoder import PictureEncoder
@@ -115,7 +115,7 @@ def with_picture(tick: Tick, number: int) -> Tick:
 
 def ordered(number: int, made: Assembly) -> None:
     """Ask for one of everything."""
-    orders: dict[int, Order] = {
+    orders: dict[int, Command] = {
         50: Ask("behaviour", "guard"),
         60: LookAt((1.0, 0.2, 0.3)),
         80: Jog((("neck_yaw", 0.1),)),
@@ -182,14 +182,14 @@ def same(now: object, was: object) -> None:
 def test_what_entered_the_run_beside_the_ticks_is_kept(recorded: Recorded) -> None:
     kept = list(RunRecording(recorded.path).moments())
     engaged, measured = kept[0].before
-    assert engaged == moments.Engaged(recorded.goals_rad)
-    assert isinstance(measured, moments.Measured) and measured.t_s == 0.0
+    assert engaged == moments.TorqueEnabled(recorded.goals_rad)
+    assert isinstance(measured, moments.MeasuredJoints) and measured.t_s == 0.0
     assert measured.joints.position_rad[6] == pytest.approx(-0.21, abs=0.01)
     times = [0.0, *(tick.t_s for tick in recorded.ticks)]
     assert [m.dt_s for m in kept] == [b - a for a, b in zip(times, times[1:], strict=False)]
     # The resumption has new goals.
     more = {n: [type(one).__name__ for one in m.before] for n, m in enumerate(kept) if m.before}
-    assert more == {0: ["Engaged", "Measured"], 141: ["Engaged"]}
+    assert more == {0: ["TorqueEnabled", "MeasuredJoints"], 141: ["TorqueEnabled"]}
 
 
 def test_info_and_end(recorded: Recorded) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.types import JointState, Verdict
+from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.safety.guard import Guard
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
@@ -38,9 +38,11 @@ def but(i: int, angle: float, others: float = 0.0) -> tuple[float, ...]:
     return tuple(angle if k == i else others for k in range(9))
 
 
-def driven(guard: Guard, wishes: Iterable[tuple[float, ...]], t_s: float = 0.0) -> list[Verdict]:
+def driven(
+    guard: Guard, wishes: Iterable[tuple[float, ...]], t_s: float = 0.0
+) -> list[GuardResult]:
     """Let the joints follow their commands one tick behind."""
-    verdicts: list[Verdict] = []
+    verdicts: list[GuardResult] = []
     position = tuple(guard._motion.command)
     for wish in wishes:
         t_s += DT

@@ -11,7 +11,7 @@ from gazerig.config.bounds import judge
 from gazerig.robot.model.forbidden_range import CollisionParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.types import JointState, Verdict
+from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.safety.guard import Guard
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
@@ -39,7 +39,7 @@ class World:
         self.guard._gentle = [False] * 9
         return self
 
-    def tick(self, dt_s: float = DT, **wish_deg: float) -> Verdict:
+    def tick(self, dt_s: float = DT, **wish_deg: float) -> GuardResult:
         self.t_s += dt_s
         joints = JointState(self.measured(self.path[-1]), (0.0,) * 9, (self.t_s,) * 9, ())
         wish = tuple(radians(wish_deg.get(name, 0.0)) for name in JOINTS)

@@ -8,7 +8,7 @@ from desk import JOINTS
 
 from gazerig.robot.model.guard_params import GuardParams, HealthParams
 from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.types import JointState, Verdict
+from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.safety.guard import Guard
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000), 70.0, 3.5, 7.0)
@@ -30,7 +30,7 @@ class World:
         self.position = [0.0] * 9
         self.path = [0.0]
 
-    def tick(self, wish: float, *, stray: float | None = None, **said: object) -> Verdict:
+    def tick(self, wish: float, *, stray: float | None = None, **said: object) -> GuardResult:
         """One tick with the joint told to go to ``wish``; stray: where it is instead."""
         self.t_s += DT
         at = list(self.position)
@@ -56,7 +56,7 @@ class World:
         return np.diff(self.path) / DT
 
 
-def reason(verdict: Verdict) -> str:
+def reason(verdict: GuardResult) -> str:
     return verdict.applied(NAME).reason
 
 

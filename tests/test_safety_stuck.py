@@ -9,7 +9,7 @@ from desk import JOINTS
 
 from gazerig.robot.model.guard_params import GuardParams, StallParams
 from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.types import JointState, Verdict
+from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.safety.guard import Guard
 
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
@@ -32,7 +32,7 @@ class World:
         self.wall: float | None = None
         self.answered_s = 0.0
         self.path = [0.0]
-        self.verdict: Verdict | None = None
+        self.verdict: GuardResult | None = None
         self._band = radians(band_deg)
         self._sent = deque([0.0] * (round(lag_s / DT) + 1), maxlen=round(lag_s / DT) + 1)
 

@@ -74,7 +74,7 @@ class Bench:
         self.port.faults.command(text.format(id=self.id))
         self.clock.sleep_until(self.clock.now_s() + 0.1)
 
-    # gazerig.robot.calibration.joint_procedure.Person
+    # gazerig.robot.calibration.joint_procedure.Operator
 
     def tell(self, line: str) -> None:
         self.said.append(line)

@@ -26,7 +26,7 @@ from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.dashboard.page_process import unpack
-from gazerig.robot.recording.export_bids import About as Subject
+from gazerig.robot.recording.export_bids import DatasetDescription as Subject
 from gazerig.robot.recording.export_bids import write_bids
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import trace_of
@@ -36,14 +36,14 @@ from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_format import HEALTH, PERCEPT, TICK, Message
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text
 from gazerig.robot.recording.run_writer import RunWriter
-from gazerig.robot.recording.snapshot_index import Frames
+from gazerig.robot.recording.snapshot_index import SnapshotIndex
 from gazerig.robot.recording.tick_record import as_json, flat, from_json
 from gazerig.robot.remote.request_handler import Pulse
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import compare
-from gazerig.robot.report.gaze_trace import Gathered, Gathering
-from gazerig.robot.report.joint_basis import RunJoints
-from gazerig.robot.report.run_header import About
+from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
+from gazerig.robot.report.joint_basis import JointBasis
+from gazerig.robot.report.run_header import RunHeader
 
 STARTED = "2026-01-31T12:00:00+00:00"
 NO_MORE = {
@@ -182,8 +182,8 @@ def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, de
 # --- what is said of the run
 
 
-def gathered(ticks: list[Tick]) -> Gathered:
-    gathering = Gathering()
+def gathered(ticks: list[Tick]) -> GazeTrace:
+    gathering = GazeTraceBuilder()
     for tick in ticks:
         gathering.note(tick)
     return gathering.gathered()
@@ -215,7 +215,7 @@ def quiet(words: str, share: float) -> None:
 
 def test_a_report_of_reckoned_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
     out = tmp_path / "six.html"
-    made = build.report(maker.ticks, About("six"), out, quiet)
+    made = build.report(maker.ticks, RunHeader("six"), out, quiet)
     rows = {row["key"]: row for row in json.loads(made.data.read_text())}
     assert {row["basis"] for row in rows.values()} == {"reckoned"}
     page = unescape(out.read_text(encoding="utf-8"))
@@ -234,7 +234,7 @@ def test_a_report_of_reckoned_joints_says_so_everywhere(maker: Run, tmp_path: Pa
 
 def test_a_report_of_measured_joints_claims_it(desk: Run) -> None:
     run = gathered(desk.ticks)
-    assert run.joints == RunJoints(JOINTS, ())
+    assert run.joints == JointBasis(JOINTS, ())
     assert run.joints.whole_basis == "measured"
     assert not any(run.joints.left_out(drawing.key) for drawing in build.DRAWINGS)
     assert np.isnan(run.column("lower_lid")).all() and np.isfinite(run.column("lid")).all()
@@ -245,7 +245,7 @@ def test_a_measured_run_beside_a_reckoned_one_is_warned_of(
 ) -> None:
     drawings = [d for d in build.DRAWINGS if d.key in ("overview", "vor", "blink_shape")]
     monkeypatch.setattr(build, "DRAWINGS", tuple(drawings))
-    abouts = About("desk"), About("maker")
+    abouts = RunHeader("desk"), RunHeader("maker")
     made = compare((desk.ticks, maker.ticks), abouts, tmp_path / "both.html", quiet)
     assert made.warning.startswith("desk is measured and maker is reckoned")
     page = unescape(made.page.read_text(encoding="utf-8"))
@@ -275,15 +275,15 @@ def test_a_measured_run_beside_a_reckoned_one_is_warned_of(
     ],
 )
 def test_what_cannot_be_told_says_why(names: tuple[str, ...], key: str, words: str) -> None:
-    why = RunJoints(names).left_out(key)
+    why = JointBasis(names).left_out(key)
     assert (words in why) if words else why == ""
 
 
 def test_a_rig_of_both_kinds_of_servos_is_measured_in_parts() -> None:
-    eyes = RunJoints(JOINTS, tuple(name for name in JOINTS if "eye" in name))
+    eyes = JointBasis(JOINTS, tuple(name for name in JOINTS if "eye" in name))
     assert eyes.basis("Saccades") == "partly reckoned" and eyes.basis("Lids") == "measured"
     assert eyes.whole_basis == "partly reckoned" and eyes.left_out("unasked")
-    lids = RunJoints(JOINTS, ("left_upper_lid", "right_upper_lid"))
+    lids = JointBasis(JOINTS, ("left_upper_lid", "right_upper_lid"))
     assert lids.basis("Lids") == "reckoned" and lids.basis("On the face") == "measured"
     assert not lids.left_out("unasked")
 
@@ -293,7 +293,7 @@ def test_hobby_eyes_on_a_neck_that_tells_its_place(tmp_path: Path) -> None:
     file.write_text(mixed_text(), encoding="utf-8")
     mixed = recorded(tmp_path / "mixed.mcap", load_rig(str(file)), 1.0)
     seen = gathered(list(mixed.recording.ticks())).joints
-    assert seen == RunJoints((*SIX, "neck_yaw", "neck_pitch"), SIX)
+    assert seen == JointBasis((*SIX, "neck_yaw", "neck_pitch"), SIX)
     assert seen.basis("Eyes and head") == "partly reckoned" and seen.basis("Lids") == "reckoned"
     trace = trace_of(mixed.ticks)
     assert trace.basis("head") == "measured" and trace.basis("left") == "partly reckoned"
@@ -379,7 +379,7 @@ def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
 
 
 def test_the_page_shows_a_recording_of_them(maker: Run) -> None:
-    frames = Frames(iter(maker.ticks[:100]), (), 200.0)
+    frames = SnapshotIndex(iter(maker.ticks[:100]), (), 200.0)
     shot = unpack(frames.message(len(frames) - 1))
     assert shot.joints == shot.reckoned == SIX and shot.lower_lids is not None
     frames.close()

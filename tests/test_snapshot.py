@@ -11,13 +11,14 @@ from six_joints import SIX
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.angles import angle_between
-from gazerig.robot.analysis.event_detector import Blink, Fixation, GazeEvents, Saccade
+from gazerig.robot.analysis.blink_finder import BlinkEvent
+from gazerig.robot.analysis.event_detector import EventDetector, FixationEvent, SaccadeEvent
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.dashboard.page_process import MESSAGE_BYTES, pack, unpack
-from gazerig.robot.dashboard.snapshot import Said, ShownRig, Snapshots, snapshot
+from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenFixation, SeenSaccade, Snapshot
 
 RATE_HZ = 200.0
@@ -53,32 +54,32 @@ def shown_rig() -> ShownRig:
 
 @cache
 def taken() -> tuple[Snapshot, ...]:
-    snapshots = Snapshots(RATE_HZ, shown_rig())
+    snapshots = SnapshotBuilder(RATE_HZ, shown_rig())
     out = []
     for number, tick in enumerate(visit()[2]):
         snapshots.note(tick)
         if number % TICKS_BETWEEN == TICKS_BETWEEN - 1:
-            shot = snapshots.take(Said("bus ok", "wait", "seeing", "shy", "listen"))
+            shot = snapshots.take(SnapshotTexts("bus ok", "wait", "seeing", "shy", "listen"))
             assert shot is not None
             out.append(shot)
     return tuple(out)
 
 
 def test_nothing_is_shown_before_the_first_tick() -> None:
-    assert Snapshots(RATE_HZ).take(Said()) is None
+    assert SnapshotBuilder(RATE_HZ).take(SnapshotTexts()) is None
 
 
 def test_every_eye_movement_is_shown_once() -> None:
-    finder = GazeEvents()
+    finder = EventDetector()
     found = [event for tick in visit()[2] for event in finder.note(tick)]
     seen = [event for shot in taken() for event in shot.events]
-    kinds = ((Saccade, SeenSaccade), (Fixation, SeenFixation), (Blink, SeenBlink))
+    kinds = ((SaccadeEvent, SeenSaccade), (FixationEvent, SeenFixation), (BlinkEvent, SeenBlink))
     for kind, shown in kinds:
         assert sum(isinstance(event, shown) for event in seen) == sum(
             isinstance(event, kind) for event in found
         )
     assert sum(isinstance(event, SeenSaccade) for event in seen) > 10
-    jumps = [event for event in found if isinstance(event, Saccade)]
+    jumps = [event for event in found if isinstance(event, SaccadeEvent)]
     first = next(event for event in seen if isinstance(event, SeenSaccade))
     assert first == (
         jumps[0].onset_s, jumps[0].duration_s, jumps[0].amplitude_deg, jumps[0].peak_deg_s,
@@ -129,11 +130,11 @@ def test_what_a_tick_does_not_tell_is_said() -> None:
 
 def test_servos_come_with_their_limits_and_their_silences() -> None:
     rig, _, ticks = visit()
-    snapshots = Snapshots(RATE_HZ, shown_rig())
+    snapshots = SnapshotBuilder(RATE_HZ, shown_rig())
     silent = ticks[3].joints._replace(missing=("neck_yaw",))
     for tick in (*ticks[:3], ticks[3]._replace(joints=silent)):
         snapshots.note(tick)
-    shot = snapshots.take(Said())
+    shot = snapshots.take(SnapshotTexts())
     assert shot is not None and shot.servos.limits is not None
     assert shot.servos.unanswered == tuple(int(name == "neck_yaw") for name in JOINTS)
     hottest = rig.joints["neck_yaw"].limit().hottest_c
@@ -143,28 +144,28 @@ def test_servos_come_with_their_limits_and_their_silences() -> None:
 
 def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
     ticks = visit()[2]
-    snapshots = Snapshots(RATE_HZ)
+    snapshots = SnapshotBuilder(RATE_HZ)
     calm = [tick for tick in ticks if tick.verdict.level == "ok"][:4]
     short = calm[1]._replace(verdict=calm[1].verdict._replace(level="hold"))
     for tick in (calm[0], short, calm[2]):
         snapshots.note(tick)
-    shot = snapshots.take(Said())
+    shot = snapshots.take(SnapshotTexts())
     assert shot is not None and (shot.level, shot.worst) == ("ok", "hold")
     snapshots.note(calm[3])
-    after = snapshots.take(Said())
+    after = snapshots.take(SnapshotTexts())
     assert after is not None and after.worst == "ok"
 
 
 def test_a_clock_set_back_begins_anew() -> None:
     ticks = visit()[2]
-    snapshots = Snapshots(RATE_HZ)
+    snapshots = SnapshotBuilder(RATE_HZ)
     for tick in (*ticks[:300], *ticks[:300]):
         snapshots.note(tick)
-    shot = snapshots.take(Said())
-    once = Snapshots(RATE_HZ)
+    shot = snapshots.take(SnapshotTexts())
+    once = SnapshotBuilder(RATE_HZ)
     for tick in ticks[:300]:
         once.note(tick)
-    alone = once.take(Said())
+    alone = once.take(SnapshotTexts())
     assert shot is not None and alone is not None
     assert shot.timing == alone.timing
     assert shot.trail == alone.trail * 2
@@ -188,10 +189,10 @@ def test_snapshots_survive_the_way_and_are_short() -> None:
 def maker_shown() -> tuple[tuple[Tick, ...], Snapshot]:
     """Two seconds of six hobby servos on a Maestro, in one snapshot."""
     _, made, ticks = visit("maker", 2.0)
-    snapshots = Snapshots(RATE_HZ, made.shown())
+    snapshots = SnapshotBuilder(RATE_HZ, made.shown())
     for tick in ticks:
         snapshots.note(tick)
-    shot = snapshots.take(Said())
+    shot = snapshots.take(SnapshotTexts())
     assert shot is not None
     return ticks, shot
 

@@ -8,16 +8,16 @@ import pytest
 from test_cli_face import DESK, PATIENCE_S, Sitting
 
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.remote.client import Refused, RunningRig
+from gazerig.robot.remote.client import RequestRejected, RobotClient
 
 
-def goes_on(running: RunningRig) -> None:
+def goes_on(running: RobotClient) -> None:
     """Resume as soon as the stop has held as long as stops do."""
     end_s = time.monotonic() + PATIENCE_S
     while True:
         try:
             return running.resume()
-        except Refused as refused:
+        except RequestRejected as refused:
             assert "holds at least" in str(refused) and time.monotonic() < end_s, refused
             time.sleep(1.2)  # who asks sooner is refused for that
 
@@ -31,7 +31,7 @@ def test_a_head_that_is_steered_over_a_face_can_be_stopped_and_told_nothing_else
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with Sitting(rig, "--no-page") as sitting:
         sitting.reads("1/8 the tip of your nose: 0 mm")
-        with RunningRig.connect() as running:
+        with RobotClient.connect() as running:
             assert running.pid == sitting.pid
             with pytest.raises((DriverError, ValueError), match="is being calibrated"):
                 running.look_at(1.0, 0.0, 0.3)

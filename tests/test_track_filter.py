@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gazerig.robot.perception.kalman import Restlessness, TrackFilter
+from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter
 
 FINE = 0.002**2 * np.eye(3)
 DT_S = 1.0 / 30.0
@@ -11,7 +11,7 @@ DT_S = 1.0 / 30.0
 
 def walked(unseen_pictures: int, stops_after: int) -> TrackFilter:
     """Follow somebody at 1.8 m/s who is then unseen, stands still meanwhile, and is seen again."""
-    track = TrackFilter((0.0, 0.0, 0.0), FINE, 0.7, Restlessness(0.12, 10.0))
+    track = TrackFilter((0.0, 0.0, 0.0), FINE, 0.7, ProcessNoise(0.12, 10.0))
     for k in range(1, 31):
         track.predict(DT_S)
         track.correct((0.0, 1.8 * k * DT_S, 0.0), FINE)

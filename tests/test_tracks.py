@@ -9,14 +9,16 @@ from hypothesis import strategies as st
 
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.kalman import far_off
-from gazerig.robot.perception.tracker import Sighting, Track, Tracker, blended
+from gazerig.robot.perception.tracker import LocalisedDetection, Track, Tracker, blended
 
 CAMERA = (0.0, 0.0, 0.2)
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def face(x: float, y: float, kind: str = "face") -> Sighting:
-    return Sighting(kind, (x, y, 0.2), IDENTITY if kind == "face" else None, 0.1, 0.0, 0.9)
+def face(x: float, y: float, kind: str = "face") -> LocalisedDetection:
+    return LocalisedDetection(
+        kind, (x, y, 0.2), IDENTITY if kind == "face" else None, 0.1, 0.0, 0.9
+    )
 
 
 def test_velocity_is_learned_and_the_lag_vanishes() -> None:
@@ -72,8 +74,8 @@ def test_blended_rotations_stay_rotations() -> None:
     assert np.degrees(np.arctan2(middle[1, 0], middle[0, 0])) == pytest.approx(45.0)
 
 
-def across(y: float, x: float = 1.5, kind: str = "face") -> Sighting:
-    return Sighting(
+def across(y: float, x: float = 1.5, kind: str = "face") -> LocalisedDetection:
+    return LocalisedDetection(
         kind,
         (x, y, 0.2),
         IDENTITY if kind == "face" else None,
@@ -140,7 +142,7 @@ def test_a_distance_known_badly_is_no_reason_to_be_somebody_else() -> None:
     (one,) = tracker.step([across(0.0, 3.0)], CAMERA, 0.0)
     (same,) = tracker.step([across(0.0, 3.4)], CAMERA, 0.033)
     assert same.id == one.id
-    exact = Sighting("thing", (3.0, 0.0, 0.2), None, 0.1, 0.0, 0.9, along_sd_m=0.01)
+    exact = LocalisedDetection("thing", (3.0, 0.0, 0.2), None, 0.1, 0.0, 0.9, along_sd_m=0.01)
     tracker = Tracker(TrackParams(gate_m=0.1))
     (one,) = tracker.step([exact], CAMERA, 0.0)
     moved = replace(exact, p_world_m=(4.2, 0.0, 0.2))

@@ -13,8 +13,8 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import Tuning
-from gazerig.robot.model.commands import Order, Tune
+from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.model.commands import Command, Tune
 
 DESK = Path("config/rigs/desk.yaml")
 NOW = datetime(2026, 1, 31, 23, 59, 59)
@@ -31,12 +31,12 @@ class Bench:
     def __init__(self, name: str, character: str | None = None, **chosen: Any) -> None:
         rig = load_rig(name, character)
         self.made: Assembly = assemble(rig, RunOptions(True, True, 0, "visitor", **chosen))
-        self.orders: list[Order] = []
-        self.tuning = Tuning(
+        self.orders: list[Command] = []
+        self.tuning = ParamStore(
             self.made.live, self.take, name, character, now=lambda: NOW, elsewhere=here
         )
 
-    def take(self, order: Order) -> None:
+    def take(self, order: Command) -> None:
         self.orders.append(order)
         assert isinstance(order, Tune)
         self.said = self.made.live(order, 0.0)

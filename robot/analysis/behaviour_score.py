@@ -105,7 +105,7 @@ class _Watch:
         return _Answer(self._first_s is not None, self._first_s, self._on_s, lasted_s)
 
 
-class Behaviours:
+class BehaviourScore:
     """Scores a run, tick by tick."""
 
     def __init__(self, events: Iterable[Happening], round_s: float) -> None:

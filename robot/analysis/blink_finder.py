@@ -22,7 +22,7 @@ _LEAST_OPEN = 0.15
 """Lids that hang lower than this do not show a blink."""
 
 
-class Blink(NamedTuple):
+class BlinkEvent(NamedTuple):
     """One blink of both lids.
 
     onset_s: the lids begin to shut; close_s, hold_s, open_s: lengths of its phases
@@ -57,7 +57,7 @@ class BlinkFinder:
         self._shut_s: float | None = None
         self._back_s: float | None = None
 
-    def note(self, t_s: float, left: float, right: float) -> Blink | None:
+    def note(self, t_s: float, left: float, right: float) -> BlinkEvent | None:
         """Take both openings, 0 shut .. 1 open; give the blink that is over now, if any."""
         opening = left if left > right else right  # a wink is no blink
         trace = self._trace
@@ -83,7 +83,7 @@ class BlinkFinder:
             self._usual += (opening - self._usual) * min(1.0, 4 * share if opening > self._usual
                                                          else share)  # fmt: skip
 
-    def _wait(self, t_s: float, opening: float, shut_s: float) -> Blink | None:
+    def _wait(self, t_s: float, opening: float, shut_s: float) -> BlinkEvent | None:
         """Wait for the lids to be open again, and for a little longer."""
         if self._back_s is None and opening >= _BACK_SHARE * self._usual:
             self._back_s = t_s
@@ -96,7 +96,7 @@ class BlinkFinder:
         return None
 
 
-def _shape(trace: list[tuple[float, float]], usual: float) -> Blink | None:
+def _shape(trace: list[tuple[float, float]], usual: float) -> BlinkEvent | None:
     """Measure one blink: (time, opening) rows from before it until after it."""
     t = [row[0] for row in trace]
     o = [row[1] for row in trace]
@@ -112,7 +112,7 @@ def _shape(trace: list[tuple[float, float]], usual: float) -> Blink | None:
         return None
     close_from, close_to = _phase(t[1:-1], [-v for v in speed], down)
     open_from, open_to = _phase(t[1:-1], speed, up)
-    return Blink(
+    return BlinkEvent(
         close_from,
         close_to - close_from,
         max(0.0, open_from - close_to),

@@ -11,8 +11,7 @@ from typing import NamedTuple, TypeVar
 
 from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.types import PARTS, Face, Vec3
-from gazerig.robot.analysis.blink_finder import Blink as Blink
-from gazerig.robot.analysis.blink_finder import BlinkFinder
+from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
 from gazerig.robot.analysis.lid_opening import UPPER, openings
 from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
 from gazerig.robot.analysis.summary import cyclopean
@@ -48,7 +47,7 @@ class Commanded(NamedTuple):
     peak_deg_s: float
 
 
-class Saccade(NamedTuple):
+class SaccadeEvent(NamedTuple):
     """One saccade of the gaze in space.
 
     peak_at: share of the duration at which it was fastest, .5 is symmetric
@@ -68,7 +67,7 @@ class Saccade(NamedTuple):
         return self.onset_s + self.duration_s
 
 
-class Fixation(NamedTuple):
+class FixationEvent(NamedTuple):
     """Rest of the gaze between two saccades, at one place or with something that moves.
 
     part: the face part that the lines of sight passed nearest to, None off the parts
@@ -90,11 +89,11 @@ class Fixation(NamedTuple):
         return self.start_s + self.duration_s
 
 
-Event = Saccade | Fixation | Blink
+Event = SaccadeEvent | FixationEvent | BlinkEvent
 T = TypeVar("T")
 
 
-class GazeEvents:
+class EventDetector:
     """Finds events in ticks as they come; an event is told when it is over."""
 
     def __init__(self) -> None:
@@ -129,13 +128,13 @@ class GazeEvents:
             return () if blink is None else (blink,)
         return self._landed(jump, blink)
 
-    def _landed(self, jump: Jump, blink: Blink | None) -> tuple[Event, ...]:
+    def _landed(self, jump: Jump, blink: BlinkEvent | None) -> tuple[Event, ...]:
         """Return the fixation that a saccade has ended, and the saccade."""
         events: list[Event] = [] if blink is None else [blink]
         fixation = self._rest.over(jump.onset_s)
         if fixation is not None:
             events.append(fixation)
-        events.append(Saccade(*jump[:5], self._command_of(jump.onset_s)))
+        events.append(SaccadeEvent(*jump[:5], self._command_of(jump.onset_s)))
         self._rest = _Rest(jump.onset_s + jump.duration_s)
         return tuple(events)
 
@@ -223,7 +222,7 @@ class _Rest:
         self._faces[face] += 1
         self._kinds[tick.target.kind, tick.target.part] += 1
 
-    def over(self, end_s: float) -> Fixation | None:
+    def over(self, end_s: float) -> FixationEvent | None:
         """Return the fixation, None where there was none worth the name."""
         if self._start_s is None or end_s - self._start_s < SHORTEST_S:
             return None
@@ -231,7 +230,7 @@ class _Rest:
         face = _most(self._faces, -1)
         kind, wanted = _most(self._kinds, ("", None))
         length_s = end_s - self._start_s
-        return Fixation(self._start_s, length_s, part, face >= 0, face, kind, wanted)
+        return FixationEvent(self._start_s, length_s, part, face >= 0, face, kind, wanted)
 
 
 def part_looked_at(tick: Tick, way: Vec3) -> tuple[str | None, int]:

@@ -9,7 +9,7 @@ _PLANE_M = -0.028
 """The plane between the nose tip and the eyes and mouth, along the face's own x axis."""
 
 
-class FaceGaze:
+class GazeOnFace:
     """Gathers gaze points on the plane of the face that is looked at.
 
     points_face_m: (y, z) to the owner's left and up from the nose; seconds: time at each

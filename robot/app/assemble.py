@@ -30,7 +30,7 @@ from gazerig.robot.app.rig_limits import (
 )
 from gazerig.robot.app.run_bus import RunBus, run_bus, true_head
 from gazerig.robot.control.body import Body
-from gazerig.robot.control.chooser import Chooser
+from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.dashboard.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
@@ -114,7 +114,7 @@ class Substitutes(NamedTuple):
     body: Callable[[Body], Body] = _unchanged
     camera: Callable[[Camera], Camera] = _unchanged
     perception: Callable[[Perception], Perception] = _unchanged
-    chooser: Callable[[Attention], Chooser] = _unchanged
+    chooser: Callable[[Attention], TargetChooser] = _unchanged
 
 
 RIGS_OWN = Substitutes()

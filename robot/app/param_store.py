@@ -38,13 +38,13 @@ from gazerig.config.save_text import Unchangeable, written
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.live_params import LiveParams
 from gazerig.robot.model.commands import Value
-from gazerig.robot.model.reply import OrderTaker
+from gazerig.robot.model.reply import CommandTaker
 
 NO_CHARACTER = "none"
 _DEFAULTS = "desk"
 
 
-class _State(NamedTuple):
+class _ParamState(NamedTuple):
     """Everything at one moment; a new one takes its place as a whole.
 
     saved: what the files make, with the options; rig: in force
@@ -63,7 +63,7 @@ class _State(NamedTuple):
     version: int
 
 
-class Tuning:
+class ParamStore:
     """Gives and changes the parameters of one running rig.
 
     version: goes up at each change
@@ -73,7 +73,7 @@ class Tuning:
     def __init__(
         self,
         live_params: LiveParams,
-        order: OrderTaker,
+        order: CommandTaker,
         rig: str,
         character: str | None = None,
         profile: str | None = None,
@@ -98,7 +98,7 @@ class Tuning:
         read, files = read_all(Layers(rig, character, profile))
         whole, found = live_params.rig, values(live_params.rig)
         self._options = differences(read, whole)
-        self._state = _State(whole, whole, rig, character, files, found, found, 0)
+        self._state = _ParamState(whole, whole, rig, character, files, found, found, 0)
         self._knobs = knobs_of(whole, self._defaults)
         # A shipped rig's own folder is the package's, where nobody has files.
         at_home = rig in shipped_names("rigs")
@@ -249,16 +249,16 @@ class Tuning:
         }
         return self._put(state, changed(state.saved, kept))
 
-    def _layers(self, state: _State) -> Layers:
+    def _layers(self, state: _ParamState) -> Layers:
         return Layers(state.name, state.character, self._profile)
 
-    def _read(self, state: _State) -> _State:
+    def _read(self, state: _ParamState) -> _ParamState:
         """Read the files, with the options over them; what is in force stays."""
         rig, files = self._elsewhere(read_all, self._layers(state))
         saved = changed(rig, self._options)
         return state._replace(saved=saved, was=values(saved), files=files)
 
-    def _put(self, state: _State, rig: Rig) -> tuple[str, ...]:
+    def _put(self, state: _ParamState, rig: Rig) -> tuple[str, ...]:
         """Put a rig in force that was checked, and say what is other than before."""
         before = self._state
         found = differences(before.rig, rig)

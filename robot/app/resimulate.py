@@ -23,16 +23,16 @@ from gazerig.robot.app.session import leave
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.recording.playback_devices import NoCamera, PlayedBody, PlayedPerception
+from gazerig.robot.recording.playback_devices import NoCamera, PlaybackBody, PlaybackPerception
 from gazerig.robot.recording.read import BadRecording, RunRecording
-from gazerig.robot.recording.tick_record import Measured, Moment
+from gazerig.robot.recording.tick_record import MeasuredJoints, TickRecord
 
 Joints = Literal["recorded", "emulated"]
 
 _LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
 
 
-class Rerun(NamedTuple):
+class Resimulation(NamedTuple):
     """What came out of doing a run again.
 
     joints: where the joints' angles came from
@@ -65,7 +65,7 @@ def rerun(
     character: str | None = None,
     joints: str | None = None,
     note: Callable[[Tick], None] | None = None,
-) -> Rerun:
+) -> Resimulation:
     """Do a recorded run again.
 
     rig: another rig, by name or path or as it is; None: as recorded
@@ -83,14 +83,14 @@ def rerun(
         with_rig = _rig(recording, rig, character, Path(folder))
         # The scene is not looked at: what it showed is in the recording.
         options = RunOptions(mock=True, fast=True, seed=recording.info.seed, scene="visitor")
-        again = _Again(with_rig, options, fed, note)
+        again = _Resimulator(with_rig, options, fed, note)
         try:
             return again.whole(recording)
         finally:
             again.close()
 
 
-class _Again:
+class _Resimulator:
     """One run being done again."""
 
     def __init__(
@@ -100,9 +100,9 @@ class _Again:
         self._note = note
         self._compared = _Compared()
         self._notes: list[str] = []
-        self._body: PlayedBody | None = None
+        self._body: PlaybackBody | None = None
         camera = rig.camera
-        self._perception = PlayedPerception(CameraMount(camera), camera.horizontal_field_deg)
+        self._perception = PlaybackPerception(CameraMount(camera), camera.horizontal_field_deg)
         self._made = assemble(
             rig,
             options,
@@ -114,14 +114,14 @@ class _Again:
         )
 
     def _played(self, own: Body) -> Body:
-        self._body = PlayedBody(own)
+        self._body = PlaybackBody(own)
         return self._body
 
     def close(self) -> None:
         """End what was started for it."""
         self._made.close()
 
-    def whole(self, recording: RunRecording) -> Rerun:
+    def whole(self, recording: RunRecording) -> Resimulation:
         """Do all of it and compare."""
         moments = recording.moments()
         first = next(moments, None)
@@ -159,10 +159,10 @@ class _Again:
             raise SetupError(f"{apart}: let the servos be emulated")
         self._notes.append(apart)
 
-    def _start(self, first: Moment) -> float:
+    def _start(self, first: TickRecord) -> float:
         """Begin where the recorded run began; give when."""
         began_s = first.tick.t_s - first.dt_s
-        starts = [one.t_s for one in first.before if isinstance(one, Measured)]
+        starts = [one.t_s for one in first.before if isinstance(one, MeasuredJoints)]
         if not starts:
             self._notes.append("the start of the run is not in the recording: it begins a little")
         self._made.clock.sleep_until(starts[0] if starts else began_s)
@@ -171,7 +171,7 @@ class _Again:
         self._made.robot.start(self._made.clock)
         return began_s
 
-    def _run(self, moments: Iterator[Moment]) -> str | None:
+    def _run(self, moments: Iterator[TickRecord]) -> str | None:
         """Do tick after tick; give what ended them before their time."""
         made = self._made
         for moment in moments:
@@ -187,7 +187,7 @@ class _Again:
                 return f"fault: {'; '.join(tick.verdict.gravest)}"
         return None
 
-    def _tick(self, moment: Moment) -> Tick:
+    def _tick(self, moment: TickRecord) -> Tick:
         """Do one tick."""
         was = moment.tick
         if self._body is not None:
@@ -228,9 +228,9 @@ class _Compared:
             self._first_s = was.t_s - self._began_s
             self._differs = differs
 
-    def result(self, joints: Joints, tx_same: bool | None, notes: tuple[str, ...]) -> Rerun:
+    def result(self, joints: Joints, tx_same: bool | None, notes: tuple[str, ...]) -> Resimulation:
         """Return what came out."""
-        return Rerun(
+        return Resimulation(
             joints, self.ticks, self._agreeing, self._first_s, self._differs, tx_same,
             self._was.figures(), self._is.figures(), notes,
         )  # fmt: skip

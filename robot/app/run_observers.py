@@ -14,19 +14,19 @@ from typing import NamedTuple
 from gazerig.config.load import ConfigError
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.control.observers import Observers, left_out
-from gazerig.robot.dashboard.click_to_look import Picking
-from gazerig.robot.dashboard.page_process import Page
-from gazerig.robot.dashboard.param_feed import TuningFeed
-from gazerig.robot.dashboard.publisher import InForce, Onlooker
-from gazerig.robot.dashboard.request_handler import PageHear
-from gazerig.robot.dashboard.snapshot import Snapshots
-from gazerig.robot.model.commands import Order, Resume, Stop, Tune
-from gazerig.robot.model.reply import OrderTaker, Ticket
+from gazerig.robot.dashboard.click_to_look import ClickToLook
+from gazerig.robot.dashboard.page_process import PageProcess
+from gazerig.robot.dashboard.param_feed import ParamFeed
+from gazerig.robot.dashboard.publisher import InForce, Publisher
+from gazerig.robot.dashboard.request_handler import PageRequestHandler
+from gazerig.robot.dashboard.snapshot import SnapshotBuilder
+from gazerig.robot.model.commands import Command, Resume, Stop, Tune
+from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.remote.live_server import LiveControl
+from gazerig.robot.remote.live_server import LiveServer
 
 _SWITCH_S = 0.0003
 
@@ -34,7 +34,7 @@ STEER = "steer"
 """The menu of this name is the page's steps of a calibration (dashboard/control_tabs.py)."""
 
 
-class Steer(NamedTuple):
+class SteeringButtons(NamedTuple):
     """Buttons of the page that lead a calibration in the place of all that leads the robot.
 
     keys: what stands on them; press: takes one, in a thread of the page's, and gives what there
@@ -55,9 +55,9 @@ class RunObservers:
         options: RunOptions,
         say: Callable[[str], None],
         status: Callable[[str], None] | None = None,
-        tuning: Tuning | None = None,
+        tuning: ParamStore | None = None,
         recorder: Recorder | None = None,
-        steer: Steer | None = None,
+        steer: SteeringButtons | None = None,
     ) -> None:
         """Take the robot before it starts.
 
@@ -75,14 +75,14 @@ class RunObservers:
         self._tuning, self._recorder = tuning, recorder
         about = {"rig": options.rig, "pid": os.getpid()}
         self._live = (
-            LiveControl(made.robot, tuning, (ConfigError,), made.clock, about, say)
+            LiveServer(made.robot, tuning, (ConfigError,), made.clock, about, say)
             if tuning is not None and not options.fast
             else None
         )
-        self._picking = Picking(made.mount, made.poses, made.camera)
+        self._picking = ClickToLook(made.mount, made.poses, made.camera)
         address = options.page_address
         self._page = self._made_page(address) if address is not None else None
-        self._snapshots = Snapshots(made.loop.rate_hz, made.shown())
+        self._snapshots = SnapshotBuilder(made.loop.rate_hz, made.shown())
         self._onlooker = self._made_onlooker(status)
         # In simulated time nobody can watch.
         self._shown = not options.fast and (self._page is not None or status is not None)
@@ -90,9 +90,9 @@ class RunObservers:
         self._observers = Observers(say)
         self.join(self._observers)
 
-    def _made_page(self, address: tuple[str, int]) -> Page:
+    def _made_page(self, address: tuple[str, int]) -> PageProcess:
         order, steer = self._made.robot.order, self._steer
-        hear = PageHear(
+        hear = PageRequestHandler(
             order if steer is None else only_stops(order),
             tuning=self._tuning,
             point=self._picking.point,
@@ -102,11 +102,11 @@ class RunObservers:
             depth=self._show_depth,
             confined=self._tuning.confined if self._tuning is not None else None,
         )
-        return Page(*address, hear)
+        return PageProcess(*address, hear)
 
-    def _made_onlooker(self, status: Callable[[str], None] | None) -> Onlooker:
+    def _made_onlooker(self, status: Callable[[str], None] | None) -> Publisher:
         page, made, tuning = self._page, self._made, self._tuning
-        return Onlooker(
+        return Publisher(
             page,
             status,
             self._snapshots,
@@ -116,7 +116,7 @@ class RunObservers:
             made.mount,
             made.poses,
             lambda: made.horizontal_field_deg,
-            TuningFeed(page.send, tuning) if page is not None and tuning is not None else None,
+            ParamFeed(page.send, tuning) if page is not None and tuning is not None else None,
             self._say,
         )
 
@@ -233,10 +233,10 @@ class RunObservers:
             self._snapshots.rig = self._made.shown()
 
 
-def only_stops(order: OrderTaker) -> OrderTaker:
+def only_stops(order: CommandTaker) -> CommandTaker:
     """Return what takes stop and resume alone; of the rest, it raises ValueError."""
 
-    def take(asked: Order) -> Ticket | None:
+    def take(asked: Command) -> Ticket | None:
         if not isinstance(asked, Stop | Resume):
             raise ValueError(
                 f"the buttons of {STEER!r} lead the head now; besides them only stop and resume go"

@@ -7,7 +7,7 @@ game; a scene carries such a plan as a function of time.
 from collections.abc import Callable
 
 
-class Planner:
+class ScriptedBehaviour:
     """Asks once for each change of the plan, so that people may overrule it in between."""
 
     def __init__(

@@ -11,15 +11,15 @@ import numpy as np
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.analysis.behaviour_score import Behaviours
-from gazerig.robot.analysis.gaze_on_face import FaceGaze
+from gazerig.robot.analysis.behaviour_score import BehaviourScore
+from gazerig.robot.analysis.gaze_on_face import GazeOnFace
 from gazerig.robot.analysis.heatmap import heatmap
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble, with_options
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
-from gazerig.robot.app.scripted_behaviour import Planner
+from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
 from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
@@ -32,16 +32,16 @@ from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
 
 
-class Run(NamedTuple):
+class ComposedRun(NamedTuple):
     """A robot put together for one run, with what reaches into it and what records it."""
 
     options: RunOptions
     made: Assembly
-    tuning: Tuning
+    tuning: ParamStore
     recorder: Recorder | None
 
 
-def compose(options: RunOptions) -> Run:
+def compose(options: RunOptions) -> ComposedRun:
     """Put one run together; nothing moves.
 
     Raises:
@@ -58,7 +58,7 @@ def compose(options: RunOptions) -> Run:
         substitutes = Substitutes(body=recorder.recorded)
     made = assemble(rig, options, substitutes)
     names = (options.rig, options.character, options.profile)
-    return Run(options, made, Tuning(made.live, made.robot.order, *names), recorder)
+    return ComposedRun(options, made, ParamStore(made.live, made.robot.order, *names), recorder)
 
 
 def run_info(rig: Rig, options: RunOptions) -> RunInfo:
@@ -82,7 +82,7 @@ def run_info(rig: Rig, options: RunOptions) -> RunInfo:
 
 
 def run(
-    composed: Run,
+    composed: ComposedRun,
     stopped: Callable[[], str | None],
     say: Callable[[str], None],
     status: Callable[[str], None] | None = None,
@@ -99,17 +99,17 @@ def run(
         SetupError: before anything moved.
     """
     try:
-        return _Running(composed, stopped, say, status).whole()
+        return _Session(composed, stopped, say, status).whole()
     finally:
         composed.made.close()
 
 
-class _Running:
+class _Session:
     """One run, with everything that watches it."""
 
     def __init__(
         self,
-        composed: Run,
+        composed: ComposedRun,
         stopped: Callable[[], str | None],
         say: Callable[[str], None],
         status: Callable[[str], None] | None,
@@ -122,8 +122,8 @@ class _Running:
         )
         self._summary, self._faults = Summary(), JointFaults(say)
         scene = made.scene
-        self._score = Behaviours(scene.events(), scene.round_s) if scene is not None else None
-        self._face_gaze = FaceGaze() if options.heatmap is not None else None
+        self._score = BehaviourScore(scene.events(), scene.round_s) if scene is not None else None
+        self._face_gaze = GazeOnFace() if options.heatmap is not None else None
         self._start_s = 0.0
         self._observers = self._all_observers()
         _ask_all(made.robot, options)
@@ -202,11 +202,11 @@ class _Running:
 
 
 def _observe_scene(
-    observers: Observers, made: Assembly, score: Behaviours | None, face_gaze: FaceGaze | None
+    observers: Observers, made: Assembly, score: BehaviourScore | None, face_gaze: GazeOnFace | None
 ) -> None:
     """Add what a scene plans and scores, and the heat map, where there are any."""
     if made.scene is not None and score is not None:
-        planner = Planner(made.scene.behaviour, made.robot.ask)
+        planner = ScriptedBehaviour(made.scene.behaviour, made.robot.ask)
         observers.add("the scene's planner", lambda tick: planner.note(tick.t_s))
         observers.add("the scene's score", score.note)
     if face_gaze is not None:
@@ -240,7 +240,7 @@ def _ask_all(robot: Robot, options: RunOptions) -> None:
 
 
 def _draw_heatmap(
-    face_gaze: FaceGaze, options: RunOptions, out: Path, say: Callable[[str], None]
+    face_gaze: GazeOnFace, options: RunOptions, out: Path, say: Callable[[str], None]
 ) -> None:
     """Write the heat map, or say why there is none."""
     if not face_gaze.points_face_m:
@@ -281,7 +281,7 @@ def parked(made: Assembly, again: Again) -> str:
 def _figures(
     made: Assembly,
     summary: Summary,
-    score: Behaviours | None,
+    score: BehaviourScore | None,
     count: LoopCount,
     wall_s: float,
     faults: JointFaults,

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from math import degrees, radians
 from typing import NamedTuple
 
-from gazerig.robot.model.types import JointAngles, JointState, Level, Verdict
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
 
 PASSING = ("starting slowly", "too hard", "too fast")
 """Reasons that say how a goal is approached, not that it cannot be reached."""
@@ -47,7 +47,7 @@ class Step(NamedTuple):
 
     t_s: float
     wish_rad: JointAngles
-    verdict: Verdict
+    verdict: GuardResult
     joints: JointState
 
 
@@ -92,7 +92,7 @@ class Notes:
     def __init__(self) -> None:
         self._by_joint: dict[str, dict[str, None]] = {}
 
-    def take(self, verdict: Verdict) -> None:
+    def take(self, verdict: GuardResult) -> None:
         """Take what a verdict says, but for how goals are approached."""
         for line in verdict.reasons:
             joint, _, reason = line.partition(": ")

@@ -1,6 +1,6 @@
 """Calibrating one joint, step by step: a hand or gentle motion turns it, a person judges.
 
-Nothing is printed or written here: questions go to ``Person``, the result is a value.
+Nothing is printed or written here: questions go to ``Operator``, the result is a value.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from gazerig.robot.calibration.joint_calibration import (
 ZeroBy = Literal["middle", "person"]
 
 
-class Person(Protocol):
+class Operator(Protocol):
     """Who is asked; ``live`` is called more than 20 times a second while they think."""
 
     def tell(self, line: str) -> None:
@@ -67,7 +67,7 @@ class Watched:
         return self._track.see(*self._single.position())
 
 
-def by_hand(single: SingleJoint, person: Person, margin_deg: float) -> Calibration:
+def by_hand(single: SingleJoint, person: Operator, margin_deg: float) -> Calibration:
     """Let a person turn the limp joint to its ends and straight ahead.
 
     Raises:
@@ -93,7 +93,7 @@ def by_hand(single: SingleJoint, person: Person, margin_deg: float) -> Calibrati
 
 def by_motion(
     single: SingleJoint,
-    person: Person,
+    person: Operator,
     margin_deg: float,
     params: StopSearchParams,
     zero_by: ZeroBy,
@@ -120,7 +120,7 @@ def by_motion(
     return calibration(single.name, marks, single.joint, margin_deg)
 
 
-def _find_stops(single: SingleJoint, person: Person, params: StopSearchParams) -> Marks:
+def _find_stops(single: SingleJoint, person: Operator, params: StopSearchParams) -> Marks:
     """Return both stops, the zero still open; the person says which way it went."""
     positive, negative = ends_of(single.name)
     way = single.joint.sign
@@ -139,7 +139,7 @@ def _find_stops(single: SingleJoint, person: Person, params: StopSearchParams) -
     return Marks(first, second, 0) if sign == way else Marks(second, first, 0)
 
 
-def _stop(single: SingleJoint, person: Person, params: StopSearchParams, way: int) -> int:
+def _stop(single: SingleJoint, person: Operator, params: StopSearchParams, way: int) -> int:
     """Find one stop; gives its position."""
     stop: EndStop = single.find_stop(params, way)
     if stop.kind == "limit":

@@ -10,7 +10,7 @@ from typing import Protocol
 from gazerig.robot.calibration.hobby_access import OneHobby
 from gazerig.robot.calibration.joint_access import SingleJoint
 from gazerig.robot.calibration.joint_calibration import LinkageFit, ends_of, is_lid
-from gazerig.robot.calibration.joint_procedure import Person, Watched
+from gazerig.robot.calibration.joint_procedure import Operator, Watched
 from gazerig.robot.calibration.linkage_calibration import (
     Place,
     angle_now,
@@ -50,7 +50,7 @@ class Steered(Protocol):
         ...
 
 
-class Steerer(Person, Protocol):
+class Steerer(Operator, Protocol):
     """Who moves a servo by small steps, and reads angles off."""
 
     def steer(self, question: str, servo: Steered) -> None:
@@ -167,7 +167,7 @@ class HobbyPlacer:
 class HandPlacer:
     """Lets a person turn a limp servo that tells its place; implements Placer."""
 
-    def __init__(self, single: SingleJoint, person: Person) -> None:
+    def __init__(self, single: SingleJoint, person: Operator) -> None:
         self.name, self.joint = single.name, single.joint
         self._single, self._person = single, person
         self._watched = Watched(single)

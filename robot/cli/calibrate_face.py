@@ -17,7 +17,7 @@ from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_observers import RunObservers, Steer
+from gazerig.robot.app.run_observers import RunObservers, SteeringButtons
 from gazerig.robot.app.session import way_out
 from gazerig.robot.calibration.face_calibration import PART_WORDS, FaceCalibration, begun, changes
 from gazerig.robot.calibration.face_steering import FaceSteering
@@ -38,7 +38,7 @@ from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.control.loop import run as run_loop
-from gazerig.robot.remote.stop_only_server import StopDoor
+from gazerig.robot.remote.stop_only_server import StopOnlyServer
 
 STILL_SCENE = "sits-still"
 
@@ -132,9 +132,9 @@ def _steered(
     # What comes through a pipe is a script, too: nobody is there to give up.
     scripted = scripted or not sys.stdin.isatty()
     keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
-    steer = Steer(BUTTONS, keys.press, lambda: shown(steering))
+    steer = SteeringButtons(BUTTONS, keys.press, lambda: shown(steering))
     audience = RunObservers(made, options, say, steer=steer)
-    door = StopDoor(
+    door = StopOnlyServer(
         made.robot.order,
         made.clock,
         {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"},
@@ -157,7 +157,7 @@ def _run(
     sitting: "_Sitting",
     keys: Keys,
     audience: RunObservers,
-    door: StopDoor,
+    door: StopOnlyServer,
     interrupts: Interrupts,
 ) -> LoopCount:
     """Run the robot until the sitting is over."""
@@ -188,7 +188,7 @@ class _Sitting:
         stopped: Callable[[], str | None],
         scripted: bool,
         audience: RunObservers,
-        door: StopDoor,
+        door: StopOnlyServer,
     ) -> None:
         self._steering, self._keys, self._now_s = steering, keys, now_s
         self._stopped, self._scripted = stopped, scripted

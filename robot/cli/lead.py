@@ -10,7 +10,7 @@ import typer
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli.terminal import FAULT, clear_errors, say
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.remote.client import RunningRig, running
+from gazerig.robot.remote.client import RobotClient, running
 
 app = typer.Typer()
 _LEADS_EVERY_S = 0.2
@@ -42,7 +42,7 @@ def look(
     """Let the running head look at a point while this command runs, or freely again."""
     with clear_errors():
         point = read_point(where)
-        with RunningRig.connect(pid, "gazerig look") as rig:
+        with RobotClient.connect(pid, "gazerig look") as rig:
             if point is None:
                 rig.look_freely()
                 say("it looks freely")
@@ -58,7 +58,7 @@ def _until(seconds: float | None) -> str:
     return "Ctrl-C" if seconds is None else f"{seconds:g} s have passed"
 
 
-def _lead_on(rig: RunningRig, seconds: float) -> None:
+def _lead_on(rig: RobotClient, seconds: float) -> None:
     """Lead for so long, or until Ctrl-C or somebody else leads; then let go."""
     clock = RealClock()
     end_s = clock.now_s() + seconds
@@ -83,7 +83,7 @@ def stop(
     with clear_errors():
         rigs = running(pid, "gazerig stop")
         if not rigs:
-            RunningRig.connect(pid)  # says why there is none
+            RobotClient.connect(pid)  # says why there is none
         failed = False
         for rig in rigs:
             try:
@@ -106,7 +106,7 @@ def resume(
     pid: PidOption = None,
 ) -> None:
     """Put the torque on again after a stop, where the joints are, and go on slowly."""
-    with clear_errors(), RunningRig.connect(pid, "gazerig resume") as rig:
+    with clear_errors(), RobotClient.connect(pid, "gazerig resume") as rig:
         now = rig.status()
         if not now["stopped"]:
             say("it was not stopped: nothing to resume")

@@ -78,7 +78,7 @@ class Lines:
 
 
 class TerminalPerson:
-    """Asks on the terminal; implements gazerig.robot.calibration.joint_procedure.Person.
+    """Asks on the terminal; implements gazerig.robot.calibration.joint_procedure.Operator.
 
     Args:
         lines: where answers come from.
@@ -99,11 +99,11 @@ class TerminalPerson:
         say(line)
 
     def wait(self, question: str, live: Callable[[], str]) -> None:
-        """Return at Enter; see gazerig.robot.calibration.joint_procedure.Person."""
+        """Return at Enter; see gazerig.robot.calibration.joint_procedure.Operator."""
         self._ask(question, live, ("",))
 
     def agrees(self, question: str, live: Callable[[], str] | None = None) -> bool:
-        """Return yes or no; see gazerig.robot.calibration.joint_procedure.Person."""
+        """Return yes or no; see gazerig.robot.calibration.joint_procedure.Operator."""
         if self._yes:
             say(f"{question} yes (--yes)")
             return True

@@ -28,7 +28,7 @@ from gazerig.robot.cli.terminal import (
 from gazerig.robot.control.loop import Tick
 
 if TYPE_CHECKING:
-    from gazerig.robot.app.resimulate import Rerun
+    from gazerig.robot.app.resimulate import Resimulation
     from gazerig.robot.dashboard.snapshot import ShownRig
 
 app = typer.Typer(add_completion=False)
@@ -110,7 +110,7 @@ def _export(
 ) -> None:
     """Write one kind of export and say what was written."""
     from gazerig.robot.control.feedback_basis import RECKONED
-    from gazerig.robot.recording.export_bids import About, write_bids
+    from gazerig.robot.recording.export_bids import DatasetDescription, write_bids
     from gazerig.robot.recording.export_csv import csv_files, write_csv
     from gazerig.robot.recording.gaze_angles import trace_of
     from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
@@ -128,7 +128,7 @@ def _export(
         stretches = stretches_of(trace, labels)
     if bids:
         info = recording.info
-        about = About(
+        about = DatasetDescription(
             subject or Path(info.rig).stem,
             task or info.scene or "live",
             info.rate_hz,
@@ -162,17 +162,17 @@ def _show(
     stopped: Callable[[], str | None],
 ) -> bool:
     """Serve the page until told to stop; False where it cannot be had."""
-    from gazerig.robot.dashboard.page_process import Page
+    from gazerig.robot.dashboard.page_process import PageProcess
     from gazerig.robot.model.clock import RealClock
-    from gazerig.robot.recording.playback_clock import State
+    from gazerig.robot.recording.playback_clock import PlaybackState
     from gazerig.robot.recording.read import RunRecording, used
     from gazerig.robot.recording.replay import Replay
-    from gazerig.robot.recording.snapshot_index import Frames
+    from gazerig.robot.recording.snapshot_index import SnapshotIndex
 
     recording, clock = RunRecording(file), RealClock()
     _warn(recording.note)
     with used(file), _progress("reading", recording.duration_s) as read:
-        frames = Frames(
+        frames = SnapshotIndex(
             recording.ticks(),
             recording.pictures(),
             recording.info.rate_hz,
@@ -181,10 +181,10 @@ def _show(
             read,
         )
     replaying = Replay(frames, clock)
-    page = Page(*address, replaying.hear)
+    page = PageProcess(*address, replaying.hear)
     began_s, urls, starts = clock.now_s(), [""], [0]
 
-    def over(_: State) -> bool:
+    def over(_: PlaybackState) -> bool:
         if (note := page.notice()) is not None:
             say(note)
         url = page.url()
@@ -266,7 +266,7 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
     return result.same or result.joints != "recorded" or changed
 
 
-def agreement(result: "Rerun") -> str:
+def agreement(result: "Resimulation") -> str:
     """Say in words how far a run done again is the one that was recorded."""
     words = f"{result.agreeing} of {result.ticks} ticks are the same to the bit"
     if result.first_difference_s is not None:

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from gazerig.robot.app.assemble import Assembly
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.recording.read import RunRecording
-    from gazerig.robot.report.gaze_trace import Gathered, Gathering
-    from gazerig.robot.report.run_header import About
-    from gazerig.robot.report.statistics import Finding
+    from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
+    from gazerig.robot.report.run_header import RunHeader
+    from gazerig.robot.report.statistics import MeasureResult
 
 app = typer.Typer(add_completion=False)
 
@@ -136,7 +136,7 @@ def compare(
         say(f"{made.page}: {count} of {len(made.differences)} measures differ by more than chance")
 
 
-def _recorded(file: Path, name: str, tell: _Tell) -> "tuple[About, Gathered]":
+def _recorded(file: Path, name: str, tell: _Tell) -> "tuple[RunHeader, GazeTrace]":
     """Read a recorded run."""
     from gazerig.robot.recording.read import RunRecording, used
     from gazerig.robot.report.report import read
@@ -153,14 +153,14 @@ def _simulated(
     seconds: float,
     conversation: str | None,
     tell: _Tell,
-) -> "tuple[About, Gathered]":
+) -> "tuple[RunHeader, GazeTrace]":
     """Run a scene in simulated time."""
     from gazerig.config.schema import load_rig, load_walk
     from gazerig.robot.app.assemble import assemble, with_options
-    from gazerig.robot.report.gaze_trace import Gathering
+    from gazerig.robot.report.gaze_trace import GazeTraceBuilder
 
     rig = load_rig(*layers)
-    made, gathering = assemble(rig, options), Gathering()
+    made, gathering = assemble(rig, options), GazeTraceBuilder()
     _run(made, gathering, seconds, conversation, tell)
     rig = with_options(rig, options)
     given = zip(("rig", "character", "profile"), layers, strict=True)
@@ -175,14 +175,18 @@ def _simulated(
 
 
 def _run(
-    made: "Assembly", gathering: "Gathering", seconds: float, conversation: str | None, tell: _Tell
+    made: "Assembly",
+    gathering: "GazeTraceBuilder",
+    seconds: float,
+    conversation: str | None,
+    tell: _Tell,
 ) -> None:
     """Let the head look for so long; Ctrl-C ends the run early."""
-    from gazerig.robot.app.scripted_behaviour import Planner
+    from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
     from gazerig.robot.control.loop import Tick, run
 
     words, scene = f"simulating {seconds:.0f} s", made.scene
-    planner = Planner(scene.behaviour, made.robot.ask) if scene is not None else None
+    planner = ScriptedBehaviour(scene.behaviour, made.robot.ask) if scene is not None else None
 
     def watch(tick: Tick) -> None:
         gathering.note(tick)
@@ -209,9 +213,9 @@ def _run(
         raise SetupError(f"the simulated run ended by a {count.stopped_by}")
 
 
-def _about(recording: "RunRecording", name: str) -> "About":
+def _about(recording: "RunRecording", name: str) -> "RunHeader":
     """Describe a recorded run."""
-    from gazerig.robot.report.run_header import About
+    from gazerig.robot.report.run_header import RunHeader
 
     info = recording.info
     known = (
@@ -232,7 +236,7 @@ def _about(recording: "RunRecording", name: str) -> "About":
     except ConfigError as error:
         first = str(error).splitlines()[0]
         cannot = f"the recorded configuration is not valid today, so no notes on it: {first}"
-        return About(name, known, warnings=(*warnings, cannot), duration_s=recording.duration_s)
+        return RunHeader(name, known, warnings=(*warnings, cannot), duration_s=recording.duration_s)
     made = _described(name, known, rig, walk)
     return replace(made, warnings=warnings, duration_s=recording.duration_s)
 
@@ -262,10 +266,10 @@ def _described(
     facts: tuple[tuple[str, str], ...],
     rig: "Rig",
     walk: "Walk",
-) -> "About":
+) -> "RunHeader":
     """Add to a run's description the style of its gaze."""
     from gazerig.robot.report.reference_walk import own
-    from gazerig.robot.report.run_header import About
+    from gazerig.robot.report.run_header import RunHeader
 
     gaze = rig.gaze
     styles = (
@@ -276,10 +280,10 @@ def _described(
         ("saccades", gaze.saccade.profile),
         ("face scanpath", f"{gaze.scanpath.model}, walk {gaze.scanpath.transition_matrix}"),
     )
-    return About(name, (*facts, *shown), frozenset(styles), own(gaze.scanpath, walk))
+    return RunHeader(name, (*facts, *shown), frozenset(styles), own(gaze.scanpath, walk))
 
 
-def _tell_findings(findings: "Sequence[Finding]") -> None:
+def _tell_findings(findings: "Sequence[MeasureResult]") -> None:
     """Say what is outside, and how many are not."""
     for finding in findings:
         if finding.verdict == "outside":

@@ -13,7 +13,7 @@ from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli import lead as cli_lead
 from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
-from gazerig.robot.remote.client import JsonValue, KnobInfo, RunningRig
+from gazerig.robot.remote.client import JsonValue, ParamInfo, RobotClient
 
 app = typer.Typer()
 app.add_typer(cli_lead.app)
@@ -27,7 +27,7 @@ _NEGATIVE = {"ignore_unknown_options": True}
 def complete_key(incomplete: str) -> list[str]:
     """Complete a key of the running rig, or of the shipped one where none runs."""
     try:
-        with RunningRig.connect() as rig:
+        with RobotClient.connect() as rig:
             return list(rig.get(incomplete))
     except DriverError:
         # Only here: the other commands leave all keys and rules to the rig that runs.
@@ -44,7 +44,7 @@ def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
     if len(given) % 2 == 0:
         return complete_key(incomplete)
     try:
-        with RunningRig.connect() as rig:
+        with RobotClient.connect() as rig:
             knob = rig.knob(given[-1])
     except DriverError:
         return []
@@ -71,7 +71,7 @@ def complete_choice(context: typer.Context, incomplete: str) -> list[str]:
 def _menus() -> dict[str, tuple[str, ...]]:
     """Return the running rig's menus, none where none runs: a shell shows no errors."""
     try:
-        with RunningRig.connect() as rig:
+        with RobotClient.connect() as rig:
             return rig.menus()
     except DriverError:
         return {}
@@ -92,7 +92,7 @@ def get(
     pid: PidOption = None,
 ) -> None:
     """Show the running rig's parameters: value, unit, default; * marks what is not saved."""
-    with clear_errors(), RunningRig.connect(pid) as rig:
+    with clear_errors(), RobotClient.connect(pid) as rig:
         values = rig.get(prefix)
         found = [knob for knob in rig.knobs() if knob.key in values]
         if differs:
@@ -125,7 +125,7 @@ def put(
     """Change parameters of the running rig at its next tick, all of them or none."""
     with clear_errors():
         changes = read_pairs(pairs)
-        with RunningRig.connect(pid) as rig:
+        with RobotClient.connect(pid) as rig:
             notes = rig.set_many(changes)
             unsaved = len(rig.unsaved())
         _tell(notes)
@@ -143,7 +143,7 @@ def save(
     pid: PidOption = None,
 ) -> None:
     """Write what was set into the rig's YAML; comments stay, the old file is kept beside it."""
-    with clear_errors(), RunningRig.connect(pid) as rig:
+    with clear_errors(), RobotClient.connect(pid) as rig:
         saved = rig.save(path)
     _tell(f"{change.key}: {change.old} -> {change.new}" for change in saved.changes)
     if not saved.changes and saved.backup is not None:
@@ -159,7 +159,7 @@ def save(
 @app.command()
 def revert(pid: PidOption = None) -> None:
     """Put back in force what the rig's file says."""
-    with clear_errors(), RunningRig.connect(pid) as rig:
+    with clear_errors(), RobotClient.connect(pid) as rig:
         notes = rig.revert()
     _tell(notes)
     say(f"{_count(len(notes))} taken back")
@@ -173,7 +173,7 @@ def character(
     pid: PidOption = None,
 ) -> None:
     """Lay a character over the running rig in place of the present one."""
-    with clear_errors(), RunningRig.connect(pid) as rig:
+    with clear_errors(), RobotClient.connect(pid) as rig:
         _tell(rig.character(name))
         say(f"character {name} is in force")
 
@@ -191,7 +191,7 @@ def ask(
     pid: PidOption = None,
 ) -> None:
     """Ask the running head for a behaviour, or to talk, listen or think; or list all there is."""
-    with clear_errors(), RunningRig.connect(pid) as rig:
+    with clear_errors(), RobotClient.connect(pid) as rig:
         if menu is not None and choice is not None:
             rig.ask(menu, choice)
             say(f"{menu} {choice} is in force")
@@ -209,7 +209,7 @@ def status(
     pid: PidOption = None,
 ) -> None:
     """Say what the running rig does: target and why, guard, joints, what it said last."""
-    with clear_errors(), RunningRig.connect(pid) as rig:
+    with clear_errors(), RobotClient.connect(pid) as rig:
         now = rig.status()
     if as_json:
         print(json.dumps(now, indent=2))
@@ -251,7 +251,7 @@ def read_value(key: str, text: str) -> Any:
 
 
 def state_lines(now: Mapping[str, Any]) -> list[str]:
-    """Say in a few lines what ``RunningRig.status`` gives."""
+    """Say in a few lines what ``RobotClient.status`` gives."""
     lines = [f"rig: {now.get('rig', '')}, process {now.get('pid', '')}"]
     if not now["ticks"]:
         return [*lines, "it has just been started: nothing is known yet"]
@@ -277,7 +277,9 @@ def _choices(choices: Sequence[str]) -> str:
     return ", ".join((f"{choices[0]} (in force)", *choices[1:]))
 
 
-def _table(found: Iterable[KnobInfo], values: dict[str, JsonValue], unsaved: set[str]) -> list[str]:
+def _table(
+    found: Iterable[ParamInfo], values: dict[str, JsonValue], unsaved: set[str]
+) -> list[str]:
     """Lay parameters out in columns, never cut: the lines are also read by programs."""
     rows = [("", "key", "value", "unit", "default", "")]
     for knob in found:
@@ -300,7 +302,7 @@ def _table(found: Iterable[KnobInfo], values: dict[str, JsonValue], unsaved: set
     ]
 
 
-def _rule(knob: KnobInfo) -> str:
+def _rule(knob: ParamInfo) -> str:
     """Say what one parameter is, what it may be, and when it changes."""
     bounds = "" if knob.low is None or knob.high is None else f"{knob.low:g} .. {knob.high:g}"
     choices = ", ".join(map(_written, knob.choices))

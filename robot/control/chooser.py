@@ -6,7 +6,7 @@ from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import GazeState, Percept, Target
 
 
-class Chooser(Protocol):
+class TargetChooser(Protocol):
     """Chooses what to look at, as gaze.attention.Attention does.
 
     top_down: the behaviours there are to choose from

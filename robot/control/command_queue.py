@@ -4,8 +4,8 @@ from collections import deque
 from contextlib import suppress
 from typing import NamedTuple
 
-from gazerig.robot.model.commands import Jog, LookAt, Order, Resume, Stop, Tune
-from gazerig.robot.model.reply import Reply, Ticket
+from gazerig.robot.model.commands import Command, Jog, LookAt, Resume, Stop, Tune
+from gazerig.robot.model.reply import CommandReply, Ticket
 
 MAX_WAITING = 64
 MAX_PER_TICK = 8
@@ -13,31 +13,31 @@ MAX_PER_TICK = 8
 as that takes longest."""
 
 
-class Waiting(NamedTuple):
+class QueuedCommand(NamedTuple):
     """An order, and where its reply goes."""
 
-    order: Order
+    order: Command
     ticket: Ticket
 
 
-class OrderQueue:
+class CommandQueue:
     """What was asked for since the last tick."""
 
     def __init__(self) -> None:
-        self._orders: deque[Waiting] = deque()
-        self._stops: deque[Waiting] = deque()
+        self._orders: deque[QueuedCommand] = deque()
+        self._stops: deque[QueuedCommand] = deque()
 
     def __len__(self) -> int:
         """Return how many orders wait."""
         return len(self._orders) + len(self._stops)
 
-    def add(self, order: Order) -> Ticket:
+    def add(self, order: Command) -> Ticket:
         """Queue an order; may be called from any thread.
 
         Raises:
             ValueError: too many wait already. A stop is never refused.
         """
-        waiting = Waiting(order, Ticket())
+        waiting = QueuedCommand(order, Ticket())
         if isinstance(order, Stop):
             if len(self._stops) >= MAX_WAITING:
                 with suppress(IndexError):  # taken up in this moment
@@ -49,16 +49,16 @@ class OrderQueue:
         self._orders.append(waiting)
         return waiting.ticket
 
-    def stops(self) -> list[Waiting]:
+    def stops(self) -> list[QueuedCommand]:
         """Take all stops, and with them refuse what would move the head after all."""
-        taken: list[Waiting] = []
+        taken: list[QueuedCommand] = []
         while self._stops:
             taken.append(self._stops.popleft())
         if taken:
             self._drop_leads()
         return taken
 
-    def take(self) -> list[Waiting]:
+    def take(self) -> list[QueuedCommand]:
         """Take what is to be obeyed in this tick, stops first."""
         if not self._orders and not self._stops:
             return []
@@ -76,6 +76,6 @@ class OrderQueue:
         for _ in range(len(self._orders)):
             waiting = self._orders.popleft()
             if isinstance(waiting.order, LookAt | Jog | Resume):
-                waiting.ticket.answer(Reply("it has been stopped since"))
+                waiting.ticket.answer(CommandReply("it has been stopped since"))
             else:
                 self._orders.append(waiting)

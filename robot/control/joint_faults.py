@@ -33,7 +33,7 @@ class JointFault(NamedTuple):
         return f"{self.joint} {self.reason} ({self.seconds:.1f} s{often})"
 
 
-class _Running:
+class _OpenFault:
     """A fault that lasts."""
 
     def __init__(self, t_s: float) -> None:
@@ -50,7 +50,7 @@ class JointFaults:
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
-        self._running: dict[tuple[str, str], _Running] = {}
+        self._running: dict[tuple[str, str], _OpenFault] = {}
         self._counted: dict[tuple[str, str], tuple[int, float]] = {}
         self._first_s: float | None = None
 
@@ -63,7 +63,7 @@ class JointFaults:
         if not held and not self._running:
             return
         for joint, reason in _held(tick) if held else ():
-            running = self._running.setdefault((joint, reason), _Running(tick.t_s))
+            running = self._running.setdefault((joint, reason), _OpenFault(tick.t_s))
             running.last_s = tick.t_s
             if not running.said and tick.t_s - running.from_s >= _PASSING_S.get(reason, 0.0):
                 running.said = True
@@ -90,7 +90,7 @@ class JointFaults:
             figures.setdefault(fault.joint, {})[fault.reason] = entry
         return figures
 
-    def _end(self, key: tuple[str, str], running: _Running, lasts: bool = False) -> None:
+    def _end(self, key: tuple[str, str], running: _OpenFault, lasts: bool = False) -> None:
         del self._running[key]
         if not running.said:
             return

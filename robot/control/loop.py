@@ -13,25 +13,25 @@ from gazerig.gaze.lids import Lids
 from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.scanpath import Scanpath
 from gazerig.robot.control.body import Body
-from gazerig.robot.control.chooser import Chooser
+from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.command_choices import (
     Menus,
     refuse_absent,
     refuse_out_of_range,
     refuse_unknown,
 )
-from gazerig.robot.control.command_queue import OrderQueue
+from gazerig.robot.control.command_queue import CommandQueue
 from gazerig.robot.control.reachability import jog_reply, look_reply
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import at_rest
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Ask, Jog, LookAt, Order, Renew, Resume, Stop, Tune, check
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop, Tune, check
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.lead import Lead
 from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.reply import Reply, Ticket
+from gazerig.robot.model.reply import CommandReply, Ticket
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.safety.guard import Guard
@@ -55,7 +55,7 @@ class Robot:
         camera: Camera,
         perception: Perception,
         poses: PoseHistory,
-        attention: Chooser,
+        attention: TargetChooser,
         scanpath: Scanpath,
         aversion: Aversion,
         oculomotor: Oculomotor,
@@ -82,7 +82,7 @@ class Robot:
         self.body = body
         self.camera = camera
         self.perception = perception
-        self.attention: Chooser = attention
+        self.attention: TargetChooser = attention
         self._kinematics = kinematics
         self._poses = poses
         self._scanpath = scanpath
@@ -91,7 +91,7 @@ class Robot:
         self._menus = Menus(aversion, lids)
         self._guard = guard
         self._settled = True
-        self._orders = OrderQueue()
+        self._orders = CommandQueue()
         self._lead = Lead()
         self._last: JointAngles = ()
         # The models lead again: they begin where this tick finds head and eyes.
@@ -105,7 +105,7 @@ class Robot:
         """Return why somebody stopped the robot, "" while it moves."""
         return self._stop.why
 
-    def order(self, order: Order) -> Ticket:
+    def order(self, order: Command) -> Ticket:
         """Ask for something, from the next tick on; may be called from any thread.
 
         Returns:
@@ -120,7 +120,7 @@ class Robot:
             refuse_out_of_range(order, self.body.names, self._guard.limits)
         return self.order_again(order)
 
-    def order_again(self, order: Order) -> Ticket:
+    def order_again(self, order: Command) -> Ticket:
         """Ask for what was accepted in a recorded run, whatever the ranges are now.
 
         Raises:
@@ -265,7 +265,7 @@ class Robot:
         finally:
             self.camera.close()
 
-    def _obey(self, t_s: float) -> tuple[Order, ...]:
+    def _obey(self, t_s: float) -> tuple[Command, ...]:
         """Put in force what was asked for, and end a lead that nobody renews."""
         taken = self._orders.take()
         for order, ticket in taken:
@@ -275,20 +275,20 @@ class Robot:
             self._let_lead(self._lead.end)
         return tuple([order for order, _ in taken])
 
-    def _obey_one(self, order: Order, t_s: float) -> Reply:
+    def _obey_one(self, order: Command, t_s: float) -> CommandReply:
         """Put one order in force; return what became of it."""
         match order:
             case Ask():
                 self._menus.choose(order, self.attention.top_down, t_s)
             case LookAt() | Jog() if self.stopped:
-                return Reply(f"stopped ({self.stopped}): resume first")
+                return CommandReply(f"stopped ({self.stopped}): resume first")
             case LookAt():
                 return self._look(order, t_s)
             case Jog():
                 return self._jog(order, t_s)
             case Renew():
                 if not self._lead.renew(order, t_s):
-                    return Reply(f"{order.who or 'you'} lead nothing now")
+                    return CommandReply(f"{order.who or 'you'} lead nothing now")
             case Stop():
                 self._lead.end()
                 self._stop.halt(order, self.body, t_s)
@@ -296,17 +296,17 @@ class Robot:
                 return self._resume(order, t_s)
             case Tune():
                 self._told += self._tune(order, t_s)
-        return Reply()
+        return CommandReply()
 
-    def _look(self, order: LookAt, t_s: float) -> Reply:
+    def _look(self, order: LookAt, t_s: float) -> CommandReply:
         """Look at a point that a person chose, or freely again."""
         self._let_lead(lambda: self._lead.look(order, t_s))
         target = self._lead.puppet(t_s)
         if target is None:
-            return Reply()
+            return CommandReply()
         return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
 
-    def _jog(self, order: Jog, t_s: float) -> Reply:
+    def _jog(self, order: Jog, t_s: float) -> CommandReply:
         """Hold all joints but those given; without any, let the models lead again."""
         self._let_lead(lambda: self._lead.jog(order, self.body.names, self._last, t_s))
         if order.angles_rad:
@@ -324,16 +324,16 @@ class Robot:
         if self._lead.words and not words:
             self._told.append(f"led by {self._lead.words}")
 
-    def _resume(self, order: Resume, t_s: float) -> Reply:
+    def _resume(self, order: Resume, t_s: float) -> CommandReply:
         """Put the torque on where the joints are; a servo that refuses leaves it off."""
         if not self.stopped:
-            return Reply()
+            return CommandReply()
         resumed = self._stop.resume(order, self.body, t_s)
-        if isinstance(resumed, Reply):
+        if isinstance(resumed, CommandReply):
             return resumed
         self._guard.reset(t_s, resumed)
         self._takes_over = True
-        return Reply()
+        return CommandReply()
 
 
 def run(

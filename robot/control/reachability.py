@@ -11,7 +11,7 @@ from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.gaze_error import gaze_error
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.kinematics import NECK, Kinematics
-from gazerig.robot.model.reply import JointReply, Reply
+from gazerig.robot.model.reply import CommandReply, JointReply
 from gazerig.robot.model.types import JointAngles, JointState
 
 _SAME_RAD = radians(0.1)
@@ -24,7 +24,7 @@ _ABSENT = "this rig has none"
 
 def look_reply(
     target: Target, oculomotor: Oculomotor, kinematics: Kinematics, limits: Sequence[JointLimit]
-) -> Reply:
+) -> CommandReply:
     """Return how well eyes and head will meet a point that stands still.
 
     limits: of the joints, in the order of ``kinematics.names``
@@ -55,10 +55,10 @@ def look_reply(
         for name, angle in zip(NECK, head, strict=True)
         if name not in kinematics.names and abs(angle) > _SAME_RAD
     ]
-    return Reply("", target.p_world_m, met, tuple(joints), error.whole)
+    return CommandReply("", target.p_world_m, met, tuple(joints), error.whole)
 
 
-def jog_reply(order: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> Reply:
+def jog_reply(order: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> CommandReply:
     """Return how far joints that are put at angles will go."""
     spans = {name: limit[:2] for name, limit in zip(joints, limits, strict=True)}
     found = []
@@ -67,7 +67,7 @@ def jog_reply(order: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -
         done = min(max(asked, low), high)
         reason = _AT_END if abs(done - asked) > _SAME_RAD else ""
         found.append(JointReply(name, asked, done, low, high, reason))
-    return Reply(joints=tuple(found))
+    return CommandReply(joints=tuple(found))
 
 
 def _command(head: Angles3, left: Angles2, right: Angles2) -> GazeCommand:

@@ -3,7 +3,7 @@
 from gazerig.drivers.errors import BusLost, DriverError, ServoFault, SetupError
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.commands import Resume, Stop
-from gazerig.robot.model.reply import Reply
+from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.stop_latch import StopLatch
 from gazerig.robot.model.types import JointAngles, JointState
 
@@ -46,19 +46,19 @@ class StopControl:
             self._told.append(f"stopped, but {', '.join(holding)} still held: torque off again")
             self._release(body, t_s)
 
-    def resume(self, order: Resume, body: Body, t_s: float) -> JointAngles | Reply:
+    def resume(self, order: Resume, body: Body, t_s: float) -> JointAngles | CommandReply:
         """Put the torque on where the joints are; return the goals in force, or why not."""
         by = f" by {order.who}" if order.who else ""
         if refusal := self._latch.refusal(order, t_s):
             if refusal != self._refused:  # a flood of them is one line
                 self._told.append(f"resume{by} refused: {refusal}")
             self._refused = refusal
-            return Reply(refusal)
+            return CommandReply(refusal)
         try:
             goals = body.take_hold()
         except (SetupError, ServoFault, BusLost) as error:
             self._told.append(f"still stopped: {error}")
-            return Reply(self._told[-1])
+            return CommandReply(self._told[-1])
         self._latch.lift()
         self._refused = ""
         self._told.append(f"torque on again{by}: going on slowly")

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target
-from gazerig.robot.model.commands import Order
-from gazerig.robot.model.types import JointAngles, JointState, Verdict
+from gazerig.robot.model.commands import Command
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 
 class Tick(NamedTuple):
@@ -25,15 +25,17 @@ class Tick(NamedTuple):
     target: Target
     gaze: GazeCommand
     wish_rad: JointAngles
-    verdict: Verdict
+    verdict: GuardResult
     events: tuple[str, ...] = ()
-    orders: tuple[Order, ...] = ()
+    orders: tuple[Command, ...] = ()
     stopped: str = ""
     led: str = ""
 
 
-def at_rest(joints: JointState, wish_rad: JointAngles, why: str, names: tuple[str, ...]) -> Verdict:
+def at_rest(
+    joints: JointState, wish_rad: JointAngles, why: str, names: tuple[str, ...]
+) -> GuardResult:
     """Say that nothing is sent, as somebody stopped the robot."""
     reason = f"all: stopped ({why})"
     each = ("stopped",) * len(names)
-    return Verdict(joints.position_rad, "limp", (reason,), wish_rad, each, (reason,), names)
+    return GuardResult(joints.position_rad, "limp", (reason,), wish_rad, each, (reason,), names)

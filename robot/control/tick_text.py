@@ -7,7 +7,7 @@ from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import PART_NAMES, Target
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.gaze_error import gaze_error
-from gazerig.robot.model.types import Verdict
+from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 
@@ -58,7 +58,7 @@ def lead_words(tick: Tick) -> str:
     return f"{words}; {error:.0f} deg beside it: {', '.join(ends)}"
 
 
-def verdict_words(verdict: Verdict) -> str:
+def verdict_words(verdict: GuardResult) -> str:
     """Say what the guard made of the wish, e.g. "limited (neck_yaw: too fast, +2)"."""
     if not verdict.reasons:
         return verdict.level

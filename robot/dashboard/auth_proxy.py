@@ -27,10 +27,10 @@ from aiohttp.typedefs import Handler, Middleware
 from yarl import URL
 
 from gazerig.robot.dashboard.browser_requests import ASKED_BYTES, compact, from_browser, leads
-from gazerig.robot.dashboard.browsers import Browsers, Places
+from gazerig.robot.dashboard.browsers import Browsers, TabLimits
 from gazerig.robot.dashboard.connection_limits import Connections
 from gazerig.robot.dashboard.stop_channel import StopSender
-from gazerig.robot.dashboard.token_bucket import Rate
+from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.dashboard.viser_server import (
     BROWSER_HEADER,
     FROM_BROWSER_BYTES,
@@ -69,7 +69,7 @@ Ask = Callable[[bytes], bool]
 """Hands a JSON object to the rig; False where the rig does not take it."""
 
 
-class Door:
+class AuthProxy:
     """Lets people in to the server behind it, from a thread of its own."""
 
     def __init__(
@@ -94,10 +94,10 @@ class Door:
         self.browsers = Browsers(token)
         self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
         self._state: Mapping[str, object] = {}
-        self._asked_rate = Rate(_ASKED_PER_S, _ASKED_BURST)
-        self._tab_rate = Rate(_TABS_PER_S, _TABS_BURST)
+        self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
+        self._tab_rate = TokenBucket(_TABS_PER_S, _TABS_BURST)
         self._news: set[asyncio.Event] = set()
-        self._lines, self._tabs = Places(MOST_LINES), Places(MOST_TABS)
+        self._lines, self._tabs = TabLimits(MOST_LINES), TabLimits(MOST_TABS)
         self._loop = asyncio.new_event_loop()
         self._over = asyncio.Event()
         self._opened = threading.Event()

@@ -48,7 +48,7 @@ class Browsers:
             return self._leads if self._leads and self._open[self._leads] > 0 else ""
 
 
-class Places:
+class TabLimits:
     """So many open tabs; of one more, the browser with the most tabs loses its oldest.
 
     Belongs to one event loop.

@@ -22,7 +22,7 @@ USUAL_M = 1.5
 _PATCH = 0.03  # of the picture's width, the square whose depth is read
 
 
-class Picking:
+class ClickToLook:
     """Knows the newest picture and where the camera was when it was taken."""
 
     def __init__(

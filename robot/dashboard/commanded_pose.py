@@ -18,7 +18,7 @@ from gazerig.robot.dashboard.head_model import (
 )
 from gazerig.robot.dashboard.mesh import Mesh, ellipsoid, lid, ring
 from gazerig.robot.dashboard.scene_node import along, put, quaternion
-from gazerig.robot.model.types import Ghost, Snapshot
+from gazerig.robot.model.types import CommandedPose, Snapshot
 
 _GHOST: Colour = (70, 110, 255)
 _SIGHT_M = 0.35
@@ -27,14 +27,14 @@ _IRIS_RAD = radians(29.0)
 _APART = radians(1.5)  # of the head's axes: less would only tint the rig's own shell
 
 
-class _Eye(NamedTuple):
+class _CommandedEye(NamedTuple):
     side: str
     ball: viser.FrameHandle
     upper: viser.FrameHandle
     lower: viser.FrameHandle
 
 
-class GhostView:
+class CommandedPoseView:
     """The ghost in the scene."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
@@ -58,7 +58,7 @@ class GhostView:
             receive_shadow=False,
         )
 
-    def _add_eye(self, side: str) -> _Eye:
+    def _add_eye(self, side: str) -> _CommandedEye:
         """Add an iris as a ring with a line of sight, and the lids' edges."""
         name = f"/ghost/eye_{side}"
         ball = self._scene.add_frame(name, show_axes=False)
@@ -76,7 +76,7 @@ class GhostView:
         for frame, sweep_deg in ((upper, 14.0), (lower, -9.0)):
             edge = lid(1.12 * EYE_RADIUS_M, radians(sweep_deg))
             self._add(f"{frame.name}/edge", edge, 0.45)
-        return _Eye(side, ball, upper, lower)
+        return _CommandedEye(side, ball, upper, lower)
 
     def show(self, snapshot: Snapshot | None) -> None:
         """Move the ghost to where the wish is; without a snapshot or a wish it is not seen."""
@@ -95,7 +95,7 @@ class GhostView:
             eye.upper.visible = f"{eye.side}_upper_lid" in joints
             eye.lower.visible = f"{eye.side}_lower_lid" in joints
 
-    def _move(self, ghost: Ghost) -> None:
+    def _move(self, ghost: CommandedPose) -> None:
         R, p_world_head_m = ghost.R_world_head, ghost.p_world_head_m
         put(self._frame, p_world_head_m, quaternion(R))
         sides = zip(
@@ -113,7 +113,7 @@ class GhostView:
             put(eye.lower, p_head_m, lower_lid_turn(lower))
 
 
-def _apart(ghost: Ghost, snapshot: Snapshot) -> bool:
+def _apart(ghost: CommandedPose, snapshot: Snapshot) -> bool:
     """Return whether the wished head is so far off the measured one that both can be seen."""
     turned = np.array(ghost.R_world_head) - np.array(snapshot.R_world_head)
     return float(np.abs(turned).max()) > _APART

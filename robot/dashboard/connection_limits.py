@@ -23,7 +23,7 @@ _TRIM_AFTER_S = 0.02
 _BEGINS_WITHIN_S = 5.0
 
 
-class _State:
+class _ConnectionState:
     """Since when a connection is as it is."""
 
     def __init__(self, since_s: float) -> None:
@@ -36,13 +36,13 @@ class Connections:
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
-        self._states: dict[RequestHandler, _State] = {}
+        self._states: dict[RequestHandler, _ConnectionState] = {}
         self._trimming = False
 
     def accept(self) -> RequestHandler:
         """Return the handler of a new connection; the idlest goes where there are too many."""
         handler: RequestHandler = self._server()
-        self._states[handler] = _State(asyncio.get_running_loop().time())
+        self._states[handler] = _ConnectionState(asyncio.get_running_loop().time())
         self._trim_soon()
         return handler
 

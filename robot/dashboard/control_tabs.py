@@ -5,9 +5,9 @@ from html import escape
 
 import viser
 
-from gazerig.robot.dashboard.jog_panel import JogView
-from gazerig.robot.dashboard.outbox import Teller
-from gazerig.robot.dashboard.param_panel import TuningView
+from gazerig.robot.dashboard.jog_panel import JogPanel
+from gazerig.robot.dashboard.outbox import Outbox
+from gazerig.robot.dashboard.param_panel import ParamState
 from gazerig.robot.dashboard.widget import put
 from gazerig.robot.model.commands import Ask, LookAt
 from gazerig.robot.model.types import Snapshot
@@ -18,10 +18,10 @@ STEER = "steer"
 _TARGET_SCALE = 0.12
 
 
-class ControlsView:
+class ControlTabs:
     """Three tabs: lead, joints, tuning."""
 
-    def __init__(self, server: viser.ViserServer, teller: Teller) -> None:
+    def __init__(self, server: viser.ViserServer, teller: Outbox) -> None:
         # A window of its own: below words that grow and shrink, a button would slip away from
         # under the mouse.
         window = server.gui.add_panel()
@@ -29,8 +29,8 @@ class ControlsView:
         window.dock_below(server.gui.main_panel)
         self._window = window
         self._lead = LeadView(server, lead, teller)
-        self._joints = JogView(server.gui, joints, teller)
-        self._tuning = TuningView(server, tuning, teller)
+        self._joints = JogPanel(server.gui, joints, teller)
+        self._tuning = ParamState(server, tuning, teller)
 
     def leave(self) -> None:
         """Take everything away: a recording cannot be led."""
@@ -67,7 +67,7 @@ class ControlsView:
 class LeadView:
     """Menus, and a target that is dragged through the scene."""
 
-    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Teller) -> None:
+    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Outbox) -> None:
         """Fill the tab; menus and characters follow when the rig names them."""
         self._server = server
         self._tab = tab

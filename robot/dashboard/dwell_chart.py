@@ -35,7 +35,7 @@ _BINS_PX = 204.0
 _BIN_PX = (LINE_PX - 6.0 - _BINS_PX) / BINS
 
 
-class Dwell:
+class DwellChart:
     """Gathers fixations by face part."""
 
     def __init__(self) -> None:

@@ -28,7 +28,7 @@ _FAINT, _PLAIN, _COVER = 0.02, 0.45, 0.82
 Picture = NDArray[np.uint8]
 
 
-class FaceMap:
+class GazeMap:
     """Gathers time on a face's plane.
 
     seconds: how long the gaze was on the map

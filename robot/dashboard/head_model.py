@@ -61,7 +61,7 @@ _LOWER_OPEN_RAD = radians(-46.0)
 SIDES = ("left", "right")
 
 
-class _Eye(NamedTuple):
+class _EyeModel(NamedTuple):
     side: str
     ball: viser.FrameHandle
     sight: viser.LineSegmentsHandle
@@ -70,7 +70,7 @@ class _Eye(NamedTuple):
     lower: viser.MeshHandle
 
 
-class HeadView:
+class HeadModel:
     """The rig in the scene, with those parts that its joints move."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
@@ -119,7 +119,7 @@ class HeadView:
             disc = self._add(f"/head/ear_{side}", ear, _TRIM, (x, y, z))
             disc.wxyz = transforms.SO3.from_x_radians(turn).wxyz
 
-    def _add_eye(self, side: str) -> _Eye:
+    def _add_eye(self, side: str) -> _EyeModel:
         name = f"/head/eye_{side}"
         ball = self._scene.add_frame(name, show_axes=False)
         caps = (
@@ -135,7 +135,7 @@ class HeadView:
         sight = self._scene.add_line_segments(
             f"{name}/sight", _AHEAD, _SIGHT["fixate"], thickness=2.0, thickness_units="screen"
         )
-        return _Eye(side, ball, sight, *self._add_lids(side))
+        return _EyeModel(side, ball, sight, *self._add_lids(side))
 
     def _add_lids(self, side: str) -> tuple[viser.FrameHandle, viser.FrameHandle, viser.MeshHandle]:
         name = f"/head/lids_{side}"

@@ -58,7 +58,7 @@ def urgent(message: bytes) -> bool:
     return message[:1] != TELL or told(message)[1].startswith(_URGENT)
 
 
-class Ear:
+class Inbox:
     """Two threads that hear what comes over one socket."""
 
     def __init__(

@@ -6,7 +6,7 @@ from math import degrees, radians
 
 import viser
 
-from gazerig.robot.dashboard.outbox import Teller
+from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.widget import put
 from gazerig.robot.model.commands import Jog, LookAt
 from gazerig.robot.model.types import JOINTS, Snapshot
@@ -22,10 +22,10 @@ _RIGHT = "text-align:right"
 _TABLE_EVERY = 5  # with every fifth picture, some 5 times a second: figures are to be read
 
 
-class JogView:
+class JogPanel:
     """One slider a joint."""
 
-    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, teller: Teller) -> None:
+    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, teller: Outbox) -> None:
         """Fill the tab; the sliders come with the joints' limits."""
         self._gui = gui
         self._tab = tab

@@ -26,68 +26,70 @@ _RECKONED = ("reckoned, not measured", PALE_BLUE, 2.0)
 _DASH_PX = (6.0, 4.0)
 
 
-class Group(NamedTuple):
+class ChartGroup(NamedTuple):
     """Joints that are drawn as the mean of them."""
 
     title: str
     joints: tuple[str, ...]
 
 
-_UPPER = Group("upper lids, + open", ("left_upper_lid", "right_upper_lid"))
-_LOWER = Group("lower lids, + open", ("left_lower_lid", "right_lower_lid"))
-_BOTH_YAW = Group("both eyes, yaw, + left", ("eyes_pan",))
-_BOTH_PITCH = Group("both eyes, pitch, + up", ("eyes_tilt",))
+_UPPER = ChartGroup("upper lids, + open", ("left_upper_lid", "right_upper_lid"))
+_LOWER = ChartGroup("lower lids, + open", ("left_lower_lid", "right_lower_lid"))
+_BOTH_YAW = ChartGroup("both eyes, yaw, + left", ("eyes_pan",))
+_BOTH_PITCH = ChartGroup("both eyes, pitch, + up", ("eyes_tilt",))
 
 GROUPS = {
     "yaw": (
-        Group("eyes in the head, yaw, + left", ("left_eye_pan", "right_eye_pan", "eyes_pan")),
-        Group("head, yaw, + left", ("neck_yaw",)),
+        ChartGroup("eyes in the head, yaw, + left", ("left_eye_pan", "right_eye_pan", "eyes_pan")),
+        ChartGroup("head, yaw, + left", ("neck_yaw",)),
         _UPPER,
         _LOWER,
     ),
     "pitch": (
-        Group("eyes in the head, pitch, + up", ("left_eye_tilt", "right_eye_tilt", "eyes_tilt")),
-        Group("head, pitch, + up", ("neck_pitch",)),
+        ChartGroup(
+            "eyes in the head, pitch, + up", ("left_eye_tilt", "right_eye_tilt", "eyes_tilt")
+        ),
+        ChartGroup("head, pitch, + up", ("neck_pitch",)),
         _UPPER,
         _LOWER,
     ),
     "left eye": (
-        Group("left eye, yaw, + left", ("left_eye_pan",)),
+        ChartGroup("left eye, yaw, + left", ("left_eye_pan",)),
         _BOTH_YAW,
-        Group("left eye, pitch, + up", ("left_eye_tilt",)),
+        ChartGroup("left eye, pitch, + up", ("left_eye_tilt",)),
         _BOTH_PITCH,
-        Group("left upper lid, + open", ("left_upper_lid",)),
-        Group("left lower lid, + open", ("left_lower_lid",)),
+        ChartGroup("left upper lid, + open", ("left_upper_lid",)),
+        ChartGroup("left lower lid, + open", ("left_lower_lid",)),
     ),
     "right eye": (
-        Group("right eye, yaw, + left", ("right_eye_pan",)),
+        ChartGroup("right eye, yaw, + left", ("right_eye_pan",)),
         _BOTH_YAW,
-        Group("right eye, pitch, + up", ("right_eye_tilt",)),
+        ChartGroup("right eye, pitch, + up", ("right_eye_tilt",)),
         _BOTH_PITCH,
-        Group("right upper lid, + open", ("right_upper_lid",)),
-        Group("right lower lid, + open", ("right_lower_lid",)),
+        ChartGroup("right upper lid, + open", ("right_upper_lid",)),
+        ChartGroup("right lower lid, + open", ("right_lower_lid",)),
     ),
     "neck": (
-        Group("neck, yaw, + left", ("neck_yaw",)),
-        Group("neck, pitch, + up", ("neck_pitch",)),
-        Group("neck, roll, + right ear down", ("neck_roll",)),
+        ChartGroup("neck, yaw, + left", ("neck_yaw",)),
+        ChartGroup("neck, pitch, + up", ("neck_pitch",)),
+        ChartGroup("neck, roll, + right ear down", ("neck_roll",)),
     ),
 }
 """What can be shown of a head that has every joint: one plot a group."""
 
 
-def groups_of(joints: Iterable[str]) -> dict[str, tuple[Group, ...]]:
+def groups_of(joints: Iterable[str]) -> dict[str, tuple[ChartGroup, ...]]:
     """Return what can be shown of a rig: groups of joints that are there, none empty."""
     there = frozenset(joints)
-    menu: dict[str, tuple[Group, ...]] = {}
+    menu: dict[str, tuple[ChartGroup, ...]] = {}
     for name, groups in GROUPS.items():
         kept = [(title, tuple(j for j in names if j in there)) for title, names in groups]
-        if found := tuple(Group(title, names) for title, names in kept if names):
+        if found := tuple(ChartGroup(title, names) for title, names in kept if names):
             menu[name] = found
     return menu
 
 
-class Traces:
+class JointSeries:
     """The joints of the last half minute.
 
     joints: their names; reckoned: those that nobody measures
@@ -126,7 +128,7 @@ class Traces:
         return np.array([row.t_s - now_s for row in rows]), angles
 
 
-def mean_deg(angles_deg: Floats, group: Group, joints: tuple[str, ...]) -> Floats:
+def mean_deg(angles_deg: Floats, group: ChartGroup, joints: tuple[str, ...]) -> Floats:
     """Return wish, permitted and measured (n, 3) of a group, from those of the joints."""
     mean: Floats = angles_deg[:, :, [joints.index(name) for name in group.joints]].mean(axis=2)
     return mean
@@ -143,7 +145,7 @@ class _Plot(NamedTuple):
         self.plot.remove()
 
 
-class TracesView:
+class JointCharts:
     """Two menus, and a plot for each group of what is chosen."""
 
     def __init__(self, gui: viser.GuiApi, place: viser.GuiTabHandle) -> None:
@@ -155,10 +157,10 @@ class TracesView:
                 "of the last", tuple(SPANS), initial_value="10 s", order=2
             )
             self._key = gui.add_html("", order=3)
-        self._drawn: tuple[tuple[Group, bool], ...] = ()
+        self._drawn: tuple[tuple[ChartGroup, bool], ...] = ()
         self._plots: list[_Plot] = []
 
-    def show(self, traces: Traces) -> None:
+    def show(self, traces: JointSeries) -> None:
         """Draw the traces as they are now."""
         ago_s, angles_deg = traces.table(SPANS[self._span.value])
         menu = groups_of(traces.joints)
@@ -171,7 +173,7 @@ class TracesView:
         for (_, plot), group in zip(self._plots, groups, strict=True):
             plot.data = _columns(ago_s, mean_deg(angles_deg, group, traces.joints))
 
-    def _make(self, wanted: tuple[tuple[Group, bool], ...]) -> None:
+    def _make(self, wanted: tuple[tuple[ChartGroup, bool], ...]) -> None:
         """Make the plots anew where other groups are wanted, or they are reckoned now."""
         if wanted == self._drawn:
             return

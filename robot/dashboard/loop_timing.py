@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from gazerig.robot.model.types import Timing
+from gazerig.robot.model.types import LoopFigures
 
 OVER_S = 5.0
 """How far back the figures reach."""
@@ -36,14 +36,14 @@ class LoopTiming:
         while t_s - self._rows[0][0] >= OVER_S:
             self._rows.popleft()
 
-    def figures(self) -> Timing | None:
+    def figures(self) -> LoopFigures | None:
         """Return the figures, None before the second tick."""
         if not self._rows:
             return None
         table = np.array(self._rows)
         spread_s = table[-1, 0] - table[0, 0]
         p50, p99, worst = (1e3 * np.percentile(table[:, 1], (50.0, 99.0, 100.0))).tolist()
-        return Timing(
+        return LoopFigures(
             rate_hz=float((len(table) - 1) / spread_s) if spread_s > 0.0 else 1.0 / self._period_s,
             p50_ms=p50,
             p99_ms=p99,

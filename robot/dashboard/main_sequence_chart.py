@@ -37,7 +37,7 @@ _TICKS = 4
 Curve = Callable[[Floats], Floats]
 
 
-class MainSequence:
+class MainSequenceChart:
     """Gathers saccades and draws them."""
 
     def __init__(self) -> None:

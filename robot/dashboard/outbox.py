@@ -6,9 +6,9 @@ import threading
 from collections.abc import Callable, Mapping
 
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, telling
-from gazerig.robot.dashboard.token_bucket import Rate
+from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.commands import Jog, LookAt, Order, as_json
+from gazerig.robot.model.commands import Command, Jog, LookAt, as_json
 
 DOOR = "door"
 """Who asks where it is the stop button or a click in the picture."""
@@ -18,7 +18,7 @@ _PER_S, _BURST = 100.0, 200.0
 """Requests of all browsers together; each drags one thing, at some 20 changes a second."""
 
 
-class Teller:
+class Outbox:
     """Sends requests over the page's socket; from any thread.
 
     name: returns what the browser of a client of the page is called; leads: is told of one
@@ -28,12 +28,12 @@ class Teller:
     def __init__(self, feed: socket.socket, clock: Clock | None = None) -> None:
         self._feed = feed
         self._clock = clock if clock is not None else RealClock()
-        self._rate = Rate(_PER_S, _BURST)
+        self._rate = TokenBucket(_PER_S, _BURST)
         self._lock = threading.Lock()
         self.name: Callable[[str], str] = _unnamed
         self.leads: Callable[[str], object] = _unnamed
 
-    def order(self, order: Order, who: str) -> bool:
+    def order(self, order: Command, who: str) -> bool:
         """Return an order; False where the rig does not take it now."""
         if isinstance(order, LookAt | Jog):
             self.leads(self.name(who))

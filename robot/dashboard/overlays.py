@@ -5,13 +5,13 @@ from typing import ClassVar
 
 import viser
 
-from gazerig.robot.dashboard.commanded_pose import GhostView
+from gazerig.robot.dashboard.commanded_pose import CommandedPoseView
 from gazerig.robot.dashboard.view_frusta import CameraField, EyeFields
 from gazerig.robot.model.types import Snapshot
 
 
 @dataclass
-class Layers:
+class OverlayChoices:
     """Which of them are wanted; changed by whoever looks at the page."""
 
     ghost: bool = True
@@ -25,15 +25,15 @@ class Layers:
     }
 
 
-class LayersView:
+class OverlayPanel:
     """The layers in the scene."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        self._ghost = GhostView(scene)
+        self._ghost = CommandedPoseView(scene)
         self._camera = CameraField(scene)
         self._eyes = EyeFields(scene)
 
-    def show(self, snapshot: Snapshot, layers: Layers) -> None:
+    def show(self, snapshot: Snapshot, layers: OverlayChoices) -> None:
         """Draw what is wanted and take the rest away."""
         self._ghost.show(snapshot if layers.ghost else None)
         self._camera.show(snapshot if layers.camera else None)

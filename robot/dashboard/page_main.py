@@ -1,6 +1,6 @@
 """The page's own process: take the newest snapshot off the socket and draw it.
 
-Started by ``gazerig.robot.dashboard.page_process.Page`` as ``python -m
+Started by ``gazerig.robot.dashboard.page_process.PageProcess`` as ``python -m
 gazerig.robot.dashboard.page_main FD STOP_FD PARENT HOST PORT``, with the token and a folder of its
 own in its environment, which other users cannot read as they can its arguments. It
 ends when the other side of the socket closes. Nothing is fetched from anywhere: the
@@ -25,12 +25,12 @@ from typing import NamedTuple
 
 import viser
 
-from gazerig.robot.dashboard.auth_proxy import Door
-from gazerig.robot.dashboard.control_tabs import ControlsView
-from gazerig.robot.dashboard.head_model import FLOOR_M, HeadView
+from gazerig.robot.dashboard.auth_proxy import AuthProxy
+from gazerig.robot.dashboard.control_tabs import ControlTabs
+from gazerig.robot.dashboard.head_model import FLOOR_M, HeadModel
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES
-from gazerig.robot.dashboard.outbox import Teller
-from gazerig.robot.dashboard.overlays import LayersView
+from gazerig.robot.dashboard.outbox import Outbox
+from gazerig.robot.dashboard.overlays import OverlayPanel
 from gazerig.robot.dashboard.page_process import (
     CANNOT_OPEN,
     CHOICES,
@@ -127,13 +127,13 @@ def free_port(host: str, port: int) -> int:
     raise OSError(errno.EADDRINUSE, f"no port from {port} on is free")
 
 
-class View:
+class PageView:
     """Scene and panels of one server."""
 
     def __init__(
         self,
         server: viser.ViserServer,
-        teller: Teller,
+        teller: Outbox,
         tell: Callable[[Mapping[str, object]], None],
     ) -> None:
         """Build the empty room.
@@ -146,12 +146,12 @@ class View:
         server.initial_camera.position, server.initial_camera.look_at = VIEWS["both"]
         server.on_client_connect(_greet)
         _furnish(server)
-        self._head = HeadView(server.scene)
+        self._head = HeadModel(server.scene)
         self._people = PeopleView(server.scene)
         self._panel = PanelView(server.gui)
-        self._layers = LayersView(server.scene)
+        self._layers = OverlayPanel(server.scene)
         self._panel.depth = self._ask_depth
-        self._controls = ControlsView(server, teller)
+        self._controls = ControlTabs(server, teller)
         self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
         self._jpeg: bytes | None = None
@@ -290,13 +290,13 @@ class Served(NamedTuple):
     """
 
     server: viser.ViserServer
-    door: Door
+    door: AuthProxy
     url: str
     words: str | None
 
 
 def serve(
-    host: str, port: int, token: str, folder: Path, teller: Teller, stop: StopSender
+    host: str, port: int, token: str, folder: Path, teller: Outbox, stop: StopSender
 ) -> Served:
     """Open the page's server, and its door on the first free port.
 
@@ -313,7 +313,7 @@ def serve(
     """
     open_port = free_port(host, port)
     server = open_server(folder / "page.sock")
-    door = Door(host, open_port, folder / "page.sock", teller.hand_on, stop, token)
+    door = AuthProxy(host, open_port, folder / "page.sock", teller.hand_on, stop, token)
     teller.name = lambda client: _browser(server, client)
     teller.leads = door.browsers.led_by
     door.open()
@@ -331,7 +331,7 @@ def _browser(server: viser.ViserServer, client: str) -> str:
     return browser_of(server, int(number)) if number.isdecimal() else ""
 
 
-def watch(feed: socket.socket, view: View, parent: int, door: Door) -> None:
+def watch(feed: socket.socket, view: PageView, parent: int, door: AuthProxy) -> None:
     """Draw what comes until the other side is gone.
 
     Raises:
@@ -364,7 +364,7 @@ def main(arguments: list[str]) -> int:
     # Not closed by hand: its end tells the other side to read this process's last words,
     # and those of an exception are written only after a ``with`` has been left.
     feed = socket.socket(fileno=int(fd))
-    teller, stop = Teller(feed), StopSender(socket.socket(fileno=int(stop_fd)))
+    teller, stop = Outbox(feed), StopSender(socket.socket(fileno=int(stop_fd)))
     folder = Path(os.environ.pop(FOLDER_VARIABLE))
     try:
         return _show(feed, teller, stop, (host, int(port)), token, folder, int(parent))
@@ -374,7 +374,7 @@ def main(arguments: list[str]) -> int:
 
 def _show(
     feed: socket.socket,
-    teller: Teller,
+    teller: Outbox,
     stop: StopSender,
     address: tuple[str, int],
     token: str,
@@ -390,7 +390,7 @@ def _show(
         return CANNOT_OPEN
     if served.words is not None:
         feed.send(NOTICE + served.words.encode())
-    view = View(served.server, teller, served.door.tell)
+    view = PageView(served.server, teller, served.door.tell)
     feed.send(URL + served.url.encode())
     watch(feed, view, parent, served.door)
     served.door.close()

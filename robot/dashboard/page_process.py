@@ -24,7 +24,7 @@ from math import nan
 from operator import attrgetter
 from urllib.parse import urlsplit
 
-from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, TELL, Ear, told
+from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, TELL, Inbox, told
 from gazerig.robot.dashboard.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
@@ -89,7 +89,7 @@ def unpack(message: bytes) -> Snapshot:
     )
 
 
-class Page:
+class PageProcess:
     """The live page as the control loop sees it.
 
     ``show`` belongs to one thread; everything else may be called from any.
@@ -112,7 +112,7 @@ class Page:
         self._token = secrets.token_urlsafe(_TOKEN_BYTES)
         self._socket: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._ear: Ear | None = None
+        self._ear: Inbox | None = None
         self._stops: StopListener | None = None
         self._choices: Mapping[str, tuple[str, ...]] = {}
         self._over = threading.Event()
@@ -174,7 +174,7 @@ class Page:
         """
         link.setblocking(False)
         self._socket = link
-        self._ear = Ear(link, self._take, self._lose, self._refuse)
+        self._ear = Inbox(link, self._take, self._lose, self._refuse)
         self._stops = StopListener(stops, self._stop) if stops is not None else None
 
     def show(self, snapshot: Snapshot) -> None:

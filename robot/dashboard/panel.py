@@ -12,13 +12,13 @@ import numpy as np
 import viser
 
 from gazerig.robot.dashboard.attention_panel import saliences, winner
-from gazerig.robot.dashboard.dwell_chart import Dwell
+from gazerig.robot.dashboard.dwell_chart import DwellChart
 from gazerig.robot.dashboard.event_timeline import Timeline
-from gazerig.robot.dashboard.gaze_map import FaceMap
+from gazerig.robot.dashboard.gaze_map import GazeMap
 from gazerig.robot.dashboard.html import frame, heading, note
-from gazerig.robot.dashboard.joint_charts import Traces, TracesView
-from gazerig.robot.dashboard.main_sequence_chart import MainSequence
-from gazerig.robot.dashboard.overlays import Layers
+from gazerig.robot.dashboard.joint_charts import JointCharts, JointSeries
+from gazerig.robot.dashboard.main_sequence_chart import MainSequenceChart
+from gazerig.robot.dashboard.overlays import OverlayChoices
 from gazerig.robot.dashboard.servo_health import health
 from gazerig.robot.dashboard.status import silence, status
 from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
@@ -51,7 +51,7 @@ class PanelView:
             gui.add_html(frame(heading("the last 30 seconds")), order=2)
             self._strip = gui.add_html("", order=3)
             self._saliences = gui.add_html("", order=4)
-        self._traces_view = TracesView(gui, window.add_tab("traces"))
+        self._traces_view = JointCharts(gui, window.add_tab("traces"))
         self._statistics = window.add_tab("statistics")
         with self._statistics:
             self._of_what = gui.add_html("", order=0)
@@ -68,8 +68,12 @@ class PanelView:
     def _begin(self) -> None:
         """Start all that is gathered from the snapshots."""
         self._last_s = -inf
-        self._traces, self._timeline, self._sequence = Traces(), Timeline(), MainSequence()
-        self._dwell, self._map = Dwell(), FaceMap()
+        self._traces, self._timeline, self._sequence = (
+            JointSeries(),
+            Timeline(),
+            MainSequenceChart(),
+        )
+        self._dwell, self._map = DwellChart(), GazeMap()
 
     def note(self, snapshots: tuple[Snapshot, ...]) -> None:
         """Remember every snapshot for traces and figures, also those that are not drawn.
@@ -141,9 +145,9 @@ class PanelView:
         else:
             self._map_picture.image = picture
 
-    def _add_layers(self) -> Layers:
-        layers = Layers()
-        for order, (name, says) in enumerate(Layers.NAMES.items()):
+    def _add_layers(self) -> OverlayChoices:
+        layers = OverlayChoices()
+        for order, (name, says) in enumerate(OverlayChoices.NAMES.items()):
             box = self._gui.add_checkbox(says, initial_value=getattr(layers, name), order=order)
             box.on_update(_setter(layers, name))
         depth = self._gui.add_checkbox("depth instead of the camera picture", False, order=9)
@@ -167,7 +171,9 @@ def of_what(snapshot: Snapshot) -> str:
     )
 
 
-def _setter(layers: Layers, name: str) -> Callable[[viser.GuiEvent[viser.GuiCheckboxHandle]], None]:
+def _setter(
+    layers: OverlayChoices, name: str
+) -> Callable[[viser.GuiEvent[viser.GuiCheckboxHandle]], None]:
     def put(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
         setattr(layers, name, event.target.value)
 

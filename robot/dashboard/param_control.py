@@ -17,7 +17,7 @@ _FAR = 20.0
 """A range this many times wider than the value needs a number typed, not a slider."""
 
 
-class PageKnob(NamedTuple):
+class PageParam(NamedTuple):
     """A parameter as gazerig.config.knobs describes it, read from JSON."""
 
     key: str
@@ -33,14 +33,14 @@ class PageKnob(NamedTuple):
     optional: bool = False
 
 
-def knob_from(data: Mapping[str, object]) -> PageKnob:
+def knob_from(data: Mapping[str, object]) -> PageParam:
     """Read what the rig's side wrote; what this page does not need is left."""
-    plain = {name: data[name] for name in PageKnob._fields if name in data}
+    plain = {name: data[name] for name in PageParam._fields if name in data}
     plain["choices"] = tuple(cast(list[object], data.get("choices") or ()))
-    return PageKnob(**plain)  # type: ignore[arg-type]
+    return PageParam(**plain)  # type: ignore[arg-type]
 
 
-def hint(knob: PageKnob) -> str:
+def hint(knob: PageParam) -> str:
     """Say what a parameter is, may be and would be: the text beside the mouse."""
     parts = [f"{knob.key}: {knob.says}" if knob.says else knob.key]
     unit = f" {knob.unit}" if knob.unit else ""
@@ -54,7 +54,7 @@ def hint(knob: PageKnob) -> str:
     return "; ".join(parts)
 
 
-def label(knob: PageKnob, unsaved: bool) -> str:
+def label(knob: PageParam, unsaved: bool) -> str:
     """Name a control: the last parts of the key, its unit, a mark where it is not saved."""
     unit = f" ({knob.unit})" if knob.unit else ""
     name = ".".join(knob.key.split(".")[-2:])
@@ -68,7 +68,7 @@ def step_of(low: float, high: float) -> float:
     return next(n * ten for n in (1.0, 2.0, 5.0, 10.0) if n * ten >= fine * (1.0 - 1e-9))
 
 
-def slides(knob: PageKnob, value: object) -> bool:
+def slides(knob: PageParam, value: object) -> bool:
     """Return whether a slider can set a parameter finely enough."""
     if knob.kind not in ("number", "whole") or isinstance(value, bool):
         return False
@@ -81,7 +81,7 @@ def slides(knob: PageKnob, value: object) -> bool:
     return low <= value <= high and (usual == 0.0 or high - low <= _FAR * usual)
 
 
-def written(knob: PageKnob, value: object) -> str:
+def written(knob: PageParam, value: object) -> str:
     """Write a value as a person types it: text as it is, everything else as in the file."""
     if isinstance(value, str) and knob.kind in ("text", "choice"):
         return value
@@ -90,7 +90,7 @@ def written(knob: PageKnob, value: object) -> str:
     return json.dumps(value)
 
 
-def read(knob: PageKnob, text: str) -> object:
+def read(knob: PageParam, text: str) -> object:
     """Read what a person typed.
 
     Raises:
@@ -108,13 +108,13 @@ def read(knob: PageKnob, text: str) -> object:
         raise ValueError(f"{knob.key}: {text!r} is no {knob.kind}; write it like {like}") from None
 
 
-class KnobControl:
+class ParamControl:
     """A parameter's control in one browser."""
 
     def __init__(
         self,
         gui: viser.GuiApi,
-        knob: PageKnob,
+        knob: PageParam,
         value: object,
         unsaved: bool,
         put: Put,

@@ -8,20 +8,20 @@ from typing import Protocol
 
 from gazerig.robot.dashboard.page_process import KNOBS, VALUES
 from gazerig.robot.model.commands import Value
-from gazerig.robot.remote.request_handler import Change, Knob, plain
+from gazerig.robot.remote.request_handler import ChangedParam, DescribedParam, plain
 
 _PIECE = 40  # parameters a message: some 20 kB, a tenth of what a message may be
 
 
 class Fed(Protocol):
-    """What the feed asks of the parameters of a running rig (``app.param_store.Tuning``)."""
+    """What the feed asks of the parameters of a running rig (``app.param_store.ParamStore``)."""
 
     @property
     def version(self) -> int:
         """Count the changes."""
         ...
 
-    def knobs(self) -> Iterable[Knob]:
+    def knobs(self) -> Iterable[DescribedParam]:
         """Return all parameters."""
         ...
 
@@ -29,7 +29,7 @@ class Fed(Protocol):
         """Return all values in force."""
         ...
 
-    def unsaved(self) -> Iterable[Change]:
+    def unsaved(self) -> Iterable[ChangedParam]:
         """Return what is in force and not in the file."""
         ...
 
@@ -48,7 +48,7 @@ class Fed(Protocol):
         ...
 
 
-class TuningFeed:
+class ParamFeed:
     """What the page knows of the parameters, and what it must still be told."""
 
     def __init__(self, send: Callable[[bytes], bool], tuning: Fed) -> None:

@@ -11,8 +11,8 @@ from typing import cast
 
 import viser
 
-from gazerig.robot.dashboard.outbox import Teller
-from gazerig.robot.dashboard.param_control import KnobControl, PageKnob, knob_from
+from gazerig.robot.dashboard.outbox import Outbox
+from gazerig.robot.dashboard.param_control import PageParam, ParamControl, knob_from
 from gazerig.robot.dashboard.widget import put
 
 MOST_SHOWN = 30
@@ -24,15 +24,15 @@ _REFUSED_S = 12.0
 _SAID_S = 8.0
 
 
-class TuningView:
+class ParamState:
     """The parameters, and one panel of controls a browser."""
 
-    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Teller) -> None:
+    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Outbox) -> None:
         """Give every browser that comes its own controls in the tab."""
         self._tab = tab
         self._teller = teller
-        self._knobs: dict[str, PageKnob] = {}
-        self._panels: dict[str, TuningPanel] = {}
+        self._knobs: dict[str, PageParam] = {}
+        self._panels: dict[str, ParamPanel] = {}
         # A tab takes one builder at a time, and browsers come and go in a thread of their own.
         self._lock = threading.RLock()
         self.in_force: dict[str, object] = {}
@@ -44,7 +44,7 @@ class TuningView:
 
     async def _greet(self, client: viser.ClientHandle) -> None:
         with self._lock:
-            panel = TuningPanel(client, self._tab, self._teller, self._lock)
+            panel = ParamPanel(client, self._tab, self._teller, self._lock)
             panel.offer(self._knobs)
             panel.take(self.in_force, self._unsaved, self._path)
             self._panels[str(client.client_id)] = panel
@@ -86,14 +86,14 @@ class TuningView:
             _notify(handle, words)
 
 
-class TuningPanel:
+class ParamPanel:
     """The controls of one browser."""
 
     def __init__(
         self,
         client: viser.ClientHandle,
         tab: viser.GuiTabHandle,
-        teller: Teller,
+        teller: Outbox,
         lock: threading.RLock,
     ) -> None:
         """Add search, groups and buttons; parameters come when they are chosen."""
@@ -103,10 +103,10 @@ class TuningPanel:
         self._teller = teller
         self._lock = lock
         self._who = f"{client.client_id}{_OF_TUNING}"
-        self._knobs: Mapping[str, PageKnob] = {}
+        self._knobs: Mapping[str, PageParam] = {}
         self._values: Mapping[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
-        self._controls: dict[str, KnobControl] = {}
+        self._controls: dict[str, ParamControl] = {}
         self._unanswered = 0
         with tab:
             self._build()
@@ -146,7 +146,7 @@ class TuningPanel:
         async def _(event: viser.GuiEvent[viser.GuiFormHandle]) -> None:
             self._ask({"save": self._file.value.strip() or None})
 
-    def offer(self, knobs: Mapping[str, PageKnob]) -> None:
+    def offer(self, knobs: Mapping[str, PageParam]) -> None:
         """Take the parameters there are."""
         self._knobs = knobs
         groups = tuple(dict.fromkeys(group_of(knob) for knob in knobs.values()))
@@ -208,8 +208,8 @@ class TuningPanel:
             more = len(wanted) - MOST_SHOWN
             self._rest.content = _note(f"and {more} more: search for less") if more > 0 else ""
 
-    def _control(self, key: str, place: float) -> KnobControl:
-        return KnobControl(
+    def _control(self, key: str, place: float) -> ParamControl:
+        return ParamControl(
             self._gui,
             self._knobs[key],
             self._values[key],
@@ -232,12 +232,12 @@ class TuningPanel:
                 return [knob.key for knob in known if group_of(knob) == group]
 
 
-def group_of(knob: PageKnob) -> str:
+def group_of(knob: PageParam) -> str:
     """Return the group a parameter is listed in: as in the file, two names deep."""
     return ".".join(knob.group.split(".")[:2]) if knob.group else "rig"
 
 
-def found(text: str, knobs: Iterable[PageKnob]) -> list[str]:
+def found(text: str, knobs: Iterable[PageParam]) -> list[str]:
     """Return the keys in which, with what they mean, every word of a text occurs."""
     words = text.lower().split()
     return [

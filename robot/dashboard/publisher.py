@@ -25,9 +25,9 @@ from gazerig.robot.control.tick_text import (
     verdict_words,
 )
 from gazerig.robot.dashboard.camera_overlay import draw_detections, encode, ground
-from gazerig.robot.dashboard.page_process import Page
-from gazerig.robot.dashboard.param_feed import TuningFeed
-from gazerig.robot.dashboard.snapshot import Said, Snapshots
+from gazerig.robot.dashboard.page_process import PageProcess
+from gazerig.robot.dashboard.param_feed import ParamFeed
+from gazerig.robot.dashboard.snapshot import SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
@@ -49,21 +49,21 @@ def _nobody(words: str) -> None:
     """Tell nobody."""
 
 
-class Onlooker:
+class Publisher:
     """One thread that looks at the newest tick."""
 
     def __init__(
         self,
-        page: Page | None,
+        page: PageProcess | None,
         say: Callable[[str], None] | None,
-        snapshots: Snapshots,
+        snapshots: SnapshotBuilder,
         health: Callable[[], BusHealth],
         in_force: Callable[[], InForce],
         residual: Callable[[], ResidualFigures],
         mount: CameraMount,
         poses: PoseHistory,
         horizontal_field_deg: Callable[[], float],
-        feed: TuningFeed | None = None,
+        feed: ParamFeed | None = None,
         tell: Callable[[str], None] = _nobody,
     ) -> None:
         """Take the page, and where to write the status line (None: nowhere).
@@ -144,13 +144,13 @@ class Onlooker:
                 if self._tell is not None:
                     self._tell(f"{name} failed ({type(error).__name__}: {error}); the rig runs on")
 
-    def _said(self, tick: Tick) -> Said:
+    def _said(self, tick: Tick) -> SnapshotTexts:
         """Gather what the tick itself does not tell."""
         now = self._in_force()
         words, seeing = health_words(self._health()), seeing_words(tick, self._residual())
-        return Said(words, now.behaviour, seeing, now.character, now.conversation)
+        return SnapshotTexts(words, now.behaviour, seeing, now.character, now.conversation)
 
-    def _tell_of(self, page: Page) -> None:
+    def _tell_of(self, page: PageProcess) -> None:
         """Keep the page told of what can be tuned, and the person at the rig of the page."""
         if self._feed is not None:
             if page.started != self._page_started and self._page_started:

@@ -7,9 +7,18 @@ from typing import Protocol, cast
 from gazerig.drivers.errors import DriverError
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Jog, LookAt, Order, Resume, Tune, Value, from_json, signed
-from gazerig.robot.model.reply import OrderTaker
-from gazerig.robot.remote.request_handler import Saved, Tuning
+from gazerig.robot.model.commands import (
+    Command,
+    Jog,
+    LookAt,
+    Resume,
+    Tune,
+    Value,
+    from_json,
+    signed,
+)
+from gazerig.robot.model.reply import CommandTaker
+from gazerig.robot.remote.request_handler import ParamAccess, SavedParams
 
 _REPLY_S = 1.0
 _SAID_EVERY_S = 3.0
@@ -17,7 +26,7 @@ _LATER = "next start"
 """Of what a change did, people are told what it did not; the controls show the rest."""
 
 
-class Confined(Protocol):
+class PathGuard(Protocol):
     """Says which files a person at a browser may name (gazerig.config.confined.Confined)."""
 
     def file(self, given: str, kind: str = "") -> str:
@@ -36,20 +45,20 @@ Point = Callable[[float, float], Vec3 | None]
 """Place in the picture, 0..1 from the left and from the top -> point in the world."""
 
 
-class PageHear:
+class PageRequestHandler:
     """Carries out one request of the page and gives what there is to say about it."""
 
     def __init__(
         self,
-        order: OrderTaker,
-        tuning: Tuning | None = None,
+        order: CommandTaker,
+        tuning: ParamAccess | None = None,
         point: Point | None = None,
         steer: Callable[[str], str | None] | None = None,
         replay: Callable[[Mapping[str, object]], str | None] | None = None,
         depth: Callable[[bool], None] | None = None,
         refusals: tuple[type[Exception], ...] = (),
         saved: Callable[[Path], None] | None = None,
-        confined: Confined | None = None,
+        confined: PathGuard | None = None,
     ) -> None:
         """Take who obeys.
 
@@ -103,7 +112,7 @@ class PageHear:
             raise ValueError("parameters are changed by tuning, which knows their rules")
         return self._ordered(order if getattr(order, "who", PAGE) else signed(order, PAGE))
 
-    def _ordered(self, order: Order) -> str | None:
+    def _ordered(self, order: Command) -> str | None:
         """Return an order, and return what it cannot do, None where it does all or nobody waits."""
         ticket = self._order(order)
         if ticket is None or not isinstance(order, LookAt | Jog | Resume):
@@ -153,13 +162,13 @@ class PageHear:
                 return _lines(tuning.character(name)) or f"the character is {name}"
         raise ValueError("tuning takes set, save, revert, differs or character")
 
-    def _save(self, tuning: Tuning, path: str | None) -> str:
+    def _save(self, tuning: ParamAccess, path: str | None) -> str:
         if path and self._confined is not None:
             path = self._confined.file(path)
         file = Path(path).expanduser() if path else None
         if file is not None and not file.is_absolute():
             raise ValueError(f"{path}: give the whole path; the rig has a folder of its own")
-        saved: Saved = tuning.save(file)
+        saved: SavedParams = tuning.save(file)
         if self._saved is not None:
             self._saved(saved.path)
         kept = f", what was there is in {saved.backup}" if saved.backup is not None else ""

@@ -5,7 +5,7 @@ from typing import Literal
 
 from gazerig.robot.dashboard.html import AMBER, GREEN, GREY, LEVELS, RED, frame, heading, note, pill
 from gazerig.robot.dashboard.status import OLD_PICTURE_S
-from gazerig.robot.model.types import Servos, Snapshot, Timing
+from gazerig.robot.model.types import LoopFigures, Servos, Snapshot
 
 Strain = Literal["", "near", "over"]
 """How a figure stands to its limit."""
@@ -126,7 +126,7 @@ def strain_of_voltage(servos: Servos, i: int) -> Strain:
     return "" if limits.low_v[i] <= volts <= limits.high_v[i] else "near"
 
 
-def _timing(timing: Timing | None) -> str:
+def _timing(timing: LoopFigures | None) -> str:
     """Say how the loop keeps its time."""
     if timing is None:
         return note("the loop's times are not known yet")

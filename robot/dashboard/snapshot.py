@@ -8,7 +8,8 @@ import numpy as np
 
 from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
 from gazerig.gaze.types import GazeState, Vec3
-from gazerig.robot.analysis.event_detector import Blink, Event, Fixation, GazeEvents, Saccade
+from gazerig.robot.analysis.blink_finder import BlinkEvent
+from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_text import lead_words, target_name
 from gazerig.robot.dashboard.loop_timing import LoopTiming
@@ -17,9 +18,10 @@ from gazerig.robot.model.guard_params import HealthParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.types import (
-    Ghost,
+    CommandedPose,
     JointState,
     Level,
+    LoopFigures,
     SeenBlink,
     SeenBody,
     SeenCamera,
@@ -30,7 +32,6 @@ from gazerig.robot.model.types import (
     ServoLimits,
     Servos,
     Snapshot,
-    Timing,
     Trail,
 )
 
@@ -54,7 +55,7 @@ class ShownRig(NamedTuple):
     field: FieldOfViewParams
 
 
-class Said(NamedTuple):
+class SnapshotTexts(NamedTuple):
     """What a tick does not tell: bus figures in words, what is seen, what is in force."""
 
     health: str = ""
@@ -64,7 +65,7 @@ class Said(NamedTuple):
     conversation: str = ""
 
 
-class Snapshots:
+class SnapshotBuilder:
     """Makes snapshots of a running rig, with all that has happened since the one before.
 
     ``note`` belongs to the loop's thread and only lays the tick down; ``take`` does the
@@ -81,16 +82,16 @@ class Snapshots:
 
     def _begin(self) -> None:
         self._timing = LoopTiming(self._rate_hz)
-        self._figures: Timing | None = None
+        self._figures: LoopFigures | None = None
         self._figures_s = self._trail_s = -np.inf
-        self._events = GazeEvents()
+        self._events = EventDetector()
         self._unanswered: Counter[str] = Counter()
 
     def note(self, tick: Tick) -> None:
         """Lay a tick down."""
         self._ticks.append(tick)
 
-    def take(self, said: Said) -> Snapshot | None:
+    def take(self, said: SnapshotTexts) -> Snapshot | None:
         """Return a snapshot of the newest tick, None before the first."""
         trail: list[Trail] = []
         events: list[SeenEvent] = []
@@ -132,7 +133,7 @@ class Snapshots:
         if tick.joints.missing:
             self._unanswered.update(tick.joints.missing)
 
-    def _timed(self, t_s: float) -> Timing | None:
+    def _timed(self, t_s: float) -> LoopFigures | None:
         """Return the loop's figures, worked out twice a second."""
         if t_s - self._figures_s >= _TIMING_S:
             self._figures, self._figures_s = self._timing.figures(), t_s
@@ -234,11 +235,11 @@ def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
     )
 
 
-def _ghost(tick: Tick, rig: ShownRig) -> Ghost:
+def _ghost(tick: Tick, rig: ShownRig) -> CommandedPose:
     """Return where the wish would have head and eyes."""
     at_rest = (0.0,) * len(tick.wish_rad)
     pose: GazeState = rig.kinematics.forward(JointState(tick.wish_rad, at_rest, at_rest, ()))
-    return Ghost(
+    return CommandedPose(
         pose.R_world_head,
         pose.p_world_head_m,
         (pose.p_world_eye_left_m, pose.p_world_eye_right_m),
@@ -295,13 +296,13 @@ def _trail(tick: Tick) -> Trail:
 
 def _seen(event: Event) -> SeenEvent:
     match event:
-        case Saccade():
+        case SaccadeEvent():
             return SeenSaccade(
                 event.onset_s, event.duration_s, event.amplitude_deg, event.peak_deg_s
             )
-        case Fixation():
+        case FixationEvent():
             return SeenFixation(event.start_s, event.duration_s, event.part)
-        case Blink():
+        case BlinkEvent():
             return SeenBlink(event.onset_s, event.duration_s)
 
 

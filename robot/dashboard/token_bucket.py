@@ -1,7 +1,7 @@
 """How often something may be done: a token bucket."""
 
 
-class Rate:
+class TokenBucket:
     """So many a second, and so many at once after a pause."""
 
     def __init__(self, per_s: float, burst: float) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Awaitable
 import aiohttp
 from aiohttp import web
 
-from gazerig.robot.dashboard.token_bucket import Rate
+from gazerig.robot.dashboard.token_bucket import TokenBucket
 
 MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
 """From one browser; a person who drags with two hands sends some 60 a second."""
@@ -19,7 +19,10 @@ Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 async def carry_in(browser: web.WebSocketResponse, inside: Socket) -> None:
     """Carry what a browser sends, no faster than the server should have to read it."""
-    messages, size = Rate(MESSAGES_PER_S, MESSAGES_BURST), Rate(BYTES_PER_S, BYTES_BURST)
+    messages, size = (
+        TokenBucket(MESSAGES_PER_S, MESSAGES_BURST),
+        TokenBucket(BYTES_PER_S, BYTES_BURST),
+    )
     loop = asyncio.get_running_loop()
     async for message in browser:
         if (wait_s := max(messages.wait_s(loop.time()), size.wait_s(loop.time()))) > 0.0:

@@ -82,7 +82,7 @@ class Tune(NamedTuple):
     changes: tuple[tuple[str, Value], ...]
 
 
-Order = Ask | LookAt | Jog | Renew | Stop | Resume | Tune
+Command = Ask | LookAt | Jog | Renew | Stop | Resume | Tune
 
 MAX_COORDINATE_M = 1000.0
 """No point to look at lies farther away along any axis."""
@@ -91,19 +91,19 @@ MAX_ANGLE_RAD = 2.0 * pi
 MAX_WORDS = 200
 """Longest name or reason that an order may carry, in characters."""
 
-KINDS: dict[str, type[Order]] = {
+KINDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "jog": Jog, "renew": Renew, "stop": Stop, "resume": Resume,
     "tune": Tune,
 }  # fmt: skip
 _NAMES = {kind: name for name, kind in KINDS.items()}
 
 
-def as_json(order: Order) -> dict[str, object]:
+def as_json(order: Command) -> dict[str, object]:
     """Return an order as plain JSON: its name under "order", and its fields."""
     return {"order": _NAMES[type(order)], **order._asdict()}
 
 
-def from_json(data: object) -> Order:
+def from_json(data: object) -> Command:
     """Read what ``as_json`` gave, from wherever it comes; fields with defaults may be left out.
 
     Raises:
@@ -122,7 +122,7 @@ def from_json(data: object) -> Order:
     return order
 
 
-def from_recording(data: dict[str, object]) -> Order:
+def from_recording(data: dict[str, object]) -> Command:
     """Read an order of a recorded run.
 
     Those of runs made before leads could lapse and stops be guarded say nothing of it: they
@@ -136,7 +136,7 @@ def from_recording(data: dict[str, object]) -> Order:
     return from_json({**old.get(name if isinstance(name, str) else "", {}), **data})
 
 
-def signed(order: Order, who: str) -> Order:
+def signed(order: Command, who: str) -> Command:
     """Return an order with who asks for it; orders that do not tell stay as they are."""
     match order:
         case LookAt() | Jog() | Renew() | Stop() | Resume():
@@ -144,7 +144,7 @@ def signed(order: Order, who: str) -> Order:
     return order
 
 
-def check(order: Order) -> None:
+def check(order: Command) -> None:
     """See that an order's values can be meant.
 
     Raises:

@@ -6,7 +6,7 @@ from math import degrees, radians
 from typing import Any, NamedTuple
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.commands import Order
+from gazerig.robot.model.commands import Command
 
 _BESIDE_DEG = 1.0
 """A gaze that rests nearer to its point than this looks there."""
@@ -38,7 +38,7 @@ class JointReply(NamedTuple):
         )
 
 
-class Reply(NamedTuple):
+class CommandReply(NamedTuple):
     """What the robot made of one order when it took it up.
 
     refused: why nothing was done, "" where something was
@@ -98,7 +98,7 @@ class Reply(NamedTuple):
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> "Reply":
+    def from_json(cls, data: Mapping[str, Any]) -> "CommandReply":
         """Return what ``as_json`` wrote.
 
         Raises:
@@ -131,17 +131,17 @@ class Ticket:
 
     def __init__(self) -> None:
         self._answered = threading.Event()
-        self._reply = Reply()
+        self._reply = CommandReply()
 
-    def answer(self, reply: Reply) -> None:
+    def answer(self, reply: CommandReply) -> None:
         """Leave the reply."""
         self._reply = reply
         self._answered.set()
 
-    def wait(self, within_s: float) -> Reply | None:
+    def wait(self, within_s: float) -> CommandReply | None:
         """Wait for the reply; None where the loop has not taken the order up in that time."""
         return self._reply if self._answered.wait(within_s) else None
 
 
-OrderTaker = Callable[[Order], Ticket | None]
+CommandTaker = Callable[[Command], Ticket | None]
 """Takes an order for the next tick, as Robot.order does; None: nobody will reply to it."""

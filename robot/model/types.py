@@ -71,7 +71,7 @@ class JointState(NamedTuple):
     measured: tuple[bool, ...] = ()
 
 
-class Applied(NamedTuple):
+class JointOutcome(NamedTuple):
     """What became of one joint's wish.
 
     wish_rad: as it was asked for; permitted_rad: as it was sent
@@ -83,7 +83,7 @@ class Applied(NamedTuple):
     reason: str
 
 
-class Verdict(NamedTuple):
+class GuardResult(NamedTuple):
     """What the guard let through.
 
     command_rad: permitted joint angles
@@ -103,7 +103,7 @@ class Verdict(NamedTuple):
     gravest: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
 
-    def applied(self, joint: str) -> Applied:
+    def applied(self, joint: str) -> JointOutcome:
         """Return what became of one joint's wish.
 
         Raises:
@@ -112,7 +112,7 @@ class Verdict(NamedTuple):
         if joint not in self.joints:
             raise ValueError(f"no joint {joint!r}; there is {', '.join(self.joints)}")
         i = self.joints.index(joint)
-        return Applied(self.wish_rad[i], self.command_rad[i], self.why[i] if self.why else "")
+        return JointOutcome(self.wish_rad[i], self.command_rad[i], self.why[i] if self.why else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class SeenBody:
     radius_m: float
 
 
-class Ghost(NamedTuple):
+class CommandedPose(NamedTuple):
     """Where the wish would have head and eyes: the names and frames are those of Snapshot."""
 
     R_world_head: Mat3
@@ -204,7 +204,7 @@ class Servos(NamedTuple):
     limits: ServoLimits | None = None
 
 
-class Timing(NamedTuple):
+class LoopFigures(NamedTuple):
     """How the loop keeps its time, over the last ``over_s`` seconds.
 
     p50_ms, p99_ms, worst_ms: how far the time between two ticks is off its slots
@@ -304,11 +304,11 @@ class Snapshot:
     stopped: str = ""
     led: str = ""
     picture_age_s: float | None = None
-    ghost: Ghost | None = None
+    ghost: CommandedPose | None = None
     camera: SeenCamera | None = None
     field_deg: tuple[float, float, float, float] | None = None
     servos: Servos = Servos()
-    timing: Timing | None = None
+    timing: LoopFigures | None = None
     worst: Level = "ok"
     trail: tuple[Trail, ...] = ()
     events: tuple[SeenEvent, ...] = ()

@@ -15,7 +15,7 @@ FORBIDDEN: Final = 1e6
 """Cost of a pair that cannot be; larger than that of all pairs that can."""
 
 
-def likeliest_pairs(costs: Floats) -> list[tuple[int, int]]:
+def assign(costs: Floats) -> list[tuple[int, int]]:
     """Return the pairs (row, column) that cost least together; as many pairs as can be.
 
     costs: (n, m) at least 0, FORBIDDEN where a pair cannot be
@@ -33,4 +33,4 @@ def likeliest_pairs(costs: Floats) -> list[tuple[int, int]]:
 
 def get_ready() -> None:
     """Load the solver now: in the control loop it would miss a hundred ticks."""
-    likeliest_pairs(np.zeros((1, 1)))
+    assign(np.zeros((1, 1)))

@@ -41,7 +41,7 @@ class ResidualFigures(NamedTuple):
     samples: int
 
 
-class Seen(NamedTuple):
+class TrackedPoint(NamedTuple):
     """A tracked thing in one picture: where this picture alone puts it, and its speed."""
 
     id: int
@@ -62,7 +62,7 @@ class _Turn:
     shifts: list[tuple[Vec3, Vec3, float, bool]] = field(default_factory=list)
 
 
-class HeadTurnResidual:
+class EgomotionResidual:
     """Gathers the figures picture by picture."""
 
     def __init__(self) -> None:
@@ -71,7 +71,9 @@ class HeadTurnResidual:
         self._before: tuple[float, Vec3, dict[int, Vec3]] | None = None
         self._turns: dict[int, _Turn] = {}
 
-    def step(self, t_s: float, turn_rad_s: Vec3, p_world_eye_m: Vec3, seen: Iterable[Seen]) -> None:
+    def step(
+        self, t_s: float, turn_rad_s: Vec3, p_world_eye_m: Vec3, seen: Iterable[TrackedPoint]
+    ) -> None:
         """Take in one picture; times must grow.
 
         turn_rad_s: angular velocity of the camera at the capture, along the world's axes
@@ -100,7 +102,7 @@ class HeadTurnResidual:
             round(degrees(median(self._speeds)), 3), round(1e3 * late, 2), len(self._speeds)
         )
 
-    def _stands(self, t_s: float, views: dict[int, Vec3], seen: list[Seen]) -> None:
+    def _stands(self, t_s: float, views: dict[int, Vec3], seen: list[TrackedPoint]) -> None:
         """Believe what is where it was before the turn, and begin anew."""
         for id_ in sorted(views.keys() & self._turns.keys()):
             turn = self._turns[id_]

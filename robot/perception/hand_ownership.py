@@ -12,7 +12,7 @@ from math import hypot
 
 from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
 from gazerig.gaze.types import Vec3
-from gazerig.robot.perception.tracker import Sighting
+from gazerig.robot.perception.tracker import LocalisedDetection
 
 # What a moving patch is called whose kind is not known; a named one is always itself.
 _UNNAMED = "thing"
@@ -26,11 +26,11 @@ Known = tuple[Vec3, Vec3 | None]
 
 
 def without_own_motion(
-    faces: list[Sighting],
-    things: Iterable[Sighting],
+    faces: list[LocalisedDetection],
+    things: Iterable[LocalisedDetection],
     before: Iterable[Known],
     p_camera: Vec3,
-) -> tuple[list[Sighting], list[Sighting]]:
+) -> tuple[list[LocalisedDetection], list[LocalisedDetection]]:
     """Return the faces with the spin of their own motion, and the things that are not theirs.
 
     before: tracked faces, where they are expected now; one that the detector has just missed
@@ -39,7 +39,7 @@ def without_own_motion(
     spins = [0.0] * len(faces)
     tracked = list(before)
     known = [(face.p_world_m, _velocity(face, tracked)) for face in faces]
-    others: list[Sighting] = []
+    others: list[LocalisedDetection] = []
     for thing in things:
         owner = _owner(thing, [*known, *tracked], p_camera)
         if owner is None:
@@ -53,14 +53,14 @@ def without_own_motion(
     return turned, others
 
 
-def _velocity(face: Sighting, tracked: list[Known]) -> Vec3 | None:
+def _velocity(face: LocalisedDetection, tracked: list[Known]) -> Vec3 | None:
     """Return the velocity of the tracked face at a sighting's place, None where there is none."""
     near = [(norm(sub(p, face.p_world_m)), v) for p, v in tracked]
     away, v = min(near, key=lambda pair: pair[0], default=(1.0, None))
     return v if away < _HEAD_M else None
 
 
-def _owner(thing: Sighting, faces: list[Known], p_camera: Vec3) -> int | None:
+def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int | None:
     """Find the face whose own motion this is."""
     if thing.kind != _UNNAMED:
         return None
@@ -72,19 +72,19 @@ def _owner(thing: Sighting, faces: list[Known], p_camera: Vec3) -> int | None:
     return None
 
 
-def _on_head(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> bool:
+def _on_head(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> bool:
     """Return whether a patch's middle is on the head."""
     off = _off(thing, p_face, p_camera)
     return off is not None and hypot(*off) < _HEAD_M
 
 
-def _below(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> bool:
+def _below(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> bool:
     """Return whether a patch's middle is where the body of a face is."""
     off = _off(thing, p_face, p_camera)
     return off is not None and off[0] < _HALF_WIDTH_M and -_BELOW_M < off[1] < _ABOVE_M
 
 
-def _off(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:
+def _off(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:
     """Return how far aside of and above a face a patch is, None where it is nearer or farther.
 
     A patch whose distance is only assumed is taken to be as far as the face.
@@ -98,7 +98,9 @@ def _off(thing: Sighting, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] |
     return hypot(x, y), z
 
 
-def _goes_along(thing: Sighting, p_face: Vec3, v_face: Vec3 | None, p_camera: Vec3) -> bool:
+def _goes_along(
+    thing: LocalisedDetection, p_face: Vec3, v_face: Vec3 | None, p_camera: Vec3
+) -> bool:
     """Return whether a patch moves across the view as the face does; unknown counts as so."""
     if thing.v_world_m_s is None or v_face is None:
         return True

@@ -36,7 +36,7 @@ _OF_BOTH = _PLACE.T @ _VELOCITY + _VELOCITY.T @ _PLACE
 _MOVE = _PLACE.T @ _VELOCITY
 
 
-class Restlessness(NamedTuple):
+class ProcessNoise(NamedTuple):
     """Standard deviations of the acceleration, m/s2: quiet, and when something happens."""
 
     quiet_m_s2: float
@@ -46,7 +46,7 @@ class Restlessness(NamedTuple):
 class TrackFilter:
     """The filter of one track. Numbers given to it must be finite."""
 
-    def __init__(self, p_m: Vec3, cov_m2: Floats, speed_sd_m_s: float, noise: Restlessness) -> None:
+    def __init__(self, p_m: Vec3, cov_m2: Floats, speed_sd_m_s: float, noise: ProcessNoise) -> None:
         self._noise = noise
         self._unseen_s = 0.0
         # OpenCV's filter: a prediction and a correction take 37 us, in numpy 170.
@@ -54,7 +54,7 @@ class TrackFilter:
         cov = _PLACE.T @ cov_m2 @ _PLACE + speed_sd_m_s**2 * _OF_VELOCITY
         self._keep(np.array((*p_m, 0.0, 0.0, 0.0)), cov)
 
-    def retune(self, noise: Restlessness) -> None:
+    def retune(self, noise: ProcessNoise) -> None:
         """Believe in another restlessness; place and velocity stay."""
         self._noise = noise
 

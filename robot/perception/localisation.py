@@ -17,7 +17,7 @@ from gazerig.gaze.angles import add, compose, norm, rotate, scale
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
 from gazerig.robot.perception.face_pose import FacePose, face_pose
-from gazerig.robot.perception.tracker import Sighting
+from gazerig.robot.perception.tracker import LocalisedDetection
 
 Box = tuple[float, float, float, float]
 """x, y, width, height in pixels."""
@@ -51,7 +51,7 @@ def face_sighting(
     p_world_camera_m: Vec3,
     lens: Intrinsics,
     depth: DepthReader | None = None,
-) -> Sighting | None:
+) -> LocalisedDetection | None:
     """Place a face in the world, None where its landmarks show none from its front.
 
     depth: reads the depth picture that belongs to the landmarks' picture
@@ -66,7 +66,7 @@ def face_sighting(
     share, sd = (
         measured if measured is not None else (1.0, hypot(_SIZE_PX / eyes_px, _SIZE_OF_EYES))
     )
-    return Sighting(
+    return LocalisedDetection(
         "face",
         add(p_world_camera_m, rotate(R_world_camera, scale(pose.p_camera_m, share))),
         compose(R_world_camera, pose.R_camera_face),
@@ -107,7 +107,7 @@ def _measured(
 
 def blob_sighting(
     blob: MovingBlob, R_world_camera: Mat3, p_world_camera_m: Vec3
-) -> Sighting | None:
+) -> LocalisedDetection | None:
     """Place something that moves in the world, None where it has no place at all."""
     far = norm(blob.p_camera_m)
     if not (isfinite(far) and isfinite(blob.radius_m)):
@@ -119,7 +119,7 @@ def blob_sighting(
     across = hypot(_FLOW_SHARE * (norm(v) if v else 0.0), far * _FLOW_RAD_S)
     shape = 0.0 if blob.depth_known else _SHAPE_1_S
     loom_sd = blob.loom_sd_1_s if blob.loom_sd_1_s > 0.0 else _LOOM_SD_1_S
-    return Sighting(
+    return LocalisedDetection(
         blob.kind,
         add(p_world_camera_m, rotate(R_world_camera, blob.p_camera_m)),
         None,

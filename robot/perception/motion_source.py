@@ -13,7 +13,7 @@ from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 
 
-class MotionFinder:
+class MotionSource:
     """Finds what moves from one picture to the next."""
 
     def __init__(
@@ -56,13 +56,13 @@ def motion_finder(
     params: MotionParams, lens: LensParams | None, field_rad: float, turns: PoseRing | None
 ) -> Motion:
     """Return what finds motion, for the process that will look at the pictures."""
-    return MotionFinder(params, lens, field_rad, turns)
+    return MotionSource(params, lens, field_rad, turns)
 
 
 def retuned(
     params: MotionParams, lens: LensParams | None, field_rad: float, finder: Motion | None
 ) -> Motion | None:
     """Let a finder look otherwise, in the process that has it."""
-    if isinstance(finder, MotionFinder):
+    if isinstance(finder, MotionSource):
         finder.retune(params, lens, field_rad)
     return finder

@@ -20,9 +20,9 @@ from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.perception.egomotion_residual import (
-    HeadTurnResidual,
+    EgomotionResidual,
     ResidualFigures,
-    Seen,
+    TrackedPoint,
     turning_rad_s,
 )
 from gazerig.robot.perception.hand_ownership import Known, without_own_motion
@@ -34,7 +34,7 @@ from gazerig.robot.perception.localisation import (
     face_sighting,
     reader_of,
 )
-from gazerig.robot.perception.tracker import Sighting, Track, Tracker
+from gazerig.robot.perception.tracker import LocalisedDetection, Track, Tracker
 
 DepthAt = Callable[[NDArray[Any], Box], Reading]
 """Reads the distance of what a box of pixels shows from a depth picture."""
@@ -68,7 +68,7 @@ class Perception:
         self._depth_at = depth_at
         self._tracks: tuple[Track, ...] = ()
         self._p_camera: Vec3 = (0.0, 0.0, 0.0)
-        self._residual = HeadTurnResidual()
+        self._residual = EgomotionResidual()
         self._percept: Percept | None = None
         self._number = 0
         self.pictures = 0
@@ -116,7 +116,7 @@ class Perception:
 
     def _sightings(
         self, found: Detections, R_world_camera: Mat3, p: Vec3
-    ) -> tuple[list[Sighting], list[Sighting]]:
+    ) -> tuple[list[LocalisedDetection], list[LocalisedDetection]]:
         """Place everything found in the world: faces, and what else moves."""
         lens = self._lens(found)
         depth = reader_of(found.depth_m, self._depth_at)
@@ -139,7 +139,7 @@ class Perception:
         before, after = (poses.head_pose(t_s + dt)[0] for dt in (-_HALF_TURN_S, _HALF_TURN_S))
         turn = turning_rad_s(before, after, 2.0 * _HALF_TURN_S)
         seen = [
-            Seen(track.id, track.sighting.p_world_m, norm(track.v_world_m_s))
+            TrackedPoint(track.id, track.sighting.p_world_m, norm(track.v_world_m_s))
             for track in self._tracks
             if track.seen_s == t_s
         ]

@@ -14,8 +14,8 @@ import numpy as np
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
-from gazerig.robot.perception.data_association import FORBIDDEN, get_ready, likeliest_pairs
-from gazerig.robot.perception.kalman import Floats, Restlessness, TrackFilter, far_off, sight_cov
+from gazerig.robot.perception.data_association import FORBIDDEN, assign, get_ready
+from gazerig.robot.perception.kalman import Floats, ProcessNoise, TrackFilter, far_off, sight_cov
 
 # Two numbers of the detector for one thing, as a cost: 4 standard deviations.
 _OTHER_MARK = 16.0
@@ -25,7 +25,7 @@ _NEAREST_M = 0.05
 
 
 @dataclass(slots=True)
-class Sighting:
+class LocalisedDetection:
     """One thing as one picture shows it, placed in the world.
 
     R_world_face: axes of a face, None of anything else
@@ -67,7 +67,7 @@ class Track:
     """
 
     id: int
-    sighting: Sighting
+    sighting: LocalisedDetection
     filter: TrackFilter
     R_world_face: Mat3 | None
     seen_s: float
@@ -114,14 +114,14 @@ class Tracker:
         """Believe otherwise from now on; all tracks stay."""
         self._params = params
         lively = params.lively_accel_m_s2
-        self._of_faces = Restlessness(params.quiet_accel_m_s2, lively)
-        self._of_things = Restlessness(params.things_accel_m_s2, lively)
+        self._of_faces = ProcessNoise(params.quiet_accel_m_s2, lively)
+        self._of_things = ProcessNoise(params.things_accel_m_s2, lively)
         for track in self._tracks:
             is_face = track.sighting.R_world_face is not None
             track.filter.retune(self._of_faces if is_face else self._of_things)
 
     def step(
-        self, sightings: list[Sighting], p_world_camera_m: Vec3, t_s: float
+        self, sightings: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float
     ) -> tuple[Track, ...]:
         """Join one picture's sightings to the tracks; give those that are there now."""
         par = self._params
@@ -134,7 +134,7 @@ class Tracker:
                 for track in self._tracks
             ]
         )
-        pairs = likeliest_pairs(costs)
+        pairs = assign(costs)
         for i, j in pairs:
             self._update(self._tracks[i], sightings[j], p_world_camera_m)
         taken = {j for _, j in pairs}
@@ -144,7 +144,7 @@ class Tracker:
         self._tracks = [t for t in self._tracks if t_s - t.seen_s <= par.forget_ms / 1e3]
         return tuple(t for t in self._tracks if t_s - t.seen_s <= par.coast_ms / 1e3)
 
-    def _cost(self, track: Track, sighting: Sighting, p_camera: Vec3) -> float:
+    def _cost(self, track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> float:
         """Return how unlikely it is that a track is seen so: minus twice the log likelihood.
 
         A track long unseen could be anywhere; without the logarithm that would make it
@@ -170,7 +170,7 @@ class Tracker:
         known = log(float(np.linalg.det(cov)) / (across**4 * along**2))
         return far + known + (0.0 if _same_mark(track, sighting) else _OTHER_MARK)
 
-    def _gate_m(self, track: Track, sighting: Sighting, far_m: float) -> float:
+    def _gate_m(self, track: Track, sighting: LocalisedDetection, far_m: float) -> float:
         """Return the farthest from its expected place that something is taken for the same.
 
         A detector that tells things apart in the picture has already judged; what it gave
@@ -181,7 +181,7 @@ class Tracker:
             return widest
         return min(widest, _OUTLINE * max(track.sighting.radius_m, sighting.radius_m))
 
-    def _begin(self, sighting: Sighting, p_camera: Vec3, t_s: float) -> Track:
+    def _begin(self, sighting: LocalisedDetection, p_camera: Vec3, t_s: float) -> Track:
         place = sighting.p_world_m
         track = Track(
             self._next_id,
@@ -202,7 +202,7 @@ class Tracker:
         self._velocity(track, sighting, p_camera)
         return track
 
-    def _update(self, track: Track, sighting: Sighting, p_camera: Vec3) -> None:
+    def _update(self, track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> None:
         """Take a sighting in."""
         place = sized(track, sighting, p_camera)
         track.filter.correct(
@@ -218,7 +218,7 @@ class Tracker:
         self._learn_size(track, sighting, gain)
         track.sighting, track.seen_s = sighting, track.at_s
 
-    def _velocity(self, track: Track, sighting: Sighting, p_camera: Vec3) -> None:
+    def _velocity(self, track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> None:
         """Take in a velocity that was measured in the picture."""
         if sighting.v_world_m_s is None:
             return
@@ -231,7 +231,7 @@ class Tracker:
         cov = sight_cov(sighting.p_world_m, p_camera, *sds)
         track.filter.correct_velocity(scale(sighting.v_world_m_s, share), cov)
 
-    def _learn_size(self, track: Track, sighting: Sighting, gain: float) -> None:
+    def _learn_size(self, track: Track, sighting: LocalisedDetection, gain: float) -> None:
         """Learn how large a face is where its distance is known otherwise."""
         if sighting.size_depth is None:
             return
@@ -240,13 +240,13 @@ class Tracker:
         track.depth_s = track.at_s
 
 
-def _same_mark(track: Track, sighting: Sighting) -> bool:
+def _same_mark(track: Track, sighting: LocalisedDetection) -> bool:
     """Return whether the detector takes both for the same, or does not tell things apart."""
     marks = track.sighting.mark, sighting.mark
     return None in marks or marks[0] == marks[1]
 
 
-def sized(track: Track, sighting: Sighting, p_camera: Vec3) -> Vec3:
+def sized(track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> Vec3:
     """Return a sighting's place with the distance that the size learned of this face tells."""
     if sighting.depth_measured or track.depth_s is None:
         return sighting.p_world_m

@@ -22,8 +22,8 @@ from gazerig.drivers.file_input import read_limited
 from gazerig.drivers.file_output import make_folder, output_file, write_file
 from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.control.feedback_basis import PARTLY, RECKONED, Basis
-from gazerig.robot.recording.gaze_angles import Trace
-from gazerig.robot.recording.gaze_labels import Labels, Stretch
+from gazerig.robot.recording.gaze_angles import GazeAngles
+from gazerig.robot.recording.gaze_labels import LabelledInterval, Labels
 
 BIDS_VERSION = "1.11.1"
 
@@ -40,7 +40,7 @@ _METHODS: dict[Basis, str] = {
 }
 
 
-class About(NamedTuple):
+class DatasetDescription(NamedTuple):
     """What the JSON says of a run.
 
     subject, task: names, made to letters and digits in file names
@@ -55,7 +55,7 @@ class About(NamedTuple):
     made_by: str
 
 
-class _Eye(NamedTuple):
+class _RecordedEye(NamedTuple):
     """One recording: its label, what it is of, its gaze and further columns."""
 
     label: str
@@ -65,10 +65,10 @@ class _Eye(NamedTuple):
 
 
 def write_bids(
-    trace: Trace,
+    trace: GazeAngles,
     labels: Labels,
-    stretches: Sequence[Stretch],
-    about: About,
+    stretches: Sequence[LabelledInterval],
+    about: DatasetDescription,
     root: Path,
     force: bool = False,
 ) -> tuple[Path, ...]:
@@ -117,7 +117,7 @@ def label_of(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9]", "", name) or "unnamed"
 
 
-def _eyes(trace: Trace) -> tuple[_Eye, ...]:
+def _eyes(trace: GazeAngles) -> tuple[_RecordedEye, ...]:
     head = [
         (f"head_{name}", "deg", says, trace.head_deg[:, k])
         for k, (name, says) in enumerate(
@@ -126,13 +126,13 @@ def _eyes(trace: Trace) -> tuple[_Eye, ...]:
         if f"neck_{name}" in trace.joints
     ]
     return (
-        _Eye("eye1", "left", trace.left_deg, _lids(trace, "left", 0)),
-        _Eye("eye2", "right", trace.right_deg, _lids(trace, "right", 1)),
-        _Eye("eye3", "cyclopean", trace.cyclopean_deg, tuple(head)),
+        _RecordedEye("eye1", "left", trace.left_deg, _lids(trace, "left", 0)),
+        _RecordedEye("eye2", "right", trace.right_deg, _lids(trace, "right", 1)),
+        _RecordedEye("eye3", "cyclopean", trace.cyclopean_deg, tuple(head)),
     )
 
 
-def _lids(trace: Trace, side: str, k: int) -> tuple[tuple[str, str, str, Floats], ...]:
+def _lids(trace: GazeAngles, side: str, k: int) -> tuple[tuple[str, str, str, Floats], ...]:
     """Return the columns of one eye's lids, those that are there."""
     every = (
         ("lid", "upper", trace.lids[:, k]),
@@ -145,7 +145,7 @@ def _lids(trace: Trace, side: str, k: int) -> tuple[tuple[str, str, str, Floats]
     )
 
 
-def _write_frame(root: Path, subject: str, about: About) -> Iterator[Path]:
+def _write_frame(root: Path, subject: str, about: DatasetDescription) -> Iterator[Path]:
     """Write what a data set has beside its recordings; what is there of it stays."""
     description = {
         "Name": "Gaze of an animatronic head",
@@ -182,7 +182,12 @@ def _write_frame(root: Path, subject: str, about: About) -> Iterator[Path]:
 
 
 def _write_eye(
-    stem: Path, eye: _Eye, trace: Trace, about: About, labels: Labels, force: bool
+    stem: Path,
+    eye: _RecordedEye,
+    trace: GazeAngles,
+    about: DatasetDescription,
+    labels: Labels,
+    force: bool,
 ) -> tuple[Path, Path]:
     basis = trace.basis(eye.recorded)
     sidecar: dict[str, object] = {
@@ -237,9 +242,9 @@ def _even_rows(values: Floats, rate_hz: float) -> Iterator[list[str]]:
 
 def _write_events(
     stem: Path,
-    trace: Trace,
+    trace: GazeAngles,
     labels: Labels,
-    stretches: Sequence[Stretch],
+    stretches: Sequence[LabelledInterval],
     task: str,
     force: bool,
 ) -> tuple[Path, Path]:

@@ -15,8 +15,8 @@ import numpy as np
 
 from gazerig.drivers.file_output import output_text, refuse_existing, write_file
 from gazerig.robot.control.feedback_basis import RECKONED
-from gazerig.robot.recording.gaze_angles import MOVEMENTS, Trace
-from gazerig.robot.recording.gaze_labels import Labels, Stretch
+from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeAngles
+from gazerig.robot.recording.gaze_labels import LabelledInterval, Labels
 
 _GAZE = (
     "time_s", "x_deg", "y_deg", "left_x_deg", "left_y_deg", "right_x_deg", "right_y_deg",
@@ -36,7 +36,11 @@ FIXATIONS = ("start_s", "duration_s", "part", "target")
 
 
 def write_csv(
-    trace: Trace, labels: Labels, stretches: Sequence[Stretch], stem: Path, force: bool = False
+    trace: GazeAngles,
+    labels: Labels,
+    stretches: Sequence[LabelledInterval],
+    stem: Path,
+    force: bool = False,
 ) -> tuple[Path, ...]:
     """Write STEM_samples.csv, _events.csv, _fixations.csv and _samples.json; give their paths.
 
@@ -76,7 +80,7 @@ def columns(joints: Collection[str]) -> tuple[str, ...]:
     return (*_GAZE, *there, *_LABELS)
 
 
-def _rests_on(trace: Trace) -> dict[str, object]:
+def _rests_on(trace: GazeAngles) -> dict[str, object]:
     """Say of each group of columns whether it was measured."""
     gaze = {"x_deg y_deg": "cyclopean", "left_*_deg": "left", "right_*_deg": "right"}
     more = {"head_*_deg": ("head", _HEAD), "*_lid": ("lids", _LIDS)}
@@ -104,7 +108,7 @@ def _write(path: Path, names: Sequence[str], rows: Iterable[Sequence[str]], forc
     return path
 
 
-def _sample_rows(trace: Trace, labels: Labels) -> Iterator[list[str]]:
+def _sample_rows(trace: GazeAngles, labels: Labels) -> Iterator[list[str]]:
     head = [joint in trace.joints for joint in _HEAD]
     lid = [joint in trace.joints for joint in _LIDS]
     rows = zip(
@@ -123,7 +127,7 @@ def _sample_rows(trace: Trace, labels: Labels) -> Iterator[list[str]]:
         ]  # fmt: skip
 
 
-def _event_row(stretch: Stretch) -> list[str]:
+def _event_row(stretch: LabelledInterval) -> list[str]:
     return [
         number(stretch.onset_s, 6),
         number(stretch.duration_s, 6),
@@ -134,9 +138,9 @@ def _event_row(stretch: Stretch) -> list[str]:
     ]
 
 
-def _fixation_rows(stretches: Sequence[Stretch]) -> Iterator[list[str]]:
+def _fixation_rows(stretches: Sequence[LabelledInterval]) -> Iterator[list[str]]:
     """Return one row a stay: fixation and pursuit of one part without a saccade are one."""
-    stay: Stretch | None = None
+    stay: LabelledInterval | None = None
     for s in (s for s in stretches if s.event != "blink"):
         rests = s.event in ("fixation", "pursuit")
         if stay is not None and rests and s.looked_at == stay.looked_at:
@@ -149,6 +153,6 @@ def _fixation_rows(stretches: Sequence[Stretch]) -> Iterator[list[str]]:
         yield _fixation_row(stay)
 
 
-def _fixation_row(stay: Stretch) -> list[str]:
+def _fixation_row(stay: LabelledInterval) -> list[str]:
     target, part = stay.looked_at
     return [number(stay.onset_s, 6), number(stay.duration_s, 6), part, target]

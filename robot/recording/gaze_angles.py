@@ -25,7 +25,7 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3
 from gazerig.robot.control.feedback_basis import Basis, basis_of, reckoned_joints
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.commands import Jog, Order, Renew, Stop
+from gazerig.robot.model.commands import Command, Jog, Renew, Stop
 
 Ints = NDArray[np.int64]
 
@@ -55,14 +55,14 @@ class InSpace(NamedTuple):
     cyclopean_deg: Angles2
 
 
-class LookedAt(NamedTuple):
+class GazeTarget(NamedTuple):
     """What the gaze rests on or goes to: kind and id, and the part of a face, "" elsewhere."""
 
     target: str
     part: str
 
 
-class Trace(NamedTuple):
+class GazeAngles(NamedTuple):
     """One run as columns of n ticks.
 
     start_s: clock of the rig at the first tick; time_s: (n,) since then
@@ -87,7 +87,7 @@ class Trace(NamedTuple):
     movement: Ints
     blink: NDArray[np.bool_]
     looked_at: Ints
-    names: tuple[LookedAt, ...]
+    names: tuple[GazeTarget, ...]
     messages: tuple[tuple[float, str], ...]
     lower_lids: Floats
     joints: tuple[str, ...]
@@ -109,25 +109,25 @@ def in_space(pose: GazeState) -> InSpace:
     return InSpace(_degrees(left), _degrees(right), _degrees(add(left, right)))
 
 
-def trace_of(ticks: Iterable[Tick]) -> Trace:
+def trace_of(ticks: Iterable[Tick]) -> GazeAngles:
     """Gather the columns of a run.
 
     Raises:
         ValueError: there are fewer than two ticks.
     """
-    tracing = Tracing()
+    tracing = GazeAnglesBuilder()
     for tick in ticks:
         tracing.note(tick)
     return tracing.trace()
 
 
-class Tracing:
+class GazeAnglesBuilder:
     """Gathers one run, tick by tick; some 200 bytes a tick."""
 
     def __init__(self) -> None:
         self._angles = array("d")
         self._codes = array("l")
-        self._numbers: dict[LookedAt, int] = {}
+        self._numbers: dict[GazeTarget, int] = {}
         self._messages: list[tuple[float, str]] = []
         self._start_s: float | None = None
         self._fixated: Target | None = None
@@ -162,7 +162,7 @@ class Tracing:
         movement = _CODE[tick.gaze.phase] if known else 0
         self._codes.extend((movement, tick.gaze.blink and known, self._number(tick)))
 
-    def trace(self) -> Trace:
+    def trace(self) -> GazeAngles:
         """Return the columns so far.
 
         Raises:
@@ -175,7 +175,7 @@ class Tracing:
         for column, joint in enumerate((*_NECK_AXES, *_LIDS), start=7):
             if joint not in self._joints:
                 a[:, column] = nan
-        return Trace(
+        return GazeAngles(
             self._start_s, a[:, 0], a[:, 1:3], a[:, 3:5], a[:, 5:7], a[:, 7:10], a[:, 10:12],
             a[:, 14:16], codes[:, 0], codes[:, 1] > 0, codes[:, 2], tuple(self._numbers),
             tuple(self._messages), a[:, 12:14], self._joints, tuple(self._reckoned),
@@ -211,7 +211,7 @@ class Tracing:
             if angle_between(way, sub(target.p_world_m, head)) < _ARRIVED_RAD:
                 fixated = target
         self._fixated, self._saccades = fixated, tick.gaze.saccades
-        name = LookedAt(target_words(fixated), fixated.part or "")
+        name = GazeTarget(target_words(fixated), fixated.part or "")
         return self._numbers.setdefault(name, len(self._numbers))
 
 
@@ -220,7 +220,7 @@ def target_words(target: Target) -> str:
     return target.kind if target.id < 0 else f"{target.kind} {target.id}"
 
 
-def order_words(order: Order) -> str:
+def order_words(order: Command) -> str:
     """Say in words what was asked for, e.g. "asked: stop why=space bar"."""
     usual = order._field_defaults
     given = " ".join(

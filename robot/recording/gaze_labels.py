@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.recording.gaze_angles import MOVEMENTS, Ints, LookedAt, Trace
+from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeAngles, GazeTarget, Ints
 
 LONGEST_LAG_S = 0.1
 SHORTEST_PURSUIT_S = 0.1
@@ -40,7 +40,7 @@ class Labels(NamedTuple):
         return list(np.where(self.blink, "blink", words))
 
 
-class Stretch(NamedTuple):
+class LabelledInterval(NamedTuple):
     """One saccade, fixation, pursuit or blink.
 
     onset_s: since the first tick
@@ -54,10 +54,10 @@ class Stretch(NamedTuple):
     event: str
     amplitude_deg: float | None
     peak_deg_s: float | None
-    looked_at: LookedAt
+    looked_at: GazeTarget
 
 
-def labels_of(trace: Trace) -> Labels:
+def labels_of(trace: GazeAngles) -> Labels:
     """Label a trace's samples."""
     lag_s = lag_of(trace)
     source = np.searchsorted(trace.time_s, trace.time_s - lag_s + 1e-9, side="right") - 1
@@ -66,7 +66,7 @@ def labels_of(trace: Trace) -> Labels:
     return Labels(lag_s, movement, trace.blink[source], trace.looked_at[source])
 
 
-def lag_of(trace: Trace) -> float:
+def lag_of(trace: GazeAngles) -> float:
     """Return the lag of the measured gaze behind the planned one, 0 .. LONGEST_LAG_S.
 
     That at which the speeds of both correlate best during saccades and just after: speeds,
@@ -86,7 +86,7 @@ def lag_of(trace: Trace) -> float:
     return float(_LAGS_S[int(np.argmax(fits))])
 
 
-def stretches_of(trace: Trace, labels: Labels) -> tuple[Stretch, ...]:
+def stretches_of(trace: GazeAngles, labels: Labels) -> tuple[LabelledInterval, ...]:
     """Return all stretches in the order of their onsets; a blink overlaps what the eyes do."""
     key = labels.movement * len(trace.names) + labels.looked_at
     # A target that changes under way does not make two saccades of one.
@@ -126,10 +126,12 @@ def _runs(key: Ints) -> list[tuple[int, int]]:
     return list(zip(firsts, [*(b - 1 for b in breaks.tolist()), len(key) - 1], strict=True))
 
 
-def _stretch(trace: Trace, labels: Labels, speed: Floats, first: int, last: int) -> Stretch:
+def _stretch(
+    trace: GazeAngles, labels: Labels, speed: Floats, first: int, last: int
+) -> LabelledInterval:
     amplitude = _apart_deg(trace.cyclopean_deg[first], trace.cyclopean_deg[last])
     peak = float(np.max(speed[first : last + 1]))
-    return Stretch(
+    return LabelledInterval(
         float(trace.time_s[first]),
         _until(trace, last) - float(trace.time_s[first]),
         MOVEMENTS[labels.movement[first]],
@@ -139,13 +141,15 @@ def _stretch(trace: Trace, labels: Labels, speed: Floats, first: int, last: int)
     )
 
 
-def _blink(trace: Trace, labels: Labels, first: int, last: int) -> Stretch:
+def _blink(trace: GazeAngles, labels: Labels, first: int, last: int) -> LabelledInterval:
     onset_s = float(trace.time_s[first])
     duration_s = _until(trace, last) - onset_s
-    return Stretch(onset_s, duration_s, "blink", None, None, trace.names[labels.looked_at[first]])
+    return LabelledInterval(
+        onset_s, duration_s, "blink", None, None, trace.names[labels.looked_at[first]]
+    )
 
 
-def _until(trace: Trace, last: int) -> float:
+def _until(trace: GazeAngles, last: int) -> float:
     """Return when the sample after the last one of a stretch was taken."""
     if last + 1 < len(trace.time_s):
         return float(trace.time_s[last + 1])

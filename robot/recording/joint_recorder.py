@@ -11,13 +11,18 @@ from gazerig.robot.control.body import Body
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointAngles, JointState
-from gazerig.robot.recording.tick_record import Engaged, Heard, Measured, Refused
+from gazerig.robot.recording.tick_record import (
+    BodyRecord,
+    MeasuredJoints,
+    TorqueEnabled,
+    TorqueRefused,
+)
 
 
-class BodyTap(Body):
+class JointRecorder(Body):
     """A body before a body: every call goes on to it, and what it gives is noted."""
 
-    def __init__(self, body: Body, note: Callable[[Heard], None]) -> None:
+    def __init__(self, body: Body, note: Callable[[BodyRecord], None]) -> None:
         # Not set up as a body of its own: it has no joints, only the other's.
         self.bus, self.names = body.bus, body.names
         self._body = body
@@ -36,13 +41,13 @@ class BodyTap(Body):
     def start(self) -> JointAngles:
         """Start the machine; note the goals."""
         goals = self._body.start()
-        self._note(Engaged(goals))
+        self._note(TorqueEnabled(goals))
         return goals
 
     def read(self, t_s: float) -> JointState:
         """Read all joints; note them."""
         joints = self._body.read(t_s)
-        self._note(Measured(t_s, joints))
+        self._note(MeasuredJoints(t_s, joints))
         return joints
 
     def write(self, command_rad: JointAngles) -> None:
@@ -71,9 +76,9 @@ class BodyTap(Body):
         try:
             goals = self._body.take_hold()
         except (SetupError, ServoFault) as error:
-            self._note(Refused(str(error)))
+            self._note(TorqueRefused(str(error)))
             raise
-        self._note(Engaged(goals))
+        self._note(TorqueEnabled(goals))
         return goals
 
     def stop(self) -> None:

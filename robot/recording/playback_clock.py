@@ -24,7 +24,7 @@ class Mark(NamedTuple):
 STEPS = tuple(f"{way} {kind}" for kind in MARK_KINDS for way in ("previous", "next"))
 
 
-class State(NamedTuple):
+class PlaybackState(NamedTuple):
     """Where a player stands.
 
     sought_s: the place that was last asked for, None before
@@ -37,7 +37,7 @@ class State(NamedTuple):
     sought_s: float | None
 
 
-class Player:
+class PlaybackClock:
     """Plays one recording; begins at its beginning, standing still."""
 
     def __init__(self, duration_s: float, marks: Sequence[Mark] = ()) -> None:
@@ -47,7 +47,7 @@ class Player:
         self._playing, self._speed = False, 1.0
         self._sought_s: float | None = None
 
-    def state(self, now_s: float) -> State:
+    def state(self, now_s: float) -> PlaybackState:
         """Return where it stands; at the end it stops."""
         at_s = self._from_s
         if self._playing:
@@ -55,7 +55,7 @@ class Player:
             if at_s >= self._duration_s:
                 self._stand(self._duration_s, now_s)
                 self._playing, at_s = False, self._duration_s
-        return State(at_s, self._duration_s, self._playing, self._speed, self._sought_s)
+        return PlaybackState(at_s, self._duration_s, self._playing, self._speed, self._sought_s)
 
     def play(self, now_s: float) -> None:
         """Go on; from the end it begins anew."""

@@ -15,12 +15,18 @@ from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
-from gazerig.robot.recording.tick_record import Engaged, Heard, Measured, Moment, Refused
+from gazerig.robot.recording.tick_record import (
+    BodyRecord,
+    MeasuredJoints,
+    TickRecord,
+    TorqueEnabled,
+    TorqueRefused,
+)
 
-H = TypeVar("H", bound=Heard)
+H = TypeVar("H", bound=BodyRecord)
 
 
-class PlayedBody(Body):
+class PlaybackBody(Body):
     """A body that does what it is told, and says what the recorded one said.
 
     The body behind it sees every call, so that its bus carries the bytes of the first run.
@@ -30,15 +36,17 @@ class PlayedBody(Body):
         # Not set up as a body of its own: it has no joints, only the other's.
         self.bus, self.names = body.bus, body.names
         self._body = body
-        self._moment: Moment | None = None
-        self._said: deque[Heard] = deque()
+        self._moment: TickRecord | None = None
+        self._said: deque[BodyRecord] = deque()
         self._newest: JointState | None = None
 
-    def play(self, moment: Moment) -> None:
+    def play(self, moment: TickRecord) -> None:
         """Take what is to be said until the end of a tick; once for each."""
         if moment is not self._moment:
             self._moment = moment
-            self._said = deque((*moment.before, Measured(moment.tick.t_s, moment.tick.joints)))
+            self._said = deque(
+                (*moment.before, MeasuredJoints(moment.tick.t_s, moment.tick.joints))
+            )
 
     def leave_off(self) -> None:
         """Say from now on what the body behind says."""
@@ -58,13 +66,13 @@ class PlayedBody(Body):
     def start(self) -> JointAngles:
         """Start the body behind; give the recorded goals."""
         goals = self._body.start()
-        said = self._next(Engaged)
+        said = self._next(TorqueEnabled)
         return said.goals_rad if said is not None else goals
 
     def read(self, t_s: float) -> JointState:
         """Return the recorded joints; a reading more than there were gives the newest again."""
         joints = self._body.read(t_s)
-        said = self._next(Measured)
+        said = self._next(MeasuredJoints)
         if said is not None:
             self._newest = said.joints
         return self._newest if self._newest is not None else joints
@@ -87,12 +95,12 @@ class PlayedBody(Body):
         Raises:
             SetupError: it was refused then.
         """
-        refused = next((one for one in self._said if isinstance(one, Refused)), None)
+        refused = next((one for one in self._said if isinstance(one, TorqueRefused)), None)
         if refused is not None:
             self._said.remove(refused)
             raise SetupError(refused.why)
         goals = self._body.take_hold()
-        said = self._next(Engaged)
+        said = self._next(TorqueEnabled)
         return said.goals_rad if said is not None else goals
 
     def stop(self) -> None:
@@ -109,7 +117,7 @@ class PlayedBody(Body):
                 return one
 
 
-class PlayedPerception(Perception):
+class PlaybackPerception(Perception):
     """Sees what was seen, placed in the world as it was then.
 
     percept: in force from now on

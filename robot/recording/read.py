@@ -23,7 +23,7 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.chunk_reader import LARGEST_BYTES, unpacked
 from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
-from gazerig.robot.recording.tick_record import Moment, from_json, percept_from_json
+from gazerig.robot.recording.tick_record import TickRecord, from_json, percept_from_json
 
 _MAGIC = b"\x89MCAP0\r\n"
 _CAMERA = "gazerig-camera-"
@@ -46,7 +46,7 @@ class BadRecording(SetupError):
     """A file is no recording of a run, or cannot be read further."""
 
 
-class _Place(NamedTuple):
+class _ChunkIndex(NamedTuple):
     """Where a chunk's content lies in the file, and the times of its messages."""
 
     offset: int
@@ -73,7 +73,7 @@ class RunRecording:
         self.path = Path(path)
         self.whole = False
         self.end = RunEnd()
-        self._chunks: list[_Place] = []
+        self._chunks: list[_ChunkIndex] = []
         found: RunInfo | None = None
         with _opened(self.path) as file:
             for kind, offset, length in self._records(file):
@@ -84,7 +84,7 @@ class RunRecording:
                 elif kind == Opcode.CHUNK:
                     with _damage(self.path):
                         first_ns, last_ns = struct.unpack("<QQ", _bytes(file, offset, 16))
-                    self._chunks.append(_Place(offset, length, first_ns, last_ns))
+                    self._chunks.append(_ChunkIndex(offset, length, first_ns, last_ns))
                 elif kind == Opcode.METADATA:
                     with _damage(self.path):
                         record = Metadata.read(_content(file, offset, length))
@@ -121,7 +121,7 @@ class RunRecording:
         """
         return (moment.tick for moment in self.moments())
 
-    def moments(self) -> Iterator[Moment]:
+    def moments(self) -> Iterator[TickRecord]:
         """Return the ticks with what else entered them.
 
         Raises:

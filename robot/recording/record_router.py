@@ -4,7 +4,7 @@ from typing import Any
 
 from gazerig.drivers.types import BusHealth
 from gazerig.gaze.types import GazeState, Vec3
-from gazerig.robot.model.types import JointState, Verdict
+from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import viewer_messages as viewers
 from gazerig.robot.recording.run_writer import RunWriter
@@ -13,7 +13,7 @@ from gazerig.robot.recording.tick_record import Flat, as_json, percept_as_json
 _VIEWED_EVERY_S = 0.0399  # a little under 40 ms, so that rounding does not turn it into 45
 
 
-class Scribe:
+class RecordRouter:
     """Writes one run, in the order in which it is told."""
 
     def __init__(self, writer: RunWriter) -> None:
@@ -36,7 +36,7 @@ class Scribe:
             self._add(fmt.LOG, viewers.line(event, self._now_ns))
         for order in data["orders"]:
             self._add(fmt.ORDER, order)
-        self._joints, self._names = JointState(*values[3]), Verdict(*values[8]).joints
+        self._joints, self._names = JointState(*values[3]), GuardResult(*values[8]).joints
         if self._at_s - self._viewed_s >= _VIEWED_EVERY_S or self._viewed_s < 0.0:
             self._viewed_s = self._at_s
             self._show(GazeState(*values[4]), values[6][7])

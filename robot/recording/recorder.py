@@ -18,11 +18,11 @@ from gazerig.gaze.types import Percept
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording import writer_process as writer
-from gazerig.robot.recording.joint_recorder import BodyTap
+from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.picture_encoder import PictureEncoder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
-from gazerig.robot.recording.tick_record import Heard, Measured, flat, flat_percept
-from gazerig.robot.recording.writer_client import WriterLink
+from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, flat, flat_percept
+from gazerig.robot.recording.writer_client import WriterClient
 
 _HEALTH_S = 1.0
 _SEND_S = 0.05
@@ -50,9 +50,9 @@ class Recorder:
         self._info = info
         self._health: Callable[[], BusHealth] = _no_counts
         self._over = over
-        self._link = WriterLink(patient)
+        self._link = WriterClient(patient)
         self._pictures = PictureEncoder(info.pictures_hz, at_once=patient)
-        self._heard: list[Heard] = []
+        self._heard: list[BodyRecord] = []
         self._percept: Percept | None = None
         self._percepts = 0
         self._last_s: float | None = None
@@ -97,7 +97,7 @@ class Recorder:
     def recorded(self, body: Body) -> Body:
         """Return a body to take the place of a robot's, so that all it says is recorded."""
         self._health = body.bus.health
-        return BodyTap(body, self._heard.append)
+        return JointRecorder(body, self._heard.append)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
         """Return a loop's ``stop`` that notes the time since the loop began."""
@@ -111,7 +111,7 @@ class Recorder:
     def note(self, tick: Tick) -> None:
         """Record a tick; called by the loop."""
         before = tuple(
-            [h for h in self._heard if not (type(h) is Measured and h.joints is tick.joints)]
+            [h for h in self._heard if not (type(h) is MeasuredJoints and h.joints is tick.joints)]
         )
         self._heard.clear()
         dt_s = tick.t_s - self._last_s if self._last_s is not None else self._seconds or 0.0

@@ -7,8 +7,8 @@ from typing import Protocol
 
 from gazerig.robot.dashboard.page_process import MARK_KINDS, PICTURE, REPLAY
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.recording.playback_clock import Mark, Player, State
-from gazerig.robot.recording.snapshot_index import Frames
+from gazerig.robot.recording.playback_clock import Mark, PlaybackClock, PlaybackState
+from gazerig.robot.recording.snapshot_index import SnapshotIndex
 
 ROUND_S = 0.04
 _SLIDE_S = 0.1  # how often the slider moves by itself
@@ -23,7 +23,7 @@ _MOST_WORDS = 150
 
 
 class Screen(Protocol):
-    """What shows the messages, as gazerig.robot.dashboard.page_process.Page does."""
+    """What shows the messages, as gazerig.robot.dashboard.page_process.PageProcess does."""
 
     def send(self, message: bytes) -> bool:
         """Hand over a message; False where it is not taken now."""
@@ -33,16 +33,16 @@ class Screen(Protocol):
 class Replay:
     """Plays frames on a screen."""
 
-    def __init__(self, frames: Frames, clock: Clock) -> None:
+    def __init__(self, frames: SnapshotIndex, clock: Clock) -> None:
         """Stand at the beginning."""
         self._frames = frames
         self._clock = clock
-        self._player = Player(frames.duration_s, frames.marks)
+        self._player = PlaybackClock(frames.duration_s, frames.marks)
         self._lock = threading.Lock()
         self._number, self._picture = -1, -1
         self._still = 0
         self._missing: int | None = None
-        self._told: State | None = None
+        self._told: PlaybackState | None = None
         self._told_s, self._introduced = 0.0, False
 
     def hear(self, data: Mapping[str, object]) -> str | None:
@@ -64,7 +64,7 @@ class Replay:
         with self._lock:
             self._player.obey(asked, self._clock.now_s())
 
-    def run(self, screen: Screen, over: Callable[[State], bool]) -> None:
+    def run(self, screen: Screen, over: Callable[[PlaybackState], bool]) -> None:
         """Show until ``over`` says so, looking every 40 ms."""
         while True:
             now_s = self._clock.now_s()
@@ -73,7 +73,7 @@ class Replay:
                 return
             self._clock.sleep_until(now_s + ROUND_S)
 
-    def show(self, screen: Screen, now_s: float) -> State:
+    def show(self, screen: Screen, now_s: float) -> PlaybackState:
         """Send what is new since the last call; give where the recording stands."""
         with self._lock:
             state = self._player.state(now_s)
@@ -121,7 +121,7 @@ class Replay:
         if screen.send(PICTURE + self._frames.picture(number)):
             self._picture = number
 
-    def _due(self, state: State, now_s: float) -> bool:
+    def _due(self, state: PlaybackState, now_s: float) -> bool:
         """Return whether the page is to know: at once what a person changed, else now and then."""
         told = self._told
         if told is None or state._replace(at_s=told.at_s) != told:
@@ -133,14 +133,14 @@ class Replay:
         """Introduce the recording again: the page that knew it has died, and another is there."""
         self._introduced = False
 
-    def _tell(self, screen: Screen, state: State, now_s: float) -> None:
+    def _tell(self, screen: Screen, state: PlaybackState, now_s: float) -> None:
         more = {} if self._introduced else introduction(self._frames)
         message = REPLAY + json.dumps({**state._asdict(), **more}).encode()
         if screen.send(message):
             self._told, self._told_s, self._introduced = state, now_s, True
 
 
-def introduction(frames: Frames) -> dict[str, object]:
+def introduction(frames: SnapshotIndex) -> dict[str, object]:
     """Return what a page needs to know of a recording once: marks along it, and its events."""
     events = [m for m in frames.marks if m.kind == "event"]
     return {

@@ -19,7 +19,7 @@ _CHUNK_BYTES = 1 << 20
 _WHOLE_NS = 1_000_000_000
 
 
-class Written(NamedTuple):
+class WrittenFile(NamedTuple):
     """What is in a recording: ticks, pictures, bytes."""
 
     ticks: int
@@ -54,10 +54,10 @@ class RunWriter:
         self._safely(self._begin, about)
 
     @property
-    def written(self) -> Written:
+    def written(self) -> WrittenFile:
         """Count what is in the file."""
         count = self._counts.get
-        return Written(count(fmt.TICK, 0), count(fmt.PICTURE, 0), self._file.tell())
+        return WrittenFile(count(fmt.TICK, 0), count(fmt.PICTURE, 0), self._file.tell())
 
     def time_ns(self, at_s: float) -> int:
         """Return the wall clock at a time since the first tick."""

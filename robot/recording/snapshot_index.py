@@ -16,7 +16,7 @@ from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import seeing_words, verdict_words
 from gazerig.robot.dashboard.page_process import pack, unpack
-from gazerig.robot.dashboard.snapshot import Said, ShownRig, Snapshots
+from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.commands import Ask, Renew
 from gazerig.robot.model.types import SeenEvent, Trail
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
@@ -34,7 +34,7 @@ _GRAVE = ("hold", "limp")
 _TELL_EVERY = 50
 
 
-class Frames:
+class SnapshotIndex:
     """The snapshots and pictures of one recording.
 
     duration_s: from the first tick to the last; marks: what can be stepped to
@@ -62,7 +62,7 @@ class Frames:
         self._events: list[SeenEvent] = []
         self._events_at = array("l")  # the number of the snapshot that brings each
         self._start_s, self.duration_s = 0.0, 0.0
-        self._read_ticks(ticks, Snapshots(rate_hz, rig), character, progress)
+        self._read_ticks(ticks, SnapshotBuilder(rate_hz, rig), character, progress)
         if not self._packed:
             raise SetupError("the recording holds no tick: there is nothing to show")
         self._picture_times, self._places = array("d"), array("Q", (0,))
@@ -125,7 +125,7 @@ class Frames:
     def _read_ticks(
         self,
         ticks: Iterable[Tick],
-        snapshots: Snapshots,
+        snapshots: SnapshotBuilder,
         character: str,
         progress: Callable[[float], None],
     ) -> None:
@@ -140,7 +140,9 @@ class Frames:
                 continue
             due_s = max(due_s + SNAPSHOT_EVERY_S, at_s)
             seeing = seeing_words(tick, _NO_RESIDUAL)
-            said = Said("recorded", noticing.behaviour, seeing, character, noticing.conversation)
+            said = SnapshotTexts(
+                "recorded", noticing.behaviour, seeing, character, noticing.conversation
+            )
             if (shown := snapshots.take(said)) is not None:
                 self._events += shown.events
                 self._events_at.extend([len(self._packed)] * len(shown.events))

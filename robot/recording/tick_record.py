@@ -25,36 +25,36 @@ from gazerig.gaze.types import (
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import as_json as order_as_json
 from gazerig.robot.model.commands import from_recording as order_from_json
-from gazerig.robot.model.types import JOINTS, JointAngles, JointState, Verdict
+from gazerig.robot.model.types import JOINTS, GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]
 Flat = tuple[Any, ...]
 
 
-class Engaged(NamedTuple):
+class TorqueEnabled(NamedTuple):
     """The torque came on, with the present angles as goals."""
 
     goals_rad: JointAngles
 
 
-class Measured(NamedTuple):
+class MeasuredJoints(NamedTuple):
     """The joints were read, at ``t_s``, beside the reading that every tick begins with."""
 
     t_s: float
     joints: JointState
 
 
-class Refused(NamedTuple):
+class TorqueRefused(NamedTuple):
     """The torque could not be put on; why, in words."""
 
     why: str
 
 
-Heard = Engaged | Measured | Refused
+BodyRecord = TorqueEnabled | MeasuredJoints | TorqueRefused
 """What the machine said between two ticks."""
 
 
-class Moment(NamedTuple):
+class TickRecord(NamedTuple):
     """A tick, and what entered it beside its own fields.
 
     dt_s: time since the tick before, or since the loop began
@@ -63,7 +63,7 @@ class Moment(NamedTuple):
 
     tick: Tick
     dt_s: float
-    before: tuple[Heard, ...] = ()
+    before: tuple[BodyRecord, ...] = ()
 
 
 _ONCE_ALL = tuple([name for name in JOINTS if not name.startswith("eyes_") and "lower" not in name])
@@ -75,7 +75,11 @@ _FORMER = {
 }  # fmt: skip
 """Fields of a target in recordings of before -> their names now."""
 
-_HEARD: dict[str, type[Heard]] = {"engaged": Engaged, "measured": Measured, "refused": Refused}
+_HEARD: dict[str, type[BodyRecord]] = {
+    "engaged": TorqueEnabled,
+    "measured": MeasuredJoints,
+    "refused": TorqueRefused,
+}
 _HEARD_NAMES = {kind: name for name, kind in _HEARD.items()}
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _ODD = "has_words_for_numbers"
@@ -85,7 +89,9 @@ _face_values = attrgetter(*Face.__slots__)
 _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3)}
 
 
-def flat(tick: Tick, percept_number: int | None, dt_s: float, before: tuple[Heard, ...]) -> Flat:
+def flat(
+    tick: Tick, percept_number: int | None, dt_s: float, before: tuple[BodyRecord, ...]
+) -> Flat:
     """Return a tick as plain tuples: pickled, they cost a third of the named ones.
 
     percept_number: which of the percepts handed over the tick went by
@@ -134,7 +140,7 @@ def as_json(values: Flat) -> Json:
             "limited": [_named(Limited, one) for one in gaze[-1]],
         },
         "wish_rad": wish,
-        "verdict": _named(Verdict, verdict),
+        "verdict": _named(GuardResult, verdict),
         "events": events,
         "orders": orders,
         "stopped": stopped,
@@ -147,7 +153,7 @@ def as_json(values: Flat) -> Json:
     return data
 
 
-def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
+def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
     """Return the moment that ``as_json`` named.
 
     percepts: those read so far, by number
@@ -175,14 +181,14 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> Moment:
         _made(Target, target),
         _made(GazeCommand, {**data["gaze"], "limited": _limited(data["gaze"])}),
         wish,
-        _made(Verdict, verdict),
+        _made(GuardResult, verdict),
         tuple(data["events"]),
         tuple([order_from_json(order) for order in data["orders"]]),
         data["stopped"],
         data.get("led", ""),
     )
     before = tuple([_heard(one) for one in data.get("before", ())])
-    return Moment(tick, data["dt_s"], before)
+    return TickRecord(tick, data["dt_s"], before)
 
 
 def _present_names(data: Json) -> Json:
@@ -231,19 +237,19 @@ def percept_from_json(data: Json) -> tuple[int, Percept]:
     return data["number"], Percept(data["captured_s"], bodies, faces)
 
 
-def _heard(data: Json) -> Heard:
+def _heard(data: Json) -> BodyRecord:
     """Read one thing that the machine said."""
     kind = _HEARD[data["what"]]
     fields = {name: data[name] for name in kind._fields}
-    if kind is Measured:
-        return Measured(fields["t_s"], _made(JointState, fields["joints"]))
-    made: Heard = _made(kind, fields)
+    if kind is MeasuredJoints:
+        return MeasuredJoints(fields["t_s"], _made(JointState, fields["joints"]))
+    made: BodyRecord = _made(kind, fields)
     return made
 
 
-def _plain(one: Heard) -> Flat:
+def _plain(one: BodyRecord) -> Flat:
     """Return one thing that the machine said as plain values."""
-    if isinstance(one, Measured):
+    if isinstance(one, MeasuredJoints):
         return (one.t_s, _named(JointState, tuple(one.joints)))
     return tuple(one)
 

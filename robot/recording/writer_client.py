@@ -14,7 +14,7 @@ from collections import deque
 from typing import Any
 
 from gazerig.robot.recording import writer_process as writer
-from gazerig.robot.recording.run_writer import Written
+from gazerig.robot.recording.run_writer import WrittenFile
 
 QUEUE_BYTES = 64_000_000
 """What waits at most: some minutes of a run."""
@@ -23,7 +23,7 @@ _TRIES = 8  # messages sent in one go at most, so that a writer that is back cos
 _PATIENCE_S = 15.0
 
 
-class WriterLink:
+class WriterClient:
     """A process that writes, and what waits for it.
 
     failed: why nothing more is written, or ""; done: what was written, once it has ended
@@ -38,7 +38,7 @@ class WriterLink:
         self._queue: deque[bytes] = deque()
         self._queued = 0
         self.failed = ""
-        self.done: Written | None = None
+        self.done: WrittenFile | None = None
 
     def open(self, file_fd: int) -> None:
         """Start the process that writes to an open file; returns at once."""
@@ -143,7 +143,7 @@ class WriterLink:
 
     def _hear(self, kind: str, values: Any) -> None:
         if kind == writer.DONE:
-            self.done = Written(*values)
+            self.done = WrittenFile(*values)
         else:
             self.failed = self.failed or str(values)
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.recording.record_router import Scribe
+from gazerig.robot.recording.record_router import RecordRouter
 from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
 
@@ -55,7 +55,7 @@ def _write(
     told: Iterator[tuple[str, Any] | None], writer: RunWriter, rig: socket.socket, clock: Clock
 ) -> RunEnd:
     """Write what is told; give how the run ended."""
-    scribe = Scribe(writer)
+    scribe = RecordRouter(writer)
     end = RunEnd()
     flushed_s = synced_s = clock.now_s()
     said = False
@@ -79,7 +79,7 @@ def _write(
     return end
 
 
-def _take(scribe: Scribe, kind: str, values: Any) -> None:
+def _take(scribe: RecordRouter, kind: str, values: Any) -> None:
     """Write one thing that was handed over."""
     if kind == TICK:
         scribe.tick(values)

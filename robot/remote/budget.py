@@ -8,15 +8,15 @@ import threading
 from typing import NamedTuple
 
 
-class Rate(NamedTuple):
+class RequestRate(NamedTuple):
     """A share of one processor, and the seconds that may be used at once."""
 
     share: float
     burst_s: float
 
 
-EACH = Rate(0.06, 0.2)
-ALL = Rate(0.1, 0.4)
+EACH = RequestRate(0.06, 0.2)
+ALL = RequestRate(0.1, 0.4)
 
 
 class Budget:
@@ -27,7 +27,7 @@ class Budget:
         now_s: the time it begins at, full.
     """
 
-    def __init__(self, rate: Rate, now_s: float) -> None:
+    def __init__(self, rate: RequestRate, now_s: float) -> None:
         self._rate = rate
         self._left_s = rate.burst_s
         self._at_s = now_s

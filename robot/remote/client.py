@@ -1,8 +1,8 @@
 """Steer and tune a rig that runs in another program of the same user.
 
-from gazerig.robot.remote.client import RunningRig
+from gazerig.robot.remote.client import RobotClient
 
-with RunningRig.connect() as rig:
+with RobotClient.connect() as rig:
     rig.set("gaze.lids.blinks_per_min", 12.0)
     print(rig.look_at(1.0, 0.3, 0.0).words())
     print(rig.status()["target"])
@@ -21,20 +21,20 @@ from typing import Any, NamedTuple, cast
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.model.commands import (
     Ask,
+    Command,
     Jog,
     LookAt,
-    Order,
     Resume,
     Stop,
     Value,
     as_json,
     check,
 )
-from gazerig.robot.model.reply import Reply
-from gazerig.robot.remote.heartbeat import Heartbeat
+from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.remote.heartbeat import LeadHeartbeat
 from gazerig.robot.remote.socket_io import (
     ANSWER_BYTES,
-    Garbled,
+    MalformedMessage,
     Wire,
     dial,
     folder,
@@ -52,19 +52,19 @@ JsonValue = float | int | bool | str | None | list["JsonValue"] | dict[str, "Jso
 """A value as it comes over the wire: lists where the rig has tuples."""
 
 
-class NoRig(SetupError):
+class NoRobotError(SetupError):
     """No rig runs, or not the one that is meant; the message says which do."""
 
 
-class Refused(SetupError):
+class RequestRejected(SetupError):
     """The rig runs on as before; the message lists every rule that was broken."""
 
 
-class RigGone(DriverError):
+class ConnectionLost(DriverError):
     """The rig ended or does not answer; the message says which."""
 
 
-class KnobInfo(NamedTuple):
+class ParamInfo(NamedTuple):
     """One parameter of the rig, its rule and its default.
 
     unit: "" for a bare number; says: what it is; low, high: None where there is no bound
@@ -89,7 +89,7 @@ class KnobInfo(NamedTuple):
     items: str | None = None
 
 
-class Difference(NamedTuple):
+class ParamDifference(NamedTuple):
     """One value that differs: from the file (``unsaved``) or from the default (``differs``)."""
 
     key: str
@@ -102,10 +102,10 @@ class SavedFile(NamedTuple):
 
     path: Path
     backup: Path | None
-    changes: tuple[Difference, ...]
+    changes: tuple[ParamDifference, ...]
 
 
-class RunningRig:
+class RobotClient:
     """A connection to one running rig; answers come when the rig has done what was asked."""
 
     def __init__(
@@ -119,17 +119,17 @@ class RunningRig:
         self._lock = threading.Lock()
         self._who = who
         self._dial = dial
-        self._heartbeat: Heartbeat | None = None
+        self._heartbeat: LeadHeartbeat | None = None
         self.pid = pid
 
     @classmethod
-    def connect(cls, pid: int | None = None, who: str = "") -> "RunningRig":
+    def connect(cls, pid: int | None = None, who: str = "") -> "RobotClient":
         """Find the one rig that runs, or the one of this process.
 
         who: what people are told of who asks, e.g. "my show"; the process is added
 
         Raises:
-            NoRig: none runs, or several and ``pid`` does not say which.
+            NoRobotError: none runs, or several and ``pid`` does not say which.
         """
         found = running(pid, who)
         for other in found[1:]:
@@ -139,11 +139,13 @@ class RunningRig:
         if not found:
             there = _names(running()) if pid is not None else ""
             which = f"no rig runs as process {pid}" if pid is not None else "no rig is running"
-            raise NoRig(f"{which}: {there or 'start one with gazerig run ...'}")
+            raise NoRobotError(f"{which}: {there or 'start one with gazerig run ...'}")
         names = _names(running())
-        raise NoRig(f"{len(found)} rigs are running: {names}; say which with --pid (pid=...)")
+        raise NoRobotError(
+            f"{len(found)} rigs are running: {names}; say which with --pid (pid=...)"
+        )
 
-    def __enter__(self) -> "RunningRig":
+    def __enter__(self) -> "RobotClient":
         """Return the connection itself."""
         return self
 
@@ -169,12 +171,12 @@ class RunningRig:
         """Return the values in force of all keys that begin with ``prefix``."""
         return cast(dict[str, JsonValue], self._asked("get", prefix=prefix))
 
-    def knobs(self, prefix: str = "") -> tuple[KnobInfo, ...]:
+    def knobs(self, prefix: str = "") -> tuple[ParamInfo, ...]:
         """Return the rules and defaults of all keys that begin with ``prefix``."""
         found = cast(list[dict[str, Any]], self._asked("knobs", prefix=prefix))
         return tuple(_knob(one) for one in found)
 
-    def knob(self, key: str) -> KnobInfo:
+    def knob(self, key: str) -> ParamInfo:
         """Return one parameter's rule and default.
 
         Raises:
@@ -183,7 +185,7 @@ class RunningRig:
         for knob in self.knobs(key):
             if knob.key == key:
                 return knob
-        raise Refused(f"{key}: unknown key; gazerig get lists all")
+        raise RequestRejected(f"{key}: unknown key; gazerig get lists all")
 
     def set(self, key: str, value: Value) -> tuple[str, ...]:
         """Put a value in force; when this returns, the loop has it. Gives what to know of it.
@@ -201,11 +203,11 @@ class RunningRig:
         """
         return self._notes(self._asked("set", changes=dict(changes)))
 
-    def unsaved(self) -> tuple[Difference, ...]:
+    def unsaved(self) -> tuple[ParamDifference, ...]:
         """Return what is in force and not in the rig's file."""
         return _differences(self._asked("unsaved"))
 
-    def differs(self) -> tuple[Difference, ...]:
+    def differs(self) -> tuple[ParamDifference, ...]:
         """Return what differs from the defaults."""
         return _differences(self._asked("differs"))
 
@@ -249,7 +251,7 @@ class RunningRig:
         """
         self._order(Ask(menu, choice))
 
-    def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> Reply:
+    def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> CommandReply:
         """Look at a point: metres, x ahead, y left, z up of the neck base.
 
         stay: until somebody lets go; else for as long as this connection is open, this
@@ -268,7 +270,7 @@ class RunningRig:
         self._end_heartbeat()
         self._order(LookAt(None, self._who))
 
-    def jog(self, joint: str, deg: float, stay: bool = False) -> Reply:
+    def jog(self, joint: str, deg: float, stay: bool = False) -> CommandReply:
         """Hold all joints and put one at an angle.
 
         stay: as in ``look_at``
@@ -288,16 +290,16 @@ class RunningRig:
         """True while this connection renews a lead that the rig still obeys."""
         return self._heartbeat is not None and self._heartbeat.leads
 
-    def _lead(self, order: LookAt | Jog, stay: bool) -> Reply:
+    def _lead(self, order: LookAt | Jog, stay: bool) -> CommandReply:
         reply = self._order(order)
         if stay or self._dial is None:
             self._end_heartbeat()
         elif not self.leads:
             self._end_heartbeat()
             try:
-                self._heartbeat = Heartbeat(self._dial, self._who)
+                self._heartbeat = LeadHeartbeat(self._dial, self._who)
             except OSError:
-                raise RigGone(f"the rig (process {self.pid}) has ended or hung up") from None
+                raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
         return reply
 
     def _end_heartbeat(self) -> None:
@@ -309,7 +311,7 @@ class RunningRig:
         """Take the torque off at once; when this returns, the loop has done it.
 
         Raises:
-            RigGone, Refused: nobody knows whether it stopped: press the emergency stop.
+            ConnectionLost, Refused: nobody knows whether it stopped: press the emergency stop.
         """
         self._order(Stop(why, self._who))
 
@@ -325,16 +327,16 @@ class RunningRig:
         """
         self._order(Resume(self._who, confirmed))
 
-    def _order(self, order: Order) -> Reply:
+    def _order(self, order: Command) -> CommandReply:
         try:
             check(order)
         except ValueError as error:
-            raise Refused(str(error)) from None
+            raise RequestRejected(str(error)) from None
         said = self._asked("order", order=as_json(order))
         match said:
             case {"reply": dict(reply)}:
-                return Reply.from_json(reply)
-        return Reply()
+                return CommandReply.from_json(reply)
+        return CommandReply()
 
     def _notes(self, said: object) -> tuple[str, ...]:
         return tuple(cast(dict[str, list[str]], said)["notes"])
@@ -347,44 +349,48 @@ class RunningRig:
             case {"ok": said}:
                 return said
             case {"refused": str(rules)}:
-                raise Refused(rules)
+                raise RequestRejected(rules)
             case {"failed": str(what)}:
-                raise RigGone(f"the rig (process {self.pid}) met an error of its own: {what}")
-        raise RigGone(f"process {self.pid} gave no answer of a rig: {answer!r:.80}")
+                raise ConnectionLost(
+                    f"the rig (process {self.pid}) met an error of its own: {what}"
+                )
+        raise ConnectionLost(f"process {self.pid} gave no answer of a rig: {answer!r:.80}")
 
     def _answer(self, request: dict[str, object], within_s: float) -> object:
         try:
             self._wire.write(request, _CONNECT_S)
         except (TypeError, ValueError) as error:
-            raise Refused(f"only finite numbers, text, lists and mappings go: {error}") from None
+            raise RequestRejected(
+                f"only finite numbers, text, lists and mappings go: {error}"
+            ) from None
         except OSError:
-            raise RigGone(f"the rig (process {self.pid}) has ended or hung up") from None
+            raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
         try:
             return self._wire.read(within_s, within_s)
         except TimeoutError:
             self.close()  # an answer that comes late would be taken for that of the next request
-            raise RigGone(f"the rig (process {self.pid}) does not answer") from None
+            raise ConnectionLost(f"the rig (process {self.pid}) does not answer") from None
         except (EOFError, OSError):
-            raise RigGone(f"the rig (process {self.pid}) has ended or hung up") from None
-        except Garbled as error:
+            raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
+        except MalformedMessage as error:
             self.close()
-            raise RigGone(f"process {self.pid} gave no answer of a rig: {error}") from None
+            raise ConnectionLost(f"process {self.pid} gave no answer of a rig: {error}") from None
 
 
-def running(pid: int | None = None, who: str = "") -> list[RunningRig]:
+def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
     """Connect to every rig of this user that runs, or to that of one process.
 
-    who: as in RunningRig.connect
+    who: as in RobotClient.connect
     """
     uid = os.getuid()
     place = folder(os.environ, uid)
     if not is_private(place, uid):  # whoever put a socket there is not known
         return []
-    found: list[RunningRig] = []
+    found: list[RobotClient] = []
     for number, path in sockets(place).items():
         if pid is None or number == pid:
             try:
-                found.append(RunningRig(_wire(path), number, who, partial(_wire, path)))
+                found.append(RobotClient(_wire(path), number, who, partial(_wire, path)))
             except OSError:  # killed: the next rig that starts removes it
                 continue
     return found
@@ -395,7 +401,7 @@ def _wire(path: Path) -> Wire:
     return Wire(dial(path, _CONNECT_S), ANSWER_BYTES)
 
 
-def _names(rigs: list[RunningRig]) -> str:
+def _names(rigs: list[RobotClient]) -> str:
     """Name rigs by process and file, and hang up."""
     names = []
     for rig in rigs:
@@ -407,11 +413,11 @@ def _names(rigs: list[RunningRig]) -> str:
     return ", ".join(names)
 
 
-def _knob(said: Mapping[str, Any]) -> KnobInfo:
-    named = {name: said[name] for name in KnobInfo._fields if name in said}
-    return KnobInfo(**{**named, "choices": tuple(named["choices"])})
+def _knob(said: Mapping[str, Any]) -> ParamInfo:
+    named = {name: said[name] for name in ParamInfo._fields if name in said}
+    return ParamInfo(**{**named, "choices": tuple(named["choices"])})
 
 
-def _differences(said: object) -> tuple[Difference, ...]:
+def _differences(said: object) -> tuple[ParamDifference, ...]:
     rows = cast(list[dict[str, Any]], said)
-    return tuple(Difference(row["key"], row["old"], row["new"]) for row in rows)
+    return tuple(ParamDifference(row["key"], row["old"], row["new"]) for row in rows)

@@ -23,7 +23,7 @@ _MISSING_LOOKS = 6
 """Looks in a row without a file, or with an empty one, before that is news."""
 
 
-class Look(NamedTuple):
+class FileState(NamedTuple):
     """What a file was at one look.
 
     digest: of its bytes; whole: its last line is ended
@@ -35,7 +35,7 @@ class Look(NamedTuple):
     whole: bool
 
 
-def look(path: Path) -> Look | None:
+def look(path: Path) -> FileState | None:
     """Look at a file; None where there is nothing to read: absent, empty or not permitted."""
     try:
         stat, data = path.stat(), read_limited(path, _LARGEST)
@@ -43,23 +43,25 @@ def look(path: Path) -> Look | None:
         return None
     if not data:
         return None
-    return Look(stat.st_mtime_ns, len(data), hashlib.sha256(data).digest(), data.endswith(b"\n"))
+    return FileState(
+        stat.st_mtime_ns, len(data), hashlib.sha256(data).digest(), data.endswith(b"\n")
+    )
 
 
 class Settling:
     """Tells from one look after the other when a file holds something new that stays."""
 
-    def __init__(self, first: Look | None) -> None:
+    def __init__(self, first: FileState | None) -> None:
         self.known(first)
 
-    def known(self, now: Look | None) -> None:
+    def known(self, now: FileState | None) -> None:
         """Take what the file is now as read."""
         self._known = now.digest if now is not None else b""
         self._last = now
         self._same = 0
         self._missing = 0
 
-    def note(self, now: Look | None) -> bool:
+    def note(self, now: FileState | None) -> bool:
         """Take a look; tell whether the file should be read, to find it new or missing."""
         self._same = self._same + 1 if now == self._last else 0
         self._last = now

@@ -8,12 +8,12 @@ from collections.abc import Callable
 
 from gazerig.robot.model.commands import Renew, as_json
 from gazerig.robot.model.lead import HEARTBEAT_S
-from gazerig.robot.remote.socket_io import Garbled, Wire
+from gazerig.robot.remote.socket_io import MalformedMessage, Wire
 
 _EVERY_S = 0.25 * HEARTBEAT_S
 
 
-class Heartbeat:
+class LeadHeartbeat:
     """Renews a lead until it is taken by somebody else or let go.
 
     Args:
@@ -51,5 +51,5 @@ class Heartbeat:
                         self._over.wait(_EVERY_S)
                     case _:  # somebody else leads, or nobody
                         return
-        except (OSError, EOFError, Garbled):
+        except (OSError, EOFError, MalformedMessage):
             return  # hung up, by either side

@@ -9,11 +9,11 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.remote.file_watch import FileWatch
-from gazerig.robot.remote.request_handler import Orderable, Pulse, Requests, Tuning
+from gazerig.robot.remote.request_handler import Commandable, ParamAccess, Pulse, RequestHandler
 from gazerig.robot.remote.socket_server import RemoteServer
 
 
-class FileTuning(Tuning, Protocol):
+class FileTuning(ParamAccess, Protocol):
     """The parameters of a running rig, and the files they come from."""
 
     def files(self) -> Iterable[Path]:
@@ -25,12 +25,12 @@ class FileTuning(Tuning, Protocol):
         ...
 
 
-class LiveControl:
+class LiveServer:
     """The remote control and the file watch of one running rig."""
 
     def __init__(
         self,
-        robot: Orderable,
+        robot: Commandable,
         tuning: FileTuning,
         refusals: tuple[type[Exception], ...],
         clock: Clock,
@@ -49,7 +49,7 @@ class LiveControl:
         self._pulse = Pulse(clock)
         self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
         self._watch = FileWatch(self._files, self._read_again)
-        requests = Requests(robot, tuning, self._pulse, about, refusals, self._watch.saved)
+        requests = RequestHandler(robot, tuning, self._pulse, about, refusals, self._watch.saved)
         self._server = RemoteServer(requests, say)
 
     def open(self) -> None:

@@ -16,7 +16,7 @@ from gazerig.robot.control.feedback_basis import reckoned_joints
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_text import lead_words, target_name
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Order, Renew, Tune, Value, from_json, signed
+from gazerig.robot.model.commands import Command, Renew, Tune, Value, from_json, signed
 from gazerig.robot.model.reply import Ticket
 
 _TAKEN_UP_S = 1.0
@@ -37,7 +37,7 @@ REQUESTS = (
 """All that can be asked for, in words."""
 
 
-class Knob(Protocol):
+class DescribedParam(Protocol):
     """A parameter that can be tuned, with its rule; a NamedTuple."""
 
     @property
@@ -48,7 +48,7 @@ class Knob(Protocol):
     def _asdict(self) -> dict[str, object]: ...
 
 
-class Change(Protocol):
+class ChangedParam(Protocol):
     """A value that differs from another."""
 
     @property
@@ -67,7 +67,7 @@ class Change(Protocol):
         ...
 
 
-class Saved(Protocol):
+class SavedParams(Protocol):
     """What was written where."""
 
     @property
@@ -81,12 +81,12 @@ class Saved(Protocol):
         ...
 
     @property
-    def changes(self) -> Sequence[Change]:
+    def changes(self) -> Sequence[ChangedParam]:
         """Return what was written."""
         ...
 
 
-class Tuning(Protocol):
+class ParamAccess(Protocol):
     """The parameters of a running rig."""
 
     @property
@@ -94,7 +94,7 @@ class Tuning(Protocol):
         """Count the changes."""
         ...
 
-    def knobs(self) -> Iterable[Knob]:
+    def knobs(self) -> Iterable[DescribedParam]:
         """Return all parameters."""
         ...
 
@@ -106,15 +106,15 @@ class Tuning(Protocol):
         """Put values in force from the next tick on; give what a person should know."""
         ...
 
-    def unsaved(self) -> Iterable[Change]:
+    def unsaved(self) -> Iterable[ChangedParam]:
         """Return what is in force and not in the file."""
         ...
 
-    def differs(self) -> Iterable[Change]:
+    def differs(self) -> Iterable[ChangedParam]:
         """Return what differs from the defaults."""
         ...
 
-    def save(self, path: Path | None = None) -> Saved:
+    def save(self, path: Path | None = None) -> SavedParams:
         """Write what is in force."""
         ...
 
@@ -131,10 +131,10 @@ class Tuning(Protocol):
         ...
 
 
-class Orderable(Protocol):
+class Commandable(Protocol):
     """A robot that takes orders, as gazerig.robot.control.loop.Robot does."""
 
-    def order(self, order: Order) -> Ticket | None:
+    def order(self, order: Command) -> Ticket | None:
         """Ask for something from the next tick on; raises ValueError with the rule."""
         ...
 
@@ -206,13 +206,13 @@ class Pulse:
         }
 
 
-class Requests:
+class RequestHandler:
     """Carries out what another program asks of the running rig."""
 
     def __init__(
         self,
-        robot: Orderable,
-        tuning: Tuning,
+        robot: Commandable,
+        tuning: ParamAccess,
         pulse: Pulse,
         about: Mapping[str, object],
         refusals: tuple[type[Exception], ...] = (),
@@ -233,7 +233,7 @@ class Requests:
         )  # fmt: skip
         self._saved = saved
         self._unsaved = -1, 0
-        self._knobs: tuple[Iterable[Knob], list[tuple[str, object]]] = (), []
+        self._knobs: tuple[Iterable[DescribedParam], list[tuple[str, object]]] = (), []
 
     def answer(self, request: object, peer: str = "") -> dict[str, object]:
         """Carry out one request: {"ok": what came of it} or {"refused": every rule broken}.
@@ -298,7 +298,7 @@ class Requests:
         backup = None if saved.backup is None else str(saved.backup)
         return {"path": str(saved.path), "backup": backup, "changes": _changes(saved.changes)}
 
-    def _order(self, order: Order, peer: str) -> object:
+    def _order(self, order: Command, peer: str) -> object:
         """Hand on an order; parameters go through ``set``, which knows their rules."""
         if isinstance(order, Tune):
             raise ValueError("parameters are changed by the request set, which checks them")
@@ -342,7 +342,7 @@ def plain(value: object) -> object:
     return value
 
 
-def _changes(changes: Iterable[Change]) -> list[dict[str, object]]:
+def _changes(changes: Iterable[ChangedParam]) -> list[dict[str, object]]:
     return [{"key": c.key, "old": plain(c.old), "new": plain(c.new)} for c in changes]
 
 

@@ -26,7 +26,7 @@ _PATH_BYTES = 107
 _CHUNK_BYTES = 1 << 16
 
 
-class Garbled(ValueError):
+class MalformedMessage(ValueError):
     """What came is no JSON line; the message says why.
 
     over: the end of the line is not known, so that nothing after it can be read
@@ -183,9 +183,9 @@ class Wire:
         try:
             return json.loads(line, parse_constant=_no_number)
         except RecursionError:
-            raise Garbled("nested too deep", over=False) from None
+            raise MalformedMessage("nested too deep", over=False) from None
         except ValueError as error:
-            raise Garbled(f"not a line of JSON: {error}", over=False) from None
+            raise MalformedMessage(f"not a line of JSON: {error}", over=False) from None
 
     def close(self) -> None:
         """Close this end; whoever waits at either end is told."""
@@ -199,17 +199,19 @@ class Wire:
         due_s = self._clock.now_s() + rest_s
         while b"\n" not in held:
             if len(held) > self._longest:
-                raise Garbled(f"longer than {self._longest} bytes", over=True)
+                raise MalformedMessage(f"longer than {self._longest} bytes", over=True)
             left_s = due_s - self._clock.now_s()
             try:
                 if left_s <= 0.0:  # an end that never comes, byte by byte
                     raise TimeoutError
                 held += self._received(left_s)
             except TimeoutError:
-                raise Garbled(f"no end of the line within {rest_s:g} s", over=True) from None
+                raise MalformedMessage(
+                    f"no end of the line within {rest_s:g} s", over=True
+                ) from None
         line, _, self._rest = held.partition(b"\n")
         if len(line) > self._longest:
-            raise Garbled(f"longer than {self._longest} bytes", over=True)
+            raise MalformedMessage(f"longer than {self._longest} bytes", over=True)
         return line
 
     def _received(self, within_s: float | None) -> bytes:

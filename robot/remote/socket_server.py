@@ -15,8 +15,8 @@ from pathlib import Path
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote.budget import ALL, EACH, Budget
-from gazerig.robot.remote.request_handler import Requests, is_stop
-from gazerig.robot.remote.socket_io import REQUEST_BYTES, Garbled, Wire
+from gazerig.robot.remote.request_handler import RequestHandler, is_stop
+from gazerig.robot.remote.socket_io import REQUEST_BYTES, MalformedMessage, Wire
 
 _REST_S = 2.0
 """A request that has begun must end within this."""
@@ -31,7 +31,7 @@ _MOST = 16
 class RemoteServer:
     """Listens while a rig runs."""
 
-    def __init__(self, requests: Requests, say: Callable[[str], None]) -> None:
+    def __init__(self, requests: RequestHandler, say: Callable[[str], None]) -> None:
         self._requests = requests
         self._say = say
         self._clock = RealClock()
@@ -121,7 +121,7 @@ class RemoteServer:
         """Answer one request; tell whether another can follow."""
         try:
             request = wire.read(None, _REST_S)
-        except Garbled as error:
+        except MalformedMessage as error:
             return self._answer(wire, {"refused": str(error)}) and not error.over
         except (EOFError, OSError):
             return False

@@ -10,13 +10,19 @@ from pathlib import Path
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Order, Resume, Stop, Value
-from gazerig.robot.model.reply import OrderTaker, Ticket
-from gazerig.robot.remote.request_handler import Change, Knob, Pulse, Requests, Saved
+from gazerig.robot.model.commands import Command, Resume, Stop, Value
+from gazerig.robot.model.reply import CommandTaker, Ticket
+from gazerig.robot.remote.request_handler import (
+    ChangedParam,
+    DescribedParam,
+    Pulse,
+    RequestHandler,
+    SavedParams,
+)
 from gazerig.robot.remote.socket_server import RemoteServer
 
 
-class StopDoor:
+class StopOnlyServer:
     """The remote control of a head that can be stopped and resumed, and told nothing else.
 
     Args:
@@ -27,14 +33,14 @@ class StopDoor:
 
     def __init__(
         self,
-        order: OrderTaker,
+        order: CommandTaker,
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
     ) -> None:
         self._say = say
         self._pulse = Pulse(clock)
-        requests = Requests(_OnlyStops(order), _Fixed(), self._pulse, about)
+        requests = RequestHandler(_OnlyStops(order), _Fixed(), self._pulse, about)
         self._server = RemoteServer(requests, say)
 
     def open(self) -> None:
@@ -56,10 +62,10 @@ class StopDoor:
 class _OnlyStops:
     """A robot that takes stop and resume alone."""
 
-    def __init__(self, order: OrderTaker) -> None:
+    def __init__(self, order: CommandTaker) -> None:
         self._order = order
 
-    def order(self, order: Order) -> Ticket | None:
+    def order(self, order: Command) -> Ticket | None:
         """Hand on a stop or the end of one.
 
         Raises:
@@ -79,7 +85,7 @@ class _Fixed:
 
     version = 0
 
-    def knobs(self) -> Iterable[Knob]:
+    def knobs(self) -> Iterable[DescribedParam]:
         """Return none."""
         return ()
 
@@ -91,15 +97,15 @@ class _Fixed:
         """Refuse."""
         raise _refused()
 
-    def unsaved(self) -> Iterable[Change]:
+    def unsaved(self) -> Iterable[ChangedParam]:
         """Return none: nothing was changed."""
         return ()
 
-    def differs(self) -> Iterable[Change]:
+    def differs(self) -> Iterable[ChangedParam]:
         """Refuse: what is in force is not known here."""
         raise _refused()
 
-    def save(self, path: Path | None = None) -> Saved:
+    def save(self, path: Path | None = None) -> SavedParams:
         """Refuse."""
         raise _refused()
 

@@ -6,9 +6,9 @@ from math import nan
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.blink_finder import Blink
-from gazerig.robot.report.gaze_trace import Gathered
-from gazerig.robot.report.statistics import Measured, figure, mean, median, spread_over_mean
+from gazerig.robot.analysis.blink_finder import BlinkEvent
+from gazerig.robot.report.gaze_trace import GazeTrace
+from gazerig.robot.report.statistics import MeasuredValue, figure, mean, median, spread_over_mean
 
 _DOUBLE_S = 0.6
 _EVOKING_DEG = 33.0
@@ -16,14 +16,14 @@ _WITH_BEFORE_S, _WITH_AFTER_S = 0.12, 0.2
 _PART_S = 10.0
 
 
-def intervals(run: Gathered) -> Floats:
+def intervals(run: GazeTrace) -> Floats:
     """Return seconds from blink to blink; the second of a double one counts as the same."""
     onsets = np.array([blink.onset_s for blink in run.blinks])
     apart = np.diff(onsets)
     return apart[apart > _DOUBLE_S]
 
 
-def shapes(blinks: Sequence[Blink]) -> Floats:
+def shapes(blinks: Sequence[BlinkEvent]) -> Floats:
     """Return (n, 4) closing, shut and opening in ms, and fastest closing over fastest opening."""
     rows = [
         (1e3 * b.close_s, 1e3 * b.hold_s, 1e3 * b.open_s, b.close_peak_1_s / b.open_peak_1_s)
@@ -32,7 +32,7 @@ def shapes(blinks: Sequence[Blink]) -> Floats:
     return np.array(rows).reshape(-1, 4)
 
 
-def evoked(run: Gathered) -> Floats:
+def evoked(run: GazeTrace) -> Floats:
     """Return (n, 2) amplitude of each saccade in deg and whether a blink went with it."""
     onsets = np.array([blink.onset_s for blink in run.blinks])
     rows = []
@@ -45,26 +45,26 @@ def evoked(run: Gathered) -> Floats:
     return np.array(rows).reshape(-1, 2)
 
 
-def measures(run: Gathered) -> list[Measured]:
+def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return what there is to say about lids."""
     seen, asked = shapes(run.blinks), shapes(run.asked_blinks)
     large = evoked(run)
     large = large[large[:, 0] >= _EVOKING_DEG]
     shape = [
-        Measured(key, seen[:, column], median, figure(median, asked[:, column]))
+        MeasuredValue(key, seen[:, column], median, figure(median, asked[:, column]))
         for column, key in enumerate(("blink_close", "blink_hold", "blink_open", "blink_ratio"))
     ]
     asked_rate = 60.0 * len(run.asked_blinks) / run.seconds if run.seconds else nan
     return [
-        Measured("blink_rate", _counts(run), _per_minute, asked_rate, len(run.blinks)),
-        Measured("blink_rate_talk", _counts(run), _per_minute, asked_rate, len(run.blinks)),
-        Measured("blink_cv", intervals(run), spread_over_mean),
+        MeasuredValue("blink_rate", _counts(run), _per_minute, asked_rate, len(run.blinks)),
+        MeasuredValue("blink_rate_talk", _counts(run), _per_minute, asked_rate, len(run.blinks)),
+        MeasuredValue("blink_cv", intervals(run), spread_over_mean),
         *shape,
-        Measured("evoked", large[:, 1], mean),
+        MeasuredValue("evoked", large[:, 1], mean),
     ]
 
 
-def _counts(run: Gathered) -> Floats:
+def _counts(run: GazeTrace) -> Floats:
     """Return (n, 2) blinks and seconds of every ten seconds of the run."""
     if not len(run.rows):
         return np.zeros((0, 2))

@@ -18,14 +18,14 @@ from scipy import stats
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.report.compare_page import Difference, Word, compare_page, mixed
+from gazerig.robot.report.compare_page import MeasureDifference, Word, compare_page, mixed
 from gazerig.robot.report.files import write_all
-from gazerig.robot.report.gaze_trace import Gathered
+from gazerig.robot.report.gaze_trace import GazeTrace
 from gazerig.robot.report.norm_bands import BY_KEY
 from gazerig.robot.report.plotting import COLOURS, Shown
 from gazerig.robot.report.report import Progress, drawn, measured, read
-from gazerig.robot.report.run_header import About
-from gazerig.robot.report.statistics import Measured, figure, judged
+from gazerig.robot.report.run_header import RunHeader
+from gazerig.robot.report.statistics import MeasuredValue, figure, judged
 from gazerig.robot.report.statistics import drawn as resampled
 
 LEVEL = 0.05
@@ -40,7 +40,7 @@ class Comparison(NamedTuple):
     warning: that one run is measured and the other reckoned, "" where both are alike
     """
 
-    differences: tuple[Difference, ...]
+    differences: tuple[MeasureDifference, ...]
     page: Path
     pictures: tuple[Path, ...]
     data: Path
@@ -49,7 +49,7 @@ class Comparison(NamedTuple):
 
 def compare(
     ticks: tuple[Iterable[Tick], Iterable[Tick]],
-    abouts: tuple[About, About],
+    abouts: tuple[RunHeader, RunHeader],
     out: Path,
     progress: Progress,
     force: bool = False,
@@ -75,7 +75,9 @@ def compare(
     return Comparison(differences, out, *written, mixed(abouts, runs))
 
 
-def differences_of(a: Sequence[Measured], b: Sequence[Measured]) -> tuple[Difference, ...]:
+def differences_of(
+    a: Sequence[MeasuredValue], b: Sequence[MeasuredValue]
+) -> tuple[MeasureDifference, ...]:
     """Hold the measures that both runs have against each other."""
     theirs = {measure.key: measure for measure in b}
     pairs = [(m, theirs[m.key]) for m in a if m.key in theirs]
@@ -92,7 +94,7 @@ def differences_of(a: Sequence[Measured], b: Sequence[Measured]) -> tuple[Differ
     return tuple(out)
 
 
-def chance(a: Measured, b: Measured, rng: np.random.Generator) -> float:
+def chance(a: MeasuredValue, b: MeasuredValue, rng: np.random.Generator) -> float:
     """Return how often events dealt out at random differ in their figure as much as these."""
     rows, n = np.concatenate([a.rows, b.rows]), len(a.rows)
     seen = abs(figure(b.of, b.rows) - figure(a.of, a.rows))
@@ -106,7 +108,7 @@ def chance(a: Measured, b: Measured, rng: np.random.Generator) -> float:
     return (as_much + 1.0) / (drawn_count + 1.0)
 
 
-def chance_of_shape(a: Measured, b: Measured) -> float:
+def chance_of_shape(a: MeasuredValue, b: MeasuredValue) -> float:
     """Return the Kolmogorov-Smirnov chance of two distributions, nan of rows that are none."""
     if a.rows.ndim != 1 or len(np.unique(np.concatenate([a.rows, b.rows]))) <= 2:
         return nan
@@ -124,17 +126,17 @@ def corrected(chances: Mapping[str, float]) -> dict[str, float]:
 
 
 def _difference(
-    a: Measured, b: Measured, p: float, shape: float, rng: np.random.Generator
-) -> Difference:
+    a: MeasuredValue, b: MeasuredValue, p: float, shape: float, rng: np.random.Generator
+) -> MeasureDifference:
     band = BY_KEY[a.key]
     ours, theirs = judged(a, band), judged(b, band)
     if not isfinite(p):
-        return Difference(ours, theirs, nan, nan, nan, nan, nan, "too few events")
+        return MeasureDifference(ours, theirs, nan, nan, nan, nan, nan, "too few events")
     value = theirs.value - ours.value
     low, high = _interval(resampled(b, rng), resampled(a, rng), value)
     differs = p < LEVEL or (isfinite(shape) and shape < LEVEL)
     word: Word = "more than chance" if differs else "may be chance"
-    return Difference(ours, theirs, value, low, high, p, shape, word)
+    return MeasureDifference(ours, theirs, value, low, high, p, shape, word)
 
 
 def _interval(b: Floats, a: Floats, value: float) -> tuple[float, float]:
@@ -145,7 +147,7 @@ def _interval(b: Floats, a: Floats, value: float) -> tuple[float, float]:
     return low, high
 
 
-def _numbers(d: Difference, runs: Sequence[Gathered]) -> dict[str, object]:
+def _numbers(d: MeasureDifference, runs: Sequence[GazeTrace]) -> dict[str, object]:
     values = {
         "a": d.a.value, "b": d.b.value, "difference": d.difference, "low95": d.low95,
         "high95": d.high95, "chance": d.chance, "chance_of_shape": d.chance_shape,

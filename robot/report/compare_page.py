@@ -5,7 +5,7 @@ from math import isfinite
 from typing import Literal, NamedTuple
 
 from gazerig.robot.control.feedback_basis import Basis
-from gazerig.robot.report.gaze_trace import Gathered
+from gazerig.robot.report.gaze_trace import GazeTrace
 from gazerig.robot.report.norm_bands import GROUPS
 from gazerig.robot.report.page import (
     Picture,
@@ -16,13 +16,13 @@ from gazerig.robot.report.page import (
     rendered,
     with_unit,
 )
-from gazerig.robot.report.run_header import About
-from gazerig.robot.report.statistics import Finding
+from gazerig.robot.report.run_header import RunHeader
+from gazerig.robot.report.statistics import MeasureResult
 
 Word = Literal["more than chance", "may be chance", "too few events"]
 
 
-class Difference(NamedTuple):
+class MeasureDifference(NamedTuple):
     """One measure of two runs.
 
     difference: b - a; low95, high95: its interval, nan where there is none
@@ -30,8 +30,8 @@ class Difference(NamedTuple):
         whole distribution, nan where a measure has none
     """
 
-    a: Finding
-    b: Finding
+    a: MeasureResult
+    b: MeasureResult
     difference: float
     low95: float
     high95: float
@@ -40,7 +40,7 @@ class Difference(NamedTuple):
     word: Word
 
 
-class Row(NamedTuple):
+class ComparedRow(NamedTuple):
     """One row of the page's table, ready to print."""
 
     title: str
@@ -62,14 +62,14 @@ class Row(NamedTuple):
 _CLASSES = {"more than chance": "more", "may be chance": "same", "too few events": "few"}
 
 
-def _row(difference: Difference, abouts: tuple[About, About]) -> Row:
+def _row(difference: MeasureDifference, abouts: tuple[RunHeader, RunHeader]) -> ComparedRow:
     a, b = difference.a, difference.b
     lines = (line_of(a, abouts[0].styles), line_of(b, abouts[1].styles))
     known = isfinite(difference.difference)
     chances = [f"p {_p(difference.chance)}"] if known else []
     if isfinite(difference.chance_shape):
         chances.append(f"distribution p {_p(difference.chance_shape)}")
-    return Row(
+    return ComparedRow(
         a.band.title,
         lines[0].band,
         lines[0].value,
@@ -91,25 +91,25 @@ def _p(chance: float) -> str:
     return "< .001" if chance < 0.001 else f"{chance:.3f}"
 
 
-class Section(NamedTuple):
+class ComparedSection(NamedTuple):
     """One section of the page."""
 
     name: str
-    rows: tuple[Row, ...]
+    rows: tuple[ComparedRow, ...]
     pictures: tuple[Picture, ...]
     left_out: tuple[str, ...]
     basis: tuple[str, ...]
 
 
 def compare_page(
-    abouts: tuple[About, About],
-    runs: Sequence[Gathered],
-    differences: Sequence[Difference],
+    abouts: tuple[RunHeader, RunHeader],
+    runs: Sequence[GazeTrace],
+    differences: Sequence[MeasureDifference],
     pictures: Sequence[Picture],
 ) -> str:
     """Return the page as HTML that needs no other file."""
     sections = tuple(
-        Section(
+        ComparedSection(
             group,
             tuple(_row(d, abouts) for d in differences if d.a.band.group == group),
             tuple(p for p in pictures if p.drawing.group == group),
@@ -126,7 +126,7 @@ def compare_page(
     )  # fmt: skip
 
 
-def banners(abouts: tuple[About, About], runs: Sequence[Gathered]) -> tuple[str, ...]:
+def banners(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> tuple[str, ...]:
     """Return what a reader must know first: which runs were not measured, or differ in it."""
     told = [
         f"{about.name}: {words}"
@@ -136,7 +136,7 @@ def banners(abouts: tuple[About, About], runs: Sequence[Gathered]) -> tuple[str,
     return (*told, *filter(None, (mixed(abouts, runs),)))
 
 
-def mixed(abouts: tuple[About, About], runs: Sequence[Gathered]) -> str:
+def mixed(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> str:
     """Warn of a measured run beside a reckoned one, "" where both rest on the same."""
     first, second = (run.joints.whole_basis for run in runs)
     if first == second:
@@ -147,7 +147,9 @@ def mixed(abouts: tuple[About, About], runs: Sequence[Gathered]) -> str:
     )
 
 
-def _left_out(abouts: tuple[About, About], runs: Sequence[Gathered], group: str) -> tuple[str, ...]:
+def _left_out(
+    abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace], group: str
+) -> tuple[str, ...]:
     """Return why a section says less than it could, and of which run."""
     each = [dict.fromkeys(left_out(run.joints, group)) for run in runs]
     both = [why for why in each[0] if why in each[1]]
@@ -167,7 +169,7 @@ def _basis(basis: Basis) -> str:
 
 
 def _facts(
-    abouts: tuple[About, About], runs: Sequence[Gathered]
+    abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]
 ) -> tuple[tuple[str, str, str], ...]:
     """Return what is known of both runs, side by side."""
     first, second = (dict(about.facts) for about in abouts)

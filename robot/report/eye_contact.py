@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report.gaze_trace import Gathered
-from gazerig.robot.report.statistics import Measured, longest, mean
+from gazerig.robot.report.gaze_trace import GazeTrace
+from gazerig.robot.report.statistics import MeasuredValue, longest, mean
 
 _HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
 """The oval of a face, a little larger than an adult's."""
@@ -16,14 +16,14 @@ _BRIDGED_S = 0.15
 _FACING_DEG = 12.0
 
 
-def on_face(run: Gathered) -> NDArray[np.bool_]:
+def on_face(run: GazeTrace) -> NDArray[np.bool_]:
     """Return (n,) whether the gaze is inside the oval of a face."""
     y, z = run.column("face_y") / _HALF_WIDE_M, run.column("face_z") / _HALF_HIGH_M
     inside: NDArray[np.bool_] = np.nan_to_num(y * y + z * z, nan=9.0) <= 1.0
     return inside
 
 
-def bouts(run: Gathered, mask: NDArray[np.bool_]) -> Floats:
+def bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
     """Return (n, 3) begin, end, and whether it was cut off by the run, of each time it holds."""
     t = run.column("t")
     if not len(t):
@@ -42,17 +42,17 @@ def bouts(run: Gathered, mask: NDArray[np.bool_]) -> Floats:
     return kept
 
 
-def looks(run: Gathered) -> Floats:
+def looks(run: GazeTrace) -> Floats:
     """Return the times of looks at a face, cut ones included."""
     return bouts(run, on_face(run))
 
 
-def mutual(run: Gathered) -> Floats:
+def mutual(run: GazeTrace) -> Floats:
     """Return the times in which both faces are turned to each other."""
     return bouts(run, on_face(run) & (run.column("face_off") < _FACING_DEG))
 
 
-def measures(run: Gathered) -> list[Measured]:
+def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return what there is to say about looks at people."""
     seen = looks(run)
     whole = _lengths(seen[seen[:, 2] == 0.0])
@@ -60,13 +60,13 @@ def measures(run: Gathered) -> list[Measured]:
     away = seen[1:, 0] - seen[:-1, 1]
     pairs = np.column_stack([_lengths(seen)[:-1], away])
     return [
-        Measured("bout_talk", whole, mean),
-        Measured("share_talk", pairs, _share),
-        Measured("bout_listen", whole, mean),
-        Measured("share_listen", pairs, _share),
-        Measured("bout_think", away, mean),
-        Measured("longest_look", _lengths(seen), longest),
-        Measured("mutual", _lengths(both), mean),
+        MeasuredValue("bout_talk", whole, mean),
+        MeasuredValue("share_talk", pairs, _share),
+        MeasuredValue("bout_listen", whole, mean),
+        MeasuredValue("share_listen", pairs, _share),
+        MeasuredValue("bout_think", away, mean),
+        MeasuredValue("longest_look", _lengths(seen), longest),
+        MeasuredValue("mutual", _lengths(both), mean),
     ]
 
 

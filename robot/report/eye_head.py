@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from gazerig.gaze.types import Floats
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.saccade_finder import THRESHOLD_DEG_S
-from gazerig.robot.report.gaze_trace import Gathered
-from gazerig.robot.report.statistics import Measured, median
+from gazerig.robot.report.gaze_trace import GazeTrace
+from gazerig.robot.report.statistics import MeasuredValue, median
 
 LEAST_DEG = 5.0
 _AFTER_S, _BEFORE_S, _LEAST_AFTER_S = 0.9, 0.15, 0.45
@@ -51,7 +51,7 @@ def rate(t_s: Floats, x: Floats, half: int = 4) -> Floats:
     return out
 
 
-def gaze_shifts(run: Gathered) -> list[Shift]:
+def gaze_shifts(run: GazeTrace) -> list[Shift]:
     """Return the shifts that began with the head at rest."""
     t, head, gaze = run.column("t"), run.column("head_yaw"), run.column("gaze_yaw")
     speed, moves = rate(t, head), np.abs(run.column("target_yaw_rate"))
@@ -77,7 +77,7 @@ def gaze_shifts(run: Gathered) -> list[Shift]:
 
 
 def _shift(
-    run: Gathered, onset_s: float, sign: float, aside: float, turned: float, speed: Floats
+    run: GazeTrace, onset_s: float, sign: float, aside: float, turned: float, speed: Floats
 ) -> Shift:
     """Add when the head started and how fast it was."""
     window = run.between(onset_s - _BEFORE_S, onset_s + _AFTER_S)
@@ -99,7 +99,7 @@ def stretches(mask: NDArray[np.bool_], t_s: Floats, shift: Floats, least_s: floa
     return out
 
 
-def vor(run: Gathered) -> Floats:
+def vor(run: GazeTrace) -> Floats:
     """Return (n, 2) gain of the eyes against the head and the head's speed, one row a stretch.
 
     What the eyes have to do is the target's motion seen from the head, less the head's: a near
@@ -129,7 +129,7 @@ def vor(run: Gathered) -> Floats:
     return np.array(rows).reshape(-1, 2)
 
 
-def measures(run: Gathered) -> list[Measured]:
+def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return what there is to say about eyes and head."""
     shifts = gaze_shifts(run)
     seen = np.array([(s.aside_deg, s.head_deg) for s in shifts]).reshape(-1, 2)
@@ -140,11 +140,11 @@ def measures(run: Gathered) -> list[Measured]:
     turns = turns[turns[:, 0] >= _MOVES_DEG]
     usual = (4.0 / 3.0 * turns[:, 0] / 50.0 + 0.4) * 60.0
     return [
-        Measured("head_slope", beyond, _slope),
-        Measured("head_share", large[:, 1] - human.head_deg(large[:, 0]), median),
-        Measured("head_after", after[np.isfinite(after)], median),
-        Measured("head_peak", turns[:, 1] / usual, median),
-        Measured("vor", vor(run)[:, 0], median),
+        MeasuredValue("head_slope", beyond, _slope),
+        MeasuredValue("head_share", large[:, 1] - human.head_deg(large[:, 0]), median),
+        MeasuredValue("head_after", after[np.isfinite(after)], median),
+        MeasuredValue("head_peak", turns[:, 1] / usual, median),
+        MeasuredValue("vor", vor(run)[:, 0], median),
     ]
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
-from gazerig.robot.report.gaze_trace import Gathered
-from gazerig.robot.report.statistics import Measured, mean, median
+from gazerig.robot.report.gaze_trace import GazeTrace
+from gazerig.robot.report.statistics import MeasuredValue, mean, median
 
 N = len(PARTS)
 _EYES = (PARTS.index("LE"), PARTS.index("RE"))
@@ -32,7 +32,7 @@ class Visit(NamedTuple):
     end_s: float
 
 
-def visits(run: Gathered) -> list[Visit]:
+def visits(run: GazeTrace) -> list[Visit]:
     """Return the visits to parts in their order."""
     out: list[Visit] = []
     for f in run.fixations:
@@ -46,7 +46,7 @@ def visits(run: Gathered) -> list[Visit]:
     return out
 
 
-def shifts(run: Gathered) -> Floats:
+def shifts(run: GazeTrace) -> Floats:
     """Return (n, 2) from and to of shifts between parts, as indices of PARTS."""
     seen = visits(run)
     rows = [
@@ -64,7 +64,7 @@ def counted(rows: Floats) -> Floats:
     return out
 
 
-def on_parts(run: Gathered) -> Floats:
+def on_parts(run: GazeTrace) -> Floats:
     """Return (n, 2) part and seconds of every fixation on one."""
     rows = [(PARTS.index(f.part), f.duration_s) for f in run.fixations if f.part is not None]
     return np.array(rows, dtype=float).reshape(-1, 2)
@@ -88,7 +88,7 @@ def human_share() -> Floats:
     return out
 
 
-def points(run: Gathered) -> Floats:
+def points(run: GazeTrace) -> Floats:
     """Return (n, 3) y and z on the face in metres, and seconds, of fixations meant for a face.
 
     They may well lie beside it.
@@ -122,7 +122,7 @@ def expected_density() -> Floats:
     return out
 
 
-def measures(run: Gathered) -> list[Measured]:
+def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return what there is to say about the gaze on faces."""
     parts, moves, seen = on_parts(run), shifts(run), visits(run)
     on_eyes = np.isin(parts[:, 0], _EYES).astype(float)
@@ -131,33 +131,33 @@ def measures(run: Gathered) -> list[Measured]:
     lengths = np.array([visit.end_s - visit.start_s for visit in seen])
     meant = [(float(f.part is not None), f.duration_s) for f in run.fixations if f.kind == "face"]
     return [
-        Measured("on_parts", np.array(meant).reshape(-1, 2), _weighted),
-        Measured("part_share", parts, _share_apart),
-        Measured("eyes_share", np.column_stack([on_eyes, parts[:, 1]]), _weighted),
-        Measured("visit", lengths, mean),
-        Measured("never_taken", forbidden, mean),
-        Measured("transitions", moves, _rows_apart),
-        Measured("heat", points(run), _alike),
+        MeasuredValue("on_parts", np.array(meant).reshape(-1, 2), _weighted),
+        MeasuredValue("part_share", parts, _share_apart),
+        MeasuredValue("eyes_share", np.column_stack([on_eyes, parts[:, 1]]), _weighted),
+        MeasuredValue("visit", lengths, mean),
+        MeasuredValue("never_taken", forbidden, mean),
+        MeasuredValue("transitions", moves, _rows_apart),
+        MeasuredValue("heat", points(run), _alike),
         *_axes(run),
     ]
 
 
-def _axes(run: Gathered) -> list[Measured]:
+def _axes(run: GazeTrace) -> list[MeasuredValue]:
     """Measure where both eyes point, one row a fixation on a face."""
     rows = axes(run)
     vergence = rows[:, 6]
     good = (vergence >= -2.5) & (vergence <= 4.5)
     within = np.maximum(rows[:, 4], rows[:, 5]) <= 0.5 * human.CONE_DEG
     return [
-        Measured("left_mm", np.hypot(rows[:, 0], rows[:, 1]), median),
-        Measured("right_mm", np.hypot(rows[:, 2], rows[:, 3]), median),
-        Measured("in_cone", within.astype(float), mean),
-        Measured("vergence", vergence, median),
-        Measured("vergence_ok", good.astype(float), mean),
+        MeasuredValue("left_mm", np.hypot(rows[:, 0], rows[:, 1]), median),
+        MeasuredValue("right_mm", np.hypot(rows[:, 2], rows[:, 3]), median),
+        MeasuredValue("in_cone", within.astype(float), mean),
+        MeasuredValue("vergence", vergence, median),
+        MeasuredValue("vergence_ok", good.astype(float), mean),
     ]
 
 
-def axes(run: Gathered) -> Floats:
+def axes(run: GazeTrace) -> Floats:
     """Return (n, 7) medians of fixations on a face.
 
     Columns: where the left, then the right pupil axis passes the point looked at (y, z, in mm

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Face, Floats, Vec3
-from gazerig.robot.analysis.blink_finder import BlinkFinder
+from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
 from gazerig.robot.analysis.event_detector import (
     NEAR_FACE_M,
-    Blink,
-    Fixation,
-    GazeEvents,
-    Saccade,
+    EventDetector,
+    FixationEvent,
+    SaccadeEvent,
     beside_m,
 )
 from gazerig.robot.analysis.gaze_on_face import on_face
@@ -27,7 +26,7 @@ from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.feedback_basis import reckoned_joints
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Ask
-from gazerig.robot.report.joint_basis import RunJoints, joints_of
+from gazerig.robot.report.joint_basis import JointBasis, joints_of
 
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""
@@ -36,7 +35,7 @@ MODES = ("none", "talk", "listen", "think")
 _LONGEST_FORESEEN_S = 0.3
 
 
-class Row(NamedTuple):
+class TraceRow(NamedTuple):
     """One tick; degrees, seconds, metres where the name says no other; nan where unknown.
 
     gaze_*: mean line of sight in space; head_*, eye_*: neck, and mean eye in the head
@@ -83,7 +82,7 @@ class Row(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Gathered:
+class GazeTrace:
     """A whole run: columns (one value a tick), and events in the order of their beginning.
 
     asked_blinks: as the models commanded them; kinds: seconds per kind of target
@@ -91,16 +90,16 @@ class Gathered:
     """
 
     rows: Floats
-    saccades: tuple[Saccade, ...]
-    fixations: tuple[Fixation, ...]
-    blinks: tuple[Blink, ...]
-    asked_blinks: tuple[Blink, ...] = ()
+    saccades: tuple[SaccadeEvent, ...]
+    fixations: tuple[FixationEvent, ...]
+    blinks: tuple[BlinkEvent, ...]
+    asked_blinks: tuple[BlinkEvent, ...] = ()
     kinds: dict[str, float] = field(default_factory=dict)
-    joints: RunJoints = RunJoints()
+    joints: JointBasis = JointBasis()
 
     def column(self, name: str) -> Floats:
         """Return a column of Row by its name."""
-        out: Floats = self.rows[:, Row._fields.index(name)]
+        out: Floats = self.rows[:, TraceRow._fields.index(name)]
         return out
 
     @property
@@ -134,16 +133,16 @@ class Gathered:
         return clear
 
 
-class Gathering:
+class GazeTraceBuilder:
     """Takes the ticks of a run, one after the other, and gives what was gathered."""
 
     def __init__(self) -> None:
-        self._events, self._asked_lids = GazeEvents(), BlinkFinder()
+        self._events, self._asked_lids = EventDetector(), BlinkFinder()
         self._flat = array("d")
-        self._saccades: list[Saccade] = []
-        self._fixations: list[Fixation] = []
-        self._blinks: list[Blink] = []
-        self._asked_blinks: list[Blink] = []
+        self._saccades: list[SaccadeEvent] = []
+        self._fixations: list[FixationEvent] = []
+        self._blinks: list[BlinkEvent] = []
+        self._asked_blinks: list[BlinkEvent] = []
         self._kinds: defaultdict[str, float] = defaultdict(float)
         self._mode = 0
         self._last_s: float | None = None
@@ -156,9 +155,9 @@ class Gathering:
             if isinstance(order, Ask) and order.menu == "conversation" and order.choice in MODES:
                 self._mode = MODES.index(order.choice)
         for event in self._events.note(tick):
-            if isinstance(event, Saccade):
+            if isinstance(event, SaccadeEvent):
                 self._saccades.append(event)
-            elif isinstance(event, Fixation):
+            elif isinstance(event, FixationEvent):
                 self._fixations.append(event)
             else:
                 self._blinks.append(event)
@@ -174,10 +173,10 @@ class Gathering:
         if not tick.stopped:
             self._flat.extend(row_of(tick, self._mode))
 
-    def gathered(self) -> Gathered:
+    def gathered(self) -> GazeTrace:
         """Return all of it as it is now."""
-        rows = np.array(self._flat).reshape(-1, len(Row._fields))
-        return Gathered(
+        rows = np.array(self._flat).reshape(-1, len(TraceRow._fields))
+        return GazeTrace(
             rows,
             tuple(self._saccades),
             tuple(self._fixations),
@@ -188,7 +187,7 @@ class Gathering:
         )
 
 
-def row_of(tick: Tick, mode: int) -> Row:
+def row_of(tick: Tick, mode: int) -> TraceRow:
     """Return the columns of one tick."""
     pose, target, names = tick.pose, tick.target, tick.verdict.joints
     head, left, right = pose.p_world_head_m, pose.p_world_eye_left_m, pose.p_world_eye_right_m
@@ -214,7 +213,7 @@ def row_of(tick: Tick, mode: int) -> Row:
             on_left = on_face(left, sight_left, point, R) or on_left
             on_right = on_face(right, sight_right, point, R) or on_right
     eye_left, eye_right = pose.eye_left_rad, pose.eye_right_rad
-    return Row(
+    return TraceRow(
         tick.t_s, degrees(yaw), degrees(pitch),
         degrees(pose.head_rad[0]), degrees(pose.head_rad[1]),
         degrees(0.5 * (eye_left[0] + eye_right[0])), degrees(0.5 * (eye_left[1] + eye_right[1])),

@@ -10,7 +10,7 @@ from gazerig.robot.report.norm_bands import GROUPS, LIDS, PARALLEL
 
 
 @dataclass(frozen=True)
-class RunJoints:
+class JointBasis:
     """The joints of a run.
 
     names: in their order; empty where nobody says, and then nothing is left out
@@ -61,17 +61,17 @@ _BLINKS = (
 )  # fmt: skip
 
 
-def _no_neck(joints: RunJoints) -> bool:
+def _no_neck(joints: JointBasis) -> bool:
     return not joints.has("neck_yaw", "neck_pitch", "neck_roll")
 
 
-def _eyes_reckoned(joints: RunJoints) -> bool:
+def _eyes_reckoned(joints: JointBasis) -> bool:
     return any("eye" in name for name in joints.reckoned) and all(
         name in joints.reckoned for name in joints.names if "eye" in name
     )
 
 
-_RULES: tuple[tuple[Sequence[str], Callable[[RunJoints], bool], str], ...] = (
+_RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     ((*_HEAD_PART, "vor"), _no_neck, "This rig has no neck: there is no head movement to look at."),
     (
         _HEAD_PART,
@@ -102,6 +102,6 @@ _RULES: tuple[tuple[Sequence[str], Callable[[RunJoints], bool], str], ...] = (
 )
 
 
-def joints_of(names: Iterable[str], reckoned: Iterable[str]) -> RunJoints:
+def joints_of(names: Iterable[str], reckoned: Iterable[str]) -> JointBasis:
     """Gather what ticks say of their joints."""
-    return RunJoints(in_order(names), in_order(reckoned))
+    return JointBasis(in_order(names), in_order(reckoned))

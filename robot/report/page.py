@@ -10,12 +10,12 @@ from typing import NamedTuple
 import jinja2
 
 from gazerig.robot.control.feedback_basis import RECKONED, Basis
-from gazerig.robot.report.gaze_trace import Gathered
-from gazerig.robot.report.joint_basis import RunJoints
-from gazerig.robot.report.norm_bands import BANDS, GROUPS, Band
+from gazerig.robot.report.gaze_trace import GazeTrace
+from gazerig.robot.report.joint_basis import JointBasis
+from gazerig.robot.report.norm_bands import BANDS, GROUPS, NormBand
 from gazerig.robot.report.plotting import Drawing
-from gazerig.robot.report.run_header import About
-from gazerig.robot.report.statistics import Finding
+from gazerig.robot.report.run_header import RunHeader
+from gazerig.robot.report.statistics import MeasureResult
 
 _CLASSES = {"pass": "pass", "outside": "outside", "too few events": "few"}
 
@@ -33,7 +33,7 @@ class Picture(NamedTuple):
         return f"data:image/png;base64,{b64encode(self.png).decode()}"
 
 
-class Line(NamedTuple):
+class TextLine(NamedTuple):
     """One row of a table of the page, ready to print.
 
     css: class of its verdict; gauge: SVG of the value beside its band; notes: why it is so
@@ -62,23 +62,23 @@ class Gauge(NamedTuple):
     wide: float
 
 
-class Section(NamedTuple):
+class PageSection(NamedTuple):
     """One section of the page."""
 
     name: str
-    lines: tuple[Line, ...]
+    lines: tuple[TextLine, ...]
     pictures: tuple[Picture, ...]
     left_out: tuple[str, ...]
     basis: Basis
 
 
 def report_page(
-    about: About, run: Gathered, findings: Sequence[Finding], pictures: Sequence[Picture]
+    about: RunHeader, run: GazeTrace, findings: Sequence[MeasureResult], pictures: Sequence[Picture]
 ) -> str:
     """Return the page of one run as HTML that needs no other file."""
     styles = about.styles | {f"conversation {run.mode}"} | run.joints.styles
     sections = tuple(
-        Section(
+        PageSection(
             group,
             tuple(line_of(f, styles) for f in findings if f.band.group == group),
             tuple(p for p in pictures if p.drawing.group == group),
@@ -96,12 +96,12 @@ def report_page(
     )  # fmt: skip
 
 
-def left_out(joints: RunJoints, group: str) -> tuple[str, ...]:
+def left_out(joints: JointBasis, group: str) -> tuple[str, ...]:
     """Return why a section says less than it could of another rig."""
     return joints.all_left_out(band.key for band in BANDS if band.group == group)
 
 
-def banner(joints: RunJoints) -> str:
+def banner(joints: JointBasis) -> str:
     """Return what a reader must know first where servos tell nothing, "" where all measure."""
     if not joints.reckoned:
         return ""
@@ -127,14 +127,14 @@ def rendered(template: str, **values: object) -> str:
     return environment.get_template(template).render(**values)
 
 
-def line_of(finding: Finding, styles: frozenset[str]) -> Line:
+def line_of(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
     """Put a finding into words."""
     band, value = finding.band, finding.value
     known = isfinite(finding.low95)
     interval = f"{number(finding.low95)} to {number(finding.high95)}" if known else ""
     asked = finding.measured.asked
     notes = tuple(words for style, words in band.notes if style in styles)
-    return Line(
+    return TextLine(
         band.title,
         with_unit(value, band.unit) if isfinite(value) else "nothing found",
         interval,
@@ -151,7 +151,7 @@ def line_of(finding: Finding, styles: frozenset[str]) -> Line:
     )
 
 
-def gauge(finding: Finding) -> Gauge:
+def gauge(finding: MeasureResult) -> Gauge:
     """Place band and value on one scale; a value far away stands at its end."""
     band = finding.band
     margin = 0.75 * (band.high - band.low)
@@ -164,7 +164,7 @@ def gauge(finding: Finding) -> Gauge:
     return Gauge(at(band.low), at(band.high) - at(band.low), at(finding.value), low, high - low)
 
 
-def band_words(band: Band) -> str:
+def band_words(band: NormBand) -> str:
     """Return a band as text."""
     return f"{number(band.low)} to {with_unit(band.high, band.unit)}"
 
@@ -186,7 +186,7 @@ def number(value: float) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def _facts(run: Gathered) -> tuple[tuple[str, str], ...]:
+def _facts(run: GazeTrace) -> tuple[tuple[str, str], ...]:
     """Return what the ticks themselves say of the run."""
     total = sum(run.kinds.values()) or 1.0
     shares = sorted(run.kinds.items(), key=lambda item: -item[1])

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from gazerig.robot.report.gaze_trace import Gathered
-from gazerig.robot.report.reference_walk import ModelWalk
+from gazerig.robot.report.gaze_trace import GazeTrace
+from gazerig.robot.report.reference_walk import ReferenceWalk
 
 COLOURS = ("#1c6ea4", "#d9660a")
 HUMAN = "#7f8c8d"
@@ -36,9 +36,9 @@ class Shown(NamedTuple):
     """A run as figures show it; model: the walk over faces that its rig asks for."""
 
     name: str
-    run: Gathered
+    run: GazeTrace
     colour: str
-    model: ModelWalk | None = None
+    model: ReferenceWalk | None = None
 
 
 class Drawing(NamedTuple):

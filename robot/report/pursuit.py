@@ -5,8 +5,8 @@ from scipy import signal
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.report.eye_head import rate, stretches
-from gazerig.robot.report.gaze_trace import Gathered
-from gazerig.robot.report.statistics import Measured, median
+from gazerig.robot.report.gaze_trace import GazeTrace
+from gazerig.robot.report.statistics import MeasuredValue, median
 
 SLOWEST_DEG_S, FASTEST_DEG_S = 5.0, 40.0
 _STRETCH_S = 0.15
@@ -14,7 +14,7 @@ _WINDOW_S = 10.0
 _LOWEST_HZ, _HIGHEST_HZ, _COHERENT = 0.08, 1.0, 0.6
 
 
-def followed(run: Gathered) -> Floats:
+def followed(run: GazeTrace) -> Floats:
     """Return (n, 3) target speed in deg/s, gain, and lag in ms: one row a stretch."""
     t = run.column("t")
     if len(t) < 20:
@@ -38,7 +38,7 @@ def followed(run: Gathered) -> Floats:
     return np.array(rows).reshape(-1, 3)
 
 
-def response(run: Gathered) -> Floats:
+def response(run: GazeTrace) -> Floats:
     """Return (n, 3) frequency in Hz, gain, and phase in deg of the slow gaze against its target.
 
     By cross spectra of both speeds, sideways; what saccades did is bridged. Only where the
@@ -60,10 +60,10 @@ def response(run: Gathered) -> Floats:
     return np.column_stack([f[here], np.abs(transfer), np.degrees(np.angle(transfer))])
 
 
-def measures(run: Gathered) -> list[Measured]:
+def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return what there is to say about following."""
     rows = followed(run)
     return [
-        Measured("pursuit_gain", rows[:, 1], median),
-        Measured("pursuit_lag", rows[:, 2], median),
+        MeasuredValue("pursuit_gain", rows[:, 1], median),
+        MeasuredValue("pursuit_lag", rows[:, 2], median),
     ]

@@ -12,7 +12,7 @@ from gazerig.robot.analysis import human_norms as human
 _DRAWS = 3000
 
 
-class ModelWalk:
+class ReferenceWalk:
     """A chain of steps with a dwell each (Nakamoto & Tsuruno 3.2); staying lengthens a visit."""
 
     def __init__(
@@ -48,19 +48,19 @@ class ModelWalk:
         return np.maximum(drawn / self._tempo, self._floor_s)
 
 
-def published() -> ModelWalk:
+def published() -> ReferenceWalk:
     """Return the walk of Nakamoto & Tsuruno, eq 1 and table 1."""
-    return ModelWalk(human.matrix(), human.DWELL_MEAN_S, human.DWELL_SD_S)
+    return ReferenceWalk(human.matrix(), human.DWELL_MEAN_S, human.DWELL_SD_S)
 
 
-def own(params: ScanpathParams, walk: Walk) -> ModelWalk | None:
+def own(params: ScanpathParams, walk: Walk) -> ReferenceWalk | None:
     """Return the walk that a rig's parameters ask for, None where it has another model."""
     if params.model != "markov":
         return None
     merged = params.diagonal == "whole_visit"
     steps = without_refixations(walk.matrix) if merged else normalised(walk.matrix)
     order = [walk.order.index(_OTHER.get(p, p) if params.viewers_left else p) for p in PARTS]
-    return ModelWalk(
+    return ReferenceWalk(
         steps[np.ix_(order, order)],
         [walk.dwell_mean_s[i] for i in order],
         [walk.dwell_sd_s[i] for i in order],

@@ -20,12 +20,12 @@ from gazerig.robot.report import (
     saccades,
 )
 from gazerig.robot.report.files import write_all
-from gazerig.robot.report.gaze_trace import Gathered, Gathering
+from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.robot.report.norm_bands import BY_KEY, applies
 from gazerig.robot.report.page import Picture, report_page
 from gazerig.robot.report.plotting import COLOURS, Drawing, Shown, caption_of, png
-from gazerig.robot.report.run_header import About
-from gazerig.robot.report.statistics import Finding, Measured, judged
+from gazerig.robot.report.run_header import RunHeader
+from gazerig.robot.report.statistics import MeasuredValue, MeasureResult, judged
 
 Progress = Callable[[str, float], None]
 """Told what is being done and the share of it that is done, 0..1."""
@@ -44,14 +44,14 @@ READING, DRAWING = "reading the run", "drawing figures"
 class Report(NamedTuple):
     """What was found, and the files that say so: the page, its figures, and the figures as JSON."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[MeasureResult, ...]
     page: Path
     pictures: tuple[Path, ...]
     data: Path
 
 
 def report(
-    ticks: Iterable[Tick], about: About, out: Path, progress: Progress, force: bool = False
+    ticks: Iterable[Tick], about: RunHeader, out: Path, progress: Progress, force: bool = False
 ) -> Report:
     """Write one HTML page, a PNG a figure, and the numbers as JSON; give what was found.
 
@@ -65,7 +65,7 @@ def report(
 
 
 def report_of(
-    run: Gathered, about: About, out: Path, progress: Progress, force: bool = False
+    run: GazeTrace, about: RunHeader, out: Path, progress: Progress, force: bool = False
 ) -> Report:
     """Do the same with a run that is gathered already.
 
@@ -79,13 +79,13 @@ def report_of(
     return Report(findings, out, *written)
 
 
-def read(ticks: Iterable[Tick], about: About, progress: Progress) -> Gathered:
+def read(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> GazeTrace:
     """Gather a run in one pass.
 
     Raises:
         SetupError: there is nothing in it.
     """
-    gathering, first_s = Gathering(), None
+    gathering, first_s = GazeTraceBuilder(), None
     progress(READING, 0.0)
     for count, tick in enumerate(ticks):
         gathering.note(tick)
@@ -99,7 +99,7 @@ def read(ticks: Iterable[Tick], about: About, progress: Progress) -> Gathered:
     return run
 
 
-def measured(run: Gathered) -> tuple[Measured, ...]:
+def measured(run: GazeTrace) -> tuple[MeasuredValue, ...]:
     """Measure all that applies to the rig's joints and in the run's mode of conversation."""
     each = (
         saccades.measures(run), face.measures(run), eye_head.measures(run),
@@ -113,7 +113,7 @@ def measured(run: Gathered) -> tuple[Measured, ...]:
     )
 
 
-def found(run: Gathered) -> tuple[Finding, ...]:
+def found(run: GazeTrace) -> tuple[MeasureResult, ...]:
     """Measure and judge a run."""
     return tuple(judged(m, BY_KEY[m.key]) for m in measured(run))
 
@@ -130,7 +130,7 @@ def drawn(runs: Sequence[Shown], progress: Progress) -> tuple[Picture, ...]:
     return tuple(pictures)
 
 
-def _numbers(finding: Finding, run: Gathered) -> dict[str, object]:
+def _numbers(finding: MeasureResult, run: GazeTrace) -> dict[str, object]:
     """Return a finding as plain JSON; what is not known is null.
 
     basis: "measured", "partly reckoned" or "reckoned"

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, field
 
-from gazerig.robot.report.reference_walk import ModelWalk
+from gazerig.robot.report.reference_walk import ReferenceWalk
 
 
 @dataclass(frozen=True)
-class About:
+class RunHeader:
     """A run's name and circumstances.
 
     name: short, for figures; facts: (what, value) rows of the page's head
@@ -19,6 +19,6 @@ class About:
     name: str
     facts: tuple[tuple[str, str], ...] = ()
     styles: frozenset[str] = field(default_factory=frozenset)
-    model: ModelWalk | None = None
+    model: ReferenceWalk | None = None
     warnings: tuple[str, ...] = ()
     duration_s: float | None = None

@@ -4,8 +4,8 @@ import numpy as np
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.report.gaze_trace import Gathered
-from gazerig.robot.report.statistics import Measured, figure, mean, median, one_over_mean
+from gazerig.robot.report.gaze_trace import GazeTrace
+from gazerig.robot.report.statistics import MeasuredValue, figure, mean, median, one_over_mean
 
 LEAST_DEG = 1.0
 """Below, threshold and encoder steps shape what is measured."""
@@ -14,7 +14,7 @@ _SMALL_PEAK_DEG, _SMALL_DURATION_DEG = 8.0, 12.0
 _SOON_S, _PAUSE_S = 0.1, 2.0
 
 
-def table(run: Gathered) -> Floats:
+def table(run: GazeTrace) -> Floats:
     """Return (n, 4) amplitude in deg, duration in ms, peak in deg/s, time of the peak 0..1.
 
     Only saccades that had been asked for: a servo that swings back makes none.
@@ -27,7 +27,7 @@ def table(run: Gathered) -> Floats:
     return np.array(rows).reshape(-1, 4)
 
 
-def asked_table(run: Gathered) -> Floats:
+def asked_table(run: GazeTrace) -> Floats:
     """Return (n, 3) amplitude in deg, duration in ms and peak in deg/s as commanded."""
     asked = [s.commanded for s in run.saccades if s.commanded is not None]
     rows = [(c.amplitude_deg, 1e3 * c.duration_s, c.peak_deg_s) for c in asked]
@@ -35,7 +35,7 @@ def asked_table(run: Gathered) -> Floats:
     return found[found[:, 0] >= LEAST_DEG]
 
 
-def measures(run: Gathered) -> list[Measured]:
+def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return what there is to say about saccades."""
     seen, asked = table(run), asked_table(run)
     every = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG]
@@ -44,12 +44,12 @@ def measures(run: Gathered) -> list[Measured]:
     return [
         *(_peak(key, seen, asked, *ends) for key, ends in _PEAKS),
         *(_duration(key, seen, asked, *ends) for key, ends in _DURATIONS),
-        Measured("skew", skew, median),
-        Measured("below_15", (seen[:, 0] < 15.0).astype(float), mean),
-        Measured("rate", _intervals(run), one_over_mean),
-        Measured("too_soon", (_pauses(run) < _SOON_S).astype(float), mean),
-        Measured("unasked", unasked, mean),
-        Measured("rest_error", rest_errors(run), median),
+        MeasuredValue("skew", skew, median),
+        MeasuredValue("below_15", (seen[:, 0] < 15.0).astype(float), mean),
+        MeasuredValue("rate", _intervals(run), one_over_mean),
+        MeasuredValue("too_soon", (_pauses(run) < _SOON_S).astype(float), mean),
+        MeasuredValue("unasked", unasked, mean),
+        MeasuredValue("rest_error", rest_errors(run), median),
     ]
 
 
@@ -60,7 +60,7 @@ _DURATIONS = (
 )
 
 
-def _peak(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float) -> Measured:
+def _peak(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float) -> MeasuredValue:
     """Return whether each peak speed lies between the human curves."""
 
     def inside(rows: Floats) -> Floats:
@@ -68,10 +68,12 @@ def _peak(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float
         fits = (a[:, 2] >= human.slowest_peak(a[:, 0])) & (a[:, 2] <= human.fastest_peak(a[:, 0]))
         return fits.astype(float)
 
-    return Measured(key, inside(seen), mean, figure(mean, inside(asked)))
+    return MeasuredValue(key, inside(seen), mean, figure(mean, inside(asked)))
 
 
-def _duration(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float) -> Measured:
+def _duration(
+    key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float
+) -> MeasuredValue:
     """Return whether each duration lies between the human lines."""
 
     def inside(rows: Floats) -> Floats:
@@ -79,16 +81,16 @@ def _duration(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: f
         fits = (a[:, 1] >= human.shortest_ms(a[:, 0])) & (a[:, 1] <= human.longest_ms(a[:, 0]))
         return fits.astype(float)
 
-    return Measured(key, inside(seen), mean, figure(mean, inside(asked)))
+    return MeasuredValue(key, inside(seen), mean, figure(mean, inside(asked)))
 
 
-def _intervals(run: Gathered) -> Floats:
+def _intervals(run: GazeTrace) -> Floats:
     """Return seconds from each saccade asked for to the next."""
     onsets = np.array([s.onset_s for s in run.saccades if s.commanded is not None])
     return np.diff(onsets)
 
 
-def _pauses(run: Gathered) -> Floats:
+def _pauses(run: GazeTrace) -> Floats:
     """Return seconds from the end of each saccade to the next, of those that follow soon."""
     asked = [s for s in run.saccades if s.commanded is not None]
     ends = np.array([s.end_s for s in asked])
@@ -98,7 +100,7 @@ def _pauses(run: Gathered) -> Floats:
     return soon
 
 
-def rest_errors(run: Gathered) -> Floats:
+def rest_errors(run: GazeTrace) -> Floats:
     """Return per fixation the median angle of the lines of sight off the target, in deg."""
     off = 0.5 * (run.column("off_left") + run.column("off_right"))
     parts = [off[run.between(f.start_s + 0.04, f.end_s)] for f in run.fixations]

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report.norm_bands import Band
+from gazerig.robot.report.norm_bands import NormBand
 
 VerdictWord = Literal["pass", "outside", "too few events"]
 Statistic = Callable[[Floats], float]
@@ -19,7 +19,7 @@ _SEED = 20060301
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredValue:
     """What a run shows of one measure.
 
     key: of its band; rows: one row an event; of: the figure made of them
@@ -39,34 +39,34 @@ class Measured:
         return len(self.rows) if self.count is None else self.count
 
 
-class Finding(NamedTuple):
+class MeasureResult(NamedTuple):
     """A measure with its verdict.
 
     value, low95, high95: the figure and its bootstrap interval, nan where there is none
     """
 
-    band: Band
-    measured: Measured
+    band: NormBand
+    measured: MeasuredValue
     value: float
     low95: float
     high95: float
     verdict: VerdictWord
 
 
-def judged(measured: Measured, band: Band) -> Finding:
+def judged(measured: MeasuredValue, band: NormBand) -> MeasureResult:
     """Hold a figure against its pass band; too few events are no pass."""
     value = figure(measured.of, measured.rows)
     if measured.events < band.least or not isfinite(value):
-        return Finding(band, measured, value, nan, nan, "too few events")
+        return MeasureResult(band, measured, value, nan, nan, "too few events")
     spread = drawn(measured, np.random.default_rng(_SEED))
     # Figures that cannot be below 0 are larger in samples drawn again: that much is taken off.
     bias = float(spread.mean()) - value
     low, high = (float(x) - bias for x in np.percentile(spread, (2.5, 97.5)))
     inside = band.low <= value <= band.high
-    return Finding(band, measured, value, low, high, "pass" if inside else "outside")
+    return MeasureResult(band, measured, value, low, high, "pass" if inside else "outside")
 
 
-def drawn(measured: Measured, rng: np.random.Generator, draws: int = _DRAWS) -> Floats:
+def drawn(measured: MeasuredValue, rng: np.random.Generator, draws: int = _DRAWS) -> Floats:
     """Return the figure of ``draws`` bootstrap samples of the events (Efron 1979)."""
     rows, n = measured.rows, len(measured.rows)
     values = [figure(measured.of, rows[rng.integers(0, n, n)]) for _ in range(draws)]

@@ -12,7 +12,7 @@ from math import isfinite
 from gazerig.robot.model.forbidden_range import CollisionParams, ForbiddenRange, forbidden_pairs
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointAngles
-from gazerig.robot.safety.motion_limiter import Motion
+from gazerig.robot.safety.motion_limiter import MotionLimiter
 
 _ROUNDING_RAD = 1e-9
 
@@ -54,7 +54,7 @@ class Collisions:
         return bool(self._pairs)
 
     def look(
-        self, motion: Motion, wish: JointAngles, position: JointAngles, held: Sequence[bool]
+        self, motion: MotionLimiter, wish: JointAngles, position: JointAngles, held: Sequence[bool]
     ) -> None:
         """Put up this tick's walls, and say who has to leave a box first.
 
@@ -78,7 +78,7 @@ class Collisions:
         self,
         k: int,
         pair: tuple[ForbiddenRange, ForbiddenRange],
-        motion: Motion,
+        motion: MotionLimiter,
         wish: JointAngles,
         position: JointAngles,
     ) -> bool:
@@ -101,7 +101,10 @@ class Collisions:
         return True
 
     def _lead_out(
-        self, pair: tuple[ForbiddenRange, ForbiddenRange], motion: Motion, held: Sequence[bool]
+        self,
+        pair: tuple[ForbiddenRange, ForbiddenRange],
+        motion: MotionLimiter,
+        held: Sequence[bool],
     ) -> None:
         """Send one joint of a pair that began in its box out by the shortest way."""
         ways = [
@@ -119,20 +122,20 @@ class Collisions:
             farther = [exit_rad, self.exits.get(joint, exit_rad)]
             self.exits[joint] = max(farther, key=lambda angle: abs(angle - now))
 
-    def _agrees(self, joint: int, exit_rad: float, motion: Motion) -> bool:
+    def _agrees(self, joint: int, exit_rad: float, motion: MotionLimiter) -> bool:
         """Return whether a joint that leaves another box as well goes the same way."""
         now = motion.command[joint]
         return (self.exits.get(joint, exit_rad) - now) * (exit_rad - now) >= 0.0
 
 
-def _side(span: ForbiddenRange, motion: Motion) -> int:
+def _side(span: ForbiddenRange, motion: MotionLimiter) -> int:
     """Tell on which side a joint is and can stay: -1 below, 1 above, 0 neither."""
     if motion.keeps_below(span.joint, span.below):
         return -1
     return 1 if motion.keeps_above(span.joint, span.above) else 0
 
 
-def _wall_off(span: ForbiddenRange, motion: Motion) -> None:
+def _wall_off(span: ForbiddenRange, motion: MotionLimiter) -> None:
     """Keep a joint on the side where it is."""
     i = span.joint
     if _side(span, motion) < 0:
@@ -141,7 +144,7 @@ def _wall_off(span: ForbiddenRange, motion: Motion) -> None:
         motion.low[i] = max(motion.low[i], span.above)
 
 
-def _crosses(span: ForbiddenRange, motion: Motion, wish: JointAngles) -> bool:
+def _crosses(span: ForbiddenRange, motion: MotionLimiter, wish: JointAngles) -> bool:
     """Return whether a joint's way to its wish leads into its half of the box."""
     i = span.joint
     if not isfinite(wish[i]):

@@ -12,12 +12,12 @@ from typing import Literal, NamedTuple
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.types import JointAngles, JointState, Level, Verdict
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
 from gazerig.robot.safety.collisions import Collisions
-from gazerig.robot.safety.health import Health
+from gazerig.robot.safety.health import JointHealth
 from gazerig.robot.safety.late_ticks import LateTicks
-from gazerig.robot.safety.motion_limiter import Motion
-from gazerig.robot.safety.stall_detector import Stuck
+from gazerig.robot.safety.motion_limiter import MotionLimiter
+from gazerig.robot.safety.stall_detector import StallDetector
 
 _NEAR_RAD = radians(1.0)
 _ROUNDING_RAD = 1e-9
@@ -64,12 +64,12 @@ class Guard:
         self._soft = False
         self._names = joints
         self._neck = tuple(name.startswith("neck") for name in joints)
-        self._motion = Motion(self._within_reach())
+        self._motion = MotionLimiter(self._within_reach())
         self._limits = self._motion.limits
         self._waiting: set[int] = set()
         self._outside: set[int] = set()
-        self._health = Health(params.health, limits)
-        self._stuck = Stuck(params.stall, len(limits))
+        self._health = JointHealth(params.health, limits)
+        self._stuck = StallDetector(params.stall, len(limits))
         self._collisions = Collisions(
             params.collisions, params.collision_margin_deg, limits, joints
         )
@@ -200,7 +200,7 @@ class Guard:
 
     def check(
         self, wish_rad: JointAngles, joints: JointState, picture_age_s: float, t_s: float
-    ) -> Verdict:
+    ) -> GuardResult:
         """Return what may be sent now.
 
         wish_rad: any numbers at all
@@ -239,22 +239,22 @@ class Guard:
                 why[i], ranks[i] = reason, rank
         return self._verdict(wish_rad, why, ranks)
 
-    def _standstill(self, wish_rad: JointAngles) -> Verdict:
+    def _standstill(self, wish_rad: JointAngles) -> GuardResult:
         """Move nothing, as no time has passed."""
         why = ("time stands still",) * len(self._limits)
         reasons = ("all: time stands still",)
         command = tuple(self._motion.command)
-        return Verdict(command, "hold", reasons, wish_rad, why, reasons, self._names)
+        return GuardResult(command, "hold", reasons, wish_rad, why, reasons, self._names)
 
     def _verdict(
         self, wish_rad: JointAngles, why: dict[int, str], ranks: dict[int, int]
-    ) -> Verdict:
+    ) -> GuardResult:
         command = tuple(self._motion.command)
         if not why:
-            return Verdict(command, "ok", (), wish_rad, joints=self._names)
+            return GuardResult(command, "ok", (), wish_rad, joints=self._names)
         worst = max(ranks.values())
         reasons = {i: f"{self._names[i]}: {reason}" for i, reason in why.items()}
-        return Verdict(
+        return GuardResult(
             command,
             _LEVELS[worst],
             tuple(reasons.values()),

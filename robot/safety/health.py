@@ -13,7 +13,7 @@ _Column = tuple[float | None, ...]
 _COOLER_C = 2.0  # temperatures come in whole degrees: without this a joint would stutter
 
 
-class Health:
+class JointHealth:
     """Strain of every joint.
 
     share: part of its speed and acceleration that a joint may use

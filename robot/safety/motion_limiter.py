@@ -12,7 +12,7 @@ from gazerig.robot.model.joint_limit import JointLimit
 _ROUNDING_RAD = 1e-9
 
 
-class Motion:
+class MotionLimiter:
     """The commands of all joints and their speeds, moved one step at a time.
 
     command, speed: what was sent last

@@ -9,7 +9,7 @@ from math import nan, radians
 from gazerig.robot.model.guard_params import StallParams
 
 
-class Stuck:
+class StallDetector:
     """Watches how joints follow their commands.
 
     far_rad: joints nearer to their commands than this are well

@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 from page_visitor import LOOKING, Visitor
 from websockets.sync.client import ClientConnection
 
-from gazerig.robot.remote.client import RunningRig
+from gazerig.robot.remote.client import RobotClient
 
 CLIENTS = 8
 PRESSES = 20
@@ -219,7 +219,7 @@ class Rig:
         self._reader.start()
         while not self.address:
             time.sleep(0.05)
-        self.remote = RunningRig.connect(self._process.pid)
+        self.remote = RobotClient.connect(self._process.pid)
 
     def _read(self) -> None:
         assert self._process.stdout is not None

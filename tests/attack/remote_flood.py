@@ -13,12 +13,12 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.loop import run
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote import socket_server as server
-from gazerig.robot.remote.budget import ALL, EACH, Rate
-from gazerig.robot.remote.live_server import LiveControl
+from gazerig.robot.remote.budget import ALL, EACH, RequestRate
+from gazerig.robot.remote.live_server import LiveServer
 
 FLOODS = {
     "nothing": "",
@@ -47,9 +47,9 @@ def flooded(what: str, seconds: float, programs: int) -> tuple[float, int, float
     """Return the loop's rate, slots lost, and how long a stop took, in ms."""
     made = assemble(load_rig("desk"), RunOptions(True, False, 0, "visitor"))
     robot = made.robot
-    tuning = Tuning(made.live, robot.order, "desk")
+    tuning = ParamStore(made.live, robot.order, "desk")
     about = {"rig": "desk", "pid": os.getpid()}
-    live = LiveControl(robot, tuning, (ConfigError,), made.clock, about, lambda _: None)
+    live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, lambda _: None)
     robot.start(made.clock)
     live.open()
     command = [sys.executable, "-c", FLOOD.format(FLOODS[what])]
@@ -92,7 +92,7 @@ def main(seconds: float) -> None:
         os.environ["XDG_RUNTIME_DIR"] = folder
         print(f"{'flood':10} {'allowed':>8} {'Hz':>7} {'slots lost':>10} {'stop ms':>8}")
         for what in FLOODS:
-            for limits in ((EACH, ALL), (Rate(9.0, 9.0), Rate(9.0, 9.0))):
+            for limits in ((EACH, ALL), (RequestRate(9.0, 9.0), RequestRate(9.0, 9.0))):
                 server.EACH, server.ALL = limits
                 rate, lost, took_ms = flooded(what, seconds, 4)
                 share = f"{limits[1].share:.0%}" if limits[1] is ALL else "all"

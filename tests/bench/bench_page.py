@@ -32,7 +32,7 @@ from websockets.sync.connection import Connection
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import Tuning
+from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick, run
 
@@ -87,7 +87,7 @@ class Bench:
             load_rig("desk"), RunOptions(mock=True, fast=False, seed=0, scene="visitor")
         )
         robot = made.robot
-        tuning = Tuning(made.live, robot.order, "desk")
+        tuning = ParamStore(made.live, robot.order, "desk")
         options = RunOptions(page="127.0.0.1:8700" if page else None)
         self.audience = RunObservers(made, options, lambda _: None, lambda _: None, tuning)
         self.page = self.audience._page
