@@ -8,7 +8,9 @@ is believed then.
 """
 
 from collections.abc import Sequence
+from math import isnan
 from operator import sub
+from typing import Any
 
 SLACK_STEPS = 64
 """So far apart two answers may be whatever the time between them: play, and jitter."""
@@ -47,37 +49,39 @@ class Plausibility:
     def forget(self) -> None:
         """Believe the next positions whatever they are, as after a port that was gone."""
         count = len(self._fastest)
-        self._last: list[int | None] = [None] * count
+        self._last: Sequence[Any] = [None] * count
         self._at_s = [0.0] * count
         self._odd: list[list[tuple[int, float]]] = [[] for _ in range(count)]
         self._whole_s = float("nan")
 
     def place(self, slot: int, position: int, at_s: float) -> None:
         """Note where a servo was found by other means than its cyclic answer."""
-        self._last[slot], self._at_s[slot] = position, at_s
+        last = self._last = list(self._last)
+        if not isnan(self._whole_s):
+            self._at_s = [self._whole_s] * len(last)
+        last[slot], self._at_s[slot] = position, at_s
         self._odd[slot].clear()
         self._whole_s = float("nan")
 
     def whole(self, positions: Sequence[int], at_s: float) -> bool:
         """Return whether all positions of one answer can be true; they are noted only then."""
-        last, since_s = self._last, at_s - self._whole_s
         # Every tick: where all were last heard together there is one time for all of them.
-        if not since_s >= 0.0 or None in last:
+        since_s = at_s - self._whole_s
+        if not since_s >= 0.0:  # nor where they were not
             return False
-        ways = tuple(map(sub, positions, last))
-        if not -self._nearest <= min(ways) <= max(ways) <= self._nearest:
+        ways = tuple(map(sub, positions, self._last))
+        if max(ways) > self._nearest or min(ways) < -self._nearest:
             for way, free, pace in zip(ways, self._free, self._pace, strict=True):
                 if not -free - pace * since_s <= way <= free + pace * since_s:
                     return False
-        self._last[:] = positions
-        self._whole_s = at_s
-        self._at_s[:] = [at_s] * len(last)
+        self._last, self._whole_s = positions, at_s
         return True
 
     def one(self, slot: int, position: int, at_s: float) -> bool:
         """Return whether one servo's position can be true; to be asked once for every answer."""
         last, odd = self._last[slot], self._odd[slot]
-        if last is not None and not self._near(slot, last, self._at_s[slot], position, at_s):
+        last_s = self._at_s[slot] if isnan(self._whole_s) else self._whole_s
+        if last is not None and not self._near(slot, last, last_s, position, at_s):
             if odd and not self._near(slot, *odd[-1], position, at_s):
                 odd.clear()
             odd.append((position, at_s))

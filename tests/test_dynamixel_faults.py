@@ -154,6 +154,30 @@ def test_noise_around_an_answer_does_no_harm(rig):
         assert rig.places() == [2001, 2002, 2003]
 
 
+@pytest.mark.parametrize("fast", [True, False])
+@pytest.mark.parametrize("more", [b"\x00", b"\xff\xff\xfd\x00\xfe", b"\x55" * 300, None])
+def test_bytes_behind_a_whole_answer_do_not_spoil_the_next_one(fast, more):
+    rig = Rig(fast).open()
+    rig.bus.engage()
+    for _ in range(5):
+        rig.tick([2000] * 3)
+    asked = []
+
+    def spoil(code, raw):
+        if code in GROUP_READS:
+            asked.append(code)
+        # Noise, or the whole answer once more, after every other answer.
+        return raw + (raw if more is None else more) if len(asked) % 2 else raw
+
+    rig.port.spoil = spoil
+    for k in range(60):
+        truth = [round(at) for at in rig.chain.positions_steps()]
+        readings = rig.tick([2000 + 5 * k] * 3, dt_s=0.0)
+        assert [r.position_steps for r in readings] == truth
+        rig.now_s += 0.005
+    assert "timeout" not in rig.errors()
+
+
 def test_an_echo_of_the_own_bytes_does_no_harm(rig):
     rig.port.spoil = lambda code, raw: rig.sent[-1] + raw
     assert rig.places() == [2001, 2002, 2003]

@@ -25,10 +25,14 @@ ROOT = Path(__file__).parents[1]
 
 DRIVER = """
 import sys, time
+from gazerig.drivers.servo_bus.bus import SmartServoBus
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.types import ServoSetup
 setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 200.0) for i in (1, 2, 3)]
-bus = SmartServoBus(DYNAMIXEL, BlockingPort(sys.argv[1]), setups, DynamixelParams(reply_timeout_ms=100.0))
+params = DynamixelParams(reply_timeout_ms=100.0)
+bus = SmartServoBus(DYNAMIXEL, BlockingPort(sys.argv[1]), setups, params)
 bus.open()
 bus.engage()
 while True:

@@ -5,8 +5,9 @@ from math import inf, isnan
 import pytest
 from servo_rows import Row, feedback_of, rows
 
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.types import Feedback
+from gazerig.drivers.types import Feedback, ServoSetup
 
 
 def row(steps, at_s, torque=True, rearmed=False):
@@ -37,7 +38,8 @@ def test_a_missing_servo_keeps_its_last_values_of_their_own_age():
 
 @pytest.fixture
 def columns():
-    return FeedbackColumns([2000.0] * 3)
+    setups = [ServoSetup(i, "xl330-m077", 0, 4095, 1000.0) for i in (1, 2, 3)]
+    return FeedbackColumns(DYNAMIXEL, setups)
 
 
 def test_an_exchange_begins_with_nobody_and_takes_servo_by_servo(columns):

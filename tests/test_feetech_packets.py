@@ -13,6 +13,7 @@ from gazerig.drivers.feetech.protocol import (
     RESET,
     GoalWrite,
     Status,
+    all_intact,
     bytes_missing,
     checksum,
     instruction,
@@ -123,3 +124,12 @@ def test_bytes_missing_is_exact_on_the_way(count, length, cut):
 def test_noise_never_raises_and_always_gets_an_end(raw, count, length):
     statuses(raw)
     assert 0 <= bytes_missing(raw, count, length) <= count * (length + 6)
+
+
+@given(st.lists(st.binary(min_size=4, max_size=253), min_size=1, max_size=9))
+def test_checksums_of_many_are_right_where_each_is(bodies):
+    right = [body + bytes([checksum(body)]) for body in bodies]
+    assert all_intact(right, ())
+    for k, part in enumerate(right):
+        bad = [*right[:k], part[:-1] + bytes([part[-1] ^ 0x10]), *right[k + 1 :]]
+        assert not all_intact(bad, ())

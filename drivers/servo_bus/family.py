@@ -120,8 +120,12 @@ class Codec(Protocol):
     def status_head(self, servo_id: int, length: int) -> bytes:
         """Return an answer's bytes before its error byte; ``length``: of its params."""
 
-    def all_intact(self, raw: bytes, size: int, checks: Sequence[int]) -> bool:
-        """Return whether the checks of answers of equal size, one after the other, are right."""
+    @property
+    def CHECKED(self) -> tuple[int, int]:
+        """So many bytes at the beginning and at the end of an answer are not under its check."""
+
+    def all_intact(self, parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
+        """Return whether the checks of answers are right, from what is under each."""
 
     @property
     def IDENTITY_LENGTH(self) -> int:

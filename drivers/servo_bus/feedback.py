@@ -7,6 +7,7 @@ says the same.
 """
 
 from collections.abc import Mapping, Sequence
+from operator import mul
 from typing import Any, TypeVar
 
 from gazerig.drivers.plausibility import Plausibility
@@ -40,6 +41,7 @@ class FeedbackColumns:
         self._family = family
         self._ids = tuple(setup.id for setup in setups)
         self._velocity_unit = family.velocity_unit_steps_s
+        self._velocity_units = (self._velocity_unit,) * len(setups)
         self._load_units = tuple(model.load_unit for model in models)
         self._turn = family.steps_per_turn if family.single_turn else 0
         self._signs = dict(family.sign_bits)
@@ -48,6 +50,8 @@ class FeedbackColumns:
         self.places = Plausibility([model.no_load_steps_s for model in models])
         self._none = none = Feedback.of_none(len(setups))
         self._torque, self._fault = none.torque, none.fault
+        self._all_on = (True,) * len(setups)
+        self._tenths: tuple[int, ...] = ()
         self._temperature, self._voltage = none.temperature_c, none.voltage_v
         self._rearmed: set[int] = set()
         self.set_limits(setups)
@@ -104,6 +108,9 @@ class FeedbackColumns:
     def set_limits(self, setups: Sequence[ServoSetup]) -> None:
         """Take other ranges and armed limits for the same servos."""
         self._ranges = [(setup.min_steps, setup.max_steps) for setup in setups]
+        # Less than half a turn away from every range, no other turn is nearer.
+        self._near_low = max((high for _, high in self._ranges), default=0) - self._turn // 2 + 1
+        self._near_high = min((low for low, _ in self._ranges), default=0) + self._turn // 2 - 1
         armed = [self._family.armed(setup) for setup in setups]
         self._limits = {name: [one[name] for one in armed] for name in armed[0]} if armed else {}
 
@@ -111,46 +118,58 @@ class FeedbackColumns:
 
     def take_whole(self, answer: Whole) -> bool:
         """Take an answer in which nothing is amiss; False where anything must be looked at."""
-        values, at, at_s = answer.values, answer.group.columns, answer.at_s
+        group, _, values, at_s = answer
+        at = group.columns
         if any(values[at.error]) or (at.status is not None and any(values[at.status])):
             return False
-        if at.temperature is not None and max(values[at.temperature]) > MOST_CELSIUS:
+        position = values[at.position]
+        if self._signs:
+            position = _signed(position, self._signs["position"])
+        if at.torque is not None and not self._armed_as_left(values, at.torque, at, position):
             return False
-        position = self._signed("position", values[at.position])
-        if at.torque is not None:
-            if values[at.torque] != self._armed or not self._keeps_limits(values, at):
-                return False
-            # Without torque a zero may be that of an indirect block without addresses.
-            if not self._engaged and 0 in position:
-                return False
-            self._torque = (self._engaged,) * len(position)
         if self._turn:
-            position = tuple(
-                [
-                    p if low <= p <= high else nearest_turn(p, low, high, self._turn)
-                    for p, (low, high) in zip(position, self._ranges, strict=True)
-                ]
-            )
+            position = self._all_near(position)
+        warm = self._temperature if at.temperature is None else values[at.temperature]
+        if warm is not self._temperature and warm != self._temperature and max(warm) > MOST_CELSIUS:
+            return False
         if not self.places.whole(position, at_s):
             return False
-        if at.temperature is not None:
-            self._temperature = values[at.temperature]
-        if at.voltage is not None:
-            self._voltage = tuple([0.1 * tenths for tenths in values[at.voltage]])
-        effort, unit = self._signed("effort", values[at.effort]), self._velocity_unit
-        loads = [e * share for e, share in zip(effort, self._load_units, strict=True)]
-        if max(loads) > 1.0 or min(loads) < -1.0:
-            loads = [max(-1.0, min(1.0, load)) for load in loads]
-        velocity = self._signed("velocity", values[at.velocity])
-        self._take_all(position, tuple([v * unit for v in velocity]), tuple(loads), at_s)
+        self._temperature = warm
+        if at.voltage is not None and (tenths := values[at.voltage]) != self._tenths:
+            self._tenths, self._voltage = tenths, tuple([0.1 * volts for volts in tenths])
+        velocity, effort = values[at.velocity], values[at.effort]
+        if self._signs:
+            velocity = _signed(velocity, self._signs["velocity"])
+            effort = _signed(effort, self._signs["effort"])
+        load = tuple(map(mul, effort, self._load_units))
+        if max(load) > 1.0 or min(load) < -1.0:
+            load = tuple([max(-1.0, min(1.0, share)) for share in load])
+        speed = tuple(map(mul, velocity, self._velocity_units))
+        self._take_all(position, speed, load, at_s)
         return True
 
-    def _signed(self, field: str, column: tuple[int, ...]) -> tuple[int, ...]:
-        """Return a column whose sign may be a bit of its own."""
-        bit = self._signs.get(field)
-        if bit is None or max(column) < (sign := 1 << bit):
-            return column
-        return tuple([value if value < sign else sign - value for value in column])
+    def _armed_as_left(
+        self, values: tuple[Any, ...], torque: slice, at: Columns, position: Sequence[int]
+    ) -> bool:
+        """Return whether an answer tells of all servos what they were left with; take it then."""
+        if values[torque] != self._armed or not self._keeps_limits(values, at):
+            return False
+        # Without torque a zero may be that of an indirect block without addresses.
+        if not self._engaged and 0 in position:
+            return False
+        self._torque = self._all_on if self._engaged else self._none.torque
+        return True
+
+    def _all_near(self, position: tuple[int, ...]) -> tuple[int, ...]:
+        """Return positions, whole turns added, nearest to their ranges."""
+        if min(position) >= self._near_low and max(position) <= self._near_high:
+            return position
+        return tuple(
+            [
+                nearest_turn(p, low, high, self._turn)
+                for p, (low, high) in zip(position, self._ranges, strict=True)
+            ]
+        )
 
     def _keeps_limits(self, values: tuple[Any, ...], at: Columns) -> bool:
         """Return whether an answer tells the limits that were armed, as far as it tells them."""
@@ -212,7 +231,7 @@ class FeedbackColumns:
             if warm is not None and warm <= MOST_CELSIUS:
                 self._temperature = with_value(self._temperature, slot, warm)
             if sample.voltage is not None:
-                self._voltage = with_value(self._voltage, slot, 0.1 * sample.voltage)
+                self._set_voltage(slot, sample.voltage)
         load = max(-1.0, min(1.0, sample.effort * self._load_units[slot]))
         position = self._near(slot, sample.position)
         self._take_one(slot, position, sample.velocity * self._velocity_unit, load, heard.at_s)
@@ -246,8 +265,11 @@ class FeedbackColumns:
 
     def set_climate(self, slot: int, tenth_volts: int, temperature_c: int) -> None:
         """Record a servo's voltage and temperature."""
-        self._voltage = with_value(self._voltage, slot, 0.1 * tenth_volts)
+        self._set_voltage(slot, tenth_volts)
         self._temperature = with_value(self._temperature, slot, float(temperature_c))
+
+    def _set_voltage(self, slot: int, tenth_volts: int) -> None:
+        self._voltage, self._tenths = with_value(self._voltage, slot, 0.1 * tenth_volts), ()
 
     def hold(self, slot: int, position: int, at_s: float, torque: bool) -> None:
         """Take the place of a servo that was just set up again and stands still."""
@@ -260,3 +282,11 @@ class FeedbackColumns:
 def with_value(column: tuple[Value, ...], slot: int, value: Value) -> tuple[Value, ...]:
     """Return a column in which one servo has another value."""
     return (*column[:slot], value, *column[slot + 1 :])
+
+
+def _signed(column: tuple[int, ...], bit: int) -> tuple[int, ...]:
+    """Return a column whose sign is a bit of its own."""
+    sign = 1 << bit
+    if max(column) < sign:
+        return column
+    return tuple([value if value < sign else sign - value for value in column])

@@ -58,6 +58,9 @@ class SyncRead:
         self._heads = tuple(codec.status_head(i, window.length) for i in ids)
         one = f"{len(codec.status_head(0, 0))}sB{window.layout}{codec.CHECK}"
         self._layout = struct.Struct(window.order + one * len(ids))
+        before, after = codec.CHECKED
+        part = f"{before}x{self._size - before - after}s{after}x"
+        self._parts = struct.Struct(part * len(ids))
         self._stride = 3 + len(window.fields)
         self.columns = window.columns(1, 2, self._stride)
 
@@ -69,7 +72,7 @@ class SyncRead:
         if values[0 :: self._stride] != self._heads:
             return None
         checks = values[self._stride - 1 :: self._stride]
-        return values if self._codec.all_intact(raw, self._size, checks) else None
+        return values if self._codec.all_intact(self._parts.unpack(raw), checks) else None
 
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""

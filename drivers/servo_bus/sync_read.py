@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.servo_bus.poll_list import Roll, silent_ones
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
-from gazerig.drivers.servo_bus.read_windows import Sample, WindowSchedule
+from gazerig.drivers.servo_bus.read_windows import ReadWindow, Sample, WindowSchedule
 from gazerig.drivers.servo_bus.sync_packets import GroupRead, SyncRead, Values
 from gazerig.drivers.servo_bus.transaction import Line
 
@@ -59,6 +59,8 @@ class Reader:
         self._until_s = inf
         self._unanswered_s: dict[int, float] = {}
         self._groups: dict[tuple[tuple[int, ...], int, int], GroupRead] = {}
+        self._prepared_ids: tuple[int, ...] = ()
+        self._prepared: dict[ReadWindow, GroupRead] = {}
 
     def read(self, now_s: float) -> Whole | dict[int, Heard]:
         """Read everybody who is asked now; who is not in the answer gave no good one.
@@ -138,6 +140,15 @@ class Reader:
     def _group(self, ids: tuple[int, ...], turns: WindowSchedule) -> GroupRead:
         """Return the prepared exchange for some servos."""
         window = turns.next()
+        if ids is not self._prepared_ids:  # the hash of many ids is not made in every tick
+            self._prepared_ids, self._prepared = ids, {}
+        group = self._prepared.get(window)
+        if group is None:
+            group = self._prepared[window] = self._prepare(ids, window)
+        return group
+
+    def _prepare(self, ids: tuple[int, ...], window: ReadWindow) -> GroupRead:
+        """Return the exchange for some servos, made once."""
         key = ids, window.address, window.length
         group = self._groups.get(key)
         if group is None:

@@ -56,7 +56,7 @@ class Line:
         self.starved = False
         self.asleep_s = 0.0
         self.lateness = HostLateness()
-        self._unheard = self._owed = self._clean = False
+        self._unheard = self._owed = False
         self.quiet = True
         self.whole_s = self.deadline_s = 0.0
         self.baud, self._byte_s = baud, BITS_PER_BYTE / baud
@@ -96,14 +96,11 @@ class Line:
             reserve: wait for as long as the time-out's reserve goes; else only promptly.
         """
         port, timeout = self.port, self.timeout
-        waited = False
-        if not self._clean:
-            # What is here before the question cannot be its answer: it is that of an earlier one.
-            # After a whole answer nothing is: what came beside it makes the next one not whole.
-            waited = self._owed and bool(port.getBytesAvailable())
-            if waited:
-                self._note_late(port.read_until(_ROOM, port.now_s()))
-            port.clearPort()
+        # What is here before the question cannot be its answer: it is that of an earlier one.
+        waited = self._owed and bool(port.getBytesAvailable())
+        if waited:
+            self._note_late(port.read_until(_ROOM, port.now_s()))
+        port.clearPort()
         self.send(request)
         self.quiet = False
         self.whole_s = whole_s = self._free_s + length * self._byte_s
@@ -123,14 +120,12 @@ class Line:
         self._unheard = not raw
         if len(raw) == length:
             timeout.note(at_s - whole_s)
-            self._clean = not self._owed
         else:
             timeout.waited_in_vain(at_s - whole_s - prompt_s, at_s)
         return raw, at_s
 
     def complete(self, raw: bytes, missing: Callable[[bytes], int], deadline_s: float) -> bytes:
         """Wait on for an answer that has turned out to be longer than its shortest form."""
-        self._clean = False
         while wanted := missing(raw):
             more = self.port.read_until(wanted, deadline_s)
             if not more:
@@ -145,7 +140,6 @@ class Line:
 
         Gives up on a line that never falls silent.
         """
-        self._clean = False
         end_s = self.port.now_s() + BABBLE_S
         dropped = b""
         while True:
@@ -202,7 +196,6 @@ class Line:
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos once; gives those of who answered well."""
         codec = self.family.codec
-        self._clean = False
         self.port.clearPort()
         self.send(codec.sync_read(ids, address, length))
         deadline_s = self._ends_s(len(ids) * (length + codec.STATUS_OVERHEAD))
