@@ -1,6 +1,7 @@
 """What README and docs name is there: keys, files, links, functions, tests."""
 
 import ast
+import importlib.util
 import re
 from collections.abc import Iterator
 from dataclasses import fields
@@ -25,7 +26,7 @@ from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.scenes.registry import scenes
 
-FOLDERS = ("config", "drivers", "gaze", "robot", "sim_mock")
+FOLDERS = ("api", "config", "drivers", "gaze", "robot", "sim_mock")
 RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
 
 
@@ -104,6 +105,16 @@ def test_what_waits_for_the_next_start_is_told() -> None:
         assert {own, key} & told, key
     for key in told:
         assert any(key in (other, *other.split(".")) for other in [*later, "buses"]), key
+
+
+def test_the_list_of_parameters_is_that_of_the_declarations() -> None:
+    path = ROOT / "docs" / "make_parameters.py"
+    spec = importlib.util.spec_from_file_location("make_parameters", path)
+    assert spec is not None and spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    paper = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
+    assert paper == made.text(), "run python docs/make_parameters.py"
 
 
 def test_yaml_shown_has_keys_that_there_are() -> None:

@@ -8,6 +8,7 @@ import pytest
 from desk import JOINTS
 
 from gazerig.config.load import ConfigError, shipped, shipped_names
+from gazerig.config.save_text import comment
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
 
 DESK = shipped("rigs", "desk")
@@ -36,6 +37,10 @@ def test_the_desk_rig_is_the_head_described() -> None:
     assert (pan.min_deg, pan.max_deg, tilt.min_deg, tilt.max_deg) == (-35, 35, -30, 30)
 
 
+SHORT = ("simple_order",)
+"""Keys whose choices stand above them, not again in their comment."""
+
+
 def test_every_key_of_the_desk_rig_is_commented() -> None:
     lines = DESK.read_text(encoding="utf-8").splitlines()
     names = rf"\s*({'|'.join(JOINTS)}|wait|guard|attack):"
@@ -47,6 +52,28 @@ def test_every_key_of_the_desk_rig_is_commented() -> None:
         if "#" not in line and not re.match(names, line) and not above.strip().startswith("#"):
             plain.append(line)
     assert keys > 150 and plain == []
+
+
+def test_the_desk_rig_explains_its_keys_as_they_are_declared() -> None:
+    lines = DESK.read_text(encoding="utf-8").splitlines()
+    seen, other = 0, []
+    path: list[str] = []
+    for number, line in enumerate(lines):
+        found = re.match(r"( *)(\w+):", line)
+        if found is None:
+            continue
+        path = [*path[: len(found[1]) // 2], found[2]]
+        if path[0] not in ("gaze", "guard", "tracks", "loop", "motion", "detector", "oak"):
+            continue
+        said = line.partition("  # ")[2]
+        above = number - 1
+        while not said and lines[above].strip().startswith("#"):
+            above -= 1
+        said = said or " ".join(one.strip()[2:] for one in lines[above + 1 : number])
+        seen += 1
+        if said != comment(Rig, path) and path[-1] not in ("wait", "guard", "attack", *SHORT):
+            other.append((".".join(path), said, comment(Rig, path)))
+    assert seen > 200 and other == []
 
 
 def test_the_desk_rig_spells_out_every_default(tmp_path: Path) -> None:

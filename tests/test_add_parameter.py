@@ -1,0 +1,77 @@
+"""The paper's "Adding a parameter", done as it stands there, on a copy of the model's room."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+TRY = """
+import json
+from gazerig.config.export import json_schema
+from gazerig.config.knobs import changed, knobs
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import Rig, load_rig
+from gazerig.gaze.saccade import SaccadeModel
+
+rig, key = load_rig("desk"), "gaze.saccade.rise_share"
+(knob,) = [one for one in knobs(rig, rig) if one.key == key]
+other = changed(rig, {key: 0.3})
+model = SaccadeModel(changed(rig, {"gaze.saccade.profile": "main_sequence"}).gaze.saccade)
+before = model.displacement_rad(0.1, 0.01)
+model.retune(changed(other, {"gaze.saccade.profile": "main_sequence"}).gaze.saccade)
+try:
+    changed(rig, {key: 0.6})
+    refused = ""
+except ConfigError as error:
+    refused = str(error)
+schema = json_schema(Rig)["$defs"]["SaccadeParams"]["properties"]["rise_share"]
+print(json.dumps({
+    "knob": knob._asdict(), "schema": schema, "refused": refused,
+    "moved": model.displacement_rad(0.1, 0.01) - before,
+}))
+"""
+
+
+def patched(text: str, hunk: str) -> str:
+    """Return a text with one hunk of a diff applied; what it takes away stands there once."""
+    old = "\n".join(line[1:] for line in hunk.splitlines() if line[:1] in " -")
+    new = "\n".join(line[1:] for line in hunk.splitlines() if line[:1] in " +")
+    assert text.count(old) == 1, old
+    return text.replace(old, new)
+
+
+def test_adding_a_parameter_takes_what_the_paper_says(tmp_path: Path) -> None:
+    paper = (ROOT / "docs" / "tuning.md").read_text(encoding="utf-8")
+    (diff,) = re.findall(r"```diff\n(.*?)```", paper, re.S)
+    head, *hunks = re.split(r"^(?:\+\+\+ .*|@@)\n", diff, flags=re.M)
+    name = head.split("a/", 1)[1].strip()
+    top = tmp_path / "gazerig"
+    top.mkdir()
+    for file in (ROOT / "api").iterdir():
+        (top / file.name).symlink_to(file)
+    for room in ("config", "drivers", "robot"):
+        (top / room).symlink_to(ROOT / room)
+    shutil.copytree(ROOT / "gaze", top / "gaze")
+    text = (top / name).read_text(encoding="utf-8")
+    for hunk in hunks:
+        text = patched(text, hunk.rstrip("\n"))
+    (top / name).write_text(text, encoding="utf-8")
+    found = subprocess.run(
+        [sys.executable, "-c", TRY],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    made = json.loads(found.stdout)
+    knob = made["knob"]
+    assert (knob["low"], knob["high"], knob["default"], knob["unit"]) == (0.3, 0.5, 0.45, "")
+    assert knob["live"] == "next tick" and "share of the rise" in knob["says"]
+    assert (made["schema"]["minimum"], made["schema"]["maximum"]) == (0.3, 0.5)
+    assert "gaze.saccade.rise_share: 0.6 is above 0.5" in made["refused"]
+    assert made["moved"] > 1e-4
