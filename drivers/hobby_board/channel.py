@@ -25,6 +25,7 @@ class Channel:
     rearmed: it was taken hold of anew, which nobody has been told yet
     fault: why it stays without pulses; "" where nothing is wrong
     told: a person has been told that it does not give the pulses it should
+    sent_steps: the pulse that it was sent last, where the driver leads it
 
     Args:
         setup: the servo.
@@ -46,6 +47,7 @@ class Channel:
         self._recent: deque[tuple[float, int]] = deque()
         self._bottom, self._top = -inf, inf
         self._end_steps = 0
+        self.sent_steps = 0
 
     def want(self, setup: ServoSetup) -> None:
         """Take another setup of the same servo."""
@@ -135,10 +137,12 @@ class Channel:
         """
         if not pulse_steps:
             return True
+        if self._longest_lead_s < inf:
+            return abs(pulse_steps - self.sent_steps) > FINE_STEPS
         self._forget(now_s)
         places = [self.goal_steps, *(goal for _, goal in self._recent)]
         room: float = FINE_STEPS
-        if led_away or now_s < self._settled_s or self._longest_lead_s < inf:
+        if led_away or now_s < self._settled_s:
             places.append(round(self.ramp.pulse_steps))
             room = self.room_steps()
         low, high = self._reached(min(places)), self._reached(max(places))

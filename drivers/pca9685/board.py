@@ -308,6 +308,7 @@ class Pca9685Board:
         """Send channels to where they are on the way to their goals, those of a board at once."""
         for channel in channels:
             self._sent[channel.id] = self._due(channel)
+            channel.sent_steps = self._sent[channel.id][1]
         self._send({channel.id: self._sent[channel.id][0] for channel in channels})
 
     def _send(self, counts: Mapping[int, int]) -> None:

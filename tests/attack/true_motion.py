@@ -137,7 +137,7 @@ def soak(args: argparse.Namespace) -> None:
                     break  # a person has to help: another head
         except (AssertionError, DriverError) as error:
             ends["broken"] += 1
-            print(f"{kind} seed {k}: {type(error).__name__}: {error}", flush=True)
+            print(f"{watch.where}: {type(error).__name__}: {error}", flush=True)
         stale += watch.stale
         seen_s += machine.clock.now_s() - 50.0
         if k % 100 == 0:
