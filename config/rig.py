@@ -5,7 +5,6 @@ Bounds stand with the values, in the rooms; the rules between sections in gazeri
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import inf
 from typing import Annotated
 
 from gazerig.drivers.camera.oak_params import OakParams
@@ -66,12 +65,6 @@ class BusConfig:
     def baud(self) -> int:
         """Return the speed of its line in bit/s."""
         return int(getattr(self, self.kind).baud)
-
-    @property
-    def channels(self) -> float:
-        """Return how many channels its boards have; inf where servos have ids instead."""
-        channels: float = getattr(getattr(self, self.kind), "channels", inf)
-        return channels
 
 
 @dataclass(frozen=True)

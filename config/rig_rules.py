@@ -2,10 +2,12 @@
 
 from collections.abc import Iterable
 
-from gazerig.config.rig import Rig
+from gazerig.config.rig import BusConfig, Rig
+from gazerig.drivers.hobby_board.params import BoardParams
 from gazerig.drivers.servo_models import SERVOS
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.forbidden_range import forbidden_pairs
+from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import JOINTS
 
@@ -62,12 +64,24 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
                 f"joints.{name}.model",
                 f"a {joint.model} speaks {SERVOS[joint.model].bus}, and its bus is of kind {kind}",
             )
-        elif joint.id >= (channels := rig.bus_of(name).channels):
-            yield f"joints.{name}.id", f"the board has channels 0 to {channels - 1}"
+        elif joint.model in SERVOS:
+            yield from _channel(name, joint, rig.bus_of(name))
     used = {joint.bus for joint in rig.joints.values()}
     for name in rig.buses:
         if name not in used:
             yield f"buses.{name}", "no joint is on it: take it out, or give joints this bus"
+
+
+def _channel(name: str, joint: JointParams, bus: BusConfig) -> Iterable[tuple[str, str]]:
+    """Find what keeps a joint from its channel of a board of hobby servos."""
+    params = getattr(bus, bus.kind)
+    if not isinstance(params, BoardParams):
+        return
+    try:
+        params.check(joint.setup(name))
+    except ValueError as error:
+        what = str(error).removeprefix(f"channel {joint.id}: ")
+        yield f"joints.{name}{'' if what.startswith('its range') else '.id'}", what
 
 
 def _lid_ranges(rig: Rig) -> Iterable[tuple[str, str]]:

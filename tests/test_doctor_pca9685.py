@@ -63,7 +63,7 @@ def test_a_board_that_is_not_there_is_one_finding_with_its_remedy() -> None:
 def test_a_channel_that_no_board_has() -> None:
     wrong = SETUPS[1]._replace(id=16)
     findings = visit(Rig().port, PARAMS, (SETUPS[0], wrong))
-    assert findings[0].level == "error" and "have 0..15" in findings[0].what
+    assert findings[0].level == "error" and "channels 0 to 15" in findings[0].what
     assert "eyes_tilt" in findings[0].where
 
 

@@ -374,8 +374,8 @@ def test_params_that_cannot_be_are_refused(given, told):
 
 def test_channels_and_pulses_outside_the_board_are_refused(world):
     for wrong, told in (
-        (setup(16), "1 PCA9685 have 0..15"),
-        (setup(0, min_steps=1000), "min_pulse_us 500"),
+        (setup(16), "the board has channels 0 to 15"),
+        (setup(0, min_steps=1000), "within 500..2500 us"),
     ):
         with pytest.raises(ValueError, match=told):
             Pca9685Bus(world.port, [wrong], QUICK)

@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.channel import Channel
+from gazerig.drivers.hobby_board.params import BoardParams
 from gazerig.drivers.host_lateness import HostLateness
 from gazerig.drivers.port_bus import Exchange
 from gazerig.drivers.serial.port import BusPort
@@ -104,12 +105,9 @@ class Board(Protocol):
         """Return what was found broken since the last call."""
         ...
 
-    def check(self, setup: ServoSetup) -> None:
-        """Refuse a servo that no channel of the board can have.
-
-        Raises:
-            ValueError: so it is; the message names the servo and what would be right.
-        """
+    @property
+    def params(self) -> BoardParams:
+        """Return what a rig file has chosen for it."""
         ...
 
     def find(self, setups: Sequence[ServoSetup], log: EventLog) -> tuple[int, ...]:

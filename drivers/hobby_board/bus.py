@@ -204,7 +204,7 @@ class HobbyBoardBus(PortBus):
 
     def _check_setups(self, setups: Sequence[ServoSetup]) -> None:
         for setup in setups:
-            self._board.check(setup)
+            self._board.params.check(setup)
 
     def _take_wanted(self) -> None:
         """Put in force what was asked for since the servos were held last."""

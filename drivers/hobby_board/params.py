@@ -1,9 +1,13 @@
 """What a rig file may choose for any board of hobby servos."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
+from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.params import Bounds
+
+if TYPE_CHECKING:  # the guardian starts without numpy
+    from gazerig.drivers.types import ServoSetup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,3 +23,28 @@ class BoardParams:
         "Servos without pulses start so long after one another: all at once pull a weak supply down."] = 100.0
     give_up_s: Annotated[float, Bounds(0.5, 3600), "Wait so long for a port or board that is gone to come back."] = 60.0
     # fmt: on
+
+    @property
+    def channels(self) -> int:
+        """Return how many there are."""
+        raise NotImplementedError
+
+    def ends_us(self) -> tuple[float, float, str]:
+        """Return the shortest and longest pulse that may be sent, and what decides that."""
+        raise NotImplementedError
+
+    def check(self, setup: "ServoSetup") -> None:
+        """Refuse a servo that no channel can have.
+
+        Raises:
+            ValueError: so it is; the message names the channel and what would be right.
+        """
+        if not 0 <= setup.id < self.channels:
+            raise ValueError(f"channel {setup.id}: the board has channels 0 to {self.channels - 1}")
+        low, high = setup.min_steps / US_STEPS, setup.max_steps / US_STEPS
+        least, most, decided = self.ends_us()
+        if not least <= low <= high <= most:
+            raise ValueError(
+                f"channel {setup.id}: its range {low:g}..{high:g} us must lie within "
+                f"{least:g}..{most:g} us ({decided}): narrow the joint's range"
+            )

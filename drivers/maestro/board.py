@@ -14,8 +14,6 @@ from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.start import every_pulse
 from gazerig.drivers.maestro.commands import (
     ERRORS,
-    HIGHEST,
-    LOWEST,
     MOST_INPUT,
     name_errors,
 )
@@ -46,21 +44,6 @@ class MaestroBoard:
             left_alone="the board goes on with its last goals as long as it has power",
         )
         self._errors_first = False
-
-    def check(self, setup: ServoSetup) -> None:
-        """Refuse a servo that no channel of the board can have.
-
-        Raises:
-            ValueError: so it is; the message names the servo and what would be right.
-        """
-        channels = self.params.channels
-        if not 0 <= setup.id < channels:
-            raise ValueError(f"channel {setup.id}: a board with {channels} has 0..{channels - 1}")
-        if not LOWEST <= setup.min_steps <= setup.max_steps <= HIGHEST:
-            raise ValueError(
-                f"channel {setup.id}: {setup.min_steps}..{setup.max_steps} steps must ascend "
-                f"within {LOWEST}..{HIGHEST} (64..4080 us)"
-            )
 
     def find(self, setups: Sequence[ServoSetup], log: EventLog) -> tuple[int, ...]:
         """Greet the board and return the pulses of these servos; nothing moves.

@@ -23,3 +23,7 @@ class MaestroParams(BoardParams):
     crc: Annotated[bool, "The board wants a check byte after every command: damaged ones do nothing."] = False
     channels: Annotated[int, Choices(6, 12, 18, 24), "Size of the board; the Micro Maestro has 6."] = 12
     # fmt: on
+
+    def ends_us(self) -> tuple[float, float, str]:
+        """Return the shortest and longest pulse that a board can give."""
+        return 64.0, 4080.0, "what a Maestro can give"

@@ -30,7 +30,6 @@ from gazerig.drivers.pca9685.registers import (
     SLEEP,
     START_S,
     TOTEM_POLE,
-    US_STEPS,
     Clock,
     counts_of,
     counts_within,
@@ -93,24 +92,6 @@ class Pca9685Board:
         self._looks = 0
 
     # --- places and units
-
-    def check(self, setup: ServoSetup) -> None:
-        """Refuse a servo that no channel of the boards can have.
-
-        Raises:
-            ValueError: so it is; the message names the servo and what would be right.
-        """
-        params = self.params
-        if not 0 <= setup.id < params.channels:
-            raise ValueError(
-                f"channel {setup.id}: {len(params.addresses)} PCA9685 have 0..{params.channels - 1}"
-            )
-        low, high = setup.min_steps / US_STEPS, setup.max_steps / US_STEPS
-        if not params.min_pulse_us <= low <= high <= params.max_pulse_us:
-            raise ValueError(
-                f"channel {setup.id}: {low:g}..{high:g} us must ascend within min_pulse_us "
-                f"{params.min_pulse_us:g} and max_pulse_us {params.max_pulse_us:g}"
-            )
 
     def _place(self, servo_id: int) -> tuple[int, int]:
         """Return the address of a servo's board, and its channel there."""

@@ -32,7 +32,7 @@ def visit(port: BusPort, params: Pca9685Params, setups: Sequence[ServoSetup]) ->
     findings, fitting = [], []
     for setup in setups:
         try:
-            board.check(setup)
+            params.check(setup)
             fitting.append(setup)
         except ValueError as error:
             what = str(error).removeprefix(f"channel {setup.id}: ")

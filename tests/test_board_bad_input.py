@@ -1,0 +1,87 @@
+"""What cannot be right about a board of hobby servos: one line with its cure, and nothing moves."""
+
+import errno
+import json
+from pathlib import Path
+
+import pytest
+from board_rig import SECTION, on_pca9685
+from typer.testing import CliRunner
+
+from gazerig.drivers.errors import PortError
+from gazerig.drivers.i2c import port as i2c
+from gazerig.robot.cli.main import app
+from gazerig.sim_mock.devices import Emulated, MaestroLine, Pca9685Line
+from gazerig.sim_mock.pty.client import PtyBus
+
+PULSES = "hobby servos without pulses go to their parking place"
+
+
+def jog(rig: str, *words: str) -> str:
+    """Type a jog that must be refused; return what is said, in one line."""
+    result = CliRunner().invoke(app, ["jog", rig, "eyes_pan", "5", "--yes", *words])
+    assert result.exit_code == 2, result.output
+    (line,) = [one for one in result.stderr.splitlines() if PULSES not in one]
+    return line
+
+
+@pytest.mark.parametrize(
+    ("was", "written", "told"),
+    [
+        ("kind: pca9685", "kind: pca6985", "bus.kind: 'pca6985' is not one of 'dynamixel', "
+         "'feetech', 'maestro', 'pca9685'; did you mean 'pca9685'?"),
+        ("0x40", "0x70", "bus.pca9685: address 0x70 is reserved: boards have 0x40 to 0x77"),
+        ("frequency_hz: 50", "frequency_hz: 330, max_pulse_us: 2900", "lower frequency_hz"),
+        ("frequency_hz: 50", "min_pulse_us: 1200", "joints.eyes_pan: its range 1096.25..1926.75 us "
+         "must lie within 1200..2500 us (min_pulse_us, max_pulse_us): narrow the joint's range"),
+        ("kind: pca9685", "kind: maestro", "/dev/i2c-1 is an I2C bus and no serial port: name the "
+         "adaptor's port with --port or in the YAML, or say that the kind of the bus is pca9685"),
+        ("i2c-1", "i2c-99", "no I2C bus /dev/i2c-99: switch I2C on"),
+    ],
+)  # fmt: skip
+def test_a_file_that_cannot_be_right(tmp_path: Path, was: str, written: str, told: str) -> None:
+    assert told in jog(on_pca9685(tmp_path, SECTION.replace(was, written)))
+
+
+def test_a_channel_that_no_board_has(tmp_path: Path) -> None:
+    path = Path(on_pca9685(tmp_path))
+    text = path.read_text(encoding="utf-8").replace("id: 0\n", "id: 16\n", 1)
+    path.write_text(text, encoding="utf-8")
+    assert "joints.eyes_pan.id: the board has channels 0 to 15" in jog(str(path))
+
+
+@pytest.mark.parametrize(
+    ("device", "rig", "fault", "told"),
+    [
+        (Pca9685Line((0x41,)), "pca9685", "", "no PCA9685 answers at 0x40: has the board its logic "
+         "supply (VCC, not V+ alone)? check SDA, SCL and ground; its jumpers make the address"),
+        (Pca9685Line(), "pca9685", "foreign on", "what answers at 0x40 is no PCA9685: another chip "
+         "has this address; close a jumper and write the new one under bus.pca9685.address"),
+        (Pca9685Line(), "pca9685", "stuck on", "the I2C bus is stuck"),
+        (Pca9685Line(), "maker", "", "no Maestro answers: on USB take the first of its two ports"),
+        (MaestroLine(12), "pca9685", "", "nobody answers as an I2C bus (timeout): a PCA9685 is "
+         "reached over an I2C bus such as /dev/i2c-1: write it under bus.port"),
+    ],
+)  # fmt: skip
+def test_a_board_that_is_not_the_one(
+    tmp_path: Path, device: Emulated, rig: str, fault: str, told: str
+) -> None:
+    with PtyBus() as bus:
+        path = bus.start_device(device)
+        if fault:
+            bus.command(fault)
+        assert told in jog(on_pca9685(tmp_path) if rig == "pca9685" else rig, "--port", path)
+        assert not any(one["target"] for one in json.loads(bus.command("status"))["servos"])
+
+
+def test_a_bus_without_the_right_to_open_it_names_the_group(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(i2c, "group_of", lambda path: "gpio")
+
+    def refused(path: str) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    with pytest.raises(PortError, match="no right to open /dev/i2c-1: join its group") as error:
+        i2c.I2cPort("/dev/i2c-1", open_bus=refused).setBaudRate(115_200)
+    assert "usermod -aG gpio $USER" in str(error.value)
