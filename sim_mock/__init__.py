@@ -1,1 +1,1 @@
-"""A second world: emulated servos that answer protocol bytes, people who move, a camera."""
+"""Simulated hardware and surroundings: servos that answer protocol bytes, people, cameras."""

@@ -1,4 +1,4 @@
-"""What a line asks of whatever is emulated at its other end: bytes in, pieces of answers out."""
+"""Interface between a line and the device emulated at its end: bytes in, timed answers out."""
 
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -8,7 +8,7 @@ from gazerig.sim_mock.replies import Piece
 
 
 class DeviceReply(NamedTuple):
-    """What an instruction is answered with; ``end``: where it ended among the bytes sent."""
+    """Answer to one instruction; ``end``: position in the sent bytes behind its last byte."""
 
     end: int
     pieces: list[Piece]
@@ -55,7 +55,7 @@ class Device(Protocol):
         ...
 
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
-        """Take bytes off the wire and give what is answered to each instruction in them."""
+        """Process received bytes and return the answer to each instruction in them."""
         ...
 
     def choose(self, case: str, value: str) -> None:

@@ -1,4 +1,4 @@
-"""Servos as words: ``1-6:xl330-m077,7:xc330-m288@1024``, ids, model and where they start."""
+"""Servos written as text: ``1-6:xl330-m077,7:xc330-m288@1024`` (ids, model, start position)."""
 
 import re
 from collections.abc import Iterable
@@ -70,7 +70,7 @@ def _read(part: str) -> tuple[range, str, int]:
 
 
 def _see_one_kind(specs: Iterable[ServoSpec]) -> None:
-    """Refuse servos that do not speak one language.
+    """Refuse servos of different protocols on one line.
 
     Raises:
         SetupError: names one of each kind.

@@ -1,4 +1,4 @@
-"""What can be emulated, as plain data that travels to another process, and how it is built."""
+"""Emulated devices as plain data that can be sent to another process, and how they are built."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -40,26 +40,31 @@ CHANNELS: tuple[int, ...] = choices_of(MaestroParams, "channels")
 
 
 @dataclass(frozen=True, slots=True)
-class DynamixelLine:
-    """Dynamixel servos on one line.
+class _SmartServoLine:
+    """Smart servos on one line.
 
-    baud: the servos' rate, clients at another are not heard; None: every client is
+    Attributes:
+        servos: one specification each.
+        baud: the servos' rate, clients at another are not heard; None: every client is.
     """
 
     servos: tuple[ServoSpec, ...]
     baud: int | None = None
+    listens: ClassVar[str] = "the servos listen"
+
+
+class DynamixelLine(_SmartServoLine):
+    """Dynamixel servos on one line."""
+
+    __slots__ = ()
     kind: ClassVar[BusKind] = "dynamixel"
-    listens: ClassVar[str] = "the servos listen"
 
 
-@dataclass(frozen=True, slots=True)
-class FeetechLine:
-    """Feetech STS servos on one line; the rest as for Dynamixel servos."""
+class FeetechLine(_SmartServoLine):
+    """Feetech servos on one line."""
 
-    servos: tuple[ServoSpec, ...]
-    baud: int | None = None
+    __slots__ = ()
     kind: ClassVar[BusKind] = "feetech"
-    listens: ClassVar[str] = "the servos listen"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What emulated servos say: one answer each, and the pieces of bytes that put it on the line."""
+"""Answers of emulated servos, and the timed pieces of bytes they are sent as."""
 
 from typing import NamedTuple
 
@@ -6,10 +6,10 @@ BROADCAST = 0xFE
 
 
 class Answer(NamedTuple):
-    """What one servo has to say.
+    """The answer of one servo.
 
     delay_s: its return delay; late_s: what it waits beyond that
-    twin: what another servo with the same id says at the same time
+    twin: the answer of another servo with the same id at the same time
     """
 
     servo_id: int
@@ -33,6 +33,6 @@ class Piece(NamedTuple):
 
 
 def merge(one: bytes, other: bytes) -> bytes:
-    """Mix what two servos send at once: the line is low where either pulls it low."""
+    """Return the bytes of two servos that send at once: a bit is 0 where either sends 0."""
     longer, shorter = (one, other) if len(one) >= len(other) else (other, one)
     return bytes(a & b for a, b in zip(longer, shorter, strict=False)) + longer[len(shorter) :]

@@ -1,4 +1,4 @@
-"""Where the gaze is against where the person truly is: what only a simulated world can tell."""
+"""The gaze compared with the true position of the person, which only a simulation knows."""
 
 from gazerig.gaze.angles import add, angle_between, rotate, rotation, scale, sub, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight

@@ -1,4 +1,4 @@
-"""A line between the host and an emulated device: when which bytes arrive. Pure arithmetic.
+"""Timing of the line between the host and an emulated device. Pure arithmetic.
 
 With wire time a byte takes 10 bits at the client's baud rate in either direction, every
 status leaves after its servo's return delay (a fast reply only after the first servo's)
@@ -45,20 +45,20 @@ class ServoLine:
 
     @property
     def busy(self) -> bool:
-        """True if bytes are still on their way, or may come by themselves."""
+        """True if bytes are in transit, or may arrive unasked."""
         return bool(self._late) or self.device.faults.on("babble")
 
     def next_due_s(self) -> float | None:
-        """Return when the next bytes arrive, None where none are on their way."""
+        """Return the arrival time of the next bytes, None if none are in transit."""
         return self._late[0][0] if self._late else None
 
     def forget(self) -> None:
-        """Drop what is on its way."""
+        """Drop bytes in transit."""
         self._late.clear()
         self._host_free_s = self._line_free_s = 0.0
 
     def arrived(self) -> bytes:
-        """Return the bytes that have arrived by now and were not given before."""
+        """Return the bytes that have arrived since the last call."""
         now_s = self.device.now_s()
         out = [self.device.faults.wire.babble(now_s)] if self.device.faults.wire.any else []
         while self._late and self._late[0][0] <= now_s:
@@ -84,7 +84,7 @@ class ServoLine:
         return self.arrived()
 
     def _disturbed(self, replies: list[DeviceReply]) -> list[DeviceReply]:
-        """Let noise strike the answers, and a line with a memory say the last ones again first."""
+        """Apply noise to the answers, and repeat the previous ones first if that fault is on."""
         wire, now_s = self.device.faults.wire, self.device.now_s()
         said = b"".join(piece.data for reply in replies for piece in reply.pieces)
         before, self._said = self._said, said or self._said
@@ -101,7 +101,7 @@ class ServoLine:
         return any(piece.late_s for reply in replies for piece in reply.pieces)
 
     def _queue_late(self, replies: list[DeviceReply], now_s: float) -> None:
-        """Queue answers that take no time but what they wait beyond the ordinary."""
+        """Queue answers that take no time beyond the delay of a fault."""
         due_s = max(now_s, self._late[-1][0] if self._late else now_s)
         for reply in replies:
             for piece in reply.pieces:

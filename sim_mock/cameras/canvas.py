@@ -1,4 +1,4 @@
-"""A picture in the making: flat pieces of the world drawn as a camera sees them.
+"""Draws flat pieces of the world as a camera sees them.
 
 Whatever is drawn later covers what was drawn before, so the farthest comes first. The lens
 does not distort. World frame, metres; camera frame optical, x right, y down, z forward.
@@ -49,7 +49,7 @@ class Picture3d:
         self.p_m = np.array(p_m)
 
     def seen(self, points_world_m: ArrayLike) -> Floats:
-        """Bring points (n, 3) into the camera frame."""
+        """Transform points (n, 3) into the camera frame."""
         points = np.asarray(points_world_m, dtype=np.float64).reshape(-1, 3)
         seen: Floats = (points - self.p_m) @ self.R_world_camera
         return seen

@@ -111,7 +111,7 @@ def true_lens(width_px: int, height_px: int, horizontal_field_deg: float = 69.0)
 
 @lru_cache(maxsize=4)
 def _fine_rays(width_px: int, height_px: int, lens: Intrinsics) -> NDArray[np.float32]:
-    """Return where the looks of all pixels meet the plane z = 1: (looks * h, looks * w, 2)."""
+    """Return where sampled rays of all pixels meet the plane z = 1: (looks * h, looks * w, 2)."""
     steps = (np.arange(_LOOKS) + 0.5) / _LOOKS - 0.5
     x = (np.arange(width_px)[:, None] + steps).ravel()
     y = (np.arange(height_px)[:, None] + steps).ravel()

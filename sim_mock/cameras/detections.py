@@ -44,7 +44,7 @@ class SceneCameraParams:
 
 
 class SceneCamera:
-    """A gazerig.drivers.types.Camera on a scene; everything happens when it is looked at."""
+    """A gazerig.drivers.types.Camera in a scene; frames are computed on demand."""
 
     def __init__(
         self,
@@ -87,11 +87,11 @@ class SceneCamera:
         return self._arrived
 
     def events(self) -> tuple[str, ...]:
-        """Have nothing to tell."""
+        """Return no events: nothing can happen to it."""
         return ()
 
     def close(self) -> None:
-        """Stop; nothing is held."""
+        """Stop; there is nothing to free."""
 
     def _expose(self, t_s: float) -> Detections:
         """Take one picture from where the camera is."""

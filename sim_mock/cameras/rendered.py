@@ -72,7 +72,7 @@ class PixelCameraParams:
 
 
 class PixelCamera:
-    """A gazerig.drivers.types.Camera on a drawn scene; everything happens when it is looked at."""
+    """A gazerig.drivers.types.Camera in a drawn scene; frames are computed on demand."""
 
     def __init__(
         self,
@@ -144,11 +144,11 @@ class PixelCamera:
         return True
 
     def events(self) -> tuple[str, ...]:
-        """Say what has happened since the last call: nothing ever does."""
+        """Return no events: nothing can happen to it."""
         return ()
 
     def close(self) -> None:
-        """Stop; nothing is held."""
+        """Stop; there is nothing to free."""
 
     def _looked_at(self, shot: Exposure) -> Detections:
         """Let the detectors look at a picture."""
@@ -208,7 +208,7 @@ class PixelCamera:
         return out
 
     def _piece(self, size: int) -> NDArray[np.float32]:
-        """Return a piece of the stock of noise, another each time."""
+        """Return a slice of the prepared noise, another one each time."""
         start = int(self._rng.integers(0, _NOISE_STOCK))
         return np.take(self._noise, np.arange(start, start + size), mode="wrap")
 
@@ -232,7 +232,7 @@ def draw_scene(canvas: Picture3d, scene: Scene, scene_s: float, room_seed: int =
 
 
 def smeared(picture: NDArray[np.uint8], way_px: tuple[float, float]) -> NDArray[np.uint8]:
-    """Smear a picture evenly along a way (x, y) through each pixel's place."""
+    """Blur a frame evenly along a displacement (x, y) in pixels."""
     length = hypot(*way_px)
     if length < 1.0:
         return picture
@@ -251,5 +251,5 @@ def smeared(picture: NDArray[np.uint8], way_px: tuple[float, float]) -> NDArray[
 
 
 def _later(draw: Callable[..., None], *what: Any) -> Callable[[], None]:
-    """Keep a call for later."""
+    """Return a call to be made later."""
     return lambda: draw(*what)

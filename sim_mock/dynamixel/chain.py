@@ -69,7 +69,7 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
         return not touches_eeprom(code, params)
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
-        """Feed every bus watchdog, after those that have starved have tripped; then obey."""
+        """Let expired bus watchdogs trip, reset the others, then carry out the instruction."""
         if instruction.code < 0:
             return self._reject(instruction.servo_id)
         if self._now_ms - self._fed_ms >= MIN_WATCHDOG_MS:
@@ -79,7 +79,7 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
         return super()._execute(instruction)
 
     def _reject(self, servo_id: int) -> list[Piece]:
-        """Meet an instruction with a wrong CRC."""
+        """Answer an instruction with a wrong CRC, as the quirks say."""
         servo = self._by_id.get(servo_id)
         if servo is None or not servo.advance(self._now_ms, self._fed_ms):
             return []
@@ -91,7 +91,7 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
     # --- groups
 
     def _fast(self, rows: Sequence[GroupRead]) -> list[Piece]:
-        """Answer as one packet; a servo that refuses fills its block with zeros."""
+        """Return one packet of all answers; a servo that refuses fills its block with zeros."""
         length = 1 + sum([4 + row[2] for row in rows])
         if not self._wire.any and not self._twins:
             packet = fast_reply(self._by_id, rows, length, self._now_ms, self._fed_ms)
@@ -99,7 +99,7 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
         return self._fast_with_faults(rows, length)
 
     def _fast_with_faults(self, rows: Sequence[GroupRead], length: int) -> list[Piece]:
-        """Do the same block by block, where some are missing, spoilt or sent by two servos."""
+        """Build the same block by block: some are missing, damaged or sent by two servos."""
         answers: list[Answer] = []
         for servo_id, address, size in rows:
             servo = self._by_id.get(servo_id)

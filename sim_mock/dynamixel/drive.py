@@ -11,14 +11,6 @@ from gazerig.drivers.dynamixel.control_table import (
     VELOCITY_UNIT_STEPS_S,
     Model,
 )
-from gazerig.sim_mock.dynamixel.live_registers import (
-    ARRIVED,
-    ASTRAY,
-    FOLLOWING_STEPS,
-    IN_POSITION_STEPS,
-    RUNNING,
-    Live,
-)
 from gazerig.sim_mock.dynamixel.memory import DynamixelMemory
 from gazerig.sim_mock.dynamixel.modes import (
     BY_TIME,
@@ -44,6 +36,13 @@ HOMING_ACTS_STEPS = 1024
 LARGEST = 32767
 """Largest number that Present Current can hold."""
 
+ARRIVED, RUNNING, ASTRAY = 1, 2, 8
+"""Bits of Moving Status (123): in position, profile ongoing, following error."""
+
+IN_POSITION_STEPS = 12
+FOLLOWING_STEPS = 100
+"""Distances that decide over in position and following error; no document tells them."""
+
 _WATCHDOG_AT = 98
 _SPEED_UNIT = VELOCITY_UNIT_STEPS_S / 1000.0
 _RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
@@ -68,7 +67,7 @@ class DynamixelDrive(Drive):
         super().__init__(memory, model, spec)
 
     def boot(self) -> None:
-        """Begin without torque, within one turn, with goals where a mode begins."""
+        """Reset to power-on: torque off, position within one turn, goals at their start values."""
         self.torque = False
         self.shaft.disable()
         self.mode = self.memory.get("operating_mode")
@@ -101,30 +100,32 @@ class DynamixelDrive(Drive):
         amps += round(current)
         return max(-self._max_current, min(self._max_current, amps)), speed, at
 
-    def live(self, tick_ms: int, now_ms: int) -> Live:
-        """Return what the profile does."""
-        shaft, side, sensed = self.shaft, self._side, self.sensed(now_ms)
-        profile = shaft.profile
+    def motion(self, now_ms: int) -> tuple[bool, int, int]:
+        """Return moving, moving status and PWM in register units."""
+        shaft, profile, (_, velocity, position) = (
+            self.shaft,
+            self.shaft.profile,
+            self.sensed(now_ms),
+        )
         running = self.torque and profile.running and profile.v != profile.goal
         status = running * RUNNING | profile.kind << 4
         if self.torque and self.mode in POSITION_MODES:
             goal = self.memory.get("goal_position")
-            status |= (not running and abs(goal - sensed[2]) <= IN_POSITION_STEPS) * ARRIVED
+            status |= (not running and abs(goal - position) <= IN_POSITION_STEPS) * ARRIVED
             status |= (abs(profile.r - shaft.x) > FOLLOWING_STEPS) * ASTRAY
+        moving = running or abs(velocity) > self.memory.get("moving_threshold")
+        return moving, status, round(self._side * shaft.u * PWM_FULL)
+
+    def reference(self) -> tuple[int, int]:
+        """Return the velocity and position that the profile asks for, in register units."""
+        shaft, side, profile = self.shaft, self._side, self.shaft.profile
         place = shaft.x if isinstance(profile, SpeedProfile) else profile.r
-        return Live(
-            tick_ms=tick_ms,
-            moving=running or abs(sensed[1]) > self.memory.get("moving_threshold"),
-            status=status,
-            pwm=round(side * shaft.u * PWM_FULL),
-            velocity_asked=round(side * profile.v / _SPEED_UNIT),
-            position_asked=round(side * place + self._shift),
-        )
+        return round(side * profile.v / _SPEED_UNIT), round(side * place + self._shift)
 
     # --- goals
 
     def set_goal(self, goal: int) -> None:
-        """Lead the profile to a goal position; the same goal again changes nothing."""
+        """Plan the profile to a goal position; the same goal again changes nothing."""
         shaft = self.shaft
         profile, to = shaft.profile, float(self._side * (goal - self._shift))
         if isinstance(profile, PositionProfile) and to != profile.goal:
@@ -135,7 +136,7 @@ class DynamixelDrive(Drive):
             shaft.resume()
 
     def set_goal_velocity(self, speed: int) -> None:
-        """Lead the profile to a goal velocity."""
+        """Plan the profile to a goal velocity."""
         profile = self.shaft.profile
         if isinstance(profile, SpeedProfile):
             ramp = 0.0 if self._by_time else self._ramp * _RAMP_UNIT
@@ -143,7 +144,7 @@ class DynamixelDrive(Drive):
             self.shaft.resume()
 
     def halt(self) -> None:
-        """Stand still under torque, here and now, until a new goal comes."""
+        """Stop at the present position under torque until a new goal comes."""
         shaft = self.shaft
         if isinstance(shaft.profile, SpeedProfile):
             shaft.profile.set_goal(0.0, 0.0)
@@ -164,7 +165,7 @@ class DynamixelDrive(Drive):
         self.apply_settings()
 
     def _start(self) -> None:
-        """Let the profile begin where the shaft is, and follow the goal there is."""
+        """Start the profile at the shaft's position and follow the goal register."""
         self._lead_from_here(self.mode == VELOCITY)
         self._wrap_by_itself()
         if self._quirks.goal_at_torque_on:
@@ -176,12 +177,12 @@ class DynamixelDrive(Drive):
             self.set_goal_velocity(self.memory.get("goal_velocity"))
 
     def _wrap_by_itself(self) -> None:
-        """Let the position jump by a turn, as some firmware does with a homing offset."""
+        """Shift the position by a turn, as some firmware does with a homing offset."""
         if self._quirks.wrap_at_torque_on and self.mode == POSITION and self._offset:
             self._shift -= int(self.position_steps // STEPS_PER_TURN) * STEPS_PER_TURN
 
     def change_mode(self, mode: int) -> None:
-        """Set profile, gains and goals as a mode begins with; the position is within one turn."""
+        """Set profile, gains, goals to a mode's start values, the position within one turn."""
         if mode == self.mode:
             return
         self.mode = mode
@@ -216,7 +217,7 @@ class DynamixelDrive(Drive):
         self._shift = self._offset - turns * STEPS_PER_TURN
 
     def shift_origin(self) -> None:
-        """Move the origin with the homing offset, or turn the direction round."""
+        """Apply a changed homing offset or a changed direction."""
         side = -1 if self.memory.get("drive_mode") & REVERSE else 1
         if side != self._side:
             self.wrap_to_one_turn()
@@ -245,7 +246,7 @@ class DynamixelDrive(Drive):
         self.shaft.turn(self._side * steps)
 
     def apply_settings(self) -> None:
-        """Take over what the registers say now."""
+        """Apply the present register values."""
         get = self.memory.get
         self.follows = self.torque and self.mode in POSITION_MODES
         self._speed, self._ramp = get("profile_velocity"), get("profile_acceleration")

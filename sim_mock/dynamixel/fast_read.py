@@ -1,7 +1,7 @@
-"""The fast read of every tick in one tight loop: unique ids, nothing spoilt.
+"""Fast sync read in one tight loop, for unique ids and a line without faults.
 
-Gives the same bytes as gazerig.sim_mock.dynamixel.packets.fast_pieces, in half the time; a test
-compares the two.
+It gives the same bytes as gazerig.sim_mock.dynamixel.packets.fast_pieces in half the time; a
+test compares the two.
 """
 
 from collections.abc import Iterable, Mapping
@@ -21,7 +21,7 @@ def fast_reply(
     now_ms: int,
     fed_ms: int,
 ) -> bytes:
-    """Return the packet up to the first servo that is silent; nothing where that is the first."""
+    """Return the packet up to the first silent servo; empty if that is the first one."""
     parts = list[bytes]()
     before, crc = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0
     for servo_id, address, size in rows:

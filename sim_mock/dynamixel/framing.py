@@ -1,4 +1,4 @@
-"""How Dynamixel servos find instructions in a stream of bytes.
+"""Framing of Protocol 2.0 instructions in a stream of bytes.
 
 An instruction is framed by its length, so one whose parameters should have been stuffed
 and were not is still understood; ``strict`` servos drop it instead.
@@ -11,7 +11,7 @@ from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
 
 
 class DynamixelFraming(Framing):
-    """Bytes in, instructions out; ``strict``: drop what should have been stuffed and was not."""
+    """Finds instructions; ``strict``: drop packets that should have been stuffed and were not."""
 
     strict = False
 

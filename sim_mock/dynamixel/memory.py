@@ -31,7 +31,7 @@ Fields = tuple[tuple[Register, int], ...]
 
 
 class Gather(NamedTuple):
-    """What stands behind a range of addresses, through the indirect windows.
+    """Real addresses behind a range, resolved through the indirect windows.
 
     runs: of real addresses
     sensed, surroundings, profiled: whether any of them tells what is sensed, voltage or
@@ -75,7 +75,7 @@ class DynamixelMemory(ServoMemory[Register]):
         self.restore(lambda register: not in_eeprom(register))
 
     def writable(self) -> Iterator[Register]:
-        """Return the registers that may be written; through a window one writes to others."""
+        """Return the writable registers but indirect data, which stands for other registers."""
         for register in self._by_address.values():
             if register.access == "rw" and not register.name.startswith("indirect_data"):
                 yield register
@@ -99,12 +99,12 @@ class DynamixelMemory(ServoMemory[Register]):
         return None if gather is None else self.collect(gather)
 
     def collect(self, gather: Gather) -> bytes:
-        """Return the bytes that stand behind a range."""
+        """Return the bytes at resolved addresses."""
         content = self.bytes
         return b"".join([content[run] for run in gather.runs])
 
     def gather(self, address: int, length: int) -> Gather | None:
-        """Return what stands behind a range, None where an address is not defined.
+        """Return the real addresses behind a range, None where an address is not defined.
 
         It is kept, as a control loop reads the same ranges again and again.
         """
@@ -195,7 +195,7 @@ class DynamixelMemory(ServoMemory[Register]):
 
 
 def _window_registers(blocks: tuple[IndirectBlock, ...]) -> Iterator[Register]:
-    """Make the registers of the indirect windows; an address starts at its own data byte."""
+    """Return the registers of the indirect windows; each starts as its own data byte."""
     for block in blocks:
         for i in range(block.entries):
             at, data = block.address_base + 2 * i, block.data_base + i

@@ -1,4 +1,4 @@
-"""What Dynamixel servos do where documents and devices are silent or differ.
+"""Behaviour of Dynamixel servos where documents and devices are silent or differ.
 
 Sources: ROBOTIS e-Manual, Protocol 2.0; the device side of ROBOTIS' Dynamixel2Arduino
 (silent on a wrong CRC).

@@ -21,11 +21,14 @@ from gazerig.drivers.dynamixel.control_table import (
 from gazerig.sim_mock.dynamixel.backup import Backup
 from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
 from gazerig.sim_mock.dynamixel.live_registers import (
+    MOTION,
+    MOTION_AT,
+    REFERENCE,
+    REFERENCE_AT,
     SENSED,
     SENSED_AT,
-    put_profiled,
-    put_sensed,
-    put_surroundings,
+    SURROUNDINGS,
+    SURROUNDINGS_AT,
 )
 from gazerig.sim_mock.dynamixel.memory import (
     ACCESS,
@@ -84,7 +87,7 @@ class DynamixelServo(EmulatedServo):
         super().__init__(spec, now_ms)
 
     def _load_limits(self) -> tuple[float, ...]:
-        """Return when a load is too much: no register says so."""
+        """Return overload share and time from the physics: no register holds them."""
         return self._physics.overload_share, self._physics.overload_s
 
     def identity(self) -> bytes:
@@ -92,7 +95,7 @@ class DynamixelServo(EmulatedServo):
         return _IDENTITY.pack(self.model.number, self.firmware)
 
     def _boot(self) -> None:
-        """Begin as after power-on, torque off unless it is to start with it."""
+        """Reset to power-on, with torque if Startup Configuration asks for it."""
         super()._boot()
         self.memory.set("backup_ready", self._backup.ready)
         startup = self.memory.get("startup_configuration") if self._new else 0
@@ -111,7 +114,7 @@ class DynamixelServo(EmulatedServo):
         self._rules.apply_settings()
 
     def _protect_from(self, bits: int) -> None:
-        """Latch what is wrong."""
+        """Latch new hardware errors."""
         if bits & ~self.errors:
             self._latch(bits)
 
@@ -136,12 +139,16 @@ class DynamixelServo(EmulatedServo):
         gather = self.memory.gather(address, length)
         if gather is None:
             return None
+        into = self.memory.bytes
         if gather.sensed:
-            put_sensed(self.drive.sensed(self._ms), self.memory.bytes)
+            SENSED.pack_into(into, SENSED_AT, *self.drive.sensed(self._ms))
         if gather.surroundings:
-            put_surroundings(self.voltage_01v, self.temperature_c, self.memory.bytes)
+            warmth = max(0, min(255, round(self.temperature_c)))
+            SURROUNDINGS.pack_into(into, SURROUNDINGS_AT, self.voltage_01v, warmth)
         if gather.profiled:
-            put_profiled(self.drive.live(self._ms - self._booted_ms, self._ms), self.memory.bytes)
+            tick_ms = self._ms - self._booted_ms & 0x7FFF
+            MOTION.pack_into(into, MOTION_AT, tick_ms, *self.drive.motion(self._ms))
+            REFERENCE.pack_into(into, REFERENCE_AT, *self.drive.reference())
         return self.memory.collect(gather)
 
     # --- writing
@@ -159,7 +166,7 @@ class DynamixelServo(EmulatedServo):
         return 0
 
     def _take_goal(self, data: bytes) -> int:
-        """Take the one write of every tick, a goal position under torque, the short way."""
+        """Write a goal position under torque without the general path: this happens every tick."""
         value = int.from_bytes(data, "little", signed=True)
         error = self._rules.goal_error(value)
         if error:
@@ -169,7 +176,7 @@ class DynamixelServo(EmulatedServo):
         return 0
 
     def _act(self, name: str, value: int) -> None:
-        """Let a written value take effect."""
+        """Apply the effect of a written register."""
         drive = self.drive
         if name == "torque_enable":
             self._switch(bool(value))
@@ -184,7 +191,7 @@ class DynamixelServo(EmulatedServo):
         self._apply_settings()
 
     def _command(self, name: str, value: int) -> None:
-        """Follow a new goal, where the mode is driven by it."""
+        """Follow a new goal if the operating mode uses it."""
         if name != DRIVEN_BY.get(self.drive.mode, "goal_position"):
             return
         if not self.torque and self._new and self.memory.get("drive_mode") & TORQUE_ON_BY_GOAL:
@@ -205,12 +212,12 @@ class DynamixelServo(EmulatedServo):
     # --- instructions
 
     def register(self, address: int, data: bytes) -> int:
-        """Keep a write for Action, if it would be permitted now; return the error number."""
+        """Keep a write for Action if it is permitted now; return the error number."""
         fields = self._rules.permitted(address, data)
         return fields if isinstance(fields, int) else super().register(address, data)
 
     def factory_reset(self, option: int) -> int:
-        """Put the EEPROM back (0xFF all, 1 all but id, 2 all but id and baud), then restart."""
+        """Restore the EEPROM (0xFF all, 1 all but id, 2 all but id and baud), then restart."""
         kept = KEPT_BY_RESET.get(option)
         if kept is None:
             return DATA_RANGE
@@ -221,7 +228,7 @@ class DynamixelServo(EmulatedServo):
         return 0
 
     def reset_all(self) -> int:
-        """Be as from the factory, id 1; return the error number."""
+        """Restore factory settings, id 1; return the error number."""
         return self.factory_reset(0xFF)
 
     def clear_turns(self) -> int:

@@ -1,4 +1,4 @@
-"""What an emulated servo lets be written now: EEPROM lock, modes, limits, tripped watchdog."""
+"""Which writes an emulated servo permits now: EEPROM lock, modes, limits, tripped watchdog."""
 
 from gazerig.drivers.dynamixel.control_table import EEPROM_END, Model, Register
 from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
@@ -17,7 +17,7 @@ WATCHDOG_AT = 98
 
 
 class Rules:
-    """Judges writes by table and state; changes nothing.
+    """Decides which writes are permitted, by table and state; changes nothing.
 
     goal_range: positions that a goal may have now
     """
@@ -29,7 +29,7 @@ class Rules:
         self.goal_range = (0, 0)
 
     def apply_settings(self) -> None:
-        """Take over what the registers say now."""
+        """Apply the present register values."""
         get = self._memory.get
         self.goal_range = -MULTI_TURN_STEPS, MULTI_TURN_STEPS
         if self._drive.mode == POSITION:

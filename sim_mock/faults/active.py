@@ -1,4 +1,4 @@
-"""What faults do to the bytes between servos and host. Values in, values out.
+"""Effects of faults on the bytes between servos and host. Values in, values out.
 
 A ``Fault`` lasts for a number of answers, for a time, or until it is cleared.
 """
@@ -20,7 +20,7 @@ BABBLE_MOST = 2000
 
 @dataclass
 class LineFault:
-    """One thing that goes wrong.
+    """One fault in force.
 
     servo_id: whose answers, None for everybody's
     numbers, data: what the kind needs (milliseconds, byte counts, ids; noise bytes)
@@ -98,7 +98,7 @@ class ActiveFaults:
     # --- electrical noise, in both directions
 
     def roughened(self, data: bytes, now_s: float) -> bytes:
-        """Return bytes as they arrive over a noisy line: some changed, lost or added.
+        """Return bytes after a noisy line: some changed, lost or added.
 
         The fault's number is how many of a hundred bytes are hit; of four that are hit two are
         changed, one is lost, and one has another put before it.
@@ -124,7 +124,7 @@ class ActiveFaults:
     # --- what the servos say
 
     def spoil_answers(self, answers: Sequence[Answer], fast: bool, now_s: float) -> list[Answer]:
-        """Change what is said: ids, errors, lengths and order; every CRC will be right."""
+        """Change answers before their checksums are made: ids, errors, lengths and order."""
         said = [self._misspoken(answer, fast, now_s) for answer in answers]
         if len(said) > 1 and self.take("reorder", None, now_s):
             said.reverse()

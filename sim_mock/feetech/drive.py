@@ -76,7 +76,7 @@ class FeetechDrive(Drive):
         super().__init__(memory, model, spec, self._scale)
 
     def boot(self) -> None:
-        """Begin without torque, within one turn."""
+        """Reset to power-on: torque off, position within one turn."""
         self.torque = self.damped = False
         self.max_duty = 1.0
         self.mode = self._wanted_mode()
@@ -112,13 +112,13 @@ class FeetechDrive(Drive):
 
     @property
     def moving(self) -> bool:
-        """True if it is on its way, or turned."""
+        """True if its profile runs or its shaft turns."""
         profile = self.shaft.profile
         led = self.torque and isinstance(profile, PositionProfile) and profile.running
         return led or abs(self.shaft.v * self._scale * 1000.0 / self._speed_unit) > self._threshold
 
     def target(self) -> int:
-        """Return the position it is led to, in the registers' terms."""
+        """Return the profile's goal in the registers' terms."""
         profile = self.shaft.profile
         if self.torque and isinstance(profile, PositionProfile):
             return round((profile.goal + self._shift) * self._scale)
@@ -127,7 +127,7 @@ class FeetechDrive(Drive):
     # --- settings
 
     def apply_settings(self) -> None:
-        """Take over what the registers say now."""
+        """Apply the present register values."""
         get = self.memory.get
         phase, low, high = get("phase"), get("min_position_limit"), get("max_position_limit")
         endless = low == 0 and high == 0
@@ -147,14 +147,14 @@ class FeetechDrive(Drive):
         self.apply_gains()
 
     def _wanted_mode(self) -> int:
-        """Return the mode of its register, or of its limits where a series has none."""
+        """Return the mode by its register, or by the limits for a series without that register."""
         get = self.memory.get
         if self._last is not None and get("min_position_limit") == get("max_position_limit") == 0:
             return PWM
         return get("operating_mode")
 
     def apply_gains(self) -> None:
-        """Take over gains, torque limit and, in mode PWM, the duty."""
+        """Apply gains, torque limit and, in mode PWM, the duty."""
         self.shaft.drive(self._loop() if self.torque else BRAKED if self.damped else DISABLED)
 
     def _loop(self) -> Loop:
@@ -176,7 +176,7 @@ class FeetechDrive(Drive):
         )
 
     def _change_mode(self, mode: int) -> None:
-        """Begin a mode where the shaft is."""
+        """Start another mode at the shaft's position."""
         self.mode = mode
         self._set_goal_here()
         if self.torque:
@@ -199,7 +199,7 @@ class FeetechDrive(Drive):
         self.apply_gains()
 
     def _begin(self) -> None:
-        """Let a profile begin where the shaft is."""
+        """Start a profile at the shaft's position."""
         self._goals_followed = ()
         self._lead_from_here(self.mode == WHEEL)
         self.apply_gains()
@@ -209,7 +209,7 @@ class FeetechDrive(Drive):
     # --- goals
 
     def obey_goal_time(self, obeyed: bool) -> None:
-        """Choose whether Goal Time means anything."""
+        """Choose whether Goal Time is used."""
         self._timed = obeyed
 
     def follow(self, new_goal: bool = False) -> None:
@@ -233,13 +233,13 @@ class FeetechDrive(Drive):
             self._plan_path(profile, profile.goal + signed(asked[1], 15) / self._scale, asked)
 
     def _goal_of_shaft(self, goal: int) -> float:
-        """Return where a goal position is, within the limits."""
+        """Return a goal position, clamped to the limits, in the shaft's steps."""
         if self._range is not None:
             goal = max(self._range[0], min(self._range[1], goal))
         return goal / self._scale - self._shift
 
     def _plan_path(self, profile: PositionProfile, to: float, asked: tuple[int, ...]) -> None:
-        """Lead the profile to a place, in a time or at goal speed and acceleration."""
+        """Plan the profile to a position, in a time or at goal speed and acceleration."""
         ramp, _, time_ms, speed = asked
         cruise = abs(signed(speed, 15)) * self._speed_unit / self._scale / 1000.0
         if cruise == 0.0 and self._stops_at_zero:
@@ -267,7 +267,7 @@ class FeetechDrive(Drive):
         self._set_goal_here()
 
     def forget_turns(self) -> None:
-        """Begin to count turns anew; under torque it stays where it is."""
+        """Reset the count of turns; under torque the shaft stays where it is."""
         self._wrap_to_one_turn()
         self._set_goal_here()
         if self.torque:

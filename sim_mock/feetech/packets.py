@@ -37,7 +37,7 @@ def unsigned(value: int, bit: int) -> int:
 
 
 class FeetechFraming(Framing):
-    """Bytes in, instructions out; what has a wrong checksum is passed over in silence."""
+    """Finds instructions; packets with a wrong checksum are dropped silently."""
 
     def _search(self, data: bytes, before: int) -> tuple[list[Instruction], bytes]:
         found: list[Instruction] = []

@@ -1,4 +1,4 @@
-"""What Feetech servos do where documents and devices are silent or differ.
+"""Behaviour of Feetech servos where documents and devices are silent or differ.
 
 Sources: Feetech, memory table and communication protocol of the STS series; reports of
 people who build arms with them. Defaults are the choice that is hardest on a client, where no

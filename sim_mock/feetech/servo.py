@@ -63,7 +63,7 @@ class FeetechServo(EmulatedServo):
         super().__init__(spec, now_ms)
 
     def _load_limits(self) -> tuple[float, ...]:
-        """Return what it bears by its registers."""
+        """Return its protection limits by its registers."""
         get = self.memory.get
         return (
             get("overload_torque") / 100.0,
@@ -73,7 +73,7 @@ class FeetechServo(EmulatedServo):
         )
 
     def apply_quirks(self, quirks: FeetechQuirks) -> None:
-        """Do from now on what these quirks say."""
+        """Apply quirks from now on."""
         self.quirks = quirks
         self.mute_reboot = quirks.reboot == "mute"
         self.drive.obey_goal_time(quirks.goal_time == "obey")
@@ -86,14 +86,14 @@ class FeetechServo(EmulatedServo):
         self._protect()
 
     def _protect_from(self, bits: int) -> None:
-        """Flag voltage and heat as long as they are wrong, all else until something ends it."""
+        """Flag voltage and heat while they are wrong, all else until something ends it."""
         errors = self.errors & ~(HEAT | VOLTAGE) | bits
         if errors != self.errors:
             self.errors = errors
             self._protect()
 
     def _protect(self) -> None:
-        """Do what Unload Conditions say: an overload lowers the torque, all else takes it."""
+        """Apply Unload Conditions: an overload lowers the torque, other errors switch it off."""
         drive = self.drive
         self._pushed = self.shaft.u
         wrong = self.errors & self.memory.get("unloading_condition")
@@ -117,7 +117,7 @@ class FeetechServo(EmulatedServo):
         return self.memory.read(address, length)
 
     def _refresh(self) -> None:
-        """Bring the registers that live up to date."""
+        """Update the registers that change by themselves."""
         drive = self.drive
         sensed = drive.sensed(self._ms)
         _SENSED[self.table.order].pack_into(
@@ -170,7 +170,7 @@ class FeetechServo(EmulatedServo):
         drive.follow(new_goal)
 
     def _goal_after_overload(self) -> None:
-        """Let a goal that is not the old one end the overload, where one does."""
+        """End the overload on a new goal, if the quirks say so."""
         ends = self.quirks.overload_ends
         ahead = self.memory.get("goal_position") - self.position_steps
         if ends == "new-goal" or (ends == "goal-away" and ahead * self._pushed < 0.0):
@@ -199,7 +199,7 @@ class FeetechServo(EmulatedServo):
             self._protect()
 
     def _end(self, bit: int) -> None:
-        """End what was wrong, and begin to count anew."""
+        """Clear an error and reset the counts of its protection."""
         self.errors &= ~bit
         self.protection.restart()
 
@@ -213,7 +213,7 @@ class FeetechServo(EmulatedServo):
         self.restart()
 
     def fail(self, error: str) -> str:
-        """Let its overload protection act, its motor be too hot or its angle sensor break.
+        """Trigger the overload protection, overheat the motor or break the angle sensor.
 
         Raises:
             ValueError: there is no such error.
@@ -224,6 +224,6 @@ class FeetechServo(EmulatedServo):
         return f"has {self.temperature_c:g} degC"
 
     def reset_all(self) -> int:
-        """Be as from the factory, id 1."""
+        """Restore factory settings, id 1."""
         self.factory_reset(1)
         return 0

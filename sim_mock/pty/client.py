@@ -1,4 +1,4 @@
-"""The client's side of emulated buses on pseudo-terminals: starts, commands and ends them."""
+"""Starts, commands and stops emulated buses on pseudo-terminals in another process."""
 
 import json
 import subprocess

@@ -95,7 +95,7 @@ class TerminalLine:
         return [fd for fd in (self.terminal.master, -1 if watch is None else watch.fd) if fd >= 0]
 
     def patience_s(self) -> float:
-        """Return how long nothing needs to be done but for what arrives."""
+        """Return how long to sleep if nothing arrives."""
         due_s = self.line.next_due_s()
         if due_s is not None:
             return max(0.0, due_s - SPIN_S - self._now_s())
@@ -127,7 +127,7 @@ class TerminalLine:
             self._warn_of(baud, self._warn)
 
     def _deliver(self) -> None:
-        """Hand over what is due; the last moment before that is waited for exactly."""
+        """Write bytes that are due; the last 0.1 ms before that is waited for by spinning."""
         due_s = self.line.next_due_s()
         if due_s is not None:
             if due_s - self._now_s() > SPIN_S:
@@ -139,7 +139,7 @@ class TerminalLine:
             self.terminal.write(data)
 
     def _warn_of(self, baud: int, warn: Callable[[str], None]) -> None:
-        """Tell a person, once for each rate, that a client speaks at the wrong one."""
+        """Warn once for each baud rate that a client uses a wrong one."""
         if baud == self._warned or self.device.hears(baud):
             return
         self._warned = baud
@@ -150,7 +150,7 @@ class TerminalLine:
     # --- faults of the adapter
 
     def _follow_faults(self) -> None:
-        """Make the terminal as the faults in force say."""
+        """Apply the faults of the adapter to the terminal."""
         faults = self.device.faults
         if faults.on("unplug") == self.terminal.plugged:
             if self.terminal.plugged:
@@ -192,5 +192,5 @@ class TerminalLine:
 
 
 def _patience(device: Emulated) -> dict[str, str]:
-    """Return the choice that lets a device wait for the rest of a torn packet."""
+    """Return the case that makes a device wait longer for the rest of a packet."""
     return {PACKET_GAP: str(GAP_MS)} if PACKET_GAP in CASES[device.kind] else {}

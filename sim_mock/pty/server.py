@@ -27,7 +27,7 @@ from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
 
 @dataclass(frozen=True)
 class ServerSettings:
-    """What to emulate; until_eof: end when standard input does."""
+    """Devices to emulate; until_eof: stop at the end of standard input."""
 
     buses: tuple[BusSettings, ...]
     until_eof: bool = False
@@ -85,7 +85,7 @@ class Server:
     # --- commands
 
     def _take_commands(self, commands: int | None) -> bool:
-        """Carry out the lines that have come; False at the end of standard input."""
+        """Carry out received command lines; return False at the end of standard input."""
         assert commands is not None
         try:
             came = os.read(commands, 4096)
@@ -99,7 +99,7 @@ class Server:
         return bool(came)
 
     def _obey(self, text: str) -> str:
-        """Let the bus that is named first carry out a command, or the one without a name."""
+        """Carry out a command on the bus it names, or on the one without a name."""
         named = {line.settings.name or "": line for line in self.lines}
         for name, line in named.items():
             if text.startswith(f"{name}:"):
@@ -152,7 +152,7 @@ def say(line: str) -> None:
 
 
 def settings_of(told: Mapping[str, Any]) -> ServerSettings:
-    """Return the settings that travelled as JSON.
+    """Return the settings decoded from JSON.
 
     Raises:
         ValueError, TypeError: there is no such device, or it has no such setting.

@@ -27,9 +27,9 @@ _EVENT = struct.Struct("iIII")
 
 
 class Watch:
-    """Counts those who open and close a file, from now on: the kernel's inotify(7).
+    """Counts how many clients have a file open, with the kernel's inotify(7).
 
-    Where the kernel cannot, ``fd`` is -1 and nobody is ever seen.
+    Where the kernel has none, ``fd`` is -1 and no client is ever counted.
     """
 
     def __init__(self, path: str) -> None:
@@ -41,7 +41,7 @@ class Watch:
             libc.inotify_add_watch(self.fd, path.encode(), wanted)
 
     def look(self) -> bool:
-        """Take in what happened; True when the last one has gone."""
+        """Process events; return True when the last client has gone."""
         before = self.opened
         gone = False
         try:
@@ -120,7 +120,7 @@ class Terminal:
         self.master = self._slave = -1
 
     def read(self) -> bytes:
-        """Return what the client has sent, nothing where that was nothing."""
+        """Return the bytes that the client has sent."""
         try:
             return os.read(self.master, 4096)
         except BlockingIOError:
@@ -146,7 +146,7 @@ class Terminal:
         fcntl.ioctl(self._slave, _TCSETS2, _TERMIOS2.pack(*words))
 
     def hold(self, held: bool) -> None:
-        """Take no more bytes from the client, as an adapter with a full buffer, or do again."""
+        """Stop taking the client's bytes, as an adapter with a full buffer, or take them again."""
         termios.tcflow(self._slave, termios.TCOOFF if held else termios.TCOON)
 
     def forbid(self, forbidden: bool) -> None:
@@ -154,13 +154,13 @@ class Terminal:
         os.chmod(self._slave, 0 if forbidden else 0o620)
 
     def release(self) -> None:
-        """Forget what the last client has left: answers not read, and its lock if it was killed."""
+        """Drop what the last client has left: unread answers, and the lock of a killed client."""
         termios.tcflush(self._slave, termios.TCIFLUSH)
         fcntl.ioctl(self._slave, termios.TIOCNXCL)
 
 
 def _point(link: Path, target: str) -> None:
-    """Make a link; one to a terminal or to nothing is left over and replaced."""
+    """Make a link; a dangling one, or one to a terminal, is replaced."""
     if link.is_symlink():
         old = os.readlink(link)
         if not old.startswith("/dev/pts/") and os.path.exists(old):

@@ -1,4 +1,4 @@
-"""What a simulated scene is: people, things, what the robot is about, and what is asked of it.
+"""Interface of a simulated scene: people, things, the robot's behaviour, expected gaze.
 
 Everything is a closed form of the time, so a scene needs no stepper and looks the same
 however often it is looked at. World frame (x forward, y left, z up), metres, seconds
@@ -92,7 +92,7 @@ class Key(NamedTuple):
 
 
 def min_jerk(s: float) -> float:
-    """Return the smoothest way from 0 to 1 at a share 0..1 of its time."""
+    """Return a minimum-jerk path from 0 to 1 at a share 0..1 of its time."""
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 

@@ -20,7 +20,7 @@ _ROUND_S = 2.0 * (_WAY_S + _TURN_S)
 
 
 def _along(phase_s: float) -> float:
-    """Return how much of a way is done: constant speed between two short even accelerations."""
+    """Return the share of a path covered: constant speed between two short even accelerations."""
     speed = 1.0 / (_WAY_S - _SOON_S)
     if phase_s <= 0.0:
         return 0.0

@@ -1,4 +1,4 @@
-"""Which servos hear a client: by id, those that share one, secondary ids, baud rates."""
+"""Servos that hear a client, by id: shared ids, secondary ids, baud rates."""
 
 from collections.abc import Iterable
 from typing import Generic, TypeVar

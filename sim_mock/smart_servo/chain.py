@@ -86,14 +86,14 @@ class ServoChain(Generic[S, Q]):
     # --- who is there
 
     def refresh(self) -> None:
-        """Look again at ids, bauds and return delays; needed after changes from outside."""
+        """Read ids, baud rates and return delays again; needed after changes from outside."""
         self._stale = False
         known = Addresses(self.servos, self._client_baud if self.heed_baud else None)
         self._known = known
         self._by_id, self._twins, self._delay_s = known.by_id, known.twins, known.delay_s
 
     def _readdressed(self) -> None:
-        """Look again before the next instruction: until then the old settings hold."""
+        """Read addresses again before the next instruction; until then the old ones hold."""
         self._stale = True
 
     def hears(self, client_baud: int) -> bool:
@@ -161,25 +161,25 @@ class ServoChain(Generic[S, Q]):
         raise NotImplementedError
 
     def _apply_quirks(self, quirks: Q) -> None:
-        """Do from now on what these quirks say."""
+        """Apply quirks from now on."""
 
     def _obeys_broadcast(self, servo: S, code: int, params: bytes) -> bool:
         """True if a servo carries out an instruction that goes to all."""
         return True
 
     def _for_shadows(self, code: int, params: bytes) -> bool:
-        """True if who listens under a secondary id carries out an instruction."""
+        """True if servos addressed by a secondary id carry out an instruction."""
         return True
 
     # --- bytes
 
     def receive(self, data: bytes, client_baud: int | None = None) -> bytes:
-        """Take bytes off the wire and return the bytes all servos answer with."""
+        """Process received bytes and return all answers as bytes."""
         replies = self.exchange(data, client_baud)
         return b"".join([piece[1] for reply in replies for piece in reply[1]])
 
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
-        """Take bytes off the wire and return what is answered to each instruction in them."""
+        """Process received bytes and return the answer to each instruction in them."""
         now_s = self._now_s = self.now_s()
         self._now_ms = whole_ms(now_s)
         if client_baud != self._client_baud:
@@ -195,7 +195,7 @@ class ServoChain(Generic[S, Q]):
         return self.faults.around(replies, data) if self._wire.any else replies
 
     def _garbage(self, data: bytes) -> list[DeviceReply]:
-        """Answer a client that no servo understands: nothing, or the ruins of its own bytes."""
+        """Answer a client at a wrong baud rate: nothing, or garbage made of its own bytes."""
         if self.quirks.wrong_baud == "silence" or not data:
             return []
         return [DeviceReply(len(data), [Piece(NOBODY, bytes(b & 0x6E | 0x80 for b in data[::2]))])]
@@ -216,7 +216,7 @@ class ServoChain(Generic[S, Q]):
         return []
 
     def _out(self, answers: list[Answer]) -> list[Piece]:
-        """Put answers on the line, as its faults leave them."""
+        """Return answers as pieces, changed by the line's faults."""
         if not self._wire.any:
             return self._pieces(answers)
         spoilt = self._pieces(self._wire.spoil_answers(answers, False, self._now_s))
@@ -349,7 +349,7 @@ def build_chain(
 
 
 def _both(one: Answer | None, other: Answer | None) -> Answer | None:
-    """Return what two servos with one id say at the same time."""
+    """Return the combined answer of two servos with one id."""
     if one is None or other is None:
         return other if one is None else one
     return one._replace(twin=_both(one.twin, other))

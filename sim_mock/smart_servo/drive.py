@@ -1,4 +1,4 @@
-"""What stands between the registers and the shaft of every emulated smart servo."""
+"""What every emulated smart servo has between its registers and its shaft."""
 
 from abc import ABC, abstractmethod
 from typing import Any, NamedTuple
@@ -46,11 +46,11 @@ class Drive(ABC):
 
     @abstractmethod
     def boot(self) -> None:
-        """Begin as after power-on: without torque, within one turn."""
+        """Reset to power-on: torque off, position within one turn."""
 
     @abstractmethod
     def apply_settings(self) -> None:
-        """Apply what the registers say now."""
+        """Apply the present register values."""
 
     @property
     @abstractmethod
@@ -62,7 +62,7 @@ class Drive(ABC):
         """Turn the joint by hand, in the registers' direction."""
 
     def _lead_from_here(self, by_speed: bool) -> None:
-        """Let a profile, of speeds or of positions, begin where the shaft is."""
+        """Start a profile, of speeds or of positions, at the shaft's position."""
         shaft = self.shaft
         shaft.start(SpeedProfile(shaft.x, shaft.v) if by_speed else PositionProfile(shaft.x))
 

@@ -17,7 +17,7 @@ from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
 
 class Chain(Protocol):
-    """What faults need of the chain they strike."""
+    """Interface of a chain for its faults."""
 
     now_s: Callable[[], float]
 

@@ -1,4 +1,4 @@
-"""How servos find instructions in a stream of bytes that comes in pieces."""
+"""Framing of instructions in a stream of bytes that arrives in pieces."""
 
 from abc import ABC, abstractmethod
 from typing import NamedTuple
@@ -22,7 +22,7 @@ class Instruction(NamedTuple):
 
 
 class Framing(ABC):
-    """Bytes in, instructions out.
+    """Finds instructions in bytes that arrive in pieces.
 
     Args:
         gap_s: a packet that stays unfinished so long is dropped.

@@ -20,7 +20,7 @@ S = TypeVar("S", bound=EmulatedServo)
 
 
 class InstructionSet(Generic[S]):
-    """What one make of servos can be told.
+    """Instructions of one make of servos.
 
     Args:
         address_bytes: so many bytes an address has in a packet; a length has as many.
@@ -48,7 +48,7 @@ class InstructionSet(Generic[S]):
         }
 
     def carry_out(self, servo: S, code: int, params: bytes) -> Result | None:
-        """Let a servo that is awake carry out an instruction; None: it says nothing to it."""
+        """Let a servo carry out an instruction; return its answer, None for silence."""
         action = self._actions.get(code)
         return self._misunderstood if action is None else action(servo, params)
 

@@ -49,7 +49,7 @@ class ServoMemory(ABC, Generic[R]):
         self.put(self._by_name[name], value)
 
     def keep(self, name: str, value: int) -> None:
-        """Set a register for longer than the power lasts, where that differs from ``set``."""
+        """Set a register so that it outlasts power-off, where that differs from ``set``."""
         self.set(name, value)
 
     def put(self, register: R, value: int) -> None:
@@ -67,7 +67,7 @@ class ServoMemory(ABC, Generic[R]):
 
     @abstractmethod
     def power_up(self) -> None:
-        """Set what power-on sets."""
+        """Set the registers that power-on sets."""
 
     @abstractmethod
     def _decode(self, register: R, data: bytes | bytearray) -> int:

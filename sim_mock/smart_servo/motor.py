@@ -56,7 +56,7 @@ class Motor(Protocol):
 
 
 class Loop(NamedTuple):
-    """What the controller makes of errors: shares of full PWM per step, per step/ms and so on.
+    """Controller gains and limits, in shares of full PWM per step, per step/ms and so on.
 
     p, d, f1, f2: on position error, speed error, profile speed, profile acceleration
     i: per ms on position error; vi: per ms on speed error (velocity mode)
@@ -85,7 +85,7 @@ _BEFORE_MS, _AFTER_MS = 3_000, 1_000
 
 
 def long_pause(now_ms: int, until_ms: int, unit_ms: int) -> tuple[int, int]:
-    """Return from when and how long a time is passed at once; (until, 0) where it is short.
+    """Return start and length of the part of a pause that is skipped; (until, 0) for short pauses.
 
     unit_ms: The time passed at once is a whole number of these.
     """
@@ -156,7 +156,7 @@ class Shaft:
     # --- from outside
 
     def place(self, position_steps: float) -> None:
-        """Put the shaft somewhere at rest, between its stops; what drives it goes on from there."""
+        """Place the shaft at rest between its stops; profile and controller go on from there."""
         x = min(max(float(position_steps), self._low_high[0]), self._low_high[1])
         self.x = self.joint = x
         self.v = self._rv = self.u = self.effort = self._integral = 0.0
@@ -167,7 +167,7 @@ class Shaft:
         self.quiet = False
 
     def turn(self, steps: float) -> None:
-        """Push the shaft by hand so far, as far as its stops let it; the controller fights on."""
+        """Turn the shaft by hand, up to its stops; the controller keeps acting."""
         self.x = min(max(self.x + steps, self._low), self._high)
         self.quiet = False
 
@@ -190,18 +190,18 @@ class Shaft:
     # --- from the servo
 
     def drive(self, loop: Loop) -> None:
-        """Take over what the controller is set to."""
+        """Apply controller settings."""
         if loop != self._loop:
             self._loop = loop
             self._integral = max(-loop.u_max, min(loop.u_max, self._integral))
             self.quiet = False
 
     def resume(self) -> None:
-        """Go on after the profile was given something new."""
+        """Mark the shaft as moving after its profile has changed."""
         self.quiet = False
 
     def start(self, profile: PositionProfile | SpeedProfile) -> None:
-        """Switch on: no memory of earlier errors; ``profile`` leads."""
+        """Switch on with an empty integrator; ``profile`` gives the reference."""
         self.profile = profile
         self._rv = self._integral = 0.0
         self.quiet = False
@@ -300,7 +300,7 @@ class Shaft:
         )
 
     def skip(self, ticks: int) -> None:
-        """Let a long time pass at once: the shaft goes where its profile goes, between its stops.
+        """Skip a long time: the shaft moves as far as its profile, between its stops.
 
         What is not at rest after seconds of nobody asking is led by a slow profile, turns
         for ever, or hunts around its goal; the last stays as it is.

@@ -1,4 +1,4 @@
-"""What an emulated servo is made of and how it is built: every physical number has its place here.
+"""Physical parameters of an emulated servo, and the specification it is built from.
 
 Stall torque, stall current and no-load speed are the model's own and stand in
 gazerig.drivers.dynamixel.control_table. What no data sheet tells is an assumption, marked [A];

@@ -13,7 +13,7 @@ STEP, RECTANGLE, TRIANGLE, TRAPEZOID = 0, 1, 2, 3
 
 
 class PositionProfile:
-    """Position and speed that the shaft should have.
+    """Reference position and speed of the shaft.
 
     r, v: position in steps and speed in steps/ms now
     goal: where it leads
@@ -50,7 +50,7 @@ class PositionProfile:
         self._t1 = self._t2 = self._t3 = 0.0
 
     def by_velocity(self, goal: float, cruise: float, ramp: float) -> None:
-        """Lead to a goal at a speed (steps/ms, 0: step) with a ramp (steps/ms2, 0: rectangle)."""
+        """Plan to a goal at a speed (steps/ms, 0: step) with a ramp (steps/ms2, 0: rectangle)."""
         if cruise <= 0.0:
             self.step(goal)
         elif ramp <= 0.0:
@@ -64,7 +64,7 @@ class PositionProfile:
             self._ramps(goal, cruise, ramp)
 
     def by_time(self, goal: float, total_ms: float, ramp_ms: float) -> None:
-        """Lead to a goal in a time (0: step), of which ramps take their part, half at most."""
+        """Plan to a goal in a time (0: step); each ramp takes its part of it, half at most."""
         distance = goal - self.r
         if total_ms <= 0.0:
             self.step(goal)
@@ -94,7 +94,7 @@ class PositionProfile:
     def _plan(
         self, goal: float, kind: int, cruise: float, first: float, flat: float, last: float
     ) -> None:
-        """Take a plan: phases of ``first``, ``flat`` and ``last`` ms around a cruise speed."""
+        """Set a plan: phases of ``first``, ``flat`` and ``last`` ms around a cruise speed."""
         start = self.v if first > 0.0 else cruise
         self.goal, self.kind, self.running = goal, kind, True
         self._t, self._from, self._start, self._cruise = 0, self.r, start, cruise
@@ -104,7 +104,7 @@ class PositionProfile:
         self._slow = 0.5 * cruise / last if last > 0.0 else 0.0
 
     def ahead(self, ticks: int) -> list[float]:
-        """Return the positions of the next milliseconds and go on by them."""
+        """Advance by some milliseconds and return the position after each."""
         if not self.running:
             return [self.goal] * ticks
         begun, t1, t2, t3, goal = self._t, self._t1, self._t2, self._t3, self.goal
@@ -127,7 +127,7 @@ class PositionProfile:
         return path
 
     def skip(self, ticks: int) -> None:
-        """Go on by many milliseconds at once."""
+        """Advance by many milliseconds at once."""
         if not self.running:
             return
         self._t = t = self._t + ticks
@@ -144,7 +144,7 @@ class PositionProfile:
             self._speed(t)
 
     def _speed(self, t: int) -> None:
-        """Bring the speed up to a time of the plan."""
+        """Update the speed to a time of the plan."""
         if t < self._t1:
             self.v = self._start + 2.0 * t * self._out
         elif t < self._t2:
@@ -157,7 +157,7 @@ class PositionProfile:
 
 
 class SpeedProfile:
-    """What Profile is to a position, for the velocity mode: a ramp to a speed.
+    """Reference of the velocity mode: a ramp to a speed.
 
     ``r`` counts on from where it started; only its changes matter.
     """
@@ -173,14 +173,14 @@ class SpeedProfile:
         self.running = False
 
     def set_goal(self, speed: float, ramp: float) -> None:
-        """Lead to a speed (steps/ms) with a ramp (steps/ms2, 0: at once)."""
+        """Plan to a speed (steps/ms) with a ramp (steps/ms2, 0: at once)."""
         self.goal = speed
         self._ramp = ramp
         self.kind = TRAPEZOID if ramp > 0.0 else STEP
         self.running = speed != self.v or speed != 0.0
 
     def ahead(self, ticks: int) -> list[float]:
-        """Return the positions of the next milliseconds and go on by them."""
+        """Advance by some milliseconds and return the position after each."""
         r, v, goal, ramp, path = self.r, self.v, self.goal, self._ramp, []
         for _ in range(ticks):
             if v != goal:
@@ -193,7 +193,7 @@ class SpeedProfile:
         return path
 
     def skip(self, ticks: int) -> None:
-        """Go on by many milliseconds at once."""
+        """Advance by many milliseconds at once."""
         left = self.goal - self.v
         ramping = min(ticks, ceil(abs(left) / self._ramp)) if self._ramp > 0.0 else 0
         end = self.goal if ramping < ticks else self.v + copysign(self._ramp * ramping, left)

@@ -1,4 +1,4 @@
-"""What an emulated servo watches over: temperature, load, current, input voltage.
+"""Protections of an emulated servo: temperature, load, current, input voltage.
 
 Checked every 20 ms of its own time, so the result does not depend on how often it is
 asked. A heavy load is torque, not duty: a motor at full speed has all the duty and no load.
@@ -18,7 +18,7 @@ VOLTAGE, HEAT, CURRENT, OVERLOAD = 1, 4, 8, 32
 
 
 class Limits(NamedTuple):
-    """What a servo bears.
+    """Limits of a servo's protections.
 
     hottest_c: degC; highest_01v, lowest_01v: 0.1 V
     overload_share: share of the stall torque at the present voltage; overload_s: for so long
@@ -59,7 +59,7 @@ class ServoProtection:
         self._heavy_checks = self._strong_checks = 0
 
     def restart(self) -> None:
-        """Forget load and current; the heat stays."""
+        """Reset the counts of load and current; the temperature stays."""
         self._heavy_checks = self._strong_checks = 0
 
     def check(self, effort: float, volts: float, checks: int = 1) -> int:

@@ -1,4 +1,4 @@
-"""What emulated servos do where documents and devices are silent or differ, typed case by case.
+"""Behaviour of emulated servos where documents and devices are silent or differ, case by case.
 
 Logic analyser traces published by users of ROBOTIS' SDK show that later servos of a group
 wait for a missing one. Times marked [A] are assumed.
@@ -34,7 +34,7 @@ Q = TypeVar("Q", bound=ChainQuirks)
 
 
 def _choices(kind: type[ChainQuirks]) -> dict[str, tuple[str, ...]]:
-    """Return every field that is one of some words, and these."""
+    """Return the fields that are a Literal, with their values."""
     hints = get_type_hints(kind).items()
     return {name: get_args(hint) for name, hint in hints if get_origin(hint) is Literal}
 
@@ -47,7 +47,7 @@ def cases_of(kind: type[ChainQuirks]) -> dict[str, str]:
 
 
 def decided(quirks: Q, case: str, value: str) -> Q:
-    """Return the quirks with one case decided otherwise.
+    """Return the quirks with one case changed.
 
     Raises:
         ValueError: there is no such case or value.

@@ -19,7 +19,7 @@ RETURN_DELAY_UNIT_S = 2e-6
 
 
 class ServoModel(Motor, Protocol):
-    """What must be known of a model of servo."""
+    """Data of a servo model."""
 
     @property
     def name(self) -> str:
@@ -77,7 +77,7 @@ class EmulatedServo(ABC):
         self._boot()
 
     def _boot(self) -> None:
-        """Begin as after power-on."""
+        """Reset to power-on."""
         self.memory.power_up()
         self._pending: tuple[int, bytes] | None = None
         self._watchdog_ms = 0
@@ -101,7 +101,7 @@ class EmulatedServo(ABC):
             self.on_address()
 
     def _limits(self) -> Limits:
-        """Return what it bears by its registers."""
+        """Return its protection limits by its registers."""
         get = self.memory.get
         return Limits(
             get("temperature_limit"),
@@ -113,7 +113,7 @@ class EmulatedServo(ABC):
     # --- time
 
     def advance(self, now_ms: int, fed_ms: int = 0) -> bool:
-        """Move on to now; the last packet before that was on the bus at ``fed_ms``.
+        """Advance to ``now_ms``; the last packet before was on the bus at ``fed_ms``.
 
         Return whether it listens: it is deaf while it restarts.
         """
@@ -130,7 +130,7 @@ class EmulatedServo(ABC):
         return now_ms >= self._deaf_until_ms
 
     def _move(self, until_ms: int) -> None:
-        """Move on; a long pause is passed at once, so that whoever asks then is answered."""
+        """Advance; the middle of a long pause is skipped, so that answers come at once."""
         pause_at_ms, pause_ms = long_pause(self._ms, until_ms, CHECK_MS)
         self._run_until(pause_at_ms)
         if pause_ms:
@@ -141,7 +141,7 @@ class EmulatedServo(ABC):
             self._run_until(until_ms)
 
     def _run_until(self, until_ms: int) -> None:
-        """Move on, and check heat, load and voltage every 20 ms of its own time."""
+        """Advance, and check heat, load and voltage every 20 ms of its own time."""
         shaft = self.shaft
         while self._ms < until_ms:
             stop = min(until_ms, self._check_ms)
@@ -153,7 +153,7 @@ class EmulatedServo(ABC):
                     self._check_ms += (until_ms - self._check_ms) // CHECK_MS * CHECK_MS
 
     def _check(self, checks: int = 1) -> None:
-        """Watch over itself: protect itself, restart where the voltage is gone."""
+        """Apply the protections; restart if the voltage has broken down."""
         self._check_ms += CHECK_MS
         shaft, protection = self.shaft, self.protection
         before_c = protection.temperature_c
@@ -175,7 +175,7 @@ class EmulatedServo(ABC):
 
     @abstractmethod
     def _protect_from(self, bits: int) -> None:
-        """Do what follows from what its protection finds wrong now."""
+        """React to the errors that its protections find now."""
 
     @abstractmethod
     def _load_limits(self) -> tuple[float, ...]:
@@ -221,7 +221,7 @@ class EmulatedServo(ABC):
     @property
     @abstractmethod
     def error_flag(self) -> int:
-        """What stands in the error byte of every status."""
+        """Bits in the error byte of every status."""
 
     @property
     def baud(self) -> int:
@@ -288,7 +288,7 @@ class EmulatedServo(ABC):
 
     @abstractmethod
     def reset_all(self) -> int:
-        """Be as from the factory, id 1; return the error number, 0 when done."""
+        """Restore factory settings, id 1; return the error number, 0 when done."""
 
     def turn(self, steps: float) -> None:
         """Turn the joint by hand, in the registers' direction; under torque it fights back."""
@@ -299,7 +299,7 @@ class EmulatedServo(ABC):
         self.shaft.jam(stuck)
 
     def set_load(self, load_nm: float) -> None:
-        """Hang a constant torque on the joint, as a spring or a cable does, from now on."""
+        """Apply a constant torque to the joint, as a spring or a cable does, from now on."""
         self.shaft.set_load(load_nm / self.model.stall_torque_nm)
 
     @property
