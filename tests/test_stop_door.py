@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 import pytest
-from test_cli_face import DESK, PATIENCE_S, Sitting
+from test_cli_calibrate_face import DESK, PATIENCE_S, Sitting
 
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.remote.client import RequestRejected, RobotClient

@@ -56,6 +56,7 @@ class Body:
             position_steps=tuple([round(linkage.steps(0.0)) for linkage in self._linkages]),
             velocity_steps_s=(0.0,) * len(self.names),
             load=(0.0,) * len(self.names),
+            torque=(True,) * len(self.names),  # it was switched on, and no servo says otherwise
             measured=tuple([joint.facts.measured for joint in self._joints]),
         )
 
