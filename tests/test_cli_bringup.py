@@ -77,7 +77,7 @@ def test_scan_of_a_port_where_nobody_answers():
         path = bus.start(SMALL, baud=2_000_000)
         words = ("--port", path, "--bauds", "1000000", "--kind", "dynamixel")
         code, out, _ = invoked("scan", *words)
-    assert code == 1 and "nobody answers" in out and "supply" in out
+    assert code == 1 and "no servo answers" in out and "supply" in out
 
 
 def test_fresh_servos_all_connected_at_once_are_noticed():

@@ -60,7 +60,7 @@ def test_jog_says_what_was_applied() -> None:
         "jog", "left_eye_pan", "-20", "--mock", "--speed", "60", "--seconds", "0", "--no-park"
     )
     assert done.code == 0, done.err
-    assert re.search(r"left_eye_pan: wished -20\.0, is at -\d+\.\d deg", done.err)
+    assert re.search(r"left_eye_pan: desired -20\.0, measured -\d+\.\d deg", done.err)
     assert "torque on: 9 servos" in done.err
     assert "torque off on all servos" in done.err
 
@@ -74,7 +74,7 @@ def test_jog_beyond_the_range_is_refused_at_once_with_the_range() -> None:
 def test_home_goes_to_the_centre() -> None:
     done = invoked("home", "--mock", "--speed", "60")
     assert done.code == 0, done.err
-    assert "left_upper_lid: wished 20.0" in done.err
+    assert "left_upper_lid: desired 20.0" in done.err
     assert "arrived" in done.err and "parked" not in done.err
 
 
@@ -127,7 +127,7 @@ def test_monitor_shows_every_kind_in_one_table(rigs: dict[str, str]) -> None:
     assert rows["eyes_pan"][1:] == ["0", "-", "-", "none", "-", "-", "-", "-", "off", "-"]
     assert rows["neck_yaw"][1] == "neck:7" and rows["neck_yaw"][-1] == "none"
     assert rows["neck_pitch"][1] == "tilt:1" and "us/step" in done.out
-    assert "reckoned from the pulse" in done.out
+    assert "estimated from the pulse" in done.out
 
 
 def test_monitor_of_a_mixed_rig_as_json(rigs: dict[str, str]) -> None:
@@ -150,7 +150,7 @@ def test_on_real_wires_hobby_servos_are_asked_for_first(
         assert done.code == 0, done.err
         assert "go to their parking place at once" in done.err
         assert "torque on: 2 servos hold where they are, 6 hobby servos" in done.err
-        assert re.search(r"eyes_pan: wished 8\.0, is reckoned at \d\.\d deg", done.err)
+        assert re.search(r"eyes_pan: desired 8\.0, estimated \d\.\d deg", done.err)
         assert "parked, torque off on all servos" in done.err
         assert all(one["target"] == 0 for one in json.loads(buses.command("status"))["servos"])
 
@@ -158,7 +158,7 @@ def test_on_real_wires_hobby_servos_are_asked_for_first(
 def test_home_opens_all_four_lids() -> None:
     done = invoked("home", "maker", "--mock", "--speed", "60")
     assert done.code == 0, done.err
-    assert "left_lower_lid: wished 22.0, is reckoned at 22.0" in done.err
+    assert "left_lower_lid: desired 22.0, estimated 22.0" in done.err
     assert "pulses on: 6 hobby servos" in done.err
 
 
@@ -167,7 +167,7 @@ def test_look_at_of_a_maker_s_head_says_what_it_cannot_do() -> None:
     done = invoked("look-at", *words)
     assert done.code == 0, done.err
     assert "mean line of sight" in done.err and "vergence: none" in done.err
-    assert "head:" not in done.err and "reckoned, not measured" in done.err
+    assert "head:" not in done.err and "estimated, not measured" in done.err
 
 
 def test_what_servos_do_alone_is_said_for_the_kinds_that_there_are(rigs: dict[str, str]) -> None:

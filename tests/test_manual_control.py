@@ -147,10 +147,10 @@ def test_out_of_range_is_held_back_at_the_limit_and_says_so(bench: Bench) -> Non
     moved = bench.control.pose({"left_eye_pan": 50.0})
     part = moved.of("left_eye_pan")
     assert not moved.arrived and moved.ended == "held back"
-    assert part.wished == pytest.approx(50.0) and part.permitted == pytest.approx(35.0)
+    assert part.desired == pytest.approx(50.0) and part.commanded == pytest.approx(35.0)
     assert part.reasons == ("out of range",)
-    assert str(part).startswith("left_eye_pan: wished 50.0, is at 3")
-    assert "permitted 35.0 (out of range)" in str(part)
+    assert str(part).startswith("left_eye_pan: desired 50.0, measured 3")
+    assert "commanded 35.0 (out of range)" in str(part)
 
 
 def test_a_stuck_joint_is_named_and_not_pushed(bench: Bench) -> None:
@@ -159,7 +159,7 @@ def test_a_stuck_joint_is_named_and_not_pushed(bench: Bench) -> None:
     moved = bench.control.jog("neck_yaw", 30.0)
     assert not moved.arrived
     assert any("not moving" in reason for reason in moved.of("neck_yaw").reasons)
-    assert moved.of("neck_yaw").permitted == pytest.approx(before, abs=15.0)
+    assert moved.of("neck_yaw").commanded == pytest.approx(before, abs=15.0)
 
 
 def test_a_silent_servo_is_named(bench: Bench) -> None:
@@ -192,7 +192,7 @@ def test_several_joints_arrive_together(bench: Bench) -> None:
     assert where["left_eye_pan"] == pytest.approx(-20.0, abs=2.0)
     halfway = bench.steps[len(bench.steps) // 3]
     i, j = JOINTS.index("left_eye_pan"), JOINTS.index("neck_yaw")
-    assert halfway.wish_rad[i] < radians(6.0) and halfway.wish_rad[j] > radians(-12.0)
+    assert halfway.desired_rad[i] < radians(6.0) and halfway.desired_rad[j] > radians(-12.0)
 
 
 @pytest.mark.parametrize(
@@ -211,10 +211,10 @@ def test_nonsense_is_refused_before_anything_moves(
 
 
 @on("maker")
-def test_hobby_servos_arrive_and_it_is_said_that_this_is_reckoned(other: Bench) -> None:
+def test_hobby_servos_arrive_and_it_is_said_that_this_is_estimated(other: Bench) -> None:
     moved = other.control.pose({"eyes_pan": -15.0, "left_lower_lid": 12.0})
     assert moved.arrived
-    assert str(moved.of("eyes_pan")) == "eyes_pan: wished -15.0, is reckoned at -15.0 deg"
+    assert str(moved.of("eyes_pan")) == "eyes_pan: desired -15.0, estimated -15.0 deg"
     where = other.where()
     assert where["eyes_pan"] == pytest.approx(-15.0, abs=1.0)
     assert where["left_lower_lid"] == pytest.approx(12.0, abs=1.0)
@@ -224,15 +224,15 @@ def test_hobby_servos_arrive_and_it_is_said_that_this_is_reckoned(other: Bench) 
 def test_a_jammed_hobby_servo_cannot_be_known_so_nothing_is_called_measured(other: Bench) -> None:
     other.command("stick 0")
     moved = other.control.jog("eyes_pan", 20.0)
-    assert moved.arrived and moved.of("eyes_pan").reckoned
+    assert moved.arrived and moved.of("eyes_pan").estimated
     assert other.where()["eyes_pan"] == pytest.approx(0.0, abs=1.0)
 
 
 @on("feetech")
 def test_sts_servos_are_measured(other: Bench) -> None:
     moved = other.control.jog("neck_yaw", 20.0)
-    assert moved.arrived and not moved.of("neck_yaw").reckoned
-    assert str(moved.of("neck_yaw")).startswith("neck_yaw: wished 20.0, is at ")
+    assert moved.arrived and not moved.of("neck_yaw").estimated
+    assert str(moved.of("neck_yaw")).startswith("neck_yaw: desired 20.0, measured ")
     assert other.where()["neck_yaw"] == pytest.approx(20.0, abs=2.0)
 
 
@@ -241,9 +241,9 @@ def test_joints_of_three_kinds_move_together(other: Bench) -> None:
     asked = {"eyes_pan": 10.0, "neck_yaw": 15.0, "neck_pitch": -5.0}
     moved = other.control.pose(asked)
     assert moved.arrived
-    reckoned = {part.joint for part in moved.joints if part.reckoned}
+    estimated = {part.joint for part in moved.joints if part.estimated}
     joints = other.rig.joints
-    assert reckoned == {name for name in other.rig.names if not joints[name].facts.measured}
+    assert estimated == {name for name in other.rig.names if not joints[name].facts.measured}
     where = other.where()
     assert {name: where[name] for name in asked} == pytest.approx(asked, abs=2.0)
 
@@ -255,7 +255,7 @@ def test_joints_of_three_kinds_move_together(other: Bench) -> None:
 def test_both_eyes_meet_a_point(bench: Bench, point: Vec3) -> None:
     looked = bench.look(point, 4.0)
     assert max(looked.left_error, looked.right_error) < 2.0
-    assert looked.vergence == pytest.approx(looked.wished_vergence, abs=2.0)
+    assert looked.vergence == pytest.approx(looked.desired_vergence, abs=2.0)
     assert looked.moved.arrived
 
 
@@ -283,9 +283,9 @@ def test_eyes_on_one_linkage_are_judged_by_their_mean_line_of_sight(
     assert looked.vergence == pytest.approx(0.0, abs=1e-6)
     # Each eye by itself is beside the point by half the vergence that it needs.
     worst = max(looked.left_error, looked.right_error)
-    assert worst == pytest.approx(looked.wished_vergence / 2.0, abs=1.0)
+    assert worst == pytest.approx(looked.desired_vergence / 2.0, abs=1.0)
     words = "\n".join(met(looked))
-    assert "reckoned, not measured" in words and "vergence: none, as one servo" in words
+    assert "estimated, not measured" in words and "vergence: none, as one servo" in words
 
 
 @on("maker")
@@ -301,7 +301,7 @@ def test_eyes_that_cannot_turn_so_far_are_said_to_be_at_their_end(other: Bench) 
 def test_separate_eyes_converge_and_are_measured(other: Bench) -> None:
     looked = other.look((0.5, 0.0, 0.14), 3.0)
     assert looked.converges and looked.error == max(looked.left_error, looked.right_error) < 2.0
-    assert "reckoned" not in "\n".join(met(looked))
+    assert "estimated" not in "\n".join(met(looked))
 
 
 @on("mixed")
@@ -310,4 +310,4 @@ def test_a_mixed_head_looks_with_a_neck_that_is_measured_and_eyes_that_are_not(
 ) -> None:
     looked = other.look((1.0, 0.5, 0.1), 3.0)
     assert not looked.converges and looked.error < 2.0 and looked.head[0] > 3.0
-    assert "reckoned" in met(looked)[0]
+    assert "estimated" in met(looked)[0]

@@ -13,7 +13,7 @@ Why the order is as it is, and what is sent at all:
   other would be pinged or read only: nothing else is ever sent here.
 
 A board that hears the line but cannot answer on it (one wire, a rate that is not asked)
-is not found out: with such a one on the line name the kind that is wished.
+is not found out: with such a one on the line name the kind that is meant.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -70,7 +70,7 @@ def plan(
     """Return which kinds to ask at which rates, in order.
 
     usb: vendor and product id of the port, "" where it has none
-    kinds: those that are wished; rates: likewise, None for all
+    kinds: those to ask; rates: likewise, None for all
     """
     if usb.startswith(POLOLU):
         return (("maestro", BOARD_RATES[0]),) if "maestro" in kinds else ()

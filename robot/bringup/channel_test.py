@@ -30,7 +30,7 @@ LOOK_S = 0.02
 FINE_STEPS = 2
 LATE_S = 1.0
 MOST_TRIES = 10
-"""A busy computer may keep answers waiting, and nobody is in a hurry here."""
+"""A busy computer may keep answers waiting, and there is no hurry here."""
 
 
 class ChannelPosition(NamedTuple):
@@ -144,7 +144,7 @@ def _end(board: Board, setup: ServoSetup) -> None:
     """Stop the pulses and see that they have.
 
     Raises:
-        ServoFault: nobody confirms it.
+        ServoFault: no answer confirms it.
     """
     try:
         left = switch_off(board, (setup.id,))
@@ -156,7 +156,7 @@ def _end(board: Board, setup: ServoSetup) -> None:
 
 
 def sent_home(line: Line) -> tuple[str, ...]:
-    """Send all channels home and clear the errors; gives those that the board held, by name.
+    """Send all channels home and clear the errors; return those that the board held, by name.
 
     Raises:
         ServoMissing: the board does not answer.

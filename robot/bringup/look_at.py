@@ -10,7 +10,7 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.types import GazeState, Target, Vec3
 from gazerig.robot.bringup.manual_control import ManualControl
-from gazerig.robot.bringup.move_result import Moved, Step
+from gazerig.robot.bringup.move_result import MoveResult, Step
 from gazerig.robot.model.gaze_error import gaze_error
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import Kinematics
@@ -28,19 +28,19 @@ class LookedAt(NamedTuple):
     left_error, right_error: angle between each eye's line of sight and the point
     error: the larger of both; where one linkage turns both eyes to the sides, that of their
         mean line of sight, from midway between them
-    vergence: angle between the lines of sight; wished_vergence: what the point needs
+    vergence: angle between the lines of sight; desired_vergence: what the point needs
     converges: each eye turns to the sides by itself, so there can be vergence
     head: (yaw, pitch, roll); distance_m: from midway between the eyes
-    moved: what the guard let through of the last wish, joint by joint
+    moved: what the guard sent of the last desired pose, joint by joint
     """
 
     left_error: float
     right_error: float
     vergence: float
-    wished_vergence: float
+    desired_vergence: float
     head: tuple[float, float, float]
     distance_m: float
-    moved: Moved
+    moved: MoveResult
     error: float
     converges: bool
 
@@ -64,7 +64,7 @@ def look_at(
     fresh = True
     target = Target(p_world_m, (0.0, 0.0, 0.0), 0.0, "point", 0, 1.0, True, None, 1, "asked for")
 
-    def wish(joints: JointState, t_s: float, dt_s: float) -> JointAngles:
+    def desired(joints: JointState, t_s: float, dt_s: float) -> JointAngles:
         nonlocal fresh
         pose = kinematics.forward(joints)
         if fresh:
@@ -81,12 +81,12 @@ def look_at(
             start_s.append(step.t_s)
         return "arrived" if step.t_s - start_s[0] >= seconds else None
 
-    moved = control.follow(wish, over, seconds + 1.0)
+    moved = control.follow(desired, over, seconds + 1.0)
     converges = TOGETHER not in kinematics.names
     return judged(p_world_m, kinematics.forward(moved.last.joints), moved, converges)
 
 
-def judged(p_world_m: Vec3, pose: GazeState, moved: Moved, converges: bool = True) -> LookedAt:
+def judged(p_world_m: Vec3, pose: GazeState, moved: MoveResult, converges: bool = True) -> LookedAt:
     """Return how measured eyes point at a point.
 
     converges: as in LookedAt
@@ -112,24 +112,24 @@ def judged(p_world_m: Vec3, pose: GazeState, moved: Moved, converges: bool = Tru
 def met(looked: LookedAt) -> tuple[str, ...]:
     """Say in words how well the point is met, as far as the mechanism can meet it."""
     eyes = [part for part in looked.moved.joints if part.joint.endswith(("_pan", "_tilt"))]
-    known = " (reckoned, not measured)" if any(part.reckoned for part in eyes) else ""
+    known = " (estimated, not measured)" if any(part.estimated for part in eyes) else ""
     away = f"of a point {looked.distance_m:.2f} m away{known}"
     if not looked.converges:
         return (
             f"gaze error: {looked.error:.2f} deg between the eyes' mean line of sight and the "
             f"direction {away}",
             "vergence: none, as one servo turns both eyes to the sides; the point needs "
-            f"{looked.wished_vergence:.2f} deg",
+            f"{looked.desired_vergence:.2f} deg",
         )
     return (
         f"gaze error: left eye {looked.left_error:.2f}, right eye {looked.right_error:.2f} deg "
         f"{away}",
-        f"vergence: {looked.vergence:.2f} deg, the point needs {looked.wished_vergence:.2f}",
+        f"vergence: {looked.vergence:.2f} deg, the point needs {looked.desired_vergence:.2f}",
     )
 
 
 def ends_reached(
-    joints: Mapping[str, JointParams], narrower_deg: Mapping[str, float], moved: Moved
+    joints: Mapping[str, JointParams], narrower_deg: Mapping[str, float], moved: MoveResult
 ) -> tuple[str, ...]:
     """Name the joints that could turn no farther towards the point.
 

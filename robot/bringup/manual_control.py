@@ -1,6 +1,6 @@
 """Moving a rig slowly, joint by joint or all at once, for bringing it up and for own programs.
 
-No camera, no attention. Every goal goes through the guard, and whoever asks gets back
+No camera, no attention. Every goal goes through the guard, and the caller gets back
 what was really applied:
 
     control = ManualControl(body, guard, RealClock())
@@ -24,7 +24,7 @@ from typing import Annotated
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.quintic import Quintic
 from gazerig.params import Bounds
-from gazerig.robot.bringup.move_result import Moved, Notes, Step, outcome, standing
+from gazerig.robot.bringup.move_result import GuardReasons, MoveResult, Step, outcome, standing
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.command_choices import refuse_out_of_range
 from gazerig.robot.control.observers import left_out
@@ -52,11 +52,11 @@ class JogParams:
     # fmt: on
 
 
-Wish = Callable[[JointState, float, float], JointAngles]
-"""Gives the wish for measured joints, the time, and the time since the step before."""
+DesiredPose = Callable[[JointState, float, float], JointAngles]
+"""Returns the desired pose for measured joints, the time, and the time since the step before."""
 
 Done = Callable[[Step], str | None]
-"""Gives how it ended, None while it goes on."""
+"""Returns how it ended, None while it goes on."""
 
 
 def no_reason() -> str | None:
@@ -72,7 +72,7 @@ class ManualControl:
         guard: the same rig's.
         clock: the host's, or a simulated one with the emulated bus.
         params: how slowly.
-        stopped: asked at every step; gives why to stop, None while there is no reason.
+        stopped: asked at every step; return why to stop, None while there is no reason.
         watch: gets every step.
     """
 
@@ -100,7 +100,7 @@ class ManualControl:
         return self._goal
 
     def start(self) -> JointAngles:
-        """Open the bus and switch torque on where the joints are; give the goals in force.
+        """Open the bus and switch torque on where the joints are; return the goals in force.
 
         Raises:
             SetupError: port or servos are not as configured.
@@ -113,7 +113,7 @@ class ManualControl:
         """Torque off and close the bus."""
         self.body.stop()
 
-    def jog(self, joint: str, angle_deg: float) -> Moved:
+    def jog(self, joint: str, angle_deg: float) -> MoveResult:
         """Move one joint slowly; the others hold where they are.
 
         Raises:
@@ -124,7 +124,7 @@ class ManualControl:
         refuse_beyond(joint, angle_deg, self.body.names, self._guard.limits)
         return self.pose({joint: angle_deg})
 
-    def pose(self, angles_deg: Mapping[str, float]) -> Moved:
+    def pose(self, angles_deg: Mapping[str, float]) -> MoveResult:
         """Move several joints slowly, so that they arrive together; the others hold.
 
         Raises:
@@ -133,14 +133,14 @@ class ManualControl:
         """
         names = self.body.names
         refuse_unknown(angles_deg, names)
-        wish = tuple(
+        desired = tuple(
             radians(angles_deg[name]) if name in angles_deg else held
             for name, held in zip(names, self._goal, strict=True)
         )
         moving = tuple(i for i, name in enumerate(names) if name in angles_deg)
         start_s = self._clock.now_s()
-        ways = [Quintic((g, 0.0, 0.0), w, 1.0) for g, w in zip(self._goal, wish, strict=True)]
-        far = max((abs(wish[i] - self._goal[i]) for i in moving), default=0.0)
+        ways = [Quintic((g, 0.0, 0.0), w, 1.0) for g, w in zip(self._goal, desired, strict=True)]
+        far = max((abs(desired[i] - self._goal[i]) for i in moving), default=0.0)
         takes_s = duration_s(far, self._params)
 
         def on_the_way(_: JointState, t_s: float, __: float) -> JointAngles:
@@ -150,12 +150,12 @@ class ManualControl:
         def there(step: Step) -> str | None:
             if step.t_s - start_s < takes_s:
                 return None
-            return standing(step, wish, moving, radians(self._params.near_deg))
+            return standing(step, desired, moving, radians(self._params.near_deg))
 
         longest_s = takes_s + self._params.patience_s
-        return self.follow(on_the_way, there, longest_s, wish, gently=True)
+        return self.follow(on_the_way, there, longest_s, desired, gently=True)
 
-    def hold(self, seconds: float) -> Moved:
+    def hold(self, seconds: float) -> MoveResult:
         """Hold the goals in force for so long.
 
         Raises:
@@ -172,10 +172,10 @@ class ManualControl:
 
     def park(
         self, angles_deg: Mapping[str, float], stopped: Callable[[], str | None] = no_reason
-    ) -> Moved:
+    ) -> MoveResult:
         """Move to a pose whatever asked for a stop so far; joints left out go to 0.
 
-        stopped: asked at every step; gives why to stop, None while there is no reason
+        stopped: asked at every step; return why to stop, None while there is no reason
 
         Raises:
             DriverError: the bus is gone.
@@ -188,16 +188,16 @@ class ManualControl:
 
     def follow(
         self,
-        wish: Wish,
+        desired: DesiredPose,
         done: Done,
         longest_s: float,
         ends_on: JointAngles | None = None,
         gently: bool = False,
-    ) -> Moved:
-        """Send wishes through the guard at the control rate until ``done`` says how it ended.
+    ) -> MoveResult:
+        """Send desired poses through the guard until ``done`` says how it ended.
 
         longest_s: after that it has ended "not there in time"
-        ends_on: the wish that the result is judged by; None: the last one
+        ends_on: the pose that the result is judged by; None: the last one
         gently: the guard goes slowly all the way, not only at the start
 
         Raises:
@@ -205,15 +205,15 @@ class ManualControl:
         """
         clock, period = self._clock, 1.0 / self._params.rate_hz
         start_s = last_s = clock.now_s()
-        slot, notes, events = 0, Notes(), list(self.body.bus.events())
+        slot, notes, events = 0, GuardReasons(), list(self.body.bus.events())
         while True:
             slot = max(slot + 1, int((clock.now_s() - start_s) / period))
             clock.sleep_until(start_s + slot * period)
             if gently:
                 self._guard.go_gently()
-            step = self._step(wish, last_s)
+            step = self._step(desired, last_s)
             last_s = step.t_s
-            notes.take(step.verdict)
+            notes.add(step.verdict)
             events += self.body.bus.events()
             ended = done(step) or self._stopped()
             ended = "limp" if step.verdict.level == "limp" else ended
@@ -222,21 +222,21 @@ class ManualControl:
             if ended is not None:
                 break
         self._goal = step.verdict.command_rad
-        applied = outcome(step, step.wish_rad if ends_on is None else ends_on, notes)
+        applied = outcome(step, step.desired_rad if ends_on is None else ends_on, notes)
         level = step.verdict.level
         events += self._said
         self._said.clear()
-        return Moved(ended, step.t_s - start_s, applied, level, tuple(events), step)
+        return MoveResult(ended, step.t_s - start_s, applied, level, tuple(events), step)
 
-    def _step(self, wish: Wish, last_s: float) -> Step:
-        """Read, wish, guard, write."""
+    def _step(self, desired: DesiredPose, last_s: float) -> Step:
+        """Read, ask for the desired pose, guard, write."""
         t_s = self._clock.now_s()
         joints = self.body.read(t_s)
-        wished = wish(joints, t_s, t_s - last_s)
-        # Nobody looks through a camera here, so no picture can be too old.
-        verdict = self._guard.check(wished, joints, 0.0, t_s)
+        wanted = desired(joints, t_s, t_s - last_s)
+        # No camera is used here, so no picture can be too old.
+        verdict = self._guard.check(wanted, joints, 0.0, t_s)
         self.body.write(verdict.command_rad)
-        step = Step(t_s, wished, verdict, joints)
+        step = Step(t_s, wanted, verdict, joints)
         if self._watch is not None:
             try:
                 self._watch(step)
@@ -247,7 +247,7 @@ class ManualControl:
 
 
 def parked(control: ManualControl, park_deg: Mapping[str, float], again: Again) -> str:
-    """Park slowly unless somebody asks again for the end; return what to say of it."""
+    """Park slowly unless the user asks again for the end; return what to say of it."""
     moved = control.park(park_deg, lambda: "interrupted" if again() else None)
     return "parked" if moved.arrived else f"not parked ({moved})"
 

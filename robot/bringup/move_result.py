@@ -1,4 +1,4 @@
-"""What really became of a wish, joint by joint, with the reason where it differs."""
+"""How a movement ended, joint by joint, with the reason where it differs from what was asked."""
 
 from collections.abc import Iterable
 from math import degrees, radians
@@ -12,46 +12,46 @@ PASSING = ("starting slowly", "too hard", "too fast")
 _STILL_DEG_S = 2.0
 
 
-class Applied(NamedTuple):
-    """What became of one joint's wish, in degrees.
+class JointResult(NamedTuple):
+    """Where one joint ended, in degrees.
 
-    wished, permitted: what was asked for, and what the guard let through of it in the end
-    measured: where the joint is; error: measured less wished
-    reasons: why permitted or measured differ, as the guard names it; empty when all is well
-    reckoned: its servo tells nothing, so measured is the goal moved by its known speed
+    desired, commanded: what was asked for, and what the guard sent of it in the end
+    measured: where the joint is; error: measured less desired
+    reasons: why commanded or measured differ, as the guard names it; empty when all is well
+    estimated: its servo tells nothing, so measured is the goal moved by its known speed
     """
 
     joint: str
-    wished: float
-    permitted: float
+    desired: float
+    commanded: float
     measured: float
     reasons: tuple[str, ...]
-    reckoned: bool = False
+    estimated: bool = False
 
     @property
     def error(self) -> float:
-        """Return how far from the wish the joint is."""
-        return self.measured - self.wished
+        """Return how far the joint is from where it was sent."""
+        return self.measured - self.desired
 
     def __str__(self) -> str:
         """Write one line."""
-        at = "is reckoned at" if self.reckoned else "is at"
-        line = f"{self.joint}: wished {_deg(self.wished)}, {at} {_deg(self.measured)} deg"
-        if abs(self.permitted - self.wished) > 0.05:
-            line += f", permitted {_deg(self.permitted)}"
+        at = "estimated" if self.estimated else "measured"
+        line = f"{self.joint}: desired {_deg(self.desired)}, {at} {_deg(self.measured)} deg"
+        if abs(self.commanded - self.desired) > 0.05:
+            line += f", commanded {_deg(self.commanded)}"
         return f"{line} ({', '.join(self.reasons)})" if self.reasons else line
 
 
 class Step(NamedTuple):
-    """One exchange: wish, what was let through, what is measured."""
+    """One exchange: desired, commanded and measured joints."""
 
     t_s: float
-    wish_rad: JointAngles
+    desired_rad: JointAngles
     verdict: GuardResult
     joints: JointState
 
 
-class Moved(NamedTuple):
+class MoveResult(NamedTuple):
     """How a movement ended.
 
     ended: "arrived", "held back" (by the guard), "not there in time", "limp", or the name
@@ -62,14 +62,14 @@ class Moved(NamedTuple):
 
     ended: str
     seconds: float
-    joints: tuple[Applied, ...]
+    joints: tuple[JointResult, ...]
     level: Level
     events: tuple[str, ...]
     last: Step
 
     @property
     def arrived(self) -> bool:
-        """Return whether every joint that was to move came near its wish."""
+        """Return whether every joint that was to move came near where it was sent."""
         return self.ended == "arrived"
 
     def __str__(self) -> str:
@@ -77,23 +77,23 @@ class Moved(NamedTuple):
         reasons = [f"{part.joint}: {', '.join(part.reasons)}" for part in self.remarkable()]
         return f"{self.ended} ({'; '.join(reasons)})" if reasons else self.ended
 
-    def of(self, joint: str) -> Applied:
+    def of(self, joint: str) -> JointResult:
         """Return one joint's part."""
         return next(part for part in self.joints if part.joint == joint)
 
-    def remarkable(self) -> tuple[Applied, ...]:
+    def remarkable(self) -> tuple[JointResult, ...]:
         """Return the joints that something is to be said of."""
         return tuple(part for part in self.joints if part.reasons)
 
 
-class Notes:
+class GuardReasons:
     """Reasons of the guard by joint, in the order of coming, each once."""
 
     def __init__(self) -> None:
         self._by_joint: dict[str, dict[str, None]] = {}
 
-    def take(self, verdict: GuardResult) -> None:
-        """Take what a verdict says, but for how goals are approached."""
+    def add(self, verdict: GuardResult) -> None:
+        """Add what a guard result says, but for how goals are approached."""
         for line in verdict.reasons:
             joint, _, reason = line.partition(": ")
             if reason not in PASSING:
@@ -104,26 +104,28 @@ class Notes:
         return (*self._by_joint.get(joint, {}), *self._by_joint.get("all", {}))
 
 
-def outcome(step: Step, wish: JointAngles, notes: Notes) -> tuple[Applied, ...]:
+def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[JointResult, ...]:
     """Return every joint's part of how a movement ended."""
     verdict, joints = step.verdict, step.joints
     told = joints.measured or (True,) * len(verdict.joints)
-    rows = zip(verdict.joints, wish, verdict.command_rad, joints.position_rad, told, strict=True)
+    rows = zip(verdict.joints, desired, verdict.command_rad, joints.position_rad, told, strict=True)
     return tuple(
-        Applied(name, degrees(wished), degrees(let), degrees(at), notes.of(name), not tells)
-        for name, wished, let, at, tells in rows
+        JointResult(name, degrees(asked), degrees(let), degrees(at), notes.of(name), not tells)
+        for name, asked, let, at, tells in rows
     )
 
 
-def standing(step: Step, wish: JointAngles, moving: Iterable[int], near_rad: float) -> str | None:
-    """Return how joints that stand have ended: at their wish, or where the guard keeps them."""
+def standing(
+    step: Step, desired: JointAngles, moving: Iterable[int], near_rad: float
+) -> str | None:
+    """Return how joints that stand have ended: where they were sent, or where they are kept."""
     joints, command = step.joints, step.verdict.command_rad
     held = False
     for i in moving:
         at = joints.position_rad[i]
         if abs(joints.velocity_rad_s[i]) > radians(_STILL_DEG_S):
             return None
-        if abs(at - wish[i]) <= near_rad:
+        if abs(at - desired[i]) <= near_rad:
             continue
         passing = any(
             f"{step.verdict.joints[i]}: {reason}" in step.verdict.reasons for reason in PASSING

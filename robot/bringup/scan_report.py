@@ -69,7 +69,7 @@ def remarks(
         yield from _odd(one, {rate.baud for rate in rounds if rate.answered})
     if not found and not boards:
         yield (
-            "nobody answers: is the servo supply on? does each servo's LED flash once when it "
+            "no servo answers: is the servo supply on? does each servo's LED flash once when it "
             "comes on? is the first cable in the right plug of the adaptor? is another program "
             "using the port? a Maestro on USB: is it set to 'USB Dual Port', and is this the "
             "first of its two ports?"

@@ -124,7 +124,7 @@ class ViewCollector:
         return coverage(self._held, self.params)
 
     def offer(self, seen: SeenBoard | None) -> str:
-        """Keep a view if it is new; give why it was not kept, "" where it was."""
+        """Keep a view if it is new; return why it was not kept, "" where it was."""
         if seen is None:
             return "no board seen"
         how = held(seen, self._guess, *self._size)

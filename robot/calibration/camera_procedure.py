@@ -27,7 +27,7 @@ from gazerig.robot.calibration.hand_eye import NeckView
 from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
 
 Look = Callable[[], Shot | None]
-"""Gives the newest picture at once, None before the first."""
+"""Returns the newest picture at once, None before the first."""
 
 # Shares of the neck's way (yaw, pitch, roll): pairs of axes mixed, both ways alike.
 _PATTERN = (
@@ -67,7 +67,7 @@ class LensStep(NamedTuple):
 
 
 class LensSteps:
-    """Takes pictures of a board that somebody holds until they show all of the lens."""
+    """Takes pictures of a board that a person holds until they show all of the lens."""
 
     def __init__(
         self, board: CharucoBoard, view_rad: float, params: LensCalibrationParams | None = None

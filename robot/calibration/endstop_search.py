@@ -69,7 +69,7 @@ class StopSearch:
         self.found: EndStop | None = None
 
     def step(self, position_steps: int, load: float, t_s: float) -> int:
-        """Take a measurement, give the goal; after the end the goal that backs off.
+        """Take a measurement, return the goal; after the end the goal that backs off.
 
         load: present current as a share of the stall current, 0 where it is not known
         """
@@ -113,7 +113,7 @@ Exchange = Callable[[int | None], tuple[int, float, float]]
 def search(
     params: StopSearchParams, direction: int, limits: tuple[int, int], exchange: Exchange
 ) -> EndStop:
-    """Run one search to its end and the way back; gives where the stop is."""
+    """Run one search to its end and the way back; return where the stop is."""
     look = StopSearch(params, direction, *limits)
     goal: int | None = None
     while look.found is None:
@@ -124,7 +124,7 @@ def search(
 
 
 def go(goal_steps: int, params: StopSearchParams, exchange: Exchange) -> bool:
-    """Lead a joint slowly to a position; tells whether it came there unhindered."""
+    """Lead a joint slowly to a position; return whether it came there unhindered."""
     position, _, _ = exchange(None)
     way = 1 if goal_steps > position else -1
     look = StopSearch(params, way, min(goal_steps, position), max(goal_steps, position))

@@ -39,7 +39,7 @@ STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0)
 FARTHEST_MM = 150.0
 """No part of a face is farther from the tip of its nose, sideways or upright."""
 
-# Whoever faces the robot sees the gaze go to their own left, which is the face's +y.
+# A person who faces the robot sees the gaze go to their own left, which is the face's +y.
 _WAYS: Mapping[str, tuple[float, float]] = {
     "left": (1.0, 0.0),
     "right": (-1.0, 0.0),
@@ -156,7 +156,7 @@ def _moved(place_mm: Vec3, way: tuple[float, float], step_mm: float) -> Vec3:
 
 
 def _within(value: float, by: float) -> float:
-    # A place that somebody wrote down farther out stays, but moves only inwards.
+    # A place that was written down farther out stays, but moves only inwards.
     far = max(FARTHEST_MM, abs(value))
     return max(-far, min(far, value + by))
 

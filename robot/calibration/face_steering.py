@@ -18,7 +18,7 @@ AIMED_DEG = 1.0
 """Eyes nearer than this to the part look at it."""
 
 STALE_S = 0.4
-"""Nobody is seen in a picture older than this."""
+"""No face is seen in a picture older than this."""
 
 WAIT_S = 1.5
 """So long an Enter waits for eyes that are on their way."""
@@ -45,7 +45,7 @@ class FaceSteering:
         rest_world_m: Vec3,
         converges: bool = True,
     ) -> None:
-        """Take where to begin, the behaviours, which rest, and where to look with nobody there.
+        """Take where to begin, the behaviours, which rest, and where to look with no face there.
 
         converges: each eye turns to the sides by itself
         """
@@ -72,7 +72,7 @@ class FaceSteering:
         return self.face is not None and self._entered_s is None and self.error_deg <= AIMED_DEG
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
-        """Return the part that is due as target, or where to wait while nobody is seen."""
+        """Return the part that is due as target, or where to wait while no face is seen."""
         self.face = face = self._nearest(percept, state.p_world_head_m, t_s)
         part = self.state.part
         if face is None or percept is None or part is None:
@@ -88,7 +88,7 @@ class FaceSteering:
         )  # fmt: skip
 
     def press(self, key: Key, t_s: float) -> str | None:
-        """Do what a key asks for; give what stands against it.
+        """Do what a key asks for; return what stands against it.
 
         An Enter counts as soon as the eyes are on the part, see ``note``.
         """
@@ -103,7 +103,7 @@ class FaceSteering:
         return None
 
     def note(self, tick: Tick) -> str | None:
-        """See where the eyes are; give why a waiting Enter was dropped."""
+        """See where the eyes are; return why a waiting Enter was dropped."""
         self.error_deg = self._off_deg(tick)
         if tick.target.kind != "part" or tick.gaze.phase == "saccade":
             self.error_deg = inf
@@ -137,7 +137,7 @@ class FaceSteering:
         )
 
     def _waiting(self, t_s: float) -> Target:
-        """Stay where somebody was, and after a while rest straight ahead."""
+        """Stay where the face was, and after a while rest straight ahead."""
         lost = t_s - self._seen_s > _LOST_S
         p = self._rest if lost else self._lost_at
         self._count(("rest", lost))

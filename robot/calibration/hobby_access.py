@@ -1,6 +1,6 @@
 """One hobby servo on a board by itself, moved slowly by a person who looks at it.
 
-Nobody measures it: its place is the pulse that it gets, as far as nothing holds it back.
+It has no position sensor: its position is the pulse that it gets, as far as nothing holds it back.
 The board knows no watchdog: a guardian stops its pulses when this program is killed.
 """
 
@@ -40,9 +40,9 @@ class OneHobby:
         port: of the board; opened by ``open``.
         params: how to speak with the board.
         clock: the host's.
-        stopped: asked all the time; tells why to stop, None while there is no reason.
+        stopped: asked all the time; returns why to stop, None while there is no reason.
         pulses_us: it is never sent outside.
-        guardian: has one plan, that of this servo; None: nobody stops its pulses.
+        guardian: has one plan, that of this servo; None: nothing stops its pulses.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class OneHobby:
         return self._pulse / US_STEPS
 
     def open(self) -> float | None:
-        """Find board and channel; gives the pulse width in us, None where there are no pulses.
+        """Find board and channel; return the pulse width in us, None where there are no pulses.
 
         Raises:
             SetupError: the board or the channel does not answer.
@@ -90,7 +90,7 @@ class OneHobby:
         return self._pulse / US_STEPS if self._on else None
 
     def begin(self, place_us: float) -> float:
-        """Hold it at the pulse that it gets, or begin with this one; gives the pulse in us.
+        """Hold it at the pulse that it gets, or begin with this one; return the pulse in us.
 
         Where it had no pulses it goes there at once, at its own speed.
 
@@ -102,12 +102,12 @@ class OneHobby:
         return self.place_us
 
     def aim(self, place_us: float) -> float:
-        """Let it go slowly to a pulse from now on; gives that pulse, inside what is allowed."""
+        """Let it go slowly to a pulse from now on; return that pulse, inside what is allowed."""
         self._goal = self._within(place_us)
         return self.place_us
 
     def look(self) -> bool:
-        """Wait a moment and lead it on; tells whether it is where it was sent.
+        """Wait a moment and lead it on; return whether it is where it was sent.
 
         Raises:
             BusLost: the board does not answer any more.
@@ -122,7 +122,7 @@ class OneHobby:
         return abs(at - self._goal) <= NEAR_STEPS
 
     def arrive(self) -> float:
-        """Lead it to where it was sent; gives the pulse in us that it gets in the end.
+        """Lead it to where it was sent; return the pulse in us that it gets in the end.
 
         Raises:
             BusLost, gazerig.robot.calibration.joint_access.CalibrationStopped: see ``look``.

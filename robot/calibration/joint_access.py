@@ -20,7 +20,7 @@ PERIOD_S = 0.02
 
 
 class CalibrationStopped(DriverError):
-    """Somebody wants it to end: let go of everything. The message says who."""
+    """The user or the system asked to end: torque off. The message says which."""
 
 
 class SingleJoint:
@@ -31,7 +31,7 @@ class SingleJoint:
         joint: as configured.
         servo: its servo.
         clock: the host's.
-        stopped: asked all the time; tells why to stop, None while there is no reason.
+        stopped: asked all the time; returns why to stop, None while there is no reason.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class SingleJoint:
         return stop
 
     def go(self, params: StopSearchParams, goal_steps: int) -> bool:
-        """Lead it slowly to a position; tells whether it came there unhindered."""
+        """Lead it slowly to a position; return whether it came there unhindered."""
         return go(goal_steps, params, self._exchange)
 
     def _exchange(self, goal: int | None) -> tuple[int, float, float]:

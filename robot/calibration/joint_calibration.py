@@ -94,10 +94,10 @@ class Unwrapped:
         return self._at
 
     def see(self, position_steps: int, t_s: float) -> int:
-        """Take one sample; give the unwrapped position.
+        """Take one sample; return the unwrapped position.
 
         Raises:
-            CalibrationRefused: it moved so far while nobody looked that its way is unknown.
+            CalibrationRefused: it moved so far while it was not watched that its way is unknown.
         """
         if self._at is None:
             self._at = position_steps % STEPS_PER_TURN

@@ -34,7 +34,7 @@ class Operator(Protocol):
         """Return when they have done what is asked; ``live`` gives the line to show meanwhile.
 
         Raises:
-            gazerig.robot.calibration.joint_access.CalibrationStopped: they want it to end.
+            gazerig.robot.calibration.joint_access.CalibrationStopped: the user asked to end.
         """
         ...
 
@@ -52,7 +52,7 @@ class Watched:
         self._first: int | None = None
 
     def live(self) -> str:
-        """Take a sample; give it in words."""
+        """Take a sample; return it in words."""
         steps, first = self.steps(), self._first
         first = steps if first is None else first
         self._first = first
@@ -63,7 +63,7 @@ class Watched:
         )
 
     def steps(self) -> int:
-        """Take a sample; give the unwrapped position."""
+        """Take a sample; return the unwrapped position."""
         return self._track.see(*self._single.position())
 
 
@@ -140,7 +140,7 @@ def _find_stops(single: SingleJoint, person: Operator, params: StopSearchParams)
 
 
 def _stop(single: SingleJoint, person: Operator, params: StopSearchParams, way: int) -> int:
-    """Find one stop; gives its position."""
+    """Find one stop; return its position."""
     stop: EndStop = single.find_stop(params, way)
     if stop.kind == "limit":
         raise CalibrationRefused(

@@ -1,6 +1,6 @@
 """Measuring a joint behind a push rod with a person: places are marked, angles are read off.
 
-A hobby servo is moved by steps of its pulse width, as nobody measures where it is; a servo
+A hobby servo is moved by steps of its pulse width, as no sensor measures where it is; a servo
 that tells its place is turned by hand. Nothing is printed or written here.
 """
 
@@ -46,7 +46,7 @@ class Steered(Protocol):
         ...
 
     def live(self) -> str:
-        """Look after it; gives where it is in words."""
+        """Look after it; return where it is in words."""
         ...
 
 
@@ -57,7 +57,7 @@ class Steerer(Operator, Protocol):
         """Return when the servo is where it is wanted.
 
         Raises:
-            gazerig.robot.calibration.joint_access.CalibrationStopped: they want it to end.
+            gazerig.robot.calibration.joint_access.CalibrationStopped: the user asked to end.
         """
         ...
 
@@ -77,11 +77,11 @@ class Placer(Protocol):
         ...
 
     def mark(self, where: str) -> float:
-        """Let a person bring it somewhere; gives the place."""
+        """Let a person bring it somewhere; return the place."""
         ...
 
     def bring(self, place: float) -> float:
-        """Bring it to about that place; gives where it is."""
+        """Bring it to about that place; return where it is."""
         ...
 
     def leave(self, place: float) -> None:
@@ -89,7 +89,7 @@ class Placer(Protocol):
         ...
 
     def live(self) -> str:
-        """Look after it; gives where it is in words."""
+        """Look after it; return where it is in words."""
         ...
 
 
@@ -107,7 +107,7 @@ class HobbyPlacer:
         if at_us is None:
             rest = self.joint.made().steps(0.0) / self.joint.facts.unit_steps
             at_us = person.number(
-                f"{hobby.who} gets no pulses, so nobody knows where it is: it goes to the first "
+                f"{hobby.who} gets no pulses, so its position is not known: it goes to the first "
                 "one at once, at its own full speed. Keep your fingers out. "
                 "At which pulse width (us) shall it begin?",
                 float(round(rest)),
@@ -121,7 +121,7 @@ class HobbyPlacer:
         )
 
     def mark(self, where: str) -> float:
-        """Let a person steer it somewhere; gives the pulse width in us."""
+        """Let a person steer it somewhere; return the pulse width in us."""
         self._person.steer(f"move {self.name} {where}, then press Enter", self)
         return self._arrived()
 
@@ -139,7 +139,7 @@ class HobbyPlacer:
         self._hobby.aim(us)
 
     def bring(self, place: float) -> float:
-        """Lead it slowly to a pulse width in us; gives the one that it gets."""
+        """Lead it slowly to a pulse width in us; return the one that it gets."""
         self._hobby.aim(place)
         return self._arrived()
 
@@ -153,7 +153,7 @@ class HobbyPlacer:
         return at_us
 
     def live(self) -> str:
-        """Lead it on; gives pulse width and angle in words."""
+        """Lead it on; return pulse width and angle in words."""
         self._hobby.look()
         self._tell_events()
         at_us = self._hobby.place_us
@@ -178,12 +178,12 @@ class HandPlacer:
         self._person.tell(f"{self._single.who}: torque off, it can be turned by hand")
 
     def mark(self, where: str) -> float:
-        """Let a person turn it somewhere; gives the position in steps."""
+        """Let a person turn it somewhere; return the position in steps."""
         self._person.wait(f"turn {self.name} {where}, then press Enter", self.live)
         return float(self._watched.steps())
 
     def bring(self, place: float) -> float:
-        """Let a person turn it to about a position in steps; gives where it is."""
+        """Let a person turn it to about a position in steps; return where it is."""
         return self.mark(f"until it reads about step {place:.0f}")
 
     def leave(self, place: float) -> None:

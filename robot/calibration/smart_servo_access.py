@@ -123,7 +123,7 @@ class SingleServo:
             raise ServoFault(f"{self.who}: {names}: {remedy}")
 
     def clear_offset(self) -> int:
-        """Set the offset of its position to 0, torque off; returns what it was."""
+        """Set the offset of its position to 0, torque off; return what it was."""
         register = self._kind.driving.offset
         was = self._value(register)
         if was:

@@ -87,7 +87,7 @@ def calibrate_face(
         options = RunOptions(
             rig=rig,
             mock=mock,
-            # Nobody watches a script on an emulated rig: simulated time will do.
+            # No user watches a script on an emulated rig: simulated time will do.
             fast=mock and answers is not None and camera is None and not oak,
             seconds=0.0,  # that much a film in simulated time asks for; keys end it
             scene=STILL_SCENE if mock and nothing else scene,
@@ -129,7 +129,7 @@ def _steered(
     begin = begun(rig.face_parts_mm)
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), rest_m, "eyes_pan" not in rig.joints)
     made = assemble(rig, options, Substitutes(chooser=lambda own: steering))
-    # What comes through a pipe is a script, too: nobody is there to give up.
+    # What comes through a pipe is a script, too: no user is there to give up.
     scripted = scripted or not sys.stdin.isatty()
     keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
     steer = SteeringButtons(BUTTONS, keys.press, lambda: shown(steering))
@@ -198,7 +198,7 @@ class _Sitting:
         self._ready_s = self._shown_s = self._seen_s = now_s()
 
     def over(self, _: float) -> str | None:
-        """Take a key; give why it ended, None while it goes on."""
+        """Take a key; return why it ended, None while it goes on."""
         steering, now_s = self._steering, self._now_s()
         if (why := self._stopped()) is not None:
             return why
@@ -223,7 +223,7 @@ class _Sitting:
             status(shown(self._steering))
 
     def _say_what_is_due(self, t_s: float) -> None:
-        """Name the part once, and say when nobody has been seen for a while."""
+        """Name the part once, and say when no face has been seen for a while."""
         part, seen = self._steering.state.part, self._steering.face is not None
         if seen:
             self._seen_s = t_s

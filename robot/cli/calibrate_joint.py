@@ -81,7 +81,7 @@ def measure(bench: CalibrationJob, names: Sequence[str]) -> JointResults:
 
     Raises:
         SetupError: a port cannot be opened, or there are no answers left.
-        gazerig.robot.calibration.joint_access.CalibrationStopped: somebody wants it to end.
+        CalibrationStopped: the user or the system asked to end.
     """
     found: dict[str, Made] = {}
     refused: list[str] = []

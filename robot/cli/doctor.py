@@ -64,7 +64,7 @@ def doctor(
 
 
 def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Diagnostic]]:
-    """Examine every bus, and tell what was found; gives the findings by bus."""
+    """Examine every bus, and tell what was found; return the findings by bus."""
     findings = {}
     for bus, line in lines.items():
         findings[bus] = _examine(rig, bus, line)

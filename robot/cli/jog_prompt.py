@@ -54,7 +54,7 @@ class SteeringPerson(TerminalPerson):
         """Wait for a line while something is looked after.
 
         Raises:
-            gazerig.robot.calibration.joint_access.CalibrationStopped: they want it to end.
+            gazerig.robot.calibration.joint_access.CalibrationStopped: the user asked to end.
             SetupError: there are no more lines.
         """
         while True:

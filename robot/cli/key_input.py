@@ -112,7 +112,7 @@ class TerminalKeys:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Switch them on again; keys that nobody has read are forgotten."""
+        """Switch them on again; keys that were not read are forgotten."""
         # Not TCSAFLUSH: a terminal that was stopped with Ctrl-S would be waited for.
         with contextlib.suppress(termios.error, OSError):  # it may be gone
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
@@ -195,7 +195,7 @@ class PageKeys:
         self._others.__exit__(kind, error, trace)
 
     def press(self, word: str) -> str | None:
-        """Take what a button says, from any thread; give what stands against it.
+        """Take what a button says, from any thread; return what stands against it.
 
         Raises:
             ValueError: there is no such button.

@@ -65,7 +65,7 @@ def holding(rig: Rig) -> str:
     blind = len(rig.names) - len(told)
     if not blind:
         return f"torque on: {len(told)} servos hold where they are"
-    pulses = f"{blind} hobby servos hold where their pulses are (reckoned: they tell nothing)"
+    pulses = f"{blind} hobby servos hold where their pulses are (estimated: they tell nothing)"
     return (
         f"torque on: {len(told)} servos hold where they are, {pulses}"
         if told

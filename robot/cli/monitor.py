@@ -31,8 +31,8 @@ from gazerig.robot.model.joint import JointParams
 
 app = typer.Typer()
 
-RECKONED = (
-    "~ is reckoned from the pulse (us); hobby servos tell nothing. The board's errors are not "
+ESTIMATED = (
+    "~ is estimated from the pulse (us); hobby servos tell nothing. The board's errors are not "
     "asked for: telling clears them"
 )
 _COLUMNS = 7
@@ -128,7 +128,7 @@ def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: flo
         box=None,
         padding=(0, 1, 0, 0),
         caption_justify="left",
-        caption=f"{caption}\n{RECKONED}" if hobby else caption,
+        caption=f"{caption}\n{ESTIMATED}" if hobby else caption,
     )
     table.add_column("joint", no_wrap=True)
     table.add_column("id", justify="right", no_wrap=True)

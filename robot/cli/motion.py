@@ -14,7 +14,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.rig_limits import lid_ends, limits
 from gazerig.robot.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
 from gazerig.robot.bringup.manual_control import JogParams, ManualControl, refuse_beyond
-from gazerig.robot.bringup.move_result import PASSING, Moved, Step
+from gazerig.robot.bringup.move_result import PASSING, MoveResult, Step
 from gazerig.robot.cli.manual_session import holding, holding_rig
 from gazerig.robot.cli.ports import MockOption, PortOption, rig_ports
 from gazerig.robot.cli.rig_command import RigCommand
@@ -136,9 +136,7 @@ def _commanded(
 ) -> Iterator[ManualControl]:
     """Return a rig that holds where it is; whatever happens, it ends with the torque off."""
     if not way.mock:
-        with clear_errors(
-            way.rig, way.port
-        ):  # before Ctrl-C is a wish that somebody has to look at
+        with clear_errors(way.rig, way.port):  # before Ctrl-C is only noted
             _ask_for_fingers(rig, way.yes)
     with (
         clear_errors(way.rig, way.port, way.mock),
@@ -156,10 +154,10 @@ def _commanded(
 
 
 def _ask_for_fingers(rig: Rig, yes: bool) -> None:
-    """Ask before servos jump that nobody knows the places of.
+    """Ask before servos jump whose positions are not known.
 
     Raises:
-        SetupError: there is nobody to ask.
+        SetupError: no user is there to ask.
         typer.Abort: the answer was no.
     """
     blind = [name for name in rig.names if not rig.joints[name].facts.measured]
@@ -219,7 +217,7 @@ def _stay(control: ManualControl, seconds: float, hold: bool) -> None:
         _tell(control.hold(inf if hold else seconds).events)
 
 
-def _report(moved: Moved, asked: tuple[str, ...]) -> None:
+def _report(moved: MoveResult, asked: tuple[str, ...]) -> None:
     """Say what was really applied, for the joints asked for and those that something befell."""
     _tell(moved.events)
     for applied in moved.joints:
@@ -229,7 +227,7 @@ def _report(moved: Moved, asked: tuple[str, ...]) -> None:
 
 
 def _report_look(looked: LookedAt, rig: Rig) -> bool:
-    """Say how well the eyes meet the point; tells whether they do within 2 deg."""
+    """Say how well the eyes meet the point; return whether they do within 2 deg."""
     good = looked.error <= 2.0
     ranges = rig.ranges
     narrower = {

@@ -18,7 +18,7 @@ from gazerig.robot.model.kinematics import NECK
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 StopReason = Callable[[], str | None]
-"""Gives why to stop, None while there is no reason."""
+"""Returns why to stop, None while there is no reason."""
 
 _GENTLE_DEG_S = 15.0
 _SETTLE_S = 0.4

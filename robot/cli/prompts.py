@@ -12,7 +12,7 @@ from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.cli.terminal import say, status
 
 LOOK_S = 0.03
-"""A joint is looked at so often while somebody thinks: more than 20 times a second."""
+"""A joint is looked at so often while the user thinks: more than 20 times a second."""
 
 HAND_STEPS = 100
 """An emulated hand turns a joint by so much between two looks."""
@@ -82,7 +82,7 @@ class TerminalPerson:
 
     Args:
         lines: where answers come from.
-        stopped: gives why to end, None while there is no reason.
+        stopped: returns why to end, None while there is no reason.
         yes: every question for a yes or no has the answer yes.
     """
 

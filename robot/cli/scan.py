@@ -96,7 +96,7 @@ def _paths(
 
 
 def _boards(path: str, as_json: bool) -> bool:
-    """Search one I2C bus and show what was found; returns whether any board answered.
+    """Search one I2C bus and show what was found; return whether any board answered.
 
     Of a serial port it is asked only where that was named: to a Maestro such bytes are commands.
     """
@@ -129,7 +129,7 @@ def parse_bauds(text: str) -> tuple[int, ...] | None:
     """Read --bauds; None for all.
 
     Raises:
-        SetupError: it holds what nobody can be set to.
+        SetupError: it holds what no servo can be set to.
     """
     if text == "all":
         return None
@@ -165,7 +165,7 @@ def _one(
     named: str | None,
     as_json: bool,
 ) -> bool:
-    """Search one port and show what was found; tells whether anyone answered."""
+    """Search one port and show what was found; return whether anyone answered."""
     usb = bench.usb_id(path)
     asked = plan(usb, kinds, rates)
     if not asked and usb.startswith(POLOLU):
@@ -179,7 +179,7 @@ def _one(
     try:
         rounds = _search(line, usb, asked, thorough, named == "all")
         if not thorough and not any(one.answered for one in rounds):
-            # Ids that lie far apart answer after a long silence; some not to everybody's ping.
+            # Ids that lie far apart answer after a long silence; some not a ping to all.
             servos = [row for row in asked if row[0] != "maestro"]
             boards = [one for one in rounds if one.kind == "maestro"]
             rounds = [*boards, *_search(line, usb, servos, True, named == "all")]

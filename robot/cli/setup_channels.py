@@ -31,7 +31,7 @@ def try_channels(
     """Move one channel after the other; return the joints that were skipped.
 
     Raises:
-        ServoMissing: the board does not answer, and nobody is asked (``yes``).
+        ServoMissing: the board does not answer, and no user is asked (``yes``).
         ServoFault: pulses could not be stopped.
         BusLost: the port is gone.
     """
@@ -50,10 +50,10 @@ def try_channels(
 def walked(
     board: Board, setup: ServoSetup, places: Sequence[int], *speed_steps_s: float
 ) -> tuple[ChannelPosition, ...]:
-    """Lead a channel over places; whoever asks for the end meanwhile gets it with pulses off.
+    """Lead a channel over places; a request to end is obeyed with pulses off.
 
     Raises:
-        KeyboardInterrupt: somebody asked for the end.
+        KeyboardInterrupt: the user asked for the end.
     """
     clock = RealClock()
     with signals() as stopped:

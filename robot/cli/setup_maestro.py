@@ -38,7 +38,7 @@ def set_up_board(
     joints: Mapping[str, JointParams],
     yes: bool,
 ) -> list[str]:
-    """Go through a board's settings and channels; gives the joints that were skipped.
+    """Go through a board's settings and channels; return the joints that were skipped.
 
     Raises:
         PortError: the port cannot be opened, or no board answers.
@@ -129,7 +129,7 @@ def _ranges(board: MaestroBoard, setups: Sequence[ServoSetup], yes: bool) -> Non
 
 
 def _range(board: MaestroBoard, setup: ServoSetup) -> list[str]:
-    """Lead a channel from end to end of its joint's range; gives what cuts it."""
+    """Lead a channel from end to end of its joint's range; return what cuts it."""
     places = (rest_steps(setup), setup.min_steps, setup.max_steps, rest_steps(setup))
     gone = walked(board, setup, places, QUICK_STEPS_S)
     wrong = [one for one in gone if abs(one.asked - one.got) > FINE_STEPS]

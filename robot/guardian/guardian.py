@@ -61,7 +61,7 @@ class Guardian:
         return None if self._process is None else self._process.pid
 
     def join(self, plan: int) -> None:
-        """Start it where it does not run yet; returns at once.
+        """Start it where it does not run yet; return at once.
 
         Raises:
             SetupError: no process can be started.

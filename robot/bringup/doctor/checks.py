@@ -122,7 +122,7 @@ def _unread(state: ServoState) -> Iterator[RuleResult]:
 
 
 def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
-    """Write a fix where the torque is off, so that it stays; returns "" or why it was not done.
+    """Write a fix where the torque is off, so that it stays; return "" or why it was not done.
 
     Raises:
         BusLost: the port is gone.

@@ -60,7 +60,7 @@ class Board:
 
     @property
     def size(self) -> int | None:
-        """Return its number of channels, None where nobody can tell."""
+        """Return its number of channels, None where it is not known."""
         return USB_CHANNELS.get(self.usb)
 
 
@@ -100,7 +100,7 @@ def take(port: BusPort, params: MaestroParams, setups: Sequence[ServoSetup], usb
         heard = None if silent or channel >= size else line.pulses((channel,))
         pulses[channel] = None if heard is None else heard[0]
     if None in pulses.values():
-        # What it did not understand is in its register now, and is nobody's fault.
+        # What it did not understand is in its register now, and is no fault.
         line.greet()
     return Board(params, setups, found, usb, pulses)
 
@@ -260,7 +260,7 @@ def _untold(board: Board) -> Iterator[Diagnostic]:
 
 
 def apply_fix(port: BusPort, params: MaestroParams, fix: Fix) -> str:
-    """Stop the board's script; gives "" or why it was not done. Nothing moves.
+    """Stop the board's script; return "" or why it was not done. Nothing moves.
 
     Raises:
         PortError: the port cannot be opened.

@@ -83,7 +83,7 @@ def check_all(
 def check(
     port: BusPort, kind: ServoKind, setups: Sequence[ServoSetup], baud: int, tell: Tell
 ) -> list[Diagnostic]:
-    """Examine every servo of a bus, and whoever else is on it; torque is left as it is.
+    """Examine every servo of a bus, and any other on it; torque is left as it is.
 
     Raises:
         PortError: the port cannot be opened.
@@ -110,7 +110,7 @@ def look(
         PortError: the port cannot be opened.
         BusLost: it has gone away.
     """
-    tell(f"asking everybody at {baud} bit/s")
+    tell(f"asking all servos at {baud} bit/s")
     _open(port, baud)
     answers, _ = scan_ids(port, kind.family, baud)
     there = {found.id: found for found in answers}
@@ -143,7 +143,7 @@ def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterato
     for other in kind.family.usual_rates:
         if other == baud:
             continue
-        tell(f"somebody is missing: asking at {other} bit/s")
+        tell(f"a servo is missing: asking at {other} bit/s")
         if port.setBaudRate(other) and any_reply(port, kind.family):
             yield from scan_ids(port, kind.family, other)[0]
 
@@ -221,7 +221,7 @@ def apply_fixes(
 ) -> Iterator[AppliedFix]:
     """Write what the findings offer, one after the other.
 
-    write: writes one, where that is safe; gives "" or why it was not done
+    write: writes one, where that is safe; return "" or why it was not done
 
     Raises:
         BusLost: the port is gone.
