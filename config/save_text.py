@@ -9,6 +9,7 @@ import operator
 import re
 import textwrap
 from collections.abc import Mapping
+from functools import lru_cache
 from math import isfinite
 from typing import NamedTuple
 
@@ -100,8 +101,9 @@ def written(value: Value) -> str:
         raise Unchangeable(f"{value!r} is no number, text, truth value or list of those") from None
 
 
+@lru_cache(maxsize=2)
 def _composed(text: str) -> MappingNode:
-    """Parse the text as far as nodes, which know where they stand."""
+    """Parse the text as far as nodes, which know where they stand; nobody changes them."""
     node = YAML(typ="safe", pure=True).compose(text)
     if not isinstance(node, MappingNode):
         raise Unchangeable("the top level is no mapping; write 'key: value' lines")

@@ -29,6 +29,8 @@ from gazerig.robot.model.commands import (
     from_json,
 )
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 YAW = JOINTS.index("neck_yaw")
 
 

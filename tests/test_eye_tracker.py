@@ -23,8 +23,6 @@ from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
 
-pymovements = pytest.importorskip("pymovements")
-
 RATE_HZ = 1000
 SECONDS = 36
 NOISE_DEG = 0.01
@@ -107,6 +105,7 @@ def look_about(seed: int, saccade: SaccadeParams) -> Trace:
 
 def judged(trace: Trace) -> np.ndarray:
     """Return onset and end of every saccade that the judge sees, in ms."""
+    pymovements = pytest.importorskip("pymovements")  # a second of processor: not while collecting
     recording = pymovements.gaze.from_numpy(
         time=trace.ms,
         position=trace.gaze_deg.T,

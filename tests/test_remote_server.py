@@ -41,6 +41,8 @@ from gazerig.robot.remote.request_handler import Pulse, RequestHandler
 from gazerig.robot.remote.socket_io import REQUEST_BYTES
 from gazerig.robot.remote.socket_server import RemoteServer
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 RATE = "loop.rate_hz"
 BLINKS = "gaze.lids.blinks_per_min"
 

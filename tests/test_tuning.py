@@ -16,6 +16,8 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.model.commands import Command, Tune
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 DESK = Path("config/rigs/desk.yaml")
 NOW = datetime(2026, 1, 31, 23, 59, 59)
 

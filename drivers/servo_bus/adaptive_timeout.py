@@ -32,7 +32,8 @@ class AdaptiveTimeout:
     """Learns from every whole answer how late answers are.
 
     Args:
-        least_s, most_s: bounds of the prompt time-out, and of it with the reserve.
+        least_s: least prompt time-out.
+        most_s: greatest time-out, the reserve included.
 
     seconds: the prompt time-out now; begins at its longest
     """

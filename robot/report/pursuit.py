@@ -1,7 +1,6 @@
 """How smoothly the gaze follows what moves: gain and lag between saccades."""
 
 import numpy as np
-from scipy import signal
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.report.eye_head import rate, stretches
@@ -44,6 +43,8 @@ def response(run: GazeTrace) -> Floats:
     By cross spectra of both speeds, sideways; what saccades did is bridged. Only where the
     two go together: a frequency that the target does not have tells nothing.
     """
+    from scipy import signal  # nearly a second of processor, which other commands need not wait for
+
     t, clear = run.column("t"), run.slow()
     rate_hz = run.rate_hz
     window = int(_WINDOW_S * rate_hz)

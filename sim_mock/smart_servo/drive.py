@@ -23,7 +23,9 @@ class Drive(ABC):
     It reads the registers and never refuses anything: what may be written is decided elsewhere.
 
     Args:
-        memory, model, spec: of the servo.
+        memory: of the servo.
+        model: of the servo.
+        spec: of the servo.
         scale: steps of the registers for one of the 4096 steps of the shaft's turn.
 
     Attributes:
