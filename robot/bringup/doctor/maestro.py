@@ -5,8 +5,8 @@ among the findings. What a board does not tell is said as a note, with what to s
 program. Source: Pololu Maestro User's Guide (0J40), sections 4.b, 4.e, 5.a and 5.e.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.hobby_board.models import US_STEPS
@@ -17,14 +17,13 @@ from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
+from gazerig.robot.bringup.doctor.board import WHERE, BoardRules, examine
 from gazerig.robot.bringup.doctor.diagnostics import BOARD, Diagnostic, Fix, Level
 from gazerig.robot.bringup.maestro_settings import FACTORY_US, wide_range
 
-WHERE = "the board"
 SCRIPT = "script"
 """In place of a register: the board's own script runs (1) or not (0)."""
 
-UNASKED = "was not asked: others give pulses, and were it not there, the board would send them home"
 TIMEOUT = "serial timeout"
 CURES = {
     "serial signal error": "something was sent at another baud rate, or the line is disturbed: "
@@ -43,25 +42,21 @@ CURES = {
 }
 
 
-@dataclass(frozen=True)
-class Board:
-    """A board as found, and what the rig says of it.
-
-    found: None where none answers; usb: vendor and product id of its port, "" unless on USB
-    pulses: by channel, quarter microseconds, None where it kept silent; channels that were
-        not asked are missing
-    """
-
-    params: MaestroParams
-    setups: Sequence[ServoSetup]
-    found: MaestroFound | None
-    usb: str
-    pulses: Mapping[int, int | None]
-
-    @property
-    def size(self) -> int | None:
-        """Return its number of channels, None where it is not known."""
-        return USB_CHANNELS.get(self.usb)
+RULES = BoardRules(
+    most_input=MOST_INPUT,
+    left_on="gazerig home ends with its pulses off; for good set 'On startup or error' to Off in "
+    "Pololu's program",
+    outside="switch the servo supply off; set 'On startup or error' to Off in Pololu's program",
+    notes=(
+        Diagnostic(
+            "note",
+            "its channels' own ranges and its serial timeout cannot be read over the serial line",
+            WHERE,
+            "gazerig setup lists what to set in Pololu's program, and tries the ranges out with "
+            "the servo supply off; without a timeout servos hold when the program or the cable dies",
+        ),
+    ),
+)
 
 
 def visit(
@@ -69,40 +64,50 @@ def visit(
 ) -> list[Diagnostic]:
     """Ask a board for all it tells and judge it; nothing moves.
 
+    Args:
+        port: opened here.
+        params: how the rig says that it wants to be spoken to.
+        setups: the servos of the rig.
+        usb: vendor and product id of its port, "" unless on USB.
+
     Raises:
         PortError: the port cannot be opened.
         BusLost: it has gone away.
     """
-    return examine(take(port, params, setups, usb))
+    found, size = probe(port, params), USB_CHANNELS.get(usb)
+    if found is None:
+        return [_mute(params, size is not None)]
+    channels = size or params.channels
+    pulses = _pulses(Line(port, _spoken(params, found)), setups, channels, found, size is not None)
+    crc = "on" if found.crc else "off"
+    named = f"{channels} channels{'' if size else ' assumed'}"
+    well = f"answers in the {' and the '.join(found.forms)} form, CRC {crc}, {named}, no script"
+    own = [*_speech(params, found, size), *_state(found)]
+    judged = examine(RULES, setups, pulses, channels, own, well)
+    return [*judged[:-1], *_wide_ranges(setups), judged[-1]]
 
 
-def take(port: BusPort, params: MaestroParams, setups: Sequence[ServoSetup], usb: str) -> Board:
-    """Ask a board for all it tells.
+def _pulses(
+    line: Line, setups: Sequence[ServoSetup], channels: int, found: MaestroFound, sized: bool
+) -> dict[int, int | None]:
+    """Ask for the pulses of a rig's channels.
 
     A channel that is not there is an error to a board, on which it sends all channels home:
     those that cannot be there are not asked for, nor, while any gives pulses, those beyond
     the six that every board has, unless its size is known.
-
-    Raises:
-        PortError: the port cannot be opened.
-        BusLost: it has gone away.
     """
-    found = probe(port, params)
-    if found is None:
-        return Board(params, setups, None, usb, {})
-    line, size = Line(port, _spoken(params, found)), USB_CHANNELS.get(usb, params.channels)
     pulses: dict[int, int | None] = {}
-    sure = MICRO if any(found.pulses) and usb not in USB_CHANNELS else size
+    sure = MICRO if any(found.pulses) and not sized else channels
     for channel in sorted(setup.id for setup in setups):
-        if sure <= channel < size:
+        if sure <= channel < channels:
             continue
         silent = None in pulses.values()
-        heard = None if silent or channel >= size else line.pulses((channel,))
+        heard = None if silent or channel >= channels else line.pulses((channel,))
         pulses[channel] = None if heard is None else heard[0]
     if None in pulses.values():
         # What it did not understand is in its register now, and is no fault.
         line.greet()
-    return Board(params, setups, found, usb, pulses)
+    return pulses
 
 
 def _spoken(params: MaestroParams, found: MaestroFound) -> MaestroParams:
@@ -111,43 +116,19 @@ def _spoken(params: MaestroParams, found: MaestroFound) -> MaestroParams:
     return replace(params, protocol=form, crc=found.crc)
 
 
-def examine(board: Board) -> list[Diagnostic]:
-    """Judge a board: all that is wrong; one finding says it where it is well."""
-    if board.found is None:
-        return [_mute(board)]
-    findings = [*_speech(board, board.found), *_state(board.found), *_channels(board)]
-    if not any(finding.level in ("warn", "error") for finding in findings):
-        findings.insert(0, Diagnostic("ok", _well(board, board.found), WHERE))
-    return [*findings, *_untold(board)]
-
-
-def _well(board: Board, found: MaestroFound) -> str:
-    size = f"{board.size} channels" if board.size else f"{board.params.channels} channels assumed"
-    given = sum(1 for pulse in board.pulses.values() if pulse)
-    return (
-        f"answers in the {' and the '.join(found.forms)} form, CRC {'on' if found.crc else 'off'}, "
-        f"{size}, no script; pulses on {given} of {len(board.pulses)} channels"
+def _mute(params: MaestroParams, on_usb: bool) -> Diagnostic:
+    port = (
+        "the first of its two ports (the Command Port), and set it to 'USB Dual Port' in Pololu's"
     )
-
-
-def _mute(board: Board) -> Diagnostic:
-    params = board.params
-    if board.usb in USB_CHANNELS:
-        cure = (
-            "take the first of its two ports (the Command Port), and set it to 'USB Dual Port' in "
-            "Pololu's program"
-        )
-    else:
-        cure = (
-            "has it power? on USB take the first of its two ports and set it to 'USB Dual Port' "
-            f"in Pololu's program; on its serial pins check TX, RX, ground and {params.baud} bit/s"
-        )
+    cure = f"take {port} program"
+    if not on_usb:
+        pins = f"on its serial pins check TX, RX, ground and {params.baud} bit/s"
+        cure = f"has it power? on USB {cure}; {pins}"
     return Diagnostic("error", f"no Maestro answers at {params.baud} bit/s", WHERE, cure)
 
 
-def _speech(board: Board, found: MaestroFound) -> Iterator[Diagnostic]:
+def _speech(params: MaestroParams, found: MaestroFound, size: int | None) -> Iterator[Diagnostic]:
     """Judge how it wants to be spoken to."""
-    params = board.params
     if params.protocol not in found.forms:
         number = (
             f"its device number is not {params.device}; " if params.protocol == "pololu" else ""
@@ -167,12 +148,12 @@ def _speech(board: Board, found: MaestroFound) -> Iterator[Diagnostic]:
             f"write bus.maestro.crc: {str(found.crc).lower()}, or change 'Enable CRC' in Pololu's "
             "program",
         )
-    if board.size is not None and board.size != params.channels:
+    if size is not None and size != params.channels:
         yield Diagnostic(
             "error",
-            f"has {board.size} channels, the YAML says {params.channels}",
+            f"has {size} channels, the YAML says {params.channels}",
             WHERE,
-            f"write bus.maestro.channels: {board.size}",
+            f"write bus.maestro.channels: {size}",
         )
 
 
@@ -193,55 +174,11 @@ def _state(found: MaestroFound) -> Iterator[Diagnostic]:
         )
 
 
-def _channels(board: Board) -> Iterator[Diagnostic]:
-    """Judge every channel of the rig."""
-    size = board.size or board.params.channels
-    for setup in board.setups:
-        pulse, where = board.pulses.get(setup.id), servo_label(setup)
-        if setup.id >= size:
-            says, cure = f"the board has channels 0..{size - 1} only", "correct its id in the YAML"
-        elif setup.id not in board.pulses:
-            yield Diagnostic("note", UNASKED, where, "let all servos go limp and look again")
+def _wide_ranges(setups: Sequence[ServoSetup]) -> Iterator[Diagnostic]:
+    """Say which joints a new board's own ranges would cut."""
+    for setup in setups:
+        if wide_range(setup) is None:
             continue
-        elif pulse is None:
-            says = "the board does not answer about this channel"
-            cure = "has it so many channels? correct its id, or bus.maestro.channels"
-        elif 0 < pulse <= MOST_INPUT:
-            says, cure = "is an input", "set its channel to Servo in Pololu's program"
-        elif pulse:
-            yield from _pulse(setup, pulse, where)
-            continue
-        else:
-            continue
-        yield Diagnostic("error", says, where, cure)
-
-
-def _pulse(setup: ServoSetup, pulse: int, where: str) -> Iterator[Diagnostic]:
-    at = f"gets pulses of {pulse / US_STEPS:g} us though no program runs it"
-    low, high = setup.min_steps / US_STEPS, setup.max_steps / US_STEPS
-    if setup.min_steps <= pulse <= setup.max_steps:
-        yield Diagnostic(
-            "warn", at, where, "gazerig home ends with its pulses off; for good set 'On startup "
-            "or error' to Off in Pololu's program",
-        )  # fmt: skip
-    else:
-        yield Diagnostic(
-            "error",
-            f"{at}, outside its range {low:g}..{high:g} us",
-            where,
-            "switch the servo supply off; set 'On startup or error' to Off in Pololu's program",
-        )
-
-
-def _untold(board: Board) -> Iterator[Diagnostic]:
-    """Say what no board tells, and what to do about it."""
-    yield Diagnostic(
-        "note",
-        "hobby servos tell nothing: position, load, temperature and supply cannot be examined",
-        "the servos",
-    )
-    wide = [setup for setup in board.setups if wide_range(setup)]
-    for setup in wide:
         low, high = wide_range(setup) or FACTORY_US
         yield Diagnostic(
             "note",
@@ -250,13 +187,6 @@ def _untold(board: Board) -> Iterator[Diagnostic]:
             servo_label(setup),
             f"set its Min to {low} and its Max to {high} in Pololu's program",
         )
-    yield Diagnostic(
-        "note",
-        "its channels' own ranges and its serial timeout cannot be read over the serial line",
-        WHERE,
-        "gazerig setup lists what to set in Pololu's program, and tries the ranges out with the "
-        "servo supply off; without a timeout servos hold when the program or the cable dies",
-    )
 
 
 def apply_fix(port: BusPort, params: MaestroParams, fix: Fix) -> str:
