@@ -136,6 +136,16 @@ def test_every_room_of_the_robot_has_its_storey() -> None:
     assert rooms <= named
 
 
+def test_emulated_servos_share_no_codec_with_the_drivers() -> None:
+    data_sheets = {"drivers.dynamixel.control_table", "drivers.feetech.memory_table"}
+    for module, path in modules():
+        if module.startswith(("sim_mock.smart_servo.", "sim_mock.dynamixel.", "sim_mock.feetech.")):
+            shared = {w for w in imports(path) if w.startswith("drivers.")}
+            allowed = {w for w in shared if w.startswith(tuple(data_sheets))}
+            assert shared == allowed, f"{module} must not import {shared - allowed}"
+            assert not (shared and "smart_servo" in module), f"{module} must not know a make"
+
+
 def test_gaze_stands_on_numpy_alone() -> None:
     standard = set(sys.stdlib_module_names) | {"numpy", "gaze", "params"}
     for module, path in modules():
