@@ -1,1 +1,1 @@
-"""Pure gaze models: no clock, no I/O, no global dice; imports numpy and nothing else of ours."""
+"""Pure gaze models: no clock, no I/O, no global random state; they import numpy only."""

@@ -11,27 +11,27 @@ from gazerig.gaze.types import Angles2, Angles3, Mat3, Vec3
 
 
 def wrap(angle_rad: float) -> float:
-    """Bring an angle into -pi..pi."""
+    """Return an angle wrapped into -pi..pi."""
     return (angle_rad + pi) % (2.0 * pi) - pi
 
 
 def clip(value: float, most: float) -> float:
-    """Keep a number within +-``most``."""
+    """Return a number clipped to +-``most``."""
     return min(max(value, -most), most)
 
 
 def add(a: Vec3, b: Vec3) -> Vec3:
-    """Add two vectors."""
+    """Return the sum of two vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 def sub(a: Vec3, b: Vec3) -> Vec3:
-    """Subtract ``b`` from ``a``."""
+    """Return ``a`` minus ``b``."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 def scale(a: Vec3, factor: float) -> Vec3:
-    """Multiply a vector by a number."""
+    """Return a vector times a number."""
     return (a[0] * factor, a[1] * factor, a[2] * factor)
 
 
@@ -92,7 +92,7 @@ def along_great_circle(start: Vec3, end: Vec3, fraction: float) -> Vec3:
 
 
 def beside(way: Vec3, start: Vec3, further_rad: float, aside_rad: float) -> Vec3:
-    """Move a direction on along the great circle that leads to it, and across.
+    """Return a direction moved on along the great circle that leads to it, and across.
 
     way: unit vector that is moved; start: where the great circle comes from
     further_rad: beyond ``way``; aside_rad: to the left of the path as seen from outside
@@ -106,7 +106,7 @@ def beside(way: Vec3, start: Vec3, further_rad: float, aside_rad: float) -> Vec3
 
 
 def turned(v: Vec3, axis: Vec3, angle_rad: float) -> Vec3:
-    """Turn a vector about a unit axis (Rodrigues)."""
+    """Return a vector rotated about a unit axis (Rodrigues' formula)."""
     c, s = cos(angle_rad), sin(angle_rad)
     k = dot(axis, v) * (1.0 - c)
     x = cross(axis, v)
@@ -118,7 +118,7 @@ def turned(v: Vec3, axis: Vec3, angle_rad: float) -> Vec3:
 
 
 def shortened(v: Vec3, offset_rad: float) -> Vec3:
-    """Bring a direction nearer to straight ahead by ``offset_rad`` along the great circle.
+    """Return a direction moved towards straight ahead by ``offset_rad`` along the great circle.
 
     A direction closer than the offset becomes straight ahead.
     """

@@ -2,10 +2,10 @@
 
 The larger amount of attention wins. Two nearly equal amounts would flicker, so the
 present winner is kept unless another is clearly stronger, and for a shortest time. And
-a winner for ever would be a stare, so amounts are multiplied by the interest that is left
-(gaze.habituation). The most interesting of the bodies that a rule points at keeps the
-rule's whole constant, which the paper's comparison needs: so somebody alone is not left
-for boredom, and several people share the gaze.
+a winner for ever would be a stare, so amounts are multiplied by the factor that habituation
+leaves (gazerig.gaze.habituation). Of the bodies that a rule points at the one with the
+highest factor keeps the rule's whole constant, which the paper's comparison needs: so one
+person alone is not left for habituation, and several people share the gaze.
 """
 
 from dataclasses import dataclass, field
@@ -32,13 +32,13 @@ _SPEED_OVER_S = 0.2  # a speed of the head from positions farther apart says not
 
 @dataclass(frozen=True)
 class AttentionParams:
-    """Hysteresis, and how old a picture may be."""
+    """Hysteresis of the choice, and the greatest age of a frame."""
 
     # fmt: off
-    hysteresis_ratio: Annotated[float, Bounds(1, 10), "another body must pull this many times stronger to take over"] = 1.2
+    hysteresis_ratio: Annotated[float, Bounds(1, 10), "salience of another body over that of the present one at which it takes over"] = 1.2
     min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time with one body"] = 300.0
-    stale_ms: Annotated[float, Bounds(20, 10000), "a picture older than this no longer tells what is there"] = 400.0
-    habituation: Annotated[HabituationParams, "how interest wears off"] = field(default_factory=HabituationParams)
+    stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
+    habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
     # fmt: on
 
 
@@ -46,8 +46,8 @@ class _Choice(NamedTuple):
     """Amounts of one decision.
 
     motion:   of the n bodies, term by term
-    rule, interest, total: (n + 1,), the place that a rule may name coming after the
-        bodies; the rule's constant, the factor of interest, and the amount compared, which
+    rule, habituation, total: (n + 1,), the point that a rule may name coming after the
+        bodies; the rule's constant, the factor of habituation, and the amount compared, which
         is -inf where there is nothing
     """
 
@@ -60,7 +60,7 @@ class _Choice(NamedTuple):
 
 
 class Attention:
-    """Chooses the target, once for each new picture."""
+    """Choice of the target, once for each new frame."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class Attention:
         self.reset(0.0)
 
     def retune(self, params: AttentionParams) -> None:
-        """Take another hysteresis; the target in force and all interest stay."""
+        """Change the hysteresis; the target in force and all habituation stay."""
         self._params = params
         self._habituation.retune(params.habituation)
 
@@ -110,7 +110,7 @@ class Attention:
         return self._settle(self._idle.step(t_s), t_s)
 
     def _settle(self, target: Target, t_s: float) -> Target:
-        """Count a shift whenever another thing is looked at."""
+        """Count a gaze shift whenever another object is looked at."""
         identity = (target.kind, target.id)
         if identity != self._identity:
             if self._identity is not None:
@@ -122,7 +122,7 @@ class Attention:
         return target._replace(shift=self._shift)
 
     def _decide(self, percept: Percept, state: GazeState, t_s: float) -> Target | None:
-        """Compare all visible bodies with the rule's choice."""
+        """Return the target of the most salient visible body or rule, None where there is none."""
         visible = self._field_of_view.visible(percept.bodies, state)
         made = self._compare(percept.bodies, visible, state, t_s)
         if made.total.max(initial=-inf) == -inf:
@@ -190,7 +190,7 @@ class Attention:
 
 
 def _target(made: _Choice, row: int, captured_s: float) -> Target:
-    """Make the target of a row, with its reason."""
+    """Return the target of a row, with its reason."""
     saliences = _strongest(made, row)
     first, rule_target = saliences[0], made.rule_target
     moving = first.translation + first.looming + first.rotation + first.onset
@@ -216,7 +216,7 @@ def _target(made: _Choice, row: int, captured_s: float) -> Target:
 
 
 def _strongest(made: _Choice, row: int) -> tuple[Salience, ...]:
-    """Return the pulls of a row and of the strongest others, term by term."""
+    """Return the saliences of a row and of the highest others, term by term."""
     total = made.total
     if len(total) > 64:
         rows = np.argpartition(-total, _LISTED)[:_LISTED]
@@ -228,7 +228,7 @@ def _strongest(made: _Choice, row: int) -> tuple[Salience, ...]:
 
 
 def _salience(made: _Choice, row: int) -> Salience:
-    """Write down what pulls to one row."""
+    """Return the salience of one row, term by term."""
     rule, habituation = float(made.rule[row]), float(made.habituation[row])
     total = float(made.total[row])
     if row == len(made.bodies):
@@ -239,7 +239,7 @@ def _salience(made: _Choice, row: int) -> Salience:
 
 
 def _terms(salience: Salience) -> str:
-    """Write the terms that count: the largest, and others that are no less than a tenth of it."""
+    """Return the largest term and all that are at least a tenth of it, as text."""
     terms = {
         "translation": salience.translation,
         "looming": salience.looming,

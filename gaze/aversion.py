@@ -1,4 +1,4 @@
-"""Looking away from a face now and then, as people do while they talk, listen and think.
+"""Gaze aversion: looking away from a face while talking, listening and thinking.
 
 A gaze that never leaves a face is a stare. So it goes to and fro between MUTUAL, on the
 face, and AWAY, beside it. How long each lasts, how far away the gaze goes and which way
@@ -29,7 +29,7 @@ _SCALE_DEG, _P_TOP, _P_MOST = 6.9, 15.7, 15.0
 
 @dataclass(frozen=True)
 class AversionParams:
-    """Times on the face and away from it, and how far away."""
+    """Durations of mutual gaze and of aversion, and the amplitudes of the latter."""
 
     # fmt: off
     talk_mutual_s: Annotated[float, Bounds(0.1, 60), "talking: mean time on the face"] = 3.13
@@ -64,7 +64,7 @@ class AversionParams:
 
 
 class Aversion:
-    """Semi-Markov MUTUAL <-> AWAY on faces; everything else passes through."""
+    """Semi-Markov process MUTUAL <-> AWAY on faces; other targets pass unchanged."""
 
     def __init__(self, params: AversionParams, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -73,7 +73,7 @@ class Aversion:
         self.reset(0.0)
 
     def retune(self, params: AversionParams) -> None:
-        """Take other times and angles, from the next look on."""
+        """Change durations and angles, from the next look on."""
         par = self._params = params
         self._times: dict[AversionMode, tuple[float, float, float, float]] = {
             "talk": (
@@ -97,7 +97,7 @@ class Aversion:
         }
 
     def reset(self, t_s: float) -> None:
-        """Forget whom it looked at; the mode stays."""
+        """Forget the face; the conversation mode stays."""
         self._face: int | None = None
         self._until_s = t_s
         self._away: Vec3 | None = None
@@ -106,11 +106,11 @@ class Aversion:
 
     @property
     def mode(self) -> AversionMode:
-        """Say what the conversation is doing."""
+        """The conversation mode in force."""
         return self._mode
 
     def converse(self, mode: AversionMode, t_s: float) -> None:
-        """Say what the robot does from now on: talk, listen, think or none of these.
+        """Set the conversation mode: talk, listen, think or none.
 
         A change brings the gaze back to the face for a new look; thinking looks away at
         once, since that is when people do.
@@ -145,7 +145,7 @@ class Aversion:
         return target._replace(shift=target.shift + self._shifts)
 
     def _attend(self, target: Target, t_s: float) -> None:
-        """Begin anew with another face; come back when there is none."""
+        """Start mutual gaze with another face; end an aversion when there is none."""
         face = target.id if target.kind == "face" else None
         if face == self._face:
             return
@@ -155,7 +155,7 @@ class Aversion:
             self._until_s = t_s + self._mutual_s()
 
     def _turn(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
-        """Leave the face, or return to it, when the time is over."""
+        """Switch between face and aversion when the drawn duration is over."""
         if self._away is not None:
             self._return()
             self._until_s = t_s + self._mutual_s()
@@ -171,7 +171,7 @@ class Aversion:
             self._shifts += 1
 
     def _beside(self, target: Target, away: Vec3, t_s: float) -> Target:
-        """Make the target of a look away."""
+        """Return the target of an aversion."""
         return target._replace(
             p_world_m=away,
             v_world_m_s=(0.0, 0.0, 0.0),
@@ -185,7 +185,7 @@ class Aversion:
         )
 
     def _place(self, face: Vec3, p_world_head_m: Vec3) -> Vec3:
-        """Draw a point beside the face, at its distance."""
+        """Draw a point beside the face, at the distance of the face."""
         rel = sub(face, p_world_head_m)
         ahead = unit(rel)
         right = unit(cross(ahead, (0.0, 0.0, 1.0)))
@@ -196,7 +196,7 @@ class Aversion:
         return add(p_world_head_m, scale(looking, norm(rel)))
 
     def _angle_deg(self) -> float:
-        """Draw how far away."""
+        """Draw the amplitude of an aversion, in degrees."""
         par = self._params
         most = par.listen_most_deg if self._mode == "listen" else par.talk_most_deg
         # The law's P, of those only that go at least as far as asked for; never 0.
@@ -205,7 +205,7 @@ class Aversion:
         return min(most, -_SCALE_DEG * log(p / _P_TOP))
 
     def _way_deg(self) -> float:
-        """Draw which way, 0 right and 90 up: a sector of the table and a way within it."""
+        """Draw the direction, 0 right and 90 up: a sector of the table, uniform within it."""
         if self._mode == "think" and self._rng.random() < self._params.think_up_share:
             sector = _UP
         else:
@@ -213,25 +213,25 @@ class Aversion:
         return 45.0 * sector + float(self._rng.uniform(-22.5, 22.5))
 
     def _sector(self) -> int:
-        dice = float(self._rng.random()) * sum(DIRECTIONS_PERCENT)
+        draw = float(self._rng.random()) * sum(DIRECTIONS_PERCENT)
         for sector, share in enumerate(DIRECTIONS_PERCENT):
-            dice -= share
-            if dice < 0.0:
+            draw -= share
+            if draw < 0.0:
                 return sector
         return len(DIRECTIONS_PERCENT) - 1  # rounding
 
     def _mutual_s(self) -> float:
-        """Draw a time on the face."""
+        """Draw a duration of mutual gaze."""
         mean, sd, _, _ = self._times[self._mode]
         return min(self._params.longest_mutual_s, self._time_s(mean, sd))
 
     def _away_s(self) -> float:
-        """Draw a time away from it."""
+        """Draw a duration of an aversion."""
         _, _, mean, sd = self._times[self._mode]
         return self._time_s(mean, sd)
 
     def _time_s(self, mean_s: float, sd_s: float) -> float:
-        """Draw from the log-normal law with a mean and standard deviation."""
+        """Draw from the log-normal distribution with a given mean and standard deviation."""
         sigma2 = log(1.0 + (sd_s / mean_s) ** 2)
         drawn = mean_s * exp(sqrt(sigma2) * float(self._rng.standard_normal()) - 0.5 * sigma2)
         return max(drawn, self._params.min_dwell_s)

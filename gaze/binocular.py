@@ -4,7 +4,7 @@ Zhang & Wakamatsu's structure, as a pure model of the human system with the dela
 own sensors: one conjugate control and one vergence control over a shared integrator,
 the efference copy that takes the delay out of the loop, a covered eye that goes with
 the seeing one, and the reflex against the motion of the head. The head on the desk,
-whose pictures are placed in space when they were taken, runs the same two controls in
+whose frames are placed in space at their time of capture, runs the same two controls in
 gaze space (gaze.pursuit). Head frame; yaw + left, or pitch + up with one value for both
 eyes; radians inside, degrees and milliseconds in the parameters.
 """
@@ -72,7 +72,7 @@ AT_REST = HeadMotion()
 
 
 class BinocularController:
-    """Drives one axis of both eyes; give the same target twice for the vertical one."""
+    """Controls one axis of both eyes; for the vertical axis both get the same target."""
 
     def __init__(self, params: BinocularParams) -> None:
         par = self._params = params
@@ -93,7 +93,7 @@ class BinocularController:
         self.reset(0.0)
 
     def reset(self, t_s: float, version_rad: float = 0.0, vergence_rad: float = 0.0) -> None:
-        """Begin at rest with both eyes anywhere and no target seen."""
+        """Start at rest at the given eye angles, with no target seen."""
         self.version_rad, self.vergence_rad = version_rad, vergence_rad
         self._conjugate.reset()
         self._canals.reset()

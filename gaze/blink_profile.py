@@ -1,4 +1,4 @@
-"""The course of a blink or a wink: quickly shut, a moment so, opened with a long tail.
+"""Lid closure over time in a blink or a wink: fast closing, a hold, slower opening.
 
 Closing is about twice as fast as opening (VanderWerf 2003; Kwon 2013). Whatever is changed
 meanwhile, a closing goes on to its end as it began, and what is over stays over.
@@ -27,10 +27,10 @@ def closure(since_onset_s: float, close_s: float, hold_s: float, open_s: float) 
 class LidClosure(NamedTuple):
     """One blink or wink.
 
-    onset_s: when it begins; close_s, hold_s, open_s: its times in somebody awake
+    onset_s: when it begins; close_s, hold_s, open_s: its durations at no sleepiness
     lower_share: part of its way that the lower lid goes
     depth: part that both lids go, 1 is shut
-    slow: how many times as long as in somebody awake
+    slow: factor of these durations
     """
 
     onset_s: float

@@ -1,4 +1,4 @@
-"""The dice of the blinks: pauses between them, which shifts bring one, how deep they are."""
+"""Random parts of blinking: intervals, gaze-evoked blinks, depth, double blinks."""
 
 from math import exp, inf, log, sqrt
 
@@ -40,7 +40,7 @@ def evokes_blink(params: LidParams, shift_deg: float, rng: np.random.Generator) 
 
 
 def blink_depth(params: LidParams, rng: np.random.Generator) -> float:
-    """Draw how far a blink shuts the lid, 1 is entirely."""
+    """Draw the depth of a blink: 1 is complete closure."""
     shallow = rng.random() < params.incomplete_share
     return float(rng.uniform(0.70, 0.85)) if shallow else 1.0
 

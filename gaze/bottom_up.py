@@ -1,4 +1,4 @@
-"""Bottom-up attention: how strongly each visible body's motion pulls the gaze.
+"""Bottom-up attention: the salience of each visible body by its motion.
 
 Mitake et al. eq 1 sums three stimuli to which cells of the areas MT and MST respond:
 translation across the line of view (slide), motion along it (loom) and rotation about
@@ -11,7 +11,7 @@ retinal   What the paper's reason, the image on the retina, demands: e from the 
           body, speeds relative to the moving eye and divided by the distance, each term
           measured by the motion that counts as 1.
 
-What has just come into view pulls besides, by a term that decays: the paper's behaviour
+What has just come into view has a further, decaying term: the paper's behaviour
 (e), a hand that reaches in from outside the field, is not in eq 1.
 
 All bodies are computed at once; what is remembered of each is a row of an array.
@@ -40,16 +40,16 @@ _AHEAD: Vec3 = (1.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class BottomUpParams:
-    """Form and weights of eq 1, and the pull of what is new."""
+    """Form and reference motions of eq 1, and the salience of a new body."""
 
     # fmt: off
     form: Annotated[Literal["retinal", "literal"], "retinal: as the eye sees it; literal: eq 1 as printed, without the weights"] = "retinal"
-    translation_reference_rad_s: Annotated[float, Bounds(0.01, 20), "sideways motion, seen from the eye, that pulls with 1"] = 0.5
-    looming_reference_1_s: Annotated[float, Bounds(0.01, 20), "growth or shrinkage, in parts of the distance, that pulls with 1"] = 0.5
-    rotation_reference_rad_s: Annotated[float, Bounds(0.01, 100), "rotation about the line of view that pulls with 1"] = 3.0
+    translation_reference_rad_s: Annotated[float, Bounds(0.01, 20), "angular speed across the line of sight that has the salience 1"] = 0.5
+    looming_reference_1_s: Annotated[float, Bounds(0.01, 20), "speed along the line of sight over distance that has the salience 1"] = 0.5
+    rotation_reference_rad_s: Annotated[float, Bounds(0.01, 100), "rotation about the line of sight that has the salience 1"] = 3.0
     smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass"] = 0.1
-    onset_salience: Annotated[float, Bounds(0, 10), "pull of what has just come into view; 0 for none"] = 1.0
-    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which that pull is gone"] = 0.5
+    onset_salience: Annotated[float, Bounds(0, 10), "salience of what has just come into view; 0 for none"] = 1.0
+    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which that salience decays"] = 0.5
     # fmt: on
 
 
@@ -102,7 +102,7 @@ def _length(v: Floats) -> Floats:
 
 
 class _Memory(NamedTuple):
-    """What is known of bodies, in any order: (m,), terms (3, m).
+    """State of m bodies, in any order: (m,) arrays, terms (3, m).
 
     terms: smoothed slide, loom and spin; entered_s, seen_s: came into view, was last seen
     """
@@ -113,7 +113,7 @@ class _Memory(NamedTuple):
     seen_s: Floats
 
     def only(self, mask: NDArray[np.bool_]) -> "_Memory":
-        """Keep the bodies in the mask."""
+        """Return the memory of the bodies in the mask."""
         return _Memory(self.ids[mask], self.terms[:, mask], self.entered_s[mask], self.seen_s[mask])
 
 
@@ -124,14 +124,14 @@ def _never_seen(ids: Ids) -> _Memory:
 
 
 class BottomUp:
-    """Eq 1 with a low-pass per body, and the pull of what has just come into view."""
+    """Eq 1 with a low-pass filter per body, and the salience of what has just come into view."""
 
     def __init__(self, params: BottomUpParams) -> None:
         self._params = params
         self.reset(0.0)
 
     def retune(self, params: BottomUpParams) -> None:
-        """Take other weights; what is known of the bodies stays."""
+        """Change the reference motions; the state of the bodies stays."""
         self._params = params
 
     def reset(self, t_s: float) -> None:
@@ -150,7 +150,7 @@ class BottomUp:
         gaze_world: Vec3 = _AHEAD,
         seen: NDArray[np.bool_] | None = None,
     ) -> SalienceTerms:
-        """Return the smoothed pulls of all bodies, in their order; 0 for those not in view.
+        """Return the smoothed salience of all bodies, in their order; 0 for those not in view.
 
         Must be called with no bodies, too, or what comes next is not known to be new.
 
@@ -192,7 +192,7 @@ class BottomUp:
         out[2] = raw.rotation / par.rotation_reference_rad_s
 
     def _blend(self, now: Floats, seen: NDArray[np.bool_], t_s: float) -> SalienceTerms:
-        """Blend each body's terms with its own past; a new body starts from nothing."""
+        """Return the low-passed terms and the onset term; a new body starts at 0."""
         tau, old = self._params.smoothing_s, self._memory
         keep = exp(min(0.0, self._at_s - t_s) / tau) if tau > 0.0 else 0.0
         past, entered_s, seen_s = old.terms, old.entered_s, old.seen_s.copy()
@@ -214,7 +214,7 @@ class BottomUp:
         return SalienceTerms(smooth[0], smooth[1], smooth[2], onset)
 
     def _pause(self, t_s: float) -> None:
-        """Begin anew where nothing at all was looked at for long: nobody left meanwhile."""
+        """Shift all times where no step was made for long, so that no body counts as gone."""
         paused_s = t_s - self._at_s
         if self._started_s is not None and paused_s <= _BLINK_S:
             return
@@ -232,7 +232,7 @@ class BottomUp:
         return t_s if t_s - started_s > _BLINK_S else -np.inf
 
     def _remember(self, ids: tuple[int, ...], t_s: float) -> None:
-        """Arrange the memory for other bodies than before, keeping those just missed."""
+        """Rearrange the memory for other bodies, keeping those missed for a moment."""
         now = _never_seen(np.fromiter(ids, dtype=np.int64, count=len(ids)))
         old = _joined(self._memory, self._gone)
         old = old.only(t_s - old.seen_s <= _BLINK_S)
@@ -249,7 +249,7 @@ class BottomUp:
 
 
 def _joined(a: _Memory, b: _Memory) -> _Memory:
-    """Put two memories of different bodies together."""
+    """Return two memories of different bodies as one."""
     return _Memory(
         np.concatenate((a.ids, b.ids)),
         np.concatenate((a.terms, b.terms), axis=1),

@@ -1,4 +1,4 @@
-"""Breathing: a slow sway of the neck that says somebody is in there.
+"""Breathing: a slow sway of the neck, as of a living person at rest.
 
 Pitch of 0.5 to 1.5 deg at 0.2 to 0.3 Hz; heads that breathe slowly while idle are
 judged more alive. The sway is added to what the head model wishes, and as the eyes
@@ -19,7 +19,7 @@ _GLIDE_S = 1.0  # time in which a breath that is retuned falls into its new dept
 
 @dataclass(frozen=True)
 class BreathingParams:
-    """Depth and pace."""
+    """Amplitude and rate."""
 
     # fmt: off
     pitch_deg: Annotated[float, Bounds(0, 5), "how far the head nods up and down with the breath; 0 is not at all"] = 0.6
@@ -41,12 +41,12 @@ class Breathing:
         self._rate_hz = params.rate_hz
 
     def reset(self, t_s: float) -> None:
-        """Begin to breathe: the sway grows from nothing within the first breath."""
+        """Start to breathe: the amplitude grows from 0 within the first breath."""
         self._start_s = self._t_s = self._retuned_s = t_s
         self._shown = self._left = _STILL
 
     def retune(self, params: BreathingParams) -> None:
-        """Take another depth and pace, the breath under way going on from where it is."""
+        """Change amplitude and rate; the phase of the breath is continuous."""
         breaths = (self._t_s - self._start_s) * self._rate_hz
         self._take(params)
         self._start_s = self._t_s - breaths / self._rate_hz

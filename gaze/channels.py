@@ -26,7 +26,7 @@ class LeakyIntegrator:
 
 
 class ConjugateChannel:
-    """Velocity wish of both eyes together along one axis.
+    """Velocity command of both eyes together (conjugate) along one axis.
 
     The delayed retinal error plus the gaze of that moment (efference copy) is where the
     target is in space. That is smoothed and compared with the gaze of now, so that no
@@ -57,7 +57,7 @@ class ConjugateChannel:
         self.speed_rad_s = 0.0
 
     def hold(self, target_rad: float | None) -> None:
-        """Let a saccade pass: the target's speed stays what it was before."""
+        """Hold the estimate of the target's velocity during a saccade."""
         if target_rad is not None and self._seen is not None:
             self._smoothed += target_rad - self._seen
             self._seen = target_rad
@@ -74,7 +74,7 @@ class ConjugateChannel:
         )
 
     def _follow(self, target_rad: float, dt_s: float) -> None:
-        """Smooth the target's place and take its speed; a jump is no speed."""
+        """Low-pass the target's position and differentiate it; a jump is not taken for velocity."""
         if self._seen is None:
             self._smoothed = target_rad
         elif abs(target_rad - self._seen) > self._reject * dt_s:
@@ -87,7 +87,7 @@ class ConjugateChannel:
 
 
 class VergenceChannel:
-    """Velocity wish of the angle between the eyes: first order, diverging slower."""
+    """Velocity command of the vergence angle: first order, slower when diverging."""
 
     def __init__(self, converge_1_s: float, diverge_1_s: float) -> None:
         self._converge, self._diverge = converge_1_s, diverge_1_s

@@ -38,13 +38,13 @@ class FieldOfViewParams:
 
 
 class FieldOfView:
-    """Tells which bodies either eye sees."""
+    """The fields of view of both eyes."""
 
     def __init__(self, params: FieldOfViewParams) -> None:
         self.retune(params)
 
     def retune(self, params: FieldOfViewParams) -> None:
-        """Take other limits."""
+        """Change the limits."""
         self._temporal = np.radians(params.temporal_deg)
         self._nasal = np.radians(params.nasal_deg)
         self._up = np.radians(params.up_deg)

@@ -1,9 +1,9 @@
-"""Interest that wears off: habituation to what is looked at, and inhibition of return.
+"""Habituation to what is attended, and inhibition of return.
 
-Habituation, as in Pan et al. 2020 ("Realistic and interactive robot gaze"): the interest h
-in what is attended falls, the interest in everything else recovers, and what is compared
-is h times the pull. Without it a gaze stares. It belongs to an identity and outlives its
-absence: somebody who comes back at once is not new.
+Habituation, as in Pan et al. 2020 ("Realistic and interactive robot gaze"): a factor h of
+what is attended falls, that of everything else recovers, and what is compared is h times
+the salience. Without it the gaze stares. It belongs to an identity and outlives its
+absence: a person who comes back at once is not new.
 
 Inhibition of return: for a moment the gaze avoids the place it has just left, as in
 Ruesch et al. 2008 (a Gaussian about that place that decays).
@@ -21,47 +21,47 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class HabituationParams:
-    """Rates of interest, and the place that is avoided."""
+    """Rates of habituation and recovery, and extent of the inhibition of return."""
 
     # fmt: off
-    decay_rate_1_s: Annotated[float, Bounds(0, 10), "how fast interest in what is looked at falls from 1; 0 for never"] = 0.2
-    recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "how fast it recovers in what is not looked at"] = 1.0
+    decay_rate_1_s: Annotated[float, Bounds(0, 10), "rate at which the factor of what is attended falls from 1; 0 for never"] = 0.2
+    recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "rate at which the factors of all else recover"] = 1.0
     rule_floor: Annotated[float, Bounds(0, 1),
-        "interest kept in what a rule points at; lower: the gaze changes sooner between several people"] = 0.6
-    inhibition_of_return_strength: Annotated[float, Bounds(0, 1), "how strongly the place just left is avoided; 0 for not at all"] = 0.5
-    inhibition_of_return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that place"] = 4.0
-    inhibition_of_return_s: Annotated[float, Bounds(0.05, 60), "time constant with which that is over"] = 1.5
+        "least factor of what a rule points at; lower: the gaze changes sooner between several people"] = 0.6
+    inhibition_of_return_strength: Annotated[float, Bounds(0, 1), "how strongly the point just left is avoided; 0 for not at all"] = 0.5
+    inhibition_of_return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that inhibition around the point"] = 4.0
+    inhibition_of_return_s: Annotated[float, Bounds(0.05, 60), "time constant with which it decays"] = 1.5
     # fmt: on
 
 
 class _Left(NamedTuple):
-    """A place the gaze has left, and when."""
+    """A point that the gaze has left, and when."""
 
     p_world_m: Vec3
     at_s: float
 
 
 class Habituation:
-    """Keeps the interest in every identity and the places left."""
+    """State of habituation of every identity, and the points left."""
 
     def __init__(self, params: HabituationParams) -> None:
         self._params = params
         self.reset(0.0)
 
     def retune(self, params: HabituationParams) -> None:
-        """Take other rates; the interest that is left and the places left stay."""
+        """Change the rates; the state stays."""
         self._params = params
 
     def reset(self, t_s: float) -> None:
-        """Find everything interesting again."""
-        # Only those below full interest are kept: the ones attended in the last 1/recovery_rate_1_s
+        """Forget all habituation and the points left."""
+        # Only factors below 1 are kept: of those attended in the last 1/recovery_rate_1_s
         # seconds, a handful however many bodies there are.
         self._habituation: dict[int, float] = {}
         self._left: list[_Left] = []
         self._at_s = t_s
 
     def leave(self, p_world_m: Vec3, t_s: float) -> None:
-        """Note that the gaze has left a place."""
+        """Record that the gaze has left a point."""
         if self._params.inhibition_of_return_strength > 0.0:
             self._left.append(_Left(p_world_m, t_s))
 
@@ -73,7 +73,7 @@ class Habituation:
         attended_id: int,
         t_s: float,
     ) -> Floats:
-        """Return (n,) the interest 0..1 in each body.
+        """Return (n,) the factor 0..1 of each body's salience.
 
         ids, p_world_m: the bodies in view and their centres, (n, 3)
         attended_id: what has been looked at since the step before; -1 for nothing
@@ -92,13 +92,13 @@ class Habituation:
         return habituation
 
     def for_rule(self, habituation: Floats) -> Floats:
-        """Return the interest in bodies that a rule points at: it does not go below the floor."""
+        """Return the factors of bodies that a rule points at: they do not go below the floor."""
         floor = self._params.rule_floor
         out: Floats = floor + (1.0 - floor) * habituation
         return out
 
     def _habituate(self, attended_id: int, dt_s: float) -> None:
-        """Let interest fall in what is attended and rise in the rest."""
+        """Lower the factor of what is attended and raise those of the rest."""
         risen = self._params.recovery_rate_1_s * dt_s
         attended = self._habituation.pop(attended_id, 1.0)
         self._habituation = {
@@ -117,7 +117,7 @@ class Habituation:
         attended_id: int,
         t_s: float,
     ) -> None:
-        """Lower the interest in bodies near the places left; what is attended is exempt."""
+        """Inhibit the return to points left: lower the factors of bodies near them, in place."""
         par = self._params
         places = np.array([one.p_world_m for one in self._left]) - np.asarray(p_eye)
         ages = t_s - np.array([one.at_s for one in self._left])

@@ -56,7 +56,7 @@ class HeadParams:
 
 
 class Head:
-    """Decides when, where to and how the head turns."""
+    """Start, goal and trajectory of the head's part of a gaze shift."""
 
     def __init__(
         self, params: HeadParams, eye_limit_rad: float, neck_limit_rad: tuple[Angles2, Angles2]
@@ -67,7 +67,7 @@ class Head:
     def retune(
         self, params: HeadParams, eye_limit_rad: float, neck_limit_rad: tuple[Angles2, Angles2]
     ) -> None:
-        """Take other constants and ranges; a movement under way goes on as it was planned."""
+        """Change constants and ranges; a movement under way goes on as planned."""
         self._params = params
         self._neck = neck_limit_rad
         reachable = eye_limit_rad - radians(params.eye_margin_deg)
@@ -77,7 +77,7 @@ class Head:
         self.trigger_rad = printed if params.literal_reach else max(0.0, min(printed, reachable))
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
-        """Stand still where the head is."""
+        """Start at rest at the present head angles."""
         self._plans = tuple(Quintic((angle, 0.0, 0.0), angle, 1.0) for angle in head_rad)
         self._planned_s = t_s
         self._goal: Angles2 = (head_rad[0], head_rad[1])
@@ -100,7 +100,7 @@ class Head:
         return self.in_range((yaw, pitch, 0.0))[:2]
 
     def in_range(self, head_rad: Angles3) -> Angles3:
-        """Keep yaw and pitch within the neck's range."""
+        """Return head angles with yaw and pitch clipped to the neck's range."""
         (yaw_low, yaw_high), (pitch_low, pitch_high) = self._neck
         yaw, pitch, roll = head_rad
         return (min(max(yaw, yaw_low), yaw_high), min(max(pitch, pitch_low), pitch_high), roll)
@@ -152,7 +152,7 @@ class Head:
         since_onset: float,
         t_s: float,
     ) -> None:
-        """Start, follow, relieve or rest."""
+        """Choose between turning to the target, recentring an eccentric eye, and rest."""
         par = self._params
         if eccentricity <= radians(par.comfort_deg):
             self._aside_since_s = t_s
@@ -172,10 +172,10 @@ class Head:
             self._follow(facing, gaze, comfort, t_s)
 
     def _follow(self, facing: Angles2, gaze: Angles2, short_rad: float, t_s: float) -> None:
-        """Turn towards the target, but never away from it because the interest has fallen.
+        """Turn towards the target, but never away from it because its salience has fallen.
 
-        Somebody who steps aside pulls most while moving; a head that then took the larger
-        offset of somebody who stands would swing back from where it has just turned to.
+        A person who steps aside is most salient while moving; a head that then took the larger
+        offset of one who stands would swing back from where it has just turned to.
         """
         way = direction(self._goal)
         near_enough = angle_between(way, direction(facing)) <= short_rad
@@ -203,7 +203,7 @@ class Head:
         return goal if rest <= self.trigger_rad else self.goal_rad(gaze, self.trigger_rad)
 
     def _aim(self, goal: Angles2, t_s: float) -> None:
-        """Plan anew when the goal has moved enough to matter."""
+        """Plan a new trajectory when the goal has moved by more than ``replan_deg``."""
         change = hypot(goal[0] - self._goal[0], goal[1] - self._goal[1])
         if change < radians(self._params.replan_deg) and self._level:
             return

@@ -1,8 +1,8 @@
-"""Where to look when there is nothing: wait, search, then rest and glance around.
+"""Idle gaze when there is no target: wait, search, then rest and glance around.
 
-A person who steps out of the picture often comes back at once, and a detector blinks;
+A person who steps out of the frame often comes back at once, and a detector blinks;
 so the gaze first stays where it was. Then it searches: towards the side the person left
-to, and around the place of the loss. With nobody to be found it rests straight ahead
+to, and around the place of the loss. With no person found it rests straight ahead
 and glances around the room at irregular intervals, coming back to rest between glances.
 
 Search points and glances all have kind "search" or "glance" and each has an id of its
@@ -27,13 +27,13 @@ _SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make no more tha
 
 @dataclass(frozen=True)
 class IdleParams:
-    """Times, ranges and the resting point."""
+    """Durations, ranges and the resting point."""
 
     # fmt: off
     hold_ms: Annotated[float, Bounds(0, 60000), "time for which the gaze stays where a lost target was"] = 1000.0
     rest_distance_m: Annotated[float, Bounds(0.3, 20), "distance of the resting point"] = 1.5
     rest_height_m: Annotated[float, Bounds(-1, 3), "height of the resting point above the neck base"] = 0.2
-    rest_salience: Annotated[float, Bounds(0, 10), "pull of the resting point"] = 0.2
+    rest_salience: Annotated[float, Bounds(0, 10), "salience of the resting point"] = 0.2
     coast_ms: Annotated[float, Bounds(0, 2000), "for this long at most a lost target is taken to have moved on"] = 200.0
     search_ms: Annotated[float, Bounds(0, 60000), "time of searching for a lost target after that; 0 is not at all"] = 3000.0
     search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean time with one place of the search"] = 600.0
@@ -74,7 +74,7 @@ class Idle:
         self._rest: Vec3 = (params.rest_distance_m, 0.0, params.rest_height_m)
 
     def reset(self, t_s: float) -> None:
-        """Forget what was looked at."""
+        """Forget the last target."""
         self._t_s = t_s
         self._last: Target | None = None
         self._lost = False
@@ -84,7 +84,7 @@ class Idle:
         self._gone: Target | None = None
 
     def retune(self, params: IdleParams) -> None:
-        """Take other times and places; what is under way goes on, for a time in the new measure."""
+        """Change durations and ranges; the phase under way goes on, its duration scaled."""
         before = self._params
         self._take(params)
         since_s, left_s = self._now.at_s, self._until_s - self._now.at_s
@@ -97,11 +97,11 @@ class Idle:
             # A lost target is waited for.
             left_s += (params.hold_ms - before.hold_ms) / 1e3
             self._search_until_s = since_s + left_s + params.search_ms / 1e3
-        if self._lost:  # else the clock of what there was before somebody came has run out
+        if self._lost:  # else the time of the phase before this target is over
             self._until_s = max(since_s + left_s, self._t_s)
 
     def remember(self, target: Target) -> None:
-        """Note a target that is in sight."""
+        """Record a target that is in sight."""
         self._last, self._lost = target, False
 
     def step(self, t_s: float) -> Target:
@@ -114,7 +114,7 @@ class Idle:
         return self._now
 
     def _lose(self, t_s: float) -> None:
-        """Begin to wait for what was just in sight, where it has got to by now."""
+        """Start to wait for a lost target, at its extrapolated position."""
         self._lost = True
         gone, par = self._last, self._params
         self._gone, self._last = gone, None
@@ -136,7 +136,7 @@ class Idle:
         self._search_until_s = self._until_s + par.search_ms / 1e3
 
     def _next(self, t_s: float) -> None:
-        """Go on to the next place at ``t_s``, when the last one's time is over."""
+        """Go on to the next phase at ``t_s``, when the duration of the last one is over."""
         if self._rng is None:
             self._now, self._until_s = self._resting(t_s), float("inf")
         elif self._gone is not None and t_s < self._search_until_s:
@@ -151,7 +151,7 @@ class Idle:
         return self._now.kind == "glance" and rng.random() < self._params.again_share
 
     def _rest_now(self, t_s: float) -> None:
-        """Come back to straight ahead for a while."""
+        """Start a rest: look straight ahead."""
         self._gone = None
         self._now = self._resting(t_s)
         self._until_s = float("inf")
@@ -159,7 +159,7 @@ class Idle:
             self._until_s = t_s + self._time_s(self._params.rest_ms, self._rng)
 
     def _search(self, gone: Target, t_s: float, rng: np.random.Generator) -> None:
-        """Look where the lost target may be: first on its way out, then about there."""
+        """Start a search fixation: first where the target left to, then around."""
         par, first = self._params, self._now.kind != "search"
         rel = sub(gone.p_world_m, self._eye)
         out = self._way_out(rel, gone.v_world_m_s)
@@ -192,7 +192,7 @@ class Idle:
         )
 
     def _glance(self, t_s: float, rng: np.random.Generator) -> None:
-        """Look at some place in the room."""
+        """Start a glance at a random point of the room."""
         par = self._params
         side = 1.0 if rng.random() < 0.5 else -1.0
         place = (
@@ -203,7 +203,7 @@ class Idle:
         self._until_s = t_s + self._time_s(par.glance_ms, rng)
 
     def _look(self, kind: str, place: Angles2, distance_m: float, t_s: float, why: str) -> None:
-        """Make the target of a search or glance, with an identity of its own."""
+        """Set the target of a search or glance, with an id of its own."""
         self._count += 1
         point = add(self._eye, scale(direction(place), distance_m))
         salience, name = self._params.rest_salience, -1 - self._count
@@ -216,7 +216,7 @@ class Idle:
         )
 
     def _time_s(self, mean_ms: float, rng: np.random.Generator) -> float:
-        """Draw a time with a mean and the common spread, no shorter than people's."""
+        """Draw a log-normal duration with a mean and the common spread, 0.25 s at least."""
         sigma2 = log(1.0 + self._params.spread**2)
         drawn = mean_ms / 1e3 * exp(sqrt(sigma2) * float(rng.standard_normal()) - 0.5 * sigma2)
         return max(drawn, _SHORTEST_S)

@@ -13,7 +13,7 @@ are calibrated where upper and lower meet, half way perhaps, so a lower lid that
 a gap. Therefore ``lower_close_share`` is 1. Calibrated the other way, with the upper lid's
 shut point at the edge of a resting lower lid, a rig may blink as people do: share 0 to 0.2.
 
-What sleepiness does to the lower lid nobody seems to have measured; the muscle that lifts it
+No measurement of the lower lid in sleepiness is known; the muscle that lifts it
 tires with the others, so it rises by little.
 """
 
@@ -51,7 +51,7 @@ class LidParams:
     gaze_evoked_blink_middle_deg: Annotated[float, Bounds(1, 180), "gaze shift that brings a blink every second time"] = 17.0
     gaze_evoked_blink_steepness_1_deg: Annotated[float, Bounds(0, 5), "slope of that probability"] = 0.217
     gaze_evoked_blink_pause_ms: Annotated[float, Bounds(0, 10000), "from the onset of a blink to the next one evoked"] = 600.0
-    gaze_evoked_blink_literal: Annotated[bool, "a blink with every shift beyond gaze_evoked_blink_literal_deg instead of the dice"] = False
+    gaze_evoked_blink_literal: Annotated[bool, "a blink with every shift beyond gaze_evoked_blink_literal_deg, not at random"] = False
     gaze_evoked_blink_literal_deg: Annotated[float, Bounds(0, 180), "a large saccade of Nakamoto & Tsuruno 3.6"] = 20.0
     sleepy_level: Annotated[float, Bounds(0, 1), "sleepiness at the start"] = 0.0
     sleepy_droop: Annotated[float, Bounds(0, 1), "part of the opening that full sleepiness takes away"] = 0.65

@@ -1,8 +1,8 @@
-"""Lids between blinks: they go with the gaze, sink in sleepiness, glide when retuned.
+"""Lid openings between blinks: lid saccades with vertical gaze, and sleepiness.
 
 Eyes that turn down take both lids down with them: the upper lid shuts by that, the lower
 one opens, by less. So the middle of the fissure goes where the eye goes, and the fissure
-narrows (Read 2006: from 9.7 to 6.4 mm at 40 deg down). Nothing here throws dice.
+narrows (Read 2006: from 9.7 to 6.4 mm at 40 deg down). Nothing here is random.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ _GLIDE_S = 0.3  # and when what they do at rest is retuned
 
 
 class LidPair(NamedTuple):
-    """What there is of the upper and of the lower lids, 0..1."""
+    """A value 0..1 of the upper and one of the lower lids."""
 
     upper: float
     lower: float
@@ -36,7 +36,7 @@ def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> LidP
 
 
 def _bounded(opening: float) -> float:
-    """Keep an opening within 0..1, also by the rounding errors of what it is made of."""
+    """Return an opening clipped to 0..1."""
     return min(1.0, max(0.0, opening))
 
 
@@ -48,7 +48,7 @@ class LidsAtRest:
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
-        """Take the sleepiness of the start, at once."""
+        """Set the sleepiness of the start, at once."""
         level = self._params.sleepy_level
         self._droop_from, self._droop_to, self._droop_since_s = level, level, t_s
         self._pitch_deg = 0.0
@@ -57,7 +57,7 @@ class LidsAtRest:
         self._retuned_s = t_s
 
     def retune(self, params: LidParams, t_s: float) -> None:
-        """Follow and sink in another way, without a jump from what was shown last."""
+        """Change the parameters without a jump of the openings."""
         before, self._params = self._params, params
         if params.sleepy_level != before.sleepy_level:
             self.sleepy(params.sleepy_level, t_s)
@@ -67,7 +67,7 @@ class LidsAtRest:
         self._retuned_s = t_s
 
     def sleepy(self, level: float, t_s: float) -> None:
-        """Sink or rise within a second: 0 awake .. 1 hardly awake.
+        """Change the sleepiness within a second: 0 awake .. 1 hardly awake.
 
         Raises:
             ValueError: level is not within 0..1.
@@ -90,7 +90,7 @@ class LidsAtRest:
         return self._shown
 
     def _glided(self, wanted: LidPair, t_s: float) -> LidPair:
-        """Add what a retune has left over, which goes within a moment."""
+        """Return openings with the difference that a retune left, which decays in 0.3 s."""
         kept = 1.0 - min_jerk((t_s - self._retuned_s) / _GLIDE_S)
         left = self._left
         if kept == 0.0:

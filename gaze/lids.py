@@ -37,7 +37,7 @@ class LidOpenings(NamedTuple):
 
 
 class Lids:
-    """Openings of upper and lower lids as a function of time, with their own dice."""
+    """Openings of upper and lower lids as a function of time, with their own random generator."""
 
     def __init__(self, params: LidParams, rng: np.random.Generator) -> None:
         self._params = params
@@ -57,7 +57,7 @@ class Lids:
         self._next_s = t_s + self._pause_s(self._length_s())
 
     def retune(self, params: LidParams) -> None:
-        """Take other rates and shapes; a blink under way ends as it began, lids glide.
+        """Change rates and shapes; a blink under way ends as it began, without a jump.
 
         The pause under way becomes longer or shorter as the mean pause does.
         """
@@ -72,7 +72,7 @@ class Lids:
         self._rest.retune(params, self._t_s)
 
     def mode(self, name: LidMode) -> None:
-        """Blink as often as people do at "rest" or in "conversation", from the next step on.
+        """Set the blink rate to that at "rest" or in "conversation", from the next step on.
 
         Raises:
             ValueError: there is no such mode.
@@ -98,7 +98,7 @@ class Lids:
             self._winks[side] = self._closing(max(t_s, self._t_s), self._params.wink_hold_ms)
 
     def sleepy(self, level: float) -> None:
-        """Let the lids sink and the blinks grow long: 0 awake .. 1 hardly awake.
+        """Set the sleepiness, which lowers the lids and slows blinks: 0 awake .. 1 hardly awake.
 
         Raises:
             ValueError: level is not within 0..1.
@@ -133,7 +133,7 @@ class Lids:
         return closure(since_onset_s, close_s, hold_s, open_s)
 
     def _due(self, t_s: float, shift_rad: float | None) -> bool:
-        """Return whether a blink begins now; the dice of a shift are thrown once."""
+        """Return whether a blink begins now; each gaze shift is drawn for once."""
         par, blink = self._params, self._blink
         evoked = shift_rad is not None and evokes_blink(par, degrees(abs(shift_rad)), self._rng)
         if any(wink is not None and wink.under_way(t_s) for wink in self._winks.values()):
@@ -147,7 +147,7 @@ class Lids:
         return t_s >= self._next_s and (blink is None or not blink.under_way(t_s))
 
     def _begin_blink(self, t_s: float) -> None:
-        """Begin a blink, draw how deep it is and when the next one comes."""
+        """Start a blink; draw its depth and the time of the next one."""
         par = self._params
         self.blinks += 1
         slow = 1.0 + par.sleepy_slowness * self._rest.sleepiness(t_s)
@@ -160,7 +160,7 @@ class Lids:
         self._next_s = t_s + blink.length_s + pause_s
 
     def _closing(self, onset_s: float, hold_ms: float) -> LidClosure:
-        """Return a full closing of somebody awake."""
+        """Return a complete closure at no sleepiness."""
         par = self._params
         return LidClosure(
             onset_s, par.close_ms / 1e3, hold_ms / 1e3, par.open_ms / 1e3, par.lower_close_share

@@ -1,4 +1,4 @@
-"""Turns a target into head, eye and lid angles, tick by tick; the one file that knows all.
+"""Oculomotor control: a target in, head, eye and lid angles out, tick by tick.
 
 Gaze is planned in space and the eyes take what the head does not: E = gaze - head. So
 whatever the head does during or after a gaze shift, planned or pushed, is compensated
@@ -40,7 +40,7 @@ _MOVING_M_S = 0.05
 
 @dataclass(frozen=True)
 class OculomotorParams(SaccadeTriggerParams):
-    """When to jump, how to bridge delays, and how exactly to land."""
+    """Saccade trigger, prediction horizon and endpoint scatter."""
 
     # fmt: off
     prediction_horizon_ms: Annotated[float, Bounds(0, 2000), "longest time for which a target is moved on by its own velocity"] = 200.0
@@ -53,10 +53,10 @@ class OculomotorParams(SaccadeTriggerParams):
 
 
 class Sway(Protocol):
-    """What moves the head beside the gaze: breathing."""
+    """A motion added to the head's angles: breathing."""
 
     def reset(self, t_s: float) -> None:
-        """Begin anew."""
+        """Start from rest."""
         ...
 
     def step(self, t_s: float) -> Angles3:
@@ -65,7 +65,7 @@ class Sway(Protocol):
 
 
 class _Seen(NamedTuple):
-    """The target as it is now: the point, its velocity, and where the head is to face."""
+    """The target at this tick: point, velocity, and the point that the head turns to."""
 
     point: Vec3
     velocity: Vec3
@@ -73,7 +73,7 @@ class _Seen(NamedTuple):
 
 
 class ReachableGaze(NamedTuple):
-    """Where head and eyes come to rest for a point, and where they would have to be for it.
+    """Where head and eyes come to rest for a point, and the eye angles that it would need.
 
     facing_rad, head_rad: (yaw, pitch, roll) that face it, and where the head stops
     asked_eyes_rad, eyes_rad: left and right (yaw, pitch) from there, and as far as they go
@@ -104,10 +104,10 @@ class Oculomotor:
     ) -> None:
         """Take the models and, for left and right eye, ((yaw low, high), (pitch low, high)).
 
-        rng: dice of the landing scatter
+        rng: random generator of the endpoint scatter
 
         Raises:
-            ValueError: the landing is to scatter and there are no dice.
+            ValueError: endpoints are to scatter and there is no rng.
         """
         self._rng = rng
         self._trigger = SaccadeTrigger(params, False)
@@ -125,21 +125,21 @@ class Oculomotor:
         params: OculomotorParams,
         eye_limits: tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]],
     ) -> None:
-        """Take other thresholds, times and ranges; a saccade under way goes on to its end.
+        """Change thresholds, durations and ranges; a saccade under way goes on to its end.
 
         Raises:
-            ValueError: the landing is to scatter and there are no dice.
+            ValueError: endpoints are to scatter and there is no rng.
         """
         scatter = (params.endpoint_scatter_along, params.endpoint_scatter_across)
         if any(scatter) and self._rng is None:
             raise ValueError(
-                "endpoint_scatter_along and endpoint_scatter_across need dice: give rng"
+                "endpoint_scatter_along and endpoint_scatter_across need a random generator: give rng"
             )
         self._params, self._scatter, self._eye_limits = params, scatter, eye_limits
         self._trigger.retune(params, any(scatter))
 
     def reset(self, t_s: float, state: GazeState) -> None:
-        """Begin where head and eyes are."""
+        """Start from the present angles of head and eyes."""
         self._head.reset(t_s, state.head_rad)
         self._lids.reset(t_s)
         if self._breathing is not None:
@@ -191,13 +191,13 @@ class Oculomotor:
         return (*self._eye_limits, self._head.range_rad)
 
     def _in_range(self, eyes: tuple[Angles2, Angles2]) -> tuple[Angles2, Angles2]:
-        """Keep both eyes inside their ranges."""
+        """Return the angles of both eyes clipped to their ranges."""
         return _clip(eyes[0], self._eye_limits[0]), _clip(eyes[1], self._eye_limits[1])
 
     def _limited(
         self, wanted: tuple[Angles2, Angles2], head: Angles3, facing: Angles2
     ) -> tuple[Limited, ...]:
-        """Name what keeps the eyes from the gaze point: their own ranges, and the neck's."""
+        """Return the angles that the ranges of eyes and neck cut off."""
         eyes = self._in_range(wanted)
         rows = (("left eye", wanted[0], eyes[0]), ("right eye", wanted[1], eyes[1]))
         found = [
@@ -241,7 +241,7 @@ class Oculomotor:
         )
 
     def _swayed(self, head: Angles3, t_s: float) -> Angles3:
-        """Add the breath to the head's angles, within the neck's range."""
+        """Return the head's angles with breathing added, clipped to the neck's range."""
         if self._breathing is None:
             return head
         yaw, pitch, roll = self._breathing.step(t_s)
@@ -256,7 +256,7 @@ class Oculomotor:
         )
 
     def _now(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
-        """Move the target on by its own velocity, which fades when there is no news."""
+        """Return the target predicted by its velocity, which decays beyond the horizon."""
         par = self._params
         age = max(0.0, t_s - target.at_s)
         known, fade = par.prediction_horizon_ms / 1e3, par.fade_ms / 1e3
@@ -272,14 +272,14 @@ class Oculomotor:
         return _Seen(point, velocity, self._clear(add(target.centre_world_m, moved), p_head))
 
     def _clear(self, point: Vec3, p_head: Vec3) -> Vec3:
-        """Keep a point far enough away to converge on."""
+        """Return a point moved away to ``nearest_m`` where it is nearer."""
         rel = sub(point, p_head)
         if norm(rel) >= self._params.nearest_m:
             return point
         return add(p_head, scale(unit(rel), self._params.nearest_m))
 
     def _maybe_jump(self, seen: _Seen, p_head: Vec3, t_s: float) -> float | None:
-        """Start a saccade when one is due; give its size."""
+        """Start a saccade when one is due; return its amplitude in radians, else None."""
         if self._trajectory is not None:
             return None
         slip = self._pursuit.slip(self._gaze, seen.point, seen.velocity, p_head)
@@ -310,7 +310,7 @@ class Oculomotor:
 
 
 def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:
-    """Keep an eye inside its range."""
+    """Return eye angles clipped to their range."""
     (yaw_low, yaw_high), (pitch_low, pitch_high) = limits
     return (min(max(eye[0], yaw_low), yaw_high), min(max(eye[1], pitch_low), pitch_high))
 

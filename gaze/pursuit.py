@@ -1,7 +1,7 @@
 """Smooth following of a moving target between saccades, in gaze space.
 
 The two controls of the binocular controller (gaze.binocular), conjugate and vergence,
-for a target whose picture was placed in space when it was taken: its place is known
+for a target whose frame was placed in space at its time of capture: its place is known
 without the eyes' own motion (efference copy), the delay is the measured one, and the
 target's own speed stands for the smoothed derivative. So a jump of the place never
 enters the speed, an eye that sees nothing goes with the other one, and a head that
@@ -42,7 +42,7 @@ class PursuitParams:
 
 
 class Slip(NamedTuple):
-    """How the target moves past the gaze, as seen from the eyes.
+    """Position error and retinal slip of the target, as seen from the eyes.
 
     error_rad: from the gaze to the target, as a vector across the line of sight
     slip_rad_s: speed of the target less that of the following, closing aside
@@ -53,13 +53,13 @@ class Slip(NamedTuple):
 
 
 class Pursuit:
-    """Moves a gaze point after a target point."""
+    """Smooth pursuit of a target point by the gaze point."""
 
     def __init__(self, params: PursuitParams) -> None:
         self.retune(params)
 
     def retune(self, params: PursuitParams) -> None:
-        """Take other gains and limits."""
+        """Change gains and limits."""
         self._params = params
         self._max_rad_s = radians(params.max_speed_deg_s)
         self._reject_rad_s = radians(params.reject_deg_s)
@@ -116,6 +116,6 @@ def _across(way: Vec3, v: Vec3) -> Vec3:
 
 
 def _shorter(v: Vec3, longest: float) -> Vec3:
-    """Keep a vector no longer than ``longest``."""
+    """Return a vector shortened to ``longest``."""
     length = norm(v)
     return scale(v, longest / length) if length > longest else v

@@ -1,4 +1,4 @@
-"""How an eye jumps: the angle covered as a function of the time since onset.
+"""Saccade profiles: the angle covered as a function of the time since onset.
 
 Three profiles with one interface. ``min_jerk`` is eqs 2-6 of Mitake et al., minimum
 jerk with a cap on the speed. ``main_sequence`` has the duration and the early peak of
@@ -40,7 +40,7 @@ class SaccadeParams:
 
 
 class SaccadeProfile(Protocol):
-    """What each kind of saccade knows of itself; sizes and angles in radians."""
+    """The interface of the saccade profiles; amplitudes and angles in radians."""
 
     def duration_s(self, amplitude_rad: float) -> float:
         """Return the time from onset to landing."""
@@ -190,7 +190,7 @@ class SaccadeModel:
         self.retune(params)
 
     def retune(self, params: SaccadeParams) -> None:
-        """Take another profile or other constants, from the next saccade on."""
+        """Change the profile or its constants, from the next saccade on."""
         self._profile = _profile(params)
 
     @property
@@ -212,7 +212,7 @@ class SaccadeModel:
 
 
 def _profile(params: SaccadeParams) -> SaccadeProfile:
-    """Make the profile that the parameters name."""
+    """Return the profile that the parameters name."""
     if params.profile == "main_sequence":
         return MainSequenceProfile(params)
     if params.profile == "literal_frame":

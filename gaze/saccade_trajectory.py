@@ -22,7 +22,7 @@ from gazerig.gaze.types import Vec3
 
 
 class SaccadeTrajectory:
-    """From one point in the world to another in the time that the saccade takes."""
+    """The gaze point on its way from one point in the world to another."""
 
     def __init__(
         self, saccade: SaccadeModel, start: Vec3, end: Vec3, eye: Vec3, onset_s: float

@@ -1,4 +1,4 @@
-"""When the gaze jumps and when it follows: one rule.
+"""Saccade trigger: when an error is closed by a saccade and when by smooth pursuit.
 
 A new object or part of it (the target's event flag) brings a saccade after the latency.
 Without that, an error beyond ``saccade_deg`` does, unless the eye is about to cross the
@@ -21,7 +21,7 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class SaccadeTriggerParams:
-    """Thresholds and times of that rule."""
+    """Thresholds and times of the saccade trigger."""
 
     # fmt: off
     saccade_deg: Annotated[float, Bounds(0.1, 30), "error that is closed by a saccade instead of smooth following"] = 2.0
@@ -36,14 +36,14 @@ class SaccadeTriggerParams:
 
 
 class SaccadeTrigger:
-    """Remembers the events and says when a saccade is due."""
+    """State of the events that call for a saccade, and the decision when one is due."""
 
     def __init__(self, params: SaccadeTriggerParams, scatters: bool) -> None:
         self.retune(params, scatters)
         self.reset(0.0)
 
     def retune(self, params: SaccadeTriggerParams, scatters: bool) -> None:
-        """Take other thresholds and times; an event that waits for its saccade still does."""
+        """Change thresholds and times; an event that waits for its saccade still does."""
         self._scatters = scatters
         self._smallest_rad = radians(params.smallest_shift_deg)
         self._saccade_rad = radians(params.saccade_deg)
@@ -54,7 +54,7 @@ class SaccadeTrigger:
         self._smooth_s = (params.crossing_least_ms / 1e3, params.crossing_most_ms / 1e3)
 
     def reset(self, t_s: float) -> None:
-        """Begin with no event and well rested."""
+        """Start with no event and no refractory time."""
         self._shift: int | None = None
         self._due_s: float | None = None
         self._landed_s = -inf
@@ -62,7 +62,7 @@ class SaccadeTrigger:
         self.onset_s = t_s
 
     def record_shift(self, shift: int, wait_s: float, free_s: float, t_s: float) -> None:
-        """Take note of the target's event count.
+        """Record the target's count of gaze shifts.
 
         wait_s: what the eyes wait beyond the latency, because the head goes first
         free_s: when a saccade in flight lands, else any time up to now
@@ -77,7 +77,7 @@ class SaccadeTrigger:
             self._due_s = self.onset_s = max(free_s, t_s + self._latency_s + wait_s)
 
     def record_landing(self, t_s: float) -> None:
-        """Take note of the end of a saccade."""
+        """Record the end of a saccade."""
         self._landed_s = t_s
         self._erred = None if self._scatters else False
 

@@ -1,4 +1,4 @@
-"""Where on a face to look: a measured walk over eight parts, or one of three simpler ways.
+"""Scanpath on a face: a Markov walk over eight parts, or one of three simpler models.
 
 The measured walk is that of Nakamoto & Tsuruno 3.2. Its printed matrix has one decimal, so
 the rows sum to 0.8-1.1 and are normalised; rows are "from", columns "to". Only the point of
@@ -31,7 +31,7 @@ _ROUNDING = 0.005
 
 @dataclass(frozen=True)
 class Walk:
-    """A measured walk: the transition matrix as printed, and dwell statistics."""
+    """Statistics of a measured scanpath: transition matrix as printed, and dwell times."""
 
     # fmt: off
     order: Annotated[tuple[str, ...], "face parts in the order of rows and columns"]
@@ -64,7 +64,7 @@ class Walk:
 
 
 def row_sums_note(walk: Walk) -> str | None:
-    """Say in one line which rows do not sum to 1 and are normalised; None where all do."""
+    """Return one line on the rows that do not sum to 1 and are normalised; None where all do."""
     sums = zip(walk.order, walk.row_sums, strict=True)
     off = [f"{part} {total:.3g}" for part, total in sums if abs(total - 1.0) > _ROUNDING]
     if not off:
@@ -74,7 +74,7 @@ def row_sums_note(walk: Walk) -> str | None:
 
 @dataclass(frozen=True)
 class ScanpathParams:
-    """Which way this robot looks at a face, and how it takes the walk."""
+    """Choice and parameters of the scanpath model."""
 
     # fmt: off
     model: Annotated[Literal["markov", "simple", "face_tracking", "random"],
@@ -124,7 +124,7 @@ def without_refixations(matrix: ArrayLike) -> Floats:
 
 
 class Scanpath:
-    """Replaces a face target by the point of the face that is due."""
+    """Replaces a face as target by the point of the face that is to be fixated."""
 
     def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -191,7 +191,7 @@ class Scanpath:
 
 
 def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> ScanpathModel:
-    """Make the model by its name."""
+    """Return the model that the parameters name."""
     match params.model:
         case "simple":
             dwells_s = [ms / 1e3 / params.rate_scale for ms in params.simple_dwell_ms]

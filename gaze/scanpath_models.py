@@ -5,8 +5,8 @@ SimpleCycle    face centre, right eye, left eye, again (4.4.2)
 FaceTracking   the face centre, always (4.4.3)
 RandomAngles   eyes to random angles at random intervals (4.4.4)
 
-All know time as an argument, throw dice only where given, and are driven alike: ``enter``
-when another face is looked at, then ``step`` every tick.
+Time and random generator are arguments of all; ``enter`` is called when another face is
+looked at, then ``step`` every tick.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from gazerig.gaze.types import PARTS, Angles2, Face, Floats, Vec3
 
 
 class ScanpathStep(NamedTuple):
-    """What is looked at on a face: the point, its part where it is one, whether it is new."""
+    """One fixation on a face: the point, its part if it is one, whether it is new."""
 
     p_world_m: Vec3
     part: str | None
@@ -29,10 +29,10 @@ class ScanpathStep(NamedTuple):
 
 
 class ScanpathModel(Protocol):
-    """A way to look at a face."""
+    """The interface of the scanpath models."""
 
     def enter(self) -> None:
-        """Begin anew: another face is looked at."""
+        """Start on another face."""
         ...
 
     @property
@@ -41,7 +41,7 @@ class ScanpathModel(Protocol):
         ...
 
     def go_on(self, before: "ScanpathModel") -> bool:
-        """Take over the look of another way; tell whether this way knows such a look."""
+        """Continue the fixation of another model; return whether this model can."""
         ...
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
@@ -50,7 +50,7 @@ class ScanpathModel(Protocol):
 
 
 class MarkovWalk:
-    """Draw the next part, move there, hold it for its dwell time, draw again.
+    """First-order Markov chain over the parts, with a dwell time drawn at each arrival.
 
     A part that is drawn again is a refixation: the gaze stays for another dwell.
     """
@@ -72,7 +72,7 @@ class MarkovWalk:
         self.enter()
 
     def enter(self) -> None:
-        """Go to the start part."""
+        """Start at the start part."""
         self._part = self._start
         self._until_s: float | None = None
 
@@ -82,7 +82,7 @@ class MarkovWalk:
         return self._parts[self._part], self._until_s
 
     def go_on(self, before: ScanpathModel) -> bool:
-        """Take over the part looked at and its dwell; tell whether it is one of these."""
+        """Continue the part fixated and its dwell; return whether it is one of this model's."""
         part, until_s = before.dwell
         if part not in self._parts:
             return False
@@ -90,7 +90,7 @@ class MarkovWalk:
         return True
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
-        """Start the dwell on arrival; after it draw until another part comes."""
+        """Return the step: the dwell starts on arrival; after it another part is drawn."""
         before = self._part
         if self._until_s is not None:
             self._walk(self._until_s, t_s)
@@ -100,11 +100,11 @@ class MarkovWalk:
         return ScanpathStep(point, self._parts[self._part], self._part != before)
 
     def next_part(self, part: int) -> int:
-        """Draw the part that follows ``part`` (both count from 0 in the order given)."""
-        dice = self._rng.random()
+        """Draw the part that follows ``part``, both as indices in the order given."""
+        draw = self._rng.random()
         row = self._cumulative[part]
         for following, edge in enumerate(row):
-            if dice < edge:
+            if draw < edge:
                 return following
         return row.index(row[-1])  # rounding left the sum a hair below 1
 
@@ -133,7 +133,7 @@ class SimpleCycle:
         self.enter()
 
     def enter(self) -> None:
-        """Go to the first part."""
+        """Start at the first part."""
         self._at = 0
         self._until_s: float | None = None
 
@@ -143,7 +143,7 @@ class SimpleCycle:
         return self._parts[self._at], self._until_s
 
     def go_on(self, before: ScanpathModel) -> bool:
-        """Take over the part looked at and its dwell; tell whether it is one of these."""
+        """Continue the part fixated and its dwell; return whether it is one of this model's."""
         part, until_s = before.dwell
         if part not in self._parts:
             return False
@@ -151,7 +151,7 @@ class SimpleCycle:
         return True
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
-        """Start the time on arrival, go on when it is over."""
+        """Return the step: the duration starts on arrival."""
         moved = False
         if self._until_s is None:
             if settled:
@@ -169,7 +169,7 @@ class FaceTracking:
     """The face centre, always; the paper takes the tip of the nose for it (4.4.2)."""
 
     def enter(self) -> None:
-        """Do nothing: there is nothing to remember."""
+        """Do nothing: this model has no state."""
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
@@ -200,7 +200,7 @@ class RandomAngles:
         self.enter()
 
     def enter(self) -> None:
-        """Draw the first angles at once."""
+        """Start with angles drawn at once."""
         self._offset_rad: Angles2 = self._angles()
         self._until_s: float | None = None
 
@@ -210,7 +210,7 @@ class RandomAngles:
         return None, self._until_s
 
     def go_on(self, before: ScanpathModel) -> bool:
-        """Take over angles and interval of another such way, as far as both are allowed."""
+        """Continue angles and interval of another such model, clipped to this one's limits."""
         if not isinstance(before, RandomAngles):
             return False
         most, (yaw, pitch) = self._angle_rad, before._offset_rad
@@ -219,7 +219,7 @@ class RandomAngles:
         return True
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
-        """Jump when the interval is over."""
+        """Return the step: new angles are drawn when the interval is over."""
         if self._until_s is None:
             self._until_s = t_s + self._interval_s()
         moved = t_s >= self._until_s

@@ -1,4 +1,4 @@
-"""Top-down attention: what the behaviour in force makes one look at (Mitake et al. 3.3.3).
+"""Top-down attention: the target of the behaviour in force (Mitake et al. 3.3.3).
 
 The paper's rules are attack -> attack target, guard -> guard target, wait -> the
 opponent's face, each with a constant amount of attention whose value it does not give.
@@ -34,7 +34,7 @@ class Rule:
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check that it says one thing.
+        """Check that the fields fit each other.
 
         Raises:
             ValueError: an id that is no number; a point without a place, or a place without one.
@@ -66,7 +66,7 @@ class TopDownParams:
     behaviour: Annotated[str, "behaviour in force at the start"] = "wait"
     rules: Annotated[Mapping[str, Rule], "behaviour -> what to look at and with what salience"] = field(default_factory=_shipped_rules)
     stay_with_person: Annotated[float, Bounds(1, 10), "the one looked at last counts as this many times nearer than the others"] = 1.25
-    nearness: Annotated[float, Bounds(0, 4), "how much less the farther of several pull: the power of the distance"] = 0.5
+    nearness: Annotated[float, Bounds(0, 4), "exponent of the distance by which the farther of several are less salient"] = 0.5
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -86,7 +86,7 @@ class RuleTarget(NamedTuple):
     rows:     (k,) rows of the bodies wanted; none for a place
     nearness: (k,) factor of each, 1 for the nearest
     point_world_m: the place wanted, None for bodies
-    pull, behaviour: the rule's constant and name
+    salience, behaviour: the rule's constant and name
     """
 
     rows: NDArray[np.intp]
@@ -97,7 +97,7 @@ class RuleTarget(NamedTuple):
 
 
 class TopDown:
-    """Applies the rule of the behaviour in force."""
+    """The rules, and the behaviour in force."""
 
     def __init__(self, params: TopDownParams) -> None:
         self._params = params
@@ -105,7 +105,7 @@ class TopDown:
         self.reset(0.0)
 
     def retune(self, params: TopDownParams) -> None:
-        """Take other rules; the behaviour in force stays unless its rule is gone.
+        """Change the rules; the behaviour in force stays unless its rule is gone.
 
         Another behaviour of the start is in force at once: what was asked for is its rule.
         """

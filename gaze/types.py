@@ -50,7 +50,7 @@ class Bodies:
     v_world_m_s: (n, 3) velocities
     w_world_rad_s: (n, 3) angular velocities
     radius_m:  (n,) half the size
-    pv_cov:    (n, 6, 6) covariance of position and velocity, None where nobody knows it
+    pv_cov:    (n, 6, 6) covariance of position and velocity, None where unknown
     """
 
     ids: tuple[int, ...] = ()
@@ -62,7 +62,7 @@ class Bodies:
     pv_cov: Floats | None = None
 
     def __len__(self) -> int:
-        """Count the bodies."""
+        """Return the number of bodies."""
         return len(self.ids)
 
 
@@ -77,7 +77,7 @@ class Face:
     parts_world_m: the eight parts in the order of PARTS
     confidence:    0..1 of the detector
     distance_from: what the distance rests on: "camera", its depth; "face size", that of an
-        adult or as learned of this person; "" where nobody knows
+        adult or as learned of this person; "" where unknown
     across_sd_m, along_sd_m: standard deviations of the place, across and along the view
     """
 
@@ -94,23 +94,23 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class Percept:
-    """What one picture showed, placed in the world by the head pose at its capture time."""
+    """What one frame showed, placed in the world by the head pose at its time of capture."""
 
     captured_s: float
     bodies: Bodies = field(default_factory=Bodies)
     faces: tuple[Face, ...] = ()
 
     def age_s(self, t_s: float) -> float:
-        """Return the age of the picture at ``t_s``."""
+        """Return the age of the frame at ``t_s``."""
         return t_s - self.captured_s
 
 
 class Salience(NamedTuple):
-    """What pulls the gaze to one body, term by term (Mitake et al., eq 1 and the rules).
+    """Salience of one body, term by term (Mitake et al., eq 1 and the rules).
 
-    slide, loom, spin: the three terms of eq 1; onset: of having just come into view
+    translation, looming, rotation: the three terms of eq 1; onset: of having just come into view
     rule:     constant of the rule that points at it, 0 without one
-    interest: factor 0..1 of habituation and inhibition of return
+    habituation: factor 0..1 of habituation and inhibition of return
     total:    the amount of attention that was compared
     """
 
@@ -131,13 +131,13 @@ class Target(NamedTuple):
     p_world_m, v_world_m_s: the point and its velocity, as at ``at_s``
     kind:     "face", "hand", "thing", "idle", ...
     id:       body or face id, -1 where there is nothing
-    pull:     amount of attention A (Mitake et al., eq 1 or the rule's constant)
+    salience: amount of attention A (Mitake et al., eq 1 or the rule's constant)
     top_down: whether a rule chose it
     part:     face part code where a face is looked at
     shift:    counts up whenever another object or part is chosen: the saccade's event flag
     why:      the reason in words
     centre_world_m: where the head turns to, e.g. the face's centre; None: the point itself
-    pulls:    the winner's pull and those of the next three, strongest first
+    saliences: of the winner and of the next three, highest first
     """
 
     p_world_m: Vec3
@@ -180,7 +180,7 @@ class GazeState(NamedTuple):
 
 
 class Limited(NamedTuple):
-    """An angle that a model's range cut off on the way to the target, in radians.
+    """An angle clipped by a range, in radians: asked for, and done.
 
     axis: "left eye yaw", "right eye pitch", "head yaw", "head pitch"
     """
@@ -192,7 +192,7 @@ class Limited(NamedTuple):
 
 
 class GazeCommand(NamedTuple):
-    """What the models wish for this tick.
+    """The commands of the gaze models for this tick.
 
     head_rad: (yaw, pitch, roll); eye_left_rad, eye_right_rad: (yaw, pitch) in the head
     lid_left, lid_right: opening of the upper lids, 0 shut .. 1 open
@@ -220,7 +220,7 @@ class GazeCommand(NamedTuple):
 
 
 class HeadGeometry(Protocol):
-    """What the oculomotor models must know of a head's build (robot/model/kinematics.py has it)."""
+    """The kinematics that the oculomotor models need (gazerig.robot.model.kinematics)."""
 
     def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
         """Return R_world_head and p_world_head_m for neck angles."""

@@ -1,4 +1,4 @@
-"""Vestibulo-ocular reflex: what the eyes do against the head's own motion.
+"""Vestibulo-ocular reflex: eye velocity against the head's own motion.
 
 Used where eyes are driven by signals of rotation and translation, as in the binocular
 controller. The robot's own gaze is planned in space instead, which compensates the same
@@ -12,7 +12,7 @@ from gazerig.gaze.types import Angles2, Angles3
 
 
 class SemicircularCanals:
-    """Head rate as the reflex receives it: delayed, and without what never changes.
+    """Head velocity as the reflex receives it: delayed and high-passed.
 
     A high-pass in the place of the semicircular canals and their velocity storage; it
     also takes the bias off a gyroscope.
@@ -23,7 +23,7 @@ class SemicircularCanals:
         self.reset()
 
     def reset(self) -> None:
-        """Begin with a head at rest."""
+        """Start with the head at rest."""
         self._slow = 0.0
         self._past: deque[float] = deque()
 

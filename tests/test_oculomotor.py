@@ -209,7 +209,7 @@ def test_scattered_landings_are_corrected_by_small_saccades() -> None:
 
 
 def test_scatter_without_dice_is_refused() -> None:
-    with pytest.raises(ValueError, match="need dice"):
+    with pytest.raises(ValueError, match="need a random generator"):
         Rig(params=OculomotorParams(endpoint_scatter_along=0.04))
 
 
