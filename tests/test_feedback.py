@@ -43,22 +43,23 @@ def columns():
 
 
 def test_an_exchange_begins_with_nobody_and_takes_servo_by_servo(columns):
-    assert columns.feedback().missing == (0, 1, 2)
+    assert columns.now.missing == (0, 1, 2)
     columns._take_one(1, 2048, 3.0, 0.5, 7.0)
-    told = columns.feedback()
+    told = columns.now
     assert told.missing == (0, 2) and told.position_steps[1] == 2048 and told.at_s[1] == 7.0
     assert columns.position(1) == 2048 and columns.position(0) is None
     columns.begin()
-    assert columns.feedback().missing == (0, 1, 2)
-    assert isnan(columns.feedback().position_steps[1])
+    assert columns.now.missing == (0, 1, 2)
+    assert isnan(columns.now.position_steps[1])
 
 
 def test_what_is_read_in_turn_stays_from_one_exchange_to_the_next(columns):
     columns.set_torque(2, True)
     columns.name_fault(0, "overload")
     columns.begin()
-    columns._take_all((1, 2, 3), (0.0,) * 3, (0.0,) * 3, 9.0)
-    told = columns.feedback()
+    for slot in range(3):
+        columns._take_one(slot, 1 + slot, 0.0, 0.0, 9.0)
+    told = columns.now
     assert told.torque == (False, False, True) and told.fault == ("overload", "", "")
     assert told.missing == () and told.at_s == (9.0,) * 3
 
@@ -66,7 +67,7 @@ def test_what_is_read_in_turn_stays_from_one_exchange_to_the_next(columns):
 def test_a_mark_of_rearming_lasts_for_one_exchange(columns):
     columns.hold(1, 2000, 3.0, torque=True)
     columns.mark_rearmed(1)
-    assert columns.feedback().rearmed == (False, True, False)
-    assert columns.feedback().torque[1]
-    columns._take_all((1, 2, 3), (0.0,) * 3, (0.0,) * 3, 4.0)
-    assert columns.feedback().rearmed == (False,) * 3
+    assert columns.now.rearmed == (False, True, False)
+    assert columns.now.torque[1]
+    columns.begin()
+    assert columns.now.rearmed == (False,) * 3

@@ -239,8 +239,8 @@ def test_a_whole_answer_at_once_reads_as_servo_by_servo(view, velocity, load):
     raw = sts_status(2, armed + block) + sts_status(5, armed + block)
     columns = [columns_of(FEETECH, "sts3215", 2, 5) for _ in range(2)]
     assert both_ways(group, raw, *columns)
-    assert columns[0].feedback() == columns[1].feedback()
-    assert columns[0].feedback().missing == ()
+    assert columns[0].now == columns[1].now
+    assert columns[0].now.missing == ()
 
 
 def test_the_same_of_servos_that_speak_with_a_crc():
@@ -248,8 +248,8 @@ def test_the_same_of_servos_that_speak_with_a_crc():
     raw = b"".join(status(i, 0, struct.pack("<hii", -147, -3, 906)) for i in (2, 5))
     columns = [columns_of(DYNAMIXEL, "xl330-m077", 2, 5) for _ in range(2)]
     assert both_ways(group, raw, *columns)
-    told = columns[0].feedback()
-    assert told == columns[1].feedback()
+    told = columns[0].now
+    assert told == columns[1].now
     assert told.load == pytest.approx((-0.1, -0.1)) and told.velocity_steps_s[0] < 0.0
 
 

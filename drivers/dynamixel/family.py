@@ -36,16 +36,10 @@ THOROUGH_S = 0.016 + 0.003 * 253
 """What the maker's SDK allows for all ids: 3 ms each and the adaptor's latency."""
 
 
-class Goals(protocol.SyncWrite):
-    """Packets of goal positions; the speed is in the servo's own profile."""
-
-    def __init__(self, ids: Sequence[int]) -> None:
-        goal = REGISTERS["goal_position"]
-        super().__init__(ids, goal.address, goal.size)
-
-    def packet(self, goals: Sequence[int], speeds: Sequence[int] = ()) -> bytes:
-        """Build the packet for one goal a servo."""
-        return super().packet(goals)
+def goal_packets(ids: Sequence[int]) -> protocol.SyncWrite:
+    """Return what builds packets of goal positions."""
+    goal = REGISTERS["goal_position"]
+    return protocol.SyncWrite(ids, goal.address, goal.size)
 
 
 def wanted_settings(setup: "ServoSetup") -> dict[str, int]:
@@ -84,7 +78,7 @@ DYNAMIXEL = Family(
     sign_bits={},
     speed_units=speed_units,
     acceleration_units=acceleration_units,
-    goals=Goals,
+    goals=goal_packets,
     baud_rates=BAUD_RATES,
     usual_rates=USUAL_RATES,
     factory_baud=57_600,

@@ -106,8 +106,8 @@ class SyncWrite:
         self._head = _HEAD.pack(HEADER, BROADCAST, length, SYNC_WRITE) + self._params
         self._row = [number for servo_id in ids for number in (servo_id, 0)]
 
-    def packet(self, values: Sequence[int]) -> bytes:
-        """Build the packet for one value a servo."""
+    def packet(self, values: Sequence[int], speeds: Sequence[int] = ()) -> bytes:
+        """Build the packet for one value a servo; speeds are in the servos' own profiles."""
         row = self._row
         row[1::2] = values
         body = self._rows.pack(*row)

@@ -18,6 +18,7 @@ class LastingPort:
         log: where its going and coming is told.
         anew: called when it is open again: nobody on it may be trusted.
 
+    down: the port is gone
     release_due: torque has to be taken off as soon as the port is there, before all else; set
         and cleared by the bus
     """
@@ -33,16 +34,12 @@ class LastingPort:
         self._port, self._baud, self._give_up_s = port, baud, give_up_s
         self._log, self._anew = log, anew
         self._link = Reconnect()
-        self.release_due = False
-
-    @property
-    def down(self) -> bool:
-        """Return whether the port is gone."""
-        return self._link.down
+        self.down = self.release_due = False
 
     def lose(self, lost: BusLost, now_s: float) -> None:
         """Note that the port is gone."""
         self._link.lost(now_s)
+        self.down = True
         self._port.closePort()
         self._log.add(f"port lost: {lost}")
 
@@ -55,6 +52,7 @@ class LastingPort:
         gone_s = self._link.gone_for_s(now_s)
         if self._link.due(now_s):
             if self._open():
+                self.down = False
                 where = getattr(self._port, "opened_as", self._port.port_name)
                 renamed = f" as {where}" if where != self._port.port_name else ""
                 self._log.add(f"port back after {self._link.back(now_s):.1f} s{renamed}")
@@ -81,6 +79,7 @@ class LastingPort:
         if not self._open():
             return False
         self._link.back(now_s)
+        self.down = False
         return True
 
     def _open(self) -> bool:

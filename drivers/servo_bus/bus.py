@@ -66,7 +66,8 @@ class SmartServoBus(PortBus):
         self._params = params
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
-        self._limits = tuple((setup.min_steps, setup.max_steps) for setup in setups)
+        self._lowest = tuple(setup.min_steps for setup in setups)
+        self._highest = tuple(setup.max_steps for setup in setups)
         self._goals = family.goals(self._ids)
         self._nothing = Feedback.of_none(len(self._ids))
         self._log = EventLog()
@@ -261,7 +262,7 @@ class SmartServoBus(PortBus):
             return self._nothing
         if self._roll.troubled:
             self._mind_silence(now_s)
-        return self._feedback.feedback()
+        return self._feedback.now
 
     def engage(self) -> tuple[int, ...]:
         """Set every goal to the present position (clipped to its limits), then torque on.
@@ -300,7 +301,7 @@ class SmartServoBus(PortBus):
         Raises:
             ValueError: a goal is not a number, or there are not as many as servos.
         """
-        goals = clipped(goals_steps, self._limits)
+        goals = clipped(goals_steps, self._lowest, self._highest)
         if not self._supervisor.engaged or self._link.down or self._line.starved:
             return
         try:
@@ -316,7 +317,8 @@ class SmartServoBus(PortBus):
         if self._wanted == self._setups:
             return
         self._setups = self._wanted
-        self._limits = tuple((setup.min_steps, setup.max_steps) for setup in self._setups)
+        self._lowest = tuple(setup.min_steps for setup in self._setups)
+        self._highest = tuple(setup.max_steps for setup in self._setups)
         self._by_id.update({setup.id: setup for setup in self._setups})
         self._provisioning.set_target(self._setups)
         self._feedback.set_limits(self._setups)

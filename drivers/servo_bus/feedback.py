@@ -34,6 +34,7 @@ class FeedbackColumns:
         setups: the servos.
 
     places: which positions can be true
+    now: all columns as they are now
     """
 
     def __init__(self, family: Family, setups: Sequence[ServoSetup]) -> None:
@@ -49,60 +50,32 @@ class FeedbackColumns:
         self._armed: tuple[int, ...] = (0,) * len(setups)
         self.places = Plausibility([model.no_load_steps_s for model in models])
         self._none = none = Feedback.of_none(len(setups))
-        self._torque, self._fault = none.torque, none.fault
+        self.now = none
         self._all_on = (True,) * len(setups)
         self._tenths: tuple[int, ...] = ()
-        self._temperature, self._voltage = none.temperature_c, none.voltage_v
-        self._rearmed: set[int] = set()
         self.set_limits(setups)
-        self.begin()
 
     def begin(self) -> None:
         """Start an exchange in which no servo has answered yet."""
-        none = self._none
-        self._position, self._velocity = none.position_steps, none.velocity_steps_s
-        self._load, self._at_s = none.load, none.at_s
-        self._missing = none.missing
-        self._rearmed.clear()
-
-    def _take_all(
-        self,
-        position: tuple[float, ...],
-        velocity: tuple[float, ...],
-        load: tuple[float, ...],
-        at_s: float,
-    ) -> None:
-        """Take an exchange that all servos have answered."""
-        self._position, self._velocity, self._load = position, velocity, load
-        self._at_s, self._missing = (at_s,) * len(position), ()
-        if self._rearmed:
-            self._rearmed.clear()
+        now = self.now
+        self.now = self._none._replace(
+            temperature_c=now.temperature_c,
+            voltage_v=now.voltage_v,
+            torque=now.torque,
+            fault=now.fault,
+        )
 
     def _take_one(
         self, slot: int, position: float, velocity: float, load: float, at_s: float
     ) -> None:
         """Take one servo's answer."""
-        self._position = with_value(self._position, slot, position)
-        self._velocity = with_value(self._velocity, slot, velocity)
-        self._load = with_value(self._load, slot, load)
-        self._at_s = with_value(self._at_s, slot, at_s)
-        self._missing = tuple([other for other in self._missing if other != slot])
-
-    def feedback(self) -> Feedback:
-        """Return all columns as they are now."""
-        none, rearmed = self._none, self._rearmed
-        return Feedback(
-            self._position,
-            self._velocity,
-            self._load,
-            self._at_s,
-            self._temperature,
-            self._voltage,
-            self._torque,
-            self._fault,
-            none.measured,
-            tuple([i in rearmed for i in range(len(self._at_s))]) if rearmed else none.rearmed,
-            self._missing,
+        now = self.now
+        self.now = now._replace(
+            position_steps=with_value(now.position_steps, slot, position),
+            velocity_steps_s=with_value(now.velocity_steps_s, slot, velocity),
+            load=with_value(now.load, slot, load),
+            at_s=with_value(now.at_s, slot, at_s),
+            missing=tuple([other for other in now.missing if other != slot]),
         )
 
     def set_limits(self, setups: Sequence[ServoSetup]) -> None:
@@ -119,46 +92,57 @@ class FeedbackColumns:
     def take_whole(self, answer: Whole) -> bool:
         """Take an answer in which nothing is amiss; False where anything must be looked at."""
         group, _, values, at_s = answer
-        at = group.columns
+        at, now, none = group.columns, self.now, self._none
         if any(values[at.error]) or (at.status is not None and any(values[at.status])):
             return False
-        position = values[at.position]
+        position, velocity, effort = values[at.position], values[at.velocity], values[at.effort]
         if self._signs:
             position = _signed(position, self._signs["position"])
-        if at.torque is not None and not self._armed_as_left(values, at.torque, at, position):
-            return False
-        if self._turn:
-            position = self._all_near(position)
-        warm = self._temperature if at.temperature is None else values[at.temperature]
-        if warm is not self._temperature and warm != self._temperature and max(warm) > MOST_CELSIUS:
-            return False
-        if not self.places.whole(position, at_s):
-            return False
-        self._temperature = warm
-        if at.voltage is not None and (tenths := values[at.voltage]) != self._tenths:
-            self._tenths, self._voltage = tenths, tuple([0.1 * volts for volts in tenths])
-        velocity, effort = values[at.velocity], values[at.effort]
-        if self._signs:
             velocity = _signed(velocity, self._signs["velocity"])
             effort = _signed(effort, self._signs["effort"])
+        torque = now.torque
+        if at.torque is not None:
+            if not self._armed_as_left(values, at.torque, at, position):
+                return False
+            torque = self._all_on if self._engaged else none.torque
+        if self._turn:
+            position = self._all_near(position)
+        warm = now.temperature_c
+        if at.temperature is not None and (celsius := values[at.temperature]) != warm:
+            if max(celsius) > MOST_CELSIUS:
+                return False
+            warm = celsius
+        if not self.places.whole(position, at_s):
+            return False
+        volts = now.voltage_v
+        if at.voltage is not None and (tenths := values[at.voltage]) != self._tenths:
+            self._tenths, volts = tenths, tuple([0.1 * one for one in tenths])
         load = tuple(map(mul, effort, self._load_units))
         if max(load) > 1.0 or min(load) < -1.0:
             load = tuple([max(-1.0, min(1.0, share)) for share in load])
-        speed = tuple(map(mul, velocity, self._velocity_units))
-        self._take_all(position, speed, load, at_s)
+        self.now = Feedback(
+            position,
+            tuple(map(mul, velocity, self._velocity_units)),
+            load,
+            (at_s,) * len(position),
+            warm,
+            volts,
+            torque,
+            now.fault,
+            none.measured,
+            none.rearmed,
+            (),
+        )
         return True
 
     def _armed_as_left(
         self, values: tuple[Any, ...], torque: slice, at: Columns, position: Sequence[int]
     ) -> bool:
-        """Return whether an answer tells of all servos what they were left with; take it then."""
+        """Return whether an answer tells of all servos what they were left with."""
         if values[torque] != self._armed or not self._keeps_limits(values, at):
             return False
         # Without torque a zero may be that of an indirect block without addresses.
-        if not self._engaged and 0 in position:
-            return False
-        self._torque = self._all_on if self._engaged else self._none.torque
-        return True
+        return self._engaged or 0 not in position
 
     def _all_near(self, position: tuple[int, ...]) -> tuple[int, ...]:
         """Return positions, whole turns added, nearest to their ranges."""
@@ -229,7 +213,7 @@ class FeedbackColumns:
         if not sample.blank:
             warm = sample.temperature
             if warm is not None and warm <= MOST_CELSIUS:
-                self._temperature = with_value(self._temperature, slot, warm)
+                self._set_temperature(slot, warm)
             if sample.voltage is not None:
                 self._set_voltage(slot, sample.voltage)
         load = max(-1.0, min(1.0, sample.effort * self._load_units[slot]))
@@ -244,32 +228,39 @@ class FeedbackColumns:
 
     def position(self, slot: int) -> float | None:
         """Return where a servo is, None where it has not answered in this exchange."""
-        return None if slot in self._missing else self._position[slot]
+        return None if slot in self.now.missing else self.now.position_steps[slot]
 
     def mark_rearmed(self, slot: int) -> None:
         """Mark a servo's answer: plans begin where it is."""
-        self._rearmed.add(slot)
+        self.now = self.now._replace(rearmed=with_value(self.now.rearmed, slot, True))
 
     def name_fault(self, slot: int, fault: str) -> None:
         """Record what a servo suffers from, "" for nothing."""
-        self._fault = with_value(self._fault, slot, fault)
+        self.now = self.now._replace(fault=with_value(self.now.fault, slot, fault))
 
     def set_torque(self, slot: int, on: bool) -> None:
         """Record whether a servo's torque is on."""
-        self._torque = with_value(self._torque, slot, on)
+        self.now = self.now._replace(torque=with_value(self.now.torque, slot, on))
 
     def expect_torque(self, on: bool) -> None:
         """Record that the torque has been switched for all."""
-        self._engaged, self._torque = on, (on,) * len(self._torque)
-        self._armed = (int(on),) * len(self._torque)
+        self._engaged = on
+        self._armed = (int(on),) * len(self._ids)
+        self.now = self.now._replace(torque=(on,) * len(self._ids))
 
     def set_climate(self, slot: int, tenth_volts: int, temperature_c: int) -> None:
         """Record a servo's voltage and temperature."""
         self._set_voltage(slot, tenth_volts)
-        self._temperature = with_value(self._temperature, slot, float(temperature_c))
+        self._set_temperature(slot, temperature_c)
 
     def _set_voltage(self, slot: int, tenth_volts: int) -> None:
-        self._voltage, self._tenths = with_value(self._voltage, slot, 0.1 * tenth_volts), ()
+        self._tenths = ()
+        volts = with_value(self.now.voltage_v, slot, 0.1 * tenth_volts)
+        self.now = self.now._replace(voltage_v=volts)
+
+    def _set_temperature(self, slot: int, celsius: float) -> None:
+        warm = with_value(self.now.temperature_c, slot, celsius)
+        self.now = self.now._replace(temperature_c=warm)
 
     def hold(self, slot: int, position: int, at_s: float, torque: bool) -> None:
         """Take the place of a servo that was just set up again and stands still."""

@@ -1,17 +1,21 @@
 """Goals kept inside the limits of their servos."""
 
 from collections.abc import Sequence
+from operator import le
 
 
-def clipped(steps: Sequence[int], limits: Sequence[tuple[int, int]]) -> list[int]:
-    """Return goals inside their (lowest, highest) steps.
+def clipped(steps: Sequence[int], lowest: Sequence[int], highest: Sequence[int]) -> Sequence[int]:
+    """Return goals inside their ranges.
 
     Raises:
         ValueError: a goal is not a number, or there are not as many as servos.
     """
+    as_many = len(steps) == len(lowest)
+    if as_many and all(map(le, lowest, steps)) and all(map(le, steps, highest)):
+        return steps
     return [
         goal if low <= goal <= high else _inside(goal, low, high)
-        for goal, (low, high) in zip(steps, limits, strict=True)
+        for goal, low, high in zip(steps, lowest, highest, strict=True)
     ]
 
 

@@ -60,7 +60,7 @@ class Reader:
         self._unanswered_s: dict[int, float] = {}
         self._groups: dict[tuple[tuple[int, ...], int, int], GroupRead] = {}
         self._prepared_ids: tuple[int, ...] = ()
-        self._prepared: dict[ReadWindow, GroupRead] = {}
+        self._prepared: dict[int, GroupRead] = {}
 
     def read(self, now_s: float) -> Whole | dict[int, Heard]:
         """Read everybody who is asked now; who is not in the answer gave no good one.
@@ -140,11 +140,12 @@ class Reader:
     def _group(self, ids: tuple[int, ...], turns: WindowSchedule) -> GroupRead:
         """Return the prepared exchange for some servos."""
         window = turns.next()
-        if ids is not self._prepared_ids:  # the hash of many ids is not made in every tick
+        # By identity: hashing ids and windows in every tick costs as much as reading the answer.
+        if ids is not self._prepared_ids:
             self._prepared_ids, self._prepared = ids, {}
-        group = self._prepared.get(window)
+        group = self._prepared.get(id(window))
         if group is None:
-            group = self._prepared[window] = self._prepare(ids, window)
+            group = self._prepared[id(window)] = self._prepare(ids, window)
         return group
 
     def _prepare(self, ids: tuple[int, ...], window: ReadWindow) -> GroupRead:
