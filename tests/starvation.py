@@ -6,6 +6,8 @@ A test marked ``own_timeouts`` that fails is tried again, from its fixtures on, 
 waited for a processor while it ran; if none did, its failure counts at once.
 """
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 ATTEMPTS = 8
@@ -38,6 +40,16 @@ _looks = [0.0]
 def _unknown() -> float:
     _looks[0] += 1e6
     return _looks[0]
+
+
+def eventually(check: Callable[[], object], patience_s: float = 20.0) -> bool:
+    """Wait for something to become true; False where it does not."""
+    deadline_s = time.monotonic() + patience_s
+    while time.monotonic() < deadline_s:
+        if check():
+            return True
+        time.sleep(0.02)
+    return False
 
 
 class Attempts:

@@ -1,10 +1,10 @@
 """Emulated Feetech SCS servos: high byte first, 1024 steps on less than a turn; by rustypot."""
 
 import math
-import time
 
 import pytest
 from servo_bench import ALL, PING, READ, SYNC_READ, SYNC_WRITE, WRITE, FeetechBench
+from starvation import eventually
 
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
@@ -127,15 +127,6 @@ def client():
         opened = rustypot.Scs0009PyController(bus.start_device(FeetechLine(specs, BAUD)), BAUD, 0.2)
         yield opened
         opened.close()
-
-
-def eventually(check, patience_s=20.0):
-    deadline = time.monotonic() + patience_s
-    while not check():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.02)
-    return True
 
 
 @pytest.mark.own_timeouts

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from starvation import eventually
 
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -42,16 +43,6 @@ def near(places, goal):
     return all(abs(place - goal) < STEADY_STEPS for place in places)
 
 
-def wait_until(check, patience_s=5.0):
-    """Wait for something to become true; False where it does not."""
-    deadline = time.monotonic() + patience_s
-    while time.monotonic() < deadline:
-        if check():
-            return True
-        time.sleep(0.02)
-    return False
-
-
 # --- Rust
 
 
@@ -66,10 +57,10 @@ def test_rustypot_with_x330(path):
     client.sync_write_profile_velocity(ids, [0] * 3)
     client.sync_write_torque_enable(ids, [True] * 3)
     client.sync_write_raw_goal_position(ids, [1500] * 3)
-    assert wait_until(lambda: near(client.sync_read_raw_present_position([3, 1, 2]), 1500))
+    assert eventually(lambda: near(client.sync_read_raw_present_position([3, 1, 2]), 1500))
     client.set_fast_sync_read(True)
     # They may have been seen on their way past it.
-    assert wait_until(lambda: near(client.sync_read_raw_present_position([3, 1, 2]), 1500))
+    assert eventually(lambda: near(client.sync_read_raw_present_position([3, 1, 2]), 1500))
     for values, error in client.sync_read_raw_data_with_error(ids, 126, 10):
         assert (len(values), error) == (10, 0)
     client.set_fast_sync_read(False)
@@ -255,8 +246,8 @@ def test_the_vendors_sdk_opens_a_terminal(path):
 
     port, packets = sdk.PortHandler(path), sdk.PacketHandler(2.0)
     assert port.openPort() and port.setBaudRate(BAUD)
-    assert wait_until(lambda: packets.ping(port, 1) == (1200, sdk.COMM_SUCCESS, 0))
-    assert wait_until(lambda: packets.read4ByteTxRx(port, 2, 132) == (1000, sdk.COMM_SUCCESS, 0))
+    assert eventually(lambda: packets.ping(port, 1) == (1200, sdk.COMM_SUCCESS, 0))
+    assert eventually(lambda: packets.read4ByteTxRx(port, 2, 132) == (1000, sdk.COMM_SUCCESS, 0))
     assert packets.ping(port, 99)[1] == sdk.COMM_RX_TIMEOUT
     port.closePort()
 
@@ -410,7 +401,7 @@ def test_a_client_killed_with_a_lock_leaves_the_port_to_the_next(path):
     fd = os.open(path, os.O_RDWR | os.O_NOCTTY)
     fcntl.ioctl(fd, termios.TIOCEXCL)
     os.close(fd)
-    assert wait_until(lambda: not locked(path), 5.0)
+    assert eventually(lambda: not locked(path))
 
 
 def locked(path):

@@ -7,6 +7,7 @@ import math
 import time
 
 import pytest
+from starvation import eventually
 
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
@@ -36,16 +37,6 @@ def client(bus):
     )
     yield opened
     opened.close()
-
-
-def wait_until(check, patience_s=5.0):
-    """Wait for something to become true; False where it does not."""
-    deadline = time.monotonic() + patience_s
-    while time.monotonic() < deadline:
-        if check():
-            return True
-        time.sleep(0.02)
-    return False
 
 
 def test_who_is_there(client):
@@ -80,7 +71,7 @@ def test_positions_speeds_and_torque_of_a_group(client):
         wanted = (2500, 1500, 1500)
         return all(abs(a - b) <= STEADY_STEPS for a, b in zip(places, wanted, strict=True))
 
-    assert wait_until(near)
+    assert eventually(near)
     # 1 and 3 turn downwards, 2 upwards, none much faster than asked
     assert min(speeds[0] for speeds in seen) < -500
     assert max(speeds[1] for speeds in seen) > 500
@@ -98,8 +89,8 @@ def test_signs_are_those_it_expects(client):
         client.write_register(2, name, 0)
     client.write_torque_enable(2, True)
     client.write_register(2, "goal_position", -500)
-    assert wait_until(lambda: client.read_register(2, "present_load") < -500)
-    assert wait_until(
+    assert eventually(lambda: client.read_register(2, "present_load") < -500)
+    assert eventually(
         lambda: abs(client.read_register(2, "present_position") + 500) <= STEADY_STEPS
     )
 

@@ -3,7 +3,7 @@
 Sources: ROBOTIS e-Manual, Protocol 2.0 and X series.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 from gazerig.drivers.dynamixel.control_table import EEPROM_END
@@ -25,7 +25,7 @@ from gazerig.sim_mock.dynamixel.packets import HEADER, fast_pieces, status
 from gazerig.sim_mock.dynamixel.quirks import DynamixelQuirks
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
 from gazerig.sim_mock.replies import Answer, Piece
-from gazerig.sim_mock.smart_servo.chain import ServoChain, build_chain
+from gazerig.sim_mock.smart_servo.chain import GroupAction, ServoChain, build_chain
 from gazerig.sim_mock.smart_servo.faults import commands_of
 from gazerig.sim_mock.smart_servo.framing import Instruction
 from gazerig.sim_mock.smart_servo.instructions import GroupRead
@@ -41,32 +41,10 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
     commands = commands_of(252, DynamixelQuirks, reset="id 1, 57600 baud; needs torque off")
     eeprom_end = EEPROM_END
     _framing: DynamixelFraming
-
-    def __init__(
-        self,
-        servos: Iterable[DynamixelServo],
-        now_s: Callable[[], float],
-        quirks: DynamixelQuirks | None = None,
-        heed_baud: bool = False,
-        seed: int = 0,
-    ) -> None:
-        super().__init__(servos, now_s, quirks, heed_baud, seed)
-        rows = self.instructions.sync_rows
-        self._groups |= {
-            FAST_SYNC_READ: lambda params: self._fast(rows(params)),
-            BULK_READ: lambda params: self._plain(bulk_rows(params)),
-            FAST_BULK_READ: lambda params: self._fast(bulk_rows(params)),
-            BULK_WRITE: lambda params: self._write_all(bulk_writes(params)),
-        }
+    _obeys_broadcast, _touches_eeprom = staticmethod(obeys_broadcast), staticmethod(touches_eeprom)
 
     def _apply_quirks(self, quirks: DynamixelQuirks) -> None:
         self._framing.strict = quirks.stuffing == "strict"
-
-    def _obeys_broadcast(self, servo: DynamixelServo, code: int, params: bytes) -> bool:
-        return obeys_broadcast(servo, code, params)
-
-    def _for_shadows(self, code: int, params: bytes) -> bool:
-        return not touches_eeprom(code, params)
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Let expired bus watchdogs trip, reset the others, then carry out the instruction."""
@@ -89,6 +67,15 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
         return self._out([Answer(servo_id, error, b"", self._delay_s[servo_id])])
 
     # --- groups
+
+    def _group_instructions(self) -> dict[int, GroupAction]:
+        rows = self.instructions.sync_rows
+        return super()._group_instructions() | {
+            FAST_SYNC_READ: lambda params: self._fast(rows(params)),
+            BULK_READ: lambda params: self._plain(bulk_rows(params)),
+            FAST_BULK_READ: lambda params: self._fast(bulk_rows(params)),
+            BULK_WRITE: lambda params: self._write_all(bulk_writes(params)),
+        }
 
     def _fast(self, rows: Sequence[GroupRead]) -> list[Piece]:
         """Return one packet of all answers; a servo that refuses fills its block with zeros."""

@@ -28,6 +28,8 @@ from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 TWIN_AWAY_STEPS = 257
 """A second servo with a taken id stands so far from the first, so that they differ."""
 
+GroupAction = Callable[[bytes], list[Piece]]
+
 S = TypeVar("S", bound=EmulatedServo)
 Q = TypeVar("Q", bound=ChainQuirks)
 
@@ -73,11 +75,7 @@ class ServoChain(Generic[S, Q]):
         self._now_ms = self._fed_ms = whole_ms(self._now_s)
         self._framing = self.framing_type(self.quirks.packet_gap_s, self._now_s)
         self._client_baud: int | None = None
-        self._groups: dict[int, Callable[[bytes], list[Piece]]] = {
-            PING: lambda params: self._out(self._ping_all()),
-            SYNC_READ: lambda params: self._plain(self.instructions.sync_rows(params)),
-            SYNC_WRITE: lambda params: self._write_all(self.instructions.sync_writes(params)),
-        }
+        self._groups = self._group_instructions()
         for servo in self.servos:
             servo.on_address = self._readdressed
         self._apply_quirks(self.quirks)
@@ -167,9 +165,9 @@ class ServoChain(Generic[S, Q]):
         """True if a servo carries out an instruction that goes to all."""
         return True
 
-    def _for_shadows(self, code: int, params: bytes) -> bool:
-        """True if servos addressed by a secondary id carry out an instruction."""
-        return True
+    def _touches_eeprom(self, code: int, params: bytes) -> bool:
+        """True if an instruction is not for servos addressed by a secondary id."""
+        return False
 
     # --- bytes
 
@@ -246,7 +244,7 @@ class ServoChain(Generic[S, Q]):
         for twin in twins:
             answer = _both(answer, self._answer(twin, code, params))
         for shadow in shadows:
-            if self._for_shadows(code, params):
+            if not self._touches_eeprom(code, params):
                 self._answer(shadow, code, params)
         return None if answer is None or self._is_muted(servo_id) else answer
 
@@ -262,6 +260,15 @@ class ServoChain(Generic[S, Q]):
         return Answer(servo_id, said[0] | flag, said[1], self._delay_s[servo_id])
 
     # --- groups
+
+    def _group_instructions(self) -> dict[int, GroupAction]:
+        """Return what is done for instructions to a group, by code."""
+        rows, writes = self.instructions.sync_rows, self.instructions.sync_writes
+        return {
+            PING: lambda params: self._out(self._ping_all()),
+            SYNC_READ: lambda params: self._plain(rows(params)),
+            SYNC_WRITE: lambda params: self._write_all(writes(params)),
+        }
 
     def _ping_all(self) -> list[Answer]:
         """Return the answers to a ping to all, in the order of the ids."""
