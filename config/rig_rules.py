@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from gazerig.config.rig import BusConfig, Rig
-from gazerig.drivers.hobby_board.params import BoardParams
+from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.servo_models import SERVOS
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.forbidden_range import forbidden_pairs
@@ -75,7 +75,7 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
 def _channel(name: str, joint: JointParams, bus: BusConfig) -> Iterable[tuple[str, str]]:
     """Find what keeps a joint from its channel of a board of hobby servos."""
     params = getattr(bus, bus.kind)
-    if not isinstance(params, BoardParams):
+    if not isinstance(params, HobbyBoardParams):
         return
     try:
         params.check(joint.setup(name))

@@ -21,7 +21,7 @@ from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.maestro.board import MaestroBoard
+from gazerig.sim_mock.maestro.board import EmulatedMaestro
 from gazerig.sim_mock.pca9685.bridge import Bridge
 
 STRUCK_S, PATIENCE_S = 1.0, 3.0
@@ -233,7 +233,7 @@ class Machine:
         """Return the goal that joint's servo follows; None where it is limp."""
         bus, place = self._at[i]
         device = self.devices[bus]
-        if isinstance(device, MaestroBoard):
+        if isinstance(device, EmulatedMaestro):
             return device.body.channels[place].target or None
         if isinstance(device, Bridge):
             return device.body.width_steps(place, self.clock.now_s()) or None

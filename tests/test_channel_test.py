@@ -5,11 +5,14 @@ import pytest
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.maestro.board import MaestroBoard
 from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.channel_test import SLOW_STEPS_S, ChannelPosition, walk
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
+from gazerig.sim_mock.pca9685.bridge import build_bridge
 
 LID = ServoSetup(2, "hobby", 4400, 7600, 9000.0, "left_upper_lid", rest_steps=5000)
 PLACES = (5000, 4780, 5220, 5000)
@@ -128,3 +131,48 @@ def test_a_cable_that_is_pulled_out():
     with pytest.raises(ServoFault, match="may still get pulses") as error:
         walk(bench.driver, LID, PLACES, sleep_and_pull)
     assert isinstance(error.value.__context__, BusLost)
+
+
+class I2cBench(Bench):
+    """The same on a PCA9685, whose pulses the driver leads."""
+
+    def __init__(self):
+        self.now_s = 5.0
+        self.board = build_bridge(
+            (0x40,), lambda: self.now_s, 25.4e6, servos=[HobbySpec(2, 6500.0)]
+        )
+        self.port = InProcessPort(self.board)
+        self.port.setBaudRate(115_200)
+        self.driver = Pca9685Board(self.port, Pca9685Params(oscillator_hz=25.4e6))
+        self.seen = []
+
+    def sleep_until(self, t_s):
+        while self.now_s < t_s:
+            self.now_s = min(t_s, self.now_s + 0.01)
+            channel = self.board.faults.reports()[2]
+            self.seen.append((self.now_s, channel["target"], channel["place"]))
+
+
+def test_a_pca9685_is_led_as_slowly_and_its_pulses_end():
+    bench = I2cBench()
+    assert bench.walk() == tuple(Place(p, p) for p in PLACES)
+    pulses = [pulse for _, pulse, _ in bench.seen]
+    assert abs(pulses[0] - 5000) <= 10
+    ways = [abs(b - a) for a, b in zip(pulses, pulses[1:], strict=False)]
+    assert 0 < max(ways) <= 0.02 * SLOW_STEPS_S + 20
+    assert min(pulses) < 4791 and max(pulses) > 5209
+    assert [c["target"] for c in bench.board.faults.reports()] == [0] * 16
+    assert bench.now_s - 5.0 < 6.0
+
+
+def test_a_pca9685_that_restarts_on_the_way_gives_no_pulses_and_is_told():
+    bench = I2cBench()
+
+    def sleep_and_restart(t_s):
+        bench.sleep_until(t_s)
+        if len(bench.seen) == 60:
+            bench.board.faults.command("brown-out")
+
+    gone = walk(bench.driver, LID, PLACES, sleep_and_restart)
+    assert gone[0] == Place(5000, 5000) and gone[-1] == Place(5000, 0)
+    assert bench.board.faults.reports()[2]["target"] == 0

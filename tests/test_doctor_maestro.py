@@ -5,7 +5,7 @@ from xml.etree.ElementTree import fromstring
 import pytest
 
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.channel_test import sent_home
@@ -176,11 +176,11 @@ def test_home():
     rig.do("55")
     rig.do("84 00 70 2E")
     rig.port.setBaudRate(115_200)
-    assert sent_home(Line(rig.port, rig.params)) == ("serial protocol error",)
+    assert sent_home(MaestroLink(rig.port, rig.params)) == ("serial protocol error",)
     assert [c["position"] for c in rig.board.faults.reports()] == [0] * 12
     rig.board.choose("mode", "mute")
     with pytest.raises(ServoMissing, match="no Maestro answers"):
-        sent_home(Line(rig.port, rig.params))
+        sent_home(MaestroLink(rig.port, rig.params))
 
 
 # --- what to set in Pololu's program

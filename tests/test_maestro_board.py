@@ -10,7 +10,7 @@ from gazerig.drivers.errors import BusLost
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import SIZES, build_board
-from gazerig.sim_mock.maestro.channel import Channel, brakes_within
+from gazerig.sim_mock.maestro.channel import EmulatedChannel, brakes_within
 from gazerig.sim_mock.maestro.commands import ERRORS, crc7
 from gazerig.sim_mock.maestro.faults import COMMANDS
 
@@ -342,7 +342,7 @@ _ORDERS = st.one_of(
 
 @given(st.lists(_ORDERS, max_size=25))
 def test_a_channel_keeps_its_limits_and_always_arrives(orders):
-    channel = Channel(3968, 8000)
+    channel = EmulatedChannel(3968, 8000)
     for order, number in orders:
         if order != "step":
             getattr(channel, order)(number)

@@ -4,7 +4,7 @@ import pytest
 
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.maestro.limits import SPEED_STEPS_S, speed_units
-from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoSetup
 
@@ -43,14 +43,14 @@ class SlowPort:
 
 def test_an_answer_after_its_time_is_not_the_next_ones():
     port = SlowPort(None, *[b"\x70\x17"] * 2, late=b"\xff\x00")
-    line = Line(port, MaestroParams())
+    line = MaestroLink(port, MaestroParams())
     assert line.pulses((0,)) is None
     assert line.pulses((0,)) == (6000,)
     assert line.errors == {"timeout": 1}
 
 
 def test_numbers_that_cannot_be_are_damage():
-    line = Line(SlowPort(b"\xff\xff", *[b"\x70\x17"] * 2), MaestroParams())
+    line = MaestroLink(SlowPort(b"\xff\xff", *[b"\x70\x17"] * 2), MaestroParams())
     assert line.pulses((0,)) is None
     assert line.errors == {"damaged": 1}
     assert line.pulses((0,)) == (6000,)
@@ -58,14 +58,14 @@ def test_numbers_that_cannot_be_are_damage():
 
 def test_the_board_is_not_asked_too_much_at_once():
     port = SlowPort(*[bytes(12), bytes(6)] * 2)
-    assert Line(port, MaestroParams()).pulses(range(9)) == (0,) * 9
+    assert MaestroLink(port, MaestroParams()).pulses(range(9)) == (0,) * 9
     assert [len(packet) for packet in port.sent] == [12, 6] * 2
 
 
 def test_more_than_was_asked_for_is_damage():
     """A channel that answers twice: all behind it would have their neighbour's pulse."""
     port = SlowPort(*[b"\x70\x17" * 3] * 2, b"\x70\x17", *[bytes(6)] * 2)
-    line = Line(port, MaestroParams())
+    line = MaestroLink(port, MaestroParams())
     assert line.pulses((0, 1, 2)) is None
     assert line.errors == {"damaged": 1}
     assert line.pulses((0, 1, 2)) == (0, 0, 0)
@@ -73,7 +73,7 @@ def test_more_than_was_asked_for_is_damage():
 
 def test_pulses_that_differ_when_asked_twice_are_damage():
     """Answers carry no check, and a channel is held at the pulse that it is said to give."""
-    line = Line(SlowPort(b"\x70\x17", b"\x70\x1b", *[b"\x70\x17"] * 2), MaestroParams())
+    line = MaestroLink(SlowPort(b"\x70\x17", b"\x70\x1b", *[b"\x70\x17"] * 2), MaestroParams())
     assert line.pulses((0,)) is None
     assert line.errors == {"damaged": 1}
     assert line.pulses((0,)) == (6000,)
@@ -90,7 +90,7 @@ def held(setup=SETUP, pulse=6000):
 
 def test_a_damaged_pulse_never_puts_a_position_outside_the_limits():
     channel = held(pulse=4400)
-    assert not channel.strange(4300, 0.0)
+    assert not channel.implausible(4300, 0.0)
     channel.found(4300)
     channel.advance(0.004)
     assert round(channel.ramp.shaft_steps) == 4400
@@ -98,28 +98,28 @@ def test_a_damaged_pulse_never_puts_a_position_outside_the_limits():
 
 def test_a_pulse_far_from_every_goal_is_strange():
     channel = held()
-    assert channel.strange(0, 0.0)
-    assert channel.strange(7000, 0.0)
-    assert not channel.strange(6010, 0.0)
+    assert channel.implausible(0, 0.0)
+    assert channel.implausible(7000, 0.0)
+    assert not channel.implausible(6010, 0.0)
 
 
 def test_long_after_the_last_goal_a_pulse_must_be_there():
     channel = held()
     channel.aim(6600, 0.0)
-    assert not channel.strange(6200, 0.02)
-    assert channel.strange(6200, 1.0)
-    assert not channel.strange(6200, 1.0, led_away=True)
-    assert not channel.strange(6604, 1.0)
+    assert not channel.implausible(6200, 0.02)
+    assert channel.implausible(6200, 1.0)
+    assert not channel.implausible(6200, 1.0, led_away=True)
+    assert not channel.implausible(6604, 1.0)
 
 
 def test_an_end_of_the_board_is_believed_when_it_was_met_twice():
     channel = held()
     channel.aim(7600, 0.0)
-    assert not channel.met_end(7400)
-    assert channel.met_end(7400)
+    assert not channel.off_goal(7400)
+    assert channel.off_goal(7400)
     channel.advance(5.0)
     assert round(channel.ramp.shaft_steps) == 7400
-    assert not channel.met_end(7600)
+    assert not channel.off_goal(7600)
     channel.advance(9.0)
     assert round(channel.ramp.shaft_steps) == 7600
 

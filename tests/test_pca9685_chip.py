@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from smbus2 import i2c_msg
 
-from gazerig.sim_mock.pca9685.body import Body
+from gazerig.sim_mock.pca9685.body import Pca9685Body
 from gazerig.sim_mock.pca9685.bridge import build_bridge
 from gazerig.sim_mock.pca9685.chip import AI, MODE1, MODE2, PRESCALE, RESTART, SLEEP, START_S
 from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
@@ -23,7 +23,7 @@ class Bench:
     def __init__(self):
         self.now = [1.0]
         self.bridge = build_bridge((ADDRESS, 0x41), lambda: self.now[0])
-        self.body: Body = self.bridge.body
+        self.body: Pca9685Body = self.bridge.body
         self.bus = EmulatedSMBus(self.body)
 
     def set(self, register, *values):

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.params import BoardParams
+from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.host_lateness import HostLateness
 from gazerig.drivers.port_bus import Exchange
 from gazerig.drivers.serial.port import BusPort
@@ -37,7 +37,7 @@ class BoardTexts(NamedTuple):
     name: of the board, with its number or address
     no_pulses, other_pulse: the cure where a channel gives no pulses, or others than it is sent
     noise: the cure where its line is disturbed
-    unheard: the cure where it does not answer
+    no_answer: the cure where it does not answer
     left_alone: what it does that cannot be reached any more
     """
 
@@ -45,11 +45,11 @@ class BoardTexts(NamedTuple):
     no_pulses: str
     other_pulse: str
     noise: str
-    unheard: str
+    no_answer: str
     left_alone: str
 
 
-class Seen(NamedTuple):
+class ChannelStatus(NamedTuple):
     """What a board has said of one channel and of itself.
 
     pulse_steps: what the channel gives now, quarter microseconds; 0: none
@@ -106,7 +106,7 @@ class Board(Protocol):
         ...
 
     @property
-    def params(self) -> BoardParams:
+    def params(self) -> HobbyBoardParams:
         """Return what a rig file has chosen for it."""
         ...
 
@@ -126,7 +126,7 @@ class Board(Protocol):
         """
         ...
 
-    def look(self, channel: Channel) -> Seen | None:
+    def look(self, channel: Channel) -> ChannelStatus | None:
         """Ask for one channel's pulse and the board's errors; None where no answer came."""
         ...
 

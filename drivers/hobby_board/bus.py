@@ -22,7 +22,7 @@ from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
 from gazerig.drivers.hobby_board.silence import Silence
 from gazerig.drivers.hobby_board.start import take_on
-from gazerig.drivers.hobby_board.supervisor import Supervisor
+from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
 from gazerig.drivers.port_bus import CUT, PortBus
 from gazerig.drivers.released import Released
 from gazerig.drivers.serial.reconnect import LastingPort
@@ -46,7 +46,7 @@ class HobbyBoardBus(PortBus):
     holding = "still gets pulses"
     mute = "does not confirm that its pulses have stopped"
     _line: BoardLine
-    _supervisor: Supervisor
+    _supervisor: BoardSupervisor
 
     def __init__(self, board: Board, setups: Sequence[ServoSetup]) -> None:
         self._board, self._line, self._port = board, board.line, board.line.port
@@ -64,11 +64,11 @@ class HobbyBoardBus(PortBus):
         """Make the parts that have memory, with a clean sheet."""
         timing = self._board.timing
         self._channels = tuple(Channel(setup, timing.longest_lead_s) for setup in self._setups)
-        self._supervisor = Supervisor(self._board, self._channels, self._log)
+        self._supervisor = BoardSupervisor(self._board, self._channels, self._log)
         self._silence = Silence(self._log, self._line.lateness)
         self._rx_bytes, self._byte_s = 0, -inf
         self._link = LastingPort(
-            self._port, timing.baud, timing.give_up_s, self._log, self._trust_nobody
+            self._port, timing.baud, timing.give_up_s, self._log, self._reset_trust
         )
         self._heard_s = -inf
 
@@ -114,14 +114,14 @@ class HobbyBoardBus(PortBus):
             self._lose(lost)
             return self._nothing
         if not answered:
-            self._mind_silence(now_s)
+            self._check_silence(now_s)
             return self._nothing
         return self._feedback(self._heard_s)
 
     def _feedback(self, at_s: float) -> Feedback:
         """Return where all servos are taken to be; never measured."""
         channels, nothing = self._channels, self._nothing
-        sure = [self._supervisor.believed(channel) for channel in channels]
+        sure = [self._supervisor.is_known(channel) for channel in channels]
         each = tuple(zip(channels, sure, strict=True))
         return Feedback(
             tuple([round(c.ramp.shaft_steps) if known else nan for c, known in each]),
@@ -197,7 +197,7 @@ class HobbyBoardBus(PortBus):
     def faults(self) -> tuple[str, ...]:
         """Name what channels suffer from now, and the board's errors of the last 10 s."""
         channels = (f"{channel_label(c.setup)}: {c.fault}" for c in self._channels if c.fault)
-        errors = self._supervisor.errors_of_late(self._port.now_s())
+        errors = self._supervisor.recent_errors(self._port.now_s())
         return (*channels, *(f"{self._board.texts.name}: {name}" for name in errors))
 
     # --- holding
@@ -238,7 +238,7 @@ class HobbyBoardBus(PortBus):
         if errors is None:
             self._silence.miss(now_s, self._any_byte_s(now_s))
             return False
-        self._supervisor.note_errors(errors, self._port.now_s())
+        self._supervisor.record_errors(errors, self._port.now_s())
         return True
 
     def _any_byte_s(self, now_s: float) -> float:
@@ -247,7 +247,7 @@ class HobbyBoardBus(PortBus):
             self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
         return self._byte_s
 
-    def _mind_silence(self, now_s: float) -> None:
+    def _check_silence(self, now_s: float) -> None:
         """Give up where the board has not answered for too long.
 
         Raises:
@@ -263,9 +263,9 @@ class HobbyBoardBus(PortBus):
 
     # --- a port that goes away
 
-    def _trust_nobody(self) -> None:
+    def _reset_trust(self) -> None:
         """Begin anew with a port that was away."""
-        self._supervisor.suspect_all()
+        self._supervisor.mark_all_for_recovery()
 
     def _switch_off(self) -> Released:
         released = switch_off(self._board, self._ids)

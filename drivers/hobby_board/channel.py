@@ -130,7 +130,7 @@ class Channel:
             self.ramp.move(self._reached(self.goal_steps), spent_s)
         self._at_s = now_s
 
-    def strange(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
+    def implausible(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
         """Return whether a pulse cannot come from the goals of late.
 
         led_away: an error or a restart has led it towards its home for a moment
@@ -185,7 +185,7 @@ class Channel:
         else:
             self.ramp.stop()
 
-    def met_end(self, pulse_steps: int) -> bool:
+    def off_goal(self, pulse_steps: int) -> bool:
         """Note where a goal has ended; gives whether that is elsewhere, twice at the same pulse."""
         before, self._end_steps = self._end_steps, pulse_steps
         short = self.goal_steps - pulse_steps

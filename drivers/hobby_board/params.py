@@ -11,7 +11,7 @@ if TYPE_CHECKING:  # the guardian starts without numpy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BoardParams:
+class HobbyBoardParams:
     """How long a board is waited for, how often it is looked at, and how its servos start."""
 
     # fmt: off

@@ -29,7 +29,7 @@ def every_pulse(board: Board, setups: Sequence[ServoSetup]) -> tuple[int, ...]:
     for setup in setups:
         if board.pulses((setup.id,)) is None:
             raise ServoMissing(
-                f"{where}: no answer about {channel_label(setup)}: {board.texts.unheard}"
+                f"{where}: no answer about {channel_label(setup)}: {board.texts.no_answer}"
             )
     raise ServoMissing(f"{where}: answers get lost: {board.texts.noise}")
 

@@ -24,7 +24,7 @@ SAME_S = 1.0
 """The same error is not told again within such a time."""
 
 
-class Supervisor:
+class BoardSupervisor:
     """What the board says about itself, and what is done about it.
 
     engaged: goals are followed
@@ -40,7 +40,7 @@ class Supervisor:
         self._pending: list[Channel] = []
         self._asked = -1
         self._unsure = False
-        self._unheard: tuple[str, ...] = ()
+        self._unhandled: tuple[str, ...] = ()
         self._restarts: list[float] = []
         self._errors_s: dict[str, float] = {}
         self._disturbed: list[float] = []
@@ -54,7 +54,7 @@ class Supervisor:
         self._disturbed.clear()
         self._hold_at_s = -inf
         self._pending.clear()
-        self._unsure, self._unheard = False, ()
+        self._unsure, self._unhandled = False, ()
 
     def let_go(self) -> None:
         """Leave the channels alone."""
@@ -63,14 +63,14 @@ class Supervisor:
         for channel in self._channels:
             channel.let_go()
 
-    def suspect_all(self) -> None:
+    def mark_all_for_recovery(self) -> None:
         """Trust no channel to be as it was left: each is taken hold of anew."""
         self._unsure = True
         if self.engaged:
             for channel in self._channels:
                 self._drop(channel)
 
-    def note_errors(self, names: Sequence[str], now_s: float) -> None:
+    def record_errors(self, names: Sequence[str], now_s: float) -> None:
         """Note what the board has reported."""
         for name in names:
             self._line.errors[name] += 1
@@ -78,7 +78,7 @@ class Supervisor:
                 self._log.add(f"the board reports: {name}")
             self._errors_s[name] = now_s
 
-    def errors_of_late(self, now_s: float) -> tuple[str, ...]:
+    def recent_errors(self, now_s: float) -> tuple[str, ...]:
         """Name the errors that the board has reported of late."""
         return tuple(name for name, at_s in self._errors_s.items() if now_s - at_s < WITHIN_S)
 
@@ -102,9 +102,9 @@ class Supervisor:
             return False
         now_s = self._line.port.now_s()
         self.advance(now_s)
-        self.note_errors(found.errors, now_s)
+        self.record_errors(found.errors, now_s)
         if self.engaged:
-            self._unheard = (*self._unheard, *found.errors)
+            self._unhandled = (*self._unhandled, *found.errors)
             return self._service(channel, found.pulse_steps, now_s)
         channel.found(found.pulse_steps)
         self._unsure = False
@@ -127,21 +127,21 @@ class Supervisor:
             self._board.lead([channel for channel in self._channels if channel.held])
 
     def _service(self, channel: Channel, pulse: int, now_s: float) -> bool:
-        odd = channel.held and channel.strange(pulse, now_s)
-        if self._unheard or self._unsure or odd:
-            if not self._look_at_all():
+        odd = channel.held and channel.implausible(pulse, now_s)
+        if self._unhandled or self._unsure or odd:
+            if not self._check_all():
                 return False
         elif channel.held:
             channel.confirmed(pulse)
         if self._pending and now_s >= self._hold_at_s:
-            self._take_next(now_s)
+            self._recover_next(now_s)
         for one in self._channels:
             if one.entering and one.inside():
                 one.entering = False
                 self._board.send_limits([one], confirmed=False)
         return True
 
-    def _look_at_all(self) -> bool:
+    def _check_all(self) -> bool:
         """Compare every channel's pulse with what it should be; tells whether they came."""
         pulses = self._board.pulses([channel.id for channel in self._channels])
         if pulses is None:
@@ -149,12 +149,12 @@ class Supervisor:
             return False
         now_s = self._line.port.now_s()
         self.advance(now_s)
-        errors, unsure = tuple(dict.fromkeys(self._unheard)), self._unsure
-        self._unheard, self._unsure = (), False
+        errors, unsure = tuple(dict.fromkeys(self._unhandled)), self._unsure
+        self._unhandled, self._unsure = (), False
         away = bool(errors or unsure)
         found = dict(zip(self._channels, pulses, strict=True))
         held = [channel for channel in self._channels if channel.held]
-        odd = [channel for channel in held if channel.strange(found[channel], now_s, away)]
+        odd = [channel for channel in held if channel.implausible(found[channel], now_s, away)]
         home = [channel for channel in odd if not found[channel]]
         # Boards that lead their pulses to their home are lost with any other pulse as well.
         astray = not self._led and (home or away or len(odd) == len(held))
@@ -163,17 +163,17 @@ class Supervisor:
             self._lost_hold(lost, errors, now_s)
         for channel in odd:
             if channel not in lost:
-                self._met_end(channel, found[channel])
+                self._off_goal(channel, found[channel])
         for channel in held:
             if channel not in odd:
                 channel.confirmed(found[channel])
         if away or home:
-            self._remind()
+            self._restore()
         for channel in self._pending:
             channel.found(found[channel])
         return True
 
-    def _remind(self) -> None:
+    def _restore(self) -> None:
         """Arm the limits anew, which a restart forgets, then send the goals in force.
 
         A board that leads its channels home at their armed speed has not yet gone far. A goal
@@ -188,14 +188,14 @@ class Supervisor:
             return
         self._board.send_goals(held)
 
-    def _met_end(self, channel: Channel, pulse: int) -> None:
+    def _off_goal(self, channel: Channel, pulse: int) -> None:
         """Note that a channel stays elsewhere: it meets an end of the board's own range."""
         if self._led:
             # Boards that are led have no range of their own: what was sent was lost.
             self._line.errors["other pulse"] += 1
             channel.found(pulse)
             return
-        if channel.met_end(pulse) and not channel.told:
+        if channel.off_goal(pulse) and not channel.told:
             channel.told = True
             self._line.errors["other pulse"] += 1
             self._log.add(refusal(self._board, channel))
@@ -211,7 +211,7 @@ class Supervisor:
         self._line.errors["restarted"] += 1
         for channel in lost:
             self._drop(channel)
-        if named or self._noise_of_late(now_s):
+        if named or self._recent_noise(now_s):
             self._wait_for_quiet(who, named or "bytes arrive damaged", now_s)
             return
         self._restarts = [at_s for at_s in self._restarts if now_s - at_s < WITHIN_S]
@@ -221,7 +221,7 @@ class Supervisor:
         else:
             self._log.add(f"{who} restarted: set up anew")
 
-    def _noise_of_late(self, now_s: float) -> bool:
+    def _recent_noise(self, now_s: float) -> bool:
         """Return whether bytes have been damaged of late, to the board or from it."""
         errors = self._line.errors
         damages = sum(errors[name] for name in self._board.damage)
@@ -261,7 +261,7 @@ class Supervisor:
             channel.stop()
         self._pending.clear()
 
-    def _take_next(self, now_s: float) -> None:
+    def _recover_next(self, now_s: float) -> None:
         """Take hold of one channel anew; the next at the next read, to spare the supply."""
         channel = self._pending[0]
         found = self._board.pulses((channel.id,))
@@ -274,14 +274,14 @@ class Supervisor:
             self._pending.remove(channel)
         elif outcome is Outcome.ELSEWHERE and channel.on:
             # It does give pulses, only others: that is told once, and it is held so.
-            self._met_end(channel, round(channel.ramp.pulse_steps))
+            self._off_goal(channel, round(channel.ramp.pulse_steps))
             channel.hold()
             channel.rearm()
             self._pending.remove(channel)
 
     # --- what others may know
 
-    def believed(self, channel: Channel) -> bool:
+    def is_known(self, channel: Channel) -> bool:
         """Return whether anything is known of where a channel is."""
         return channel not in self._pending
 

@@ -8,7 +8,7 @@ from math import inf
 
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import BoardTexts, Seen, Timing, goals_of
+from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, Timing, goals_of
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.start import every_pulse
@@ -18,7 +18,7 @@ from gazerig.drivers.maestro.commands import (
     name_errors,
 )
 from gazerig.drivers.maestro.limits import ACCEL_STEPS_S2, SPEED_STEPS_S, accel_units, speed_units
-from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoSetup
@@ -31,7 +31,7 @@ class MaestroBoard:
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
         self.params = params
-        self.line = Line(port, params)
+        self.line = MaestroLink(port, params)
         self.timing = Timing(
             params.baud, params.watch_ms / 1000.0, params.stagger_ms / 1000.0, params.give_up_s, inf
         )
@@ -40,7 +40,7 @@ class MaestroBoard:
             no_pulses="set its channel to Servo in Pololu's program",
             other_pulse="widen its range in Pololu's program, or delete the board's script",
             noise="check cable, ground and baud rate",
-            unheard=f"has the board {params.channels} channels?",
+            no_answer=f"has the board {params.channels} channels?",
             left_alone="the board goes on with its last goals as long as it has power",
         )
         self._errors_first = False
@@ -90,7 +90,7 @@ class MaestroBoard:
             self.line.send(self.line.speech.stop_script())
             log.add("the board ran a script of its own: stopped")
 
-    def look(self, channel: Channel) -> Seen | None:
+    def look(self, channel: Channel) -> ChannelStatus | None:
         """Ask for one channel's pulse and the error register; None where no answer came."""
         speech = self.line.speech
         questions = (speech.position(channel.id), speech.errors())
@@ -106,7 +106,7 @@ class MaestroBoard:
             # A pulse width taken for a register, or noise: such errors do not exist.
             self.line.errors["damaged"] += 1
             return None
-        return Seen(pulse, name_errors(register | self.line.unheard()))
+        return ChannelStatus(pulse, name_errors(register | self.line.unheard()))
 
     def wake(self) -> tuple[str, ...] | None:
         """Ask a board that may have to detect its baud rate anew; None: no answer."""

@@ -23,7 +23,7 @@ ALIKE_STEPS, FASTEST_STEPS_S = 200, 40_000.0
 """Two answers about a pulse may be so far apart, and farther by the time between them."""
 
 
-class Line:
+class MaestroLink:
     """A port with one board behind it; every method may raise BusLost.
 
     speech: how the board wants its commands
@@ -45,7 +45,7 @@ class Line:
         self._patience_s = params.reply_timeout_ms / 1000.0
         self._late = False
         self._owed = 0
-        self._unheard = 0
+        self._unhandled = 0
 
     def send(self, packet: bytes) -> None:
         """Send commands that are not answered."""
@@ -96,12 +96,12 @@ class Line:
         found = self.ask_words(packet + self.speech.errors(), 1)
         if found is None:
             return False
-        self._unheard |= found[0]
+        self._unhandled |= found[0]
         return not found[0]
 
     def unheard(self) -> int:
         """Return the errors that ``send_checked`` has found since the last call."""
-        register, self._unheard = self._unheard, 0
+        register, self._unhandled = self._unhandled, 0
         return register
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:

@@ -6,14 +6,14 @@ Source: Pololu Maestro Servo Controller User's Guide (0J40).
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from gazerig.drivers.hobby_board.params import BoardParams
+from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.params import Bounds, Choices
 
 Form = Literal["compact", "pololu"]
 
 
 @dataclass(frozen=True, slots=True)
-class MaestroParams(BoardParams):
+class MaestroParams(HobbyBoardParams):
     """How to speak with one board."""
 
     # fmt: off

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.maestro.commands import ERRORS, MICRO, PROTOCOL_ERROR, name_errors
-from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import Form, MaestroParams
 from gazerig.drivers.serial.port import BusPort
 
@@ -60,7 +60,7 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> MaestroF
     other: Form = "pololu" if params.protocol == "compact" else "compact"
     for crc in (params.crc, not params.crc):
         for form in (params.protocol, other):
-            line = Line(port, replace(params, protocol=form, crc=crc))
+            line = MaestroLink(port, replace(params, protocol=form, crc=crc))
             port.drain()
             register = line.greet()
             if register is not None and not register >> len(ERRORS) and line.takes_crc():
@@ -68,13 +68,15 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> MaestroF
     return None
 
 
-def _look(line: Line, params: MaestroParams, register: int, count: bool) -> MaestroFound | None:
+def _look(
+    line: MaestroLink, params: MaestroParams, register: int, count: bool
+) -> MaestroFound | None:
     """Ask a board that answers for what else it tells."""
     crc = line.speech.crc
     forms: tuple[Form, ...] = ()
     # Where several boards share a line all of them answer the compact form.
     for form in FORMS if line.speech.form == "compact" else ("pololu",):
-        spoken = Line(line.port, replace(params, protocol=form, crc=crc))
+        spoken = MaestroLink(line.port, replace(params, protocol=form, crc=crc))
         found = _patiently(partial(spoken.ask_words, spoken.speech.errors(), 1))
         if found is not None:
             forms, line = (*forms, form), spoken
@@ -99,7 +101,7 @@ def _patiently(ask: Callable[[], tuple[int, ...] | None]) -> tuple[int, ...] | N
     return next((answer for answer in (ask() for _ in range(TRIES)) if answer is not None), None)
 
 
-def _count(line: Line) -> int:
+def _count(line: MaestroLink) -> int:
     """Count the channels: the first of each larger board is asked for until it is not there."""
     for channels in sorted(USB_CHANNELS.values())[:-1]:
         question = line.speech.position(channels) + line.speech.errors()

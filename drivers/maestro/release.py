@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.hobby_board.release import switch_off
-from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BusPort
 
@@ -23,5 +23,5 @@ def stop_pulses(port: BusPort, params: MaestroParams, channels: Sequence[int]) -
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s")
-    released = switch_off(Line(port, params), channels)
+    released = switch_off(MaestroLink(port, params), channels)
     return (*released.holding, *released.mute)

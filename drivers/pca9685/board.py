@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import BoardTexts, Seen, Timing
+from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, Timing
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.start import every_pulse
 from gazerig.drivers.i2c import bridge
@@ -30,7 +30,7 @@ from gazerig.drivers.pca9685.registers import (
     SLEEP,
     START_S,
     TOTEM_POLE,
-    Clock,
+    PulseClock,
     counts_of,
     counts_within,
     output,
@@ -83,7 +83,7 @@ class Pca9685Board:
             no_pulses=again,
             other_pulse=again,
             noise="check SDA, SCL and ground, and the length of the cable",
-            unheard="check power, SDA, SCL and ground of its board",
+            no_answer="check power, SDA, SCL and ground of its board",
             left_alone="the board goes on with its last pulses as long as it has power",
         )
         self._clocks = params.clocks
@@ -106,7 +106,7 @@ class Pca9685Board:
             boards[address].append(channel)
         return boards
 
-    def _clock(self, servo_id: int) -> Clock:
+    def _clock(self, servo_id: int) -> PulseClock:
         """Return the clock of a servo's board."""
         return self._clocks[self._place(servo_id)[0]]
 
@@ -182,7 +182,7 @@ class Pca9685Board:
 
     # --- looking
 
-    def look(self, channel: Channel) -> Seen | None:
+    def look(self, channel: Channel) -> ChannelStatus | None:
         """Ask for a channel's pulse and its board's mode; None where no answer came.
 
         A board that was reset sleeps: then it gives no pulses, whatever else is there.
@@ -202,10 +202,10 @@ class Pca9685Board:
         usual = self._clocks[address].prescale
         prescale = found[2][0] if with_prescale else usual
         if found[0][0] == AWAKE and prescale == usual:
-            return Seen(self._told(channel.id, counts_of(found[1]), prescale))
+            return ChannelStatus(self._told(channel.id, counts_of(found[1]), prescale))
         return self._look_closer(channel)
 
-    def _look_closer(self, channel: Channel) -> Seen | None:
+    def _look_closer(self, channel: Channel) -> ChannelStatus | None:
         """Look again at a board that is not as it was set up, or was not heard well."""
         address, _ = self._place(channel.id)
         now, pulses = self._modes(address), self.pulses((channel.id,))
@@ -213,10 +213,10 @@ class Pca9685Board:
             return None
         well = now[0] & ~RESTART == AWAKE and now[2] == self._clocks[address].prescale
         if now[0] & EXTCLK:
-            return Seen(0, (NO_CLOCK,))
+            return ChannelStatus(0, (NO_CLOCK,))
         asleep = bool(now[0] & SILENT)
         changed = () if well or asleep or not channel.held else ("settings changed",)
-        return Seen(pulses[0], changed)
+        return ChannelStatus(pulses[0], changed)
 
     def _told(self, servo_id: int, counts: int, prescale: int) -> int:
         """Return the pulse that counts make: as it was sent, where they are what was sent."""

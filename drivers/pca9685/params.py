@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from gazerig.drivers.hobby_board.params import BoardParams
-from gazerig.drivers.pca9685.registers import CHANNELS, MOST_PRESCALE, Clock, prescale_of
+from gazerig.drivers.hobby_board.params import HobbyBoardParams
+from gazerig.drivers.pca9685.registers import CHANNELS, MOST_PRESCALE, PulseClock, prescale_of
 from gazerig.params import Bounds
 
 BRIDGE_BAUD = 115_200
@@ -15,7 +15,7 @@ RESERVED = (0x70, *range(0x78, 0x80))
 
 
 @dataclass(frozen=True, slots=True)
-class Pca9685Params(BoardParams):
+class Pca9685Params(HobbyBoardParams):
     """How to reach the boards of one I2C bus."""
 
     # fmt: off
@@ -64,12 +64,12 @@ class Pca9685Params(BoardParams):
         return (self.address, *self.further_addresses)
 
     @property
-    def clocks(self) -> dict[int, Clock]:
+    def clocks(self) -> dict[int, PulseClock]:
         """Return the clock of each board by its address."""
         known = (self.oscillator_hz, *self.further_oscillators_hz)
         rest = (self.oscillator_hz,) * (len(self.addresses) - len(known))
         return {
-            address: Clock(hz, prescale_of(self.frequency_hz, hz))
+            address: PulseClock(hz, prescale_of(self.frequency_hz, hz))
             for address, hz in zip(self.addresses, (*known, *rest), strict=True)
         }
 

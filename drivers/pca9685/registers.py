@@ -35,7 +35,7 @@ def prescale_of(frequency_hz: float, oscillator_hz: float) -> int:
     return max(LEAST_PRESCALE, round(oscillator_hz / (COUNTS * frequency_hz)) - 1)
 
 
-class Clock(NamedTuple):
+class PulseClock(NamedTuple):
     """What makes the time of a board's pulses: its oscillator, and the prescaler behind it."""
 
     oscillator_hz: float

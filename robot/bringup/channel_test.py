@@ -16,7 +16,7 @@ from gazerig.drivers.hobby_board.hold import Outcome, take
 from gazerig.drivers.hobby_board.release import switch_off
 from gazerig.drivers.hobby_board.start import every_pulse
 from gazerig.drivers.maestro.commands import name_errors
-from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 
@@ -155,7 +155,7 @@ def _end(board: Board, setup: ServoSetup) -> None:
         raise ServoFault(f"{servo_label(setup)} may still get pulses: switch the servo supply off")
 
 
-def sent_home(line: Line) -> tuple[str, ...]:
+def sent_home(line: MaestroLink) -> tuple[str, ...]:
     """Send all channels home and clear the errors; return those that the board held, by name.
 
     Raises:

@@ -8,7 +8,7 @@ import re
 
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.pca9685.registers import CHANNELS, COUNTS, Clock
+from gazerig.drivers.pca9685.registers import CHANNELS, COUNTS, PulseClock
 from gazerig.drivers.types import ServoSetup
 
 PULSE_STEPS = 1500 * US_STEPS
@@ -32,7 +32,7 @@ def free_pulse(channel: int) -> ServoSetup:
     )
 
 
-def oscillator_hz(clock: Clock, typed: str) -> float:
+def oscillator_hz(clock: PulseClock, typed: str) -> float:
     """Return the frequency of an oscillator, whole kilohertz.
 
     Args:

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.maestro.commands import MOST_INPUT
-from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
@@ -113,7 +113,10 @@ class MaestroTelemetry:
     """
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
-        self._lines = [Line(port, params), Line(port, replace(params, protocol="pololu"))]
+        self._lines = [
+            MaestroLink(port, params),
+            MaestroLink(port, replace(params, protocol="pololu")),
+        ]
 
     def read(self, joint: JointParams) -> Telemetry | None:
         """Ask for a joint's pulse; see TelemetryReader."""

@@ -7,7 +7,7 @@ import typer
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
-from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.pca9685.release import stop_pulses
 from gazerig.drivers.serial.port import BusPort
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
@@ -115,7 +115,7 @@ def _maestro(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
     if not yes and not typer.confirm("Keep fingers away. Do that?", err=True):
         say(f"{label}: left as it is")
         return
-    held = sent_home(Line(line, rig.bus_named(bus).maestro))
+    held = sent_home(MaestroLink(line, rig.bus_named(bus).maestro))
     say(f"{label}: home; errors it held, cleared now: {', '.join(held) or 'none'}")
 
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
-from gazerig.sim_mock.maestro.body import Body
-from gazerig.sim_mock.maestro.channel import Channel
+from gazerig.sim_mock.maestro.body import MaestroBody
+from gazerig.sim_mock.maestro.channel import EmulatedChannel
 from gazerig.sim_mock.maestro.commands import (
     GET_ERRORS,
     GET_MOVING,
@@ -29,8 +29,8 @@ from gazerig.sim_mock.maestro.commands import (
     SET_TARGET,
     SET_TARGETS,
     STOP_SCRIPT,
-    Ear,
-    Heard,
+    CommandParser,
+    ParsedCommand,
     word,
 )
 from gazerig.sim_mock.maestro.faults import COMMANDS, MaestroFaults
@@ -41,7 +41,7 @@ SIZES = (6, 12, 18, 24)
 ASKING = (GET_POSITION, GET_MOVING, GET_ERRORS, GET_SCRIPT)
 
 
-class MaestroBoard:
+class EmulatedMaestro:
     """One board and its servos.
 
     Args:
@@ -60,17 +60,17 @@ class MaestroBoard:
         seed: int = 0,
     ) -> None:
         self.now_s = now_s
-        self.body = Body(servos, now_s, settings or Settings())
+        self.body = MaestroBody(servos, now_s, settings or Settings())
         self.faults = MaestroFaults(self, self.body, COMMANDS, seed)
         self._wire = self.faults.wire
-        self._ear = Ear(device, len(servos) > SIZES[0])
+        self._parser = CommandParser(device, len(servos) > SIZES[0])
         self._told_baud: int | None = None
         self._set_up(self.body.settings)
         self._do: dict[int, Callable[[bytes], bytes | None]] = {
-            SET_TARGET: lambda data: self._at(data, Channel.aim),
+            SET_TARGET: lambda data: self._at(data, EmulatedChannel.aim),
             SET_TARGETS: self._set_targets,
-            SET_SPEED: lambda data: self._at(data, Channel.limit_speed),
-            SET_ACCELERATION: lambda data: self._at(data, Channel.limit_acceleration),
+            SET_SPEED: lambda data: self._at(data, EmulatedChannel.limit_speed),
+            SET_ACCELERATION: lambda data: self._at(data, EmulatedChannel.limit_acceleration),
             SET_PWM: lambda data: None,
             GET_POSITION: self._get_position,
             GET_MOVING: lambda data: bytes((any(c.led for c in self.body.channels),)),
@@ -113,12 +113,12 @@ class MaestroBoard:
 
     def _set_up(self, settings: Settings) -> None:
         self.body.settings = settings
-        self._ear.crc = settings.crc
+        self._parser.crc = settings.crc
         # The client's rate matters at the serial pins alone.
         self.heed_baud = settings.mode in ("uart-fixed", "uart-detect")
 
     def _forget(self) -> None:
-        self._ear.forget()
+        self._parser.forget()
         self._told_baud = None
 
     def restart(self) -> None:
@@ -165,7 +165,7 @@ class MaestroBoard:
         self.body.advance()
         came = self._what_comes(data, client_baud)
         missing, replies = len(data) - len(came), []
-        for heard in self._ear.feed(came):
+        for heard in self._parser.feed(came):
             pieces = self._execute(heard)
             if pieces:
                 replies.append(DeviceReply(missing + heard.end, pieces))
@@ -196,7 +196,7 @@ class MaestroBoard:
             self.body.fail("signal")
         return b""
 
-    def _execute(self, heard: Heard) -> list[Piece]:
+    def _execute(self, heard: ParsedCommand) -> list[Piece]:
         """Carry out one command; gives what is answered."""
         if heard.trouble:
             self.body.fail(heard.trouble)
@@ -225,7 +225,7 @@ class MaestroBoard:
 
     # --- commands
 
-    def _at(self, data: bytes, do: Callable[[Channel, int], None]) -> None:
+    def _at(self, data: bytes, do: Callable[[EmulatedChannel, int], None]) -> None:
         """Tell one channel a number; one that does not exist is a protocol error [A]."""
         if data[0] < len(self.body.channels):
             do(self.body.channels[data[0]], word(data[1], data[2]))
@@ -266,7 +266,7 @@ def build_board(
     baud: int | None = None,
     seed: int = 0,
     servos: Sequence[HobbySpec | Sequence[float]] = (),
-) -> MaestroBoard:
+) -> EmulatedMaestro:
     """Build a board; channels without a spec have a servo as from the shop.
 
     With a baud rate the host is at its serial pins, set to that rate; without one it is at
@@ -287,4 +287,4 @@ def build_board(
             raise ValueError(f"servo on channel {channel}: there is 0 to {channels - 1}")
     built = [HobbyServo(given.get(channel, HobbySpec(channel))) for channel in range(channels)]
     settings = Settings(crc=crc) if baud is None else Settings("uart-fixed", crc, baud=baud)
-    return MaestroBoard(built, now_s, device, settings, seed)
+    return EmulatedMaestro(built, now_s, device, settings, seed)

@@ -7,7 +7,7 @@ at. Source: Pololu Maestro User's Guide (0J40); [A] is assumed.
 from collections.abc import Callable, Sequence
 
 from gazerig.sim_mock.hobby_servo import HobbyServo
-from gazerig.sim_mock.maestro.channel import Channel
+from gazerig.sim_mock.maestro.channel import EmulatedChannel
 from gazerig.sim_mock.maestro.commands import ERRORS
 from gazerig.sim_mock.maestro.settings import OnError, Settings
 
@@ -21,7 +21,7 @@ SWING = 100
 """The script that a fault starts sends a channel to its other end every so many periods."""
 
 
-class Body:
+class MaestroBody:
     """The board's body and its servos.
 
     Args:
@@ -37,7 +37,7 @@ class Body:
     ) -> None:
         self.now_s = now_s
         self.servos = tuple(servos)
-        self.channels = tuple(Channel(s.spec.min_steps, s.spec.max_steps) for s in servos)
+        self.channels = tuple(EmulatedChannel(s.spec.min_steps, s.spec.max_steps) for s in servos)
         self.settings = settings
         self.errors = 0
         self.servo_power = True
@@ -154,7 +154,7 @@ class Body:
             if k != but
         )
 
-    def _pulse(self, channel: Channel) -> int:
+    def _pulse(self, channel: EmulatedChannel) -> int:
         """Return the pulse that reaches a servo; 0: none."""
         return channel.position if self.servo_power else 0
 

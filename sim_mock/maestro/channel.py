@@ -13,7 +13,7 @@ EIGHTHS = 8
 """Periods of 10 ms in the 80 ms of the unit of acceleration."""
 
 
-class Channel:
+class EmulatedChannel:
     """A channel set up as a servo.
 
     target, position: what it was told and what it sends now; 0: no pulses

@@ -51,7 +51,7 @@ ERRORS = (
 Trouble = Literal["", "crc", "protocol"]
 
 
-class Heard(NamedTuple):
+class ParsedCommand(NamedTuple):
     """One command, or what was wrong with the bytes.
 
     end: where it ended among the bytes fed
@@ -64,7 +64,7 @@ class Heard(NamedTuple):
     trouble: Trouble = ""
 
 
-class Ear:
+class CommandParser:
     """Keeps what has been heard of a command that is not complete yet.
 
     Args:
@@ -87,13 +87,13 @@ class Ear:
         self._packet.clear()
         self._deaf = False
 
-    def feed(self, data: bytes) -> Iterator[Heard]:
+    def feed(self, data: bytes) -> Iterator[ParsedCommand]:
         """Take bytes one by one; gives what each of them completes."""
         for end, byte in enumerate(data, 1):
             for heard in self._take(byte):
                 yield heard._replace(end=end)
 
-    def _take(self, byte: int) -> tuple[Heard, ...]:
+    def _take(self, byte: int) -> tuple[ParsedCommand, ...]:
         packet = self._packet
         if byte & 0x80 and not (packet and packet[0] == MINI_SSC and byte != MINI_SSC):
             return self._begin(byte)
@@ -104,7 +104,7 @@ class Ear:
         packet.append(byte)
         return self._go_on() if len(packet) >= self._until else ()
 
-    def _begin(self, byte: int) -> tuple[Heard, ...]:
+    def _begin(self, byte: int) -> tuple[ParsedCommand, ...]:
         """Start a command; one that was not finished is an error."""
         packet = self._packet
         said = (_PROTOCOL,) if packet and packet != _SIGN else ()
@@ -115,7 +115,7 @@ class Ear:
             return said
         return said + self._go_on()
 
-    def _go_on(self) -> tuple[Heard, ...]:
+    def _go_on(self) -> tuple[ParsedCommand, ...]:
         """Look whether the command is complete, or how long it must be for another look."""
         packet, head = self._packet, 1
         if packet[0] == MINI_SSC:
@@ -138,18 +138,18 @@ class Ear:
             self._until = self._until + 2 * packet[head] if len(packet) > head else head + 1
         return self._finished(code, head) if len(packet) >= self._until else ()
 
-    def _finished(self, code: int, head: int) -> tuple[Heard, ...]:
+    def _finished(self, code: int, head: int) -> tuple[ParsedCommand, ...]:
         packet = bytes(self._packet)
         self._packet.clear()
         if self.crc and code != MINI_SSC:
             packet, check = packet[:-1], packet[-1]
             if crc7(packet) != check:
-                return (Heard(0, 0, trouble="crc"),)
-        return (Heard(0, code, packet[head:]),)
+                return (ParsedCommand(0, 0, trouble="crc"),)
+        return (ParsedCommand(0, code, packet[head:]),)
 
 
 _SIGN = bytes((POLOLU,))
-_PROTOCOL = Heard(0, 0, trouble="protocol")
+_PROTOCOL = ParsedCommand(0, 0, trouble="protocol")
 
 
 def word(low: int, high: int) -> int:

@@ -2,7 +2,7 @@
 
 from gazerig.sim_mock.faults.grammar import Commands, Verb, Word, one_of
 from gazerig.sim_mock.faults.hobby import HobbyBoard, HobbyFaults, channel_word, hobby_verbs
-from gazerig.sim_mock.maestro.body import Body
+from gazerig.sim_mock.maestro.body import MaestroBody
 from gazerig.sim_mock.maestro.commands import ERRORS
 from gazerig.sim_mock.maestro.settings import cases
 
@@ -10,7 +10,9 @@ from gazerig.sim_mock.maestro.settings import cases
 class MaestroFaults(HobbyFaults):
     """The faults of one board; an id is a channel."""
 
-    def __init__(self, board: HobbyBoard, body: Body, commands: Commands, seed: int = 0) -> None:
+    def __init__(
+        self, board: HobbyBoard, body: MaestroBody, commands: Commands, seed: int = 0
+    ) -> None:
         # A Maestro's packets begin with AA: what a loose header and a broken node send.
         super().__init__(board, commands, seed, header=b"\xaa")
         self._body = body

@@ -29,7 +29,7 @@ def _wired_and(*bytes_at_once: int) -> int:
     return reduce(and_, bytes_at_once)
 
 
-class Body:
+class Pca9685Body:
     """The bus with its boards and servos.
 
     Args:

@@ -13,7 +13,7 @@ from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
 from gazerig.sim_mock.faults.hobby import HobbyFaults
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
-from gazerig.sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
+from gazerig.sim_mock.pca9685.body import BusStuck, NotAcknowledged, Pca9685Body
 from gazerig.sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
 from gazerig.sim_mock.pca9685.faults import CASES, COMMANDS
 from gazerig.sim_mock.replies import Piece
@@ -23,7 +23,7 @@ STATUS_REGISTER = 0x0A
 OK, NO_ACKNOWLEDGE, TIMED_OUT = 0xF0, 0xF1, 0xF8
 
 
-class Part(NamedTuple):
+class _Part(NamedTuple):
     """One start of a transfer; length: of a read, None where it is a write."""
 
     address: int
@@ -50,7 +50,7 @@ class Bridge:
     ) -> None:
         self.now_s = now_s
         chips = {address: Chip(oscillator_hz) for address in addresses}
-        self.body = Body(chips, servos, now_s)
+        self.body = Pca9685Body(chips, servos, now_s)
         self.faults = HobbyFaults(self, COMMANDS, seed, header=b"S")
         self._wire = self.faults.wire
         self._order = {address: board for board, address in enumerate(addresses)}
@@ -153,7 +153,7 @@ class Bridge:
         left = [p for p in pieces if self._wire.take("lose", p.servo_id, now_s) is None]
         return self._wire.spoil_pieces(left, False, now_s)
 
-    def _carry_out(self, parts: Sequence[Part]) -> list[Piece]:
+    def _carry_out(self, parts: Sequence[_Part]) -> list[Piece]:
         """Carry out one transfer; the first part that fails ends it."""
         self._status = OK
         now_s, said = self.now_s(), []
@@ -183,7 +183,7 @@ class Bridge:
             self._status = TIMED_OUT
         return said
 
-    def _whose(self, part: Part) -> int:
+    def _whose(self, part: _Part) -> int:
         """Return the channel whose registers are read, NOBODY where it is not one's alone."""
         register = self._pointers.get(part.address, 0) - LED0
         if part.length != 4 or register % 4 or not 0 <= register < 4 * CHANNELS:
@@ -191,9 +191,9 @@ class Bridge:
         return self._order.get(part.address, 0) * CHANNELS + register // 4
 
 
-def _transfer(text: bytes, at: int) -> tuple[int, list[Part]] | None:
+def _transfer(text: bytes, at: int) -> tuple[int, list[_Part]] | None:
     """Take a transfer apart; gives where it ends. None where bytes are missing."""
-    parts: list[Part] = []
+    parts: list[_Part] = []
     while True:
         if at >= len(text):
             return None
@@ -206,11 +206,11 @@ def _transfer(text: bytes, at: int) -> tuple[int, list[Part]] | None:
         address, count = text[at + 1], text[at + 2]
         at += 3
         if address & 1:
-            parts.append(Part(address >> 1, b"", count))
+            parts.append(_Part(address >> 1, b"", count))
             continue
         if len(text) < at + count:
             return None
-        parts.append(Part(address >> 1, text[at : at + count], None))
+        parts.append(_Part(address >> 1, text[at : at + count], None))
         at += count
 
 

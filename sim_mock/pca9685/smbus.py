@@ -5,7 +5,7 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from gazerig.sim_mock.pca9685.body import Body, BusStuck, NotAcknowledged
+from gazerig.sim_mock.pca9685.body import BusStuck, NotAcknowledged, Pca9685Body
 
 READ_FLAG = 0x0001
 LONGEST_BLOCK = 32
@@ -20,7 +20,7 @@ class EmulatedSMBus:
     gone: the adapter was unplugged
     """
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: Pca9685Body) -> None:
         self._body = body
         self.fd: int | None = None
         self.gone = False

@@ -11,7 +11,7 @@ from dataclasses import replace
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.maestro.commands import MICRO, MOST_INPUT
-from gazerig.drivers.maestro.line import Line
+from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from gazerig.drivers.serial.port import BusPort
@@ -78,7 +78,9 @@ def visit(
     if found is None:
         return [_mute(params, size is not None)]
     channels = size or params.channels
-    pulses = _pulses(Line(port, _spoken(params, found)), setups, channels, found, size is not None)
+    pulses = _pulses(
+        MaestroLink(port, _spoken(params, found)), setups, channels, found, size is not None
+    )
     crc = "on" if found.crc else "off"
     named = f"{channels} channels{'' if size else ' assumed'}"
     well = f"answers in the {' and the '.join(found.forms)} form, CRC {crc}, {named}, no script"
@@ -88,7 +90,7 @@ def visit(
 
 
 def _pulses(
-    line: Line, setups: Sequence[ServoSetup], channels: int, found: MaestroFound, sized: bool
+    line: MaestroLink, setups: Sequence[ServoSetup], channels: int, found: MaestroFound, sized: bool
 ) -> dict[int, int | None]:
     """Ask for the pulses of a rig's channels.
 
@@ -199,6 +201,6 @@ def apply_fix(port: BusPort, params: MaestroParams, fix: Fix) -> str:
     found = probe(port, params)
     if found is None:
         raise PortError(f"{port.port_name}: no Maestro answers: gazerig doctor names the cure")
-    line = Line(port, _spoken(params, found))
+    line = MaestroLink(port, _spoken(params, found))
     line.send(line.speech.stop_script())
     return "" if line.ask(line.speech.script_status(), 1) == b"\1" else "it runs on"
