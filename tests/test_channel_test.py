@@ -155,7 +155,7 @@ class I2cBench(Bench):
 
 def test_a_pca9685_is_led_as_slowly_and_its_pulses_end():
     bench = I2cBench()
-    assert bench.walk() == tuple(Place(p, p) for p in PLACES)
+    assert bench.walk() == tuple(ChannelPosition(p, p) for p in PLACES)
     pulses = [pulse for _, pulse, _ in bench.seen]
     assert abs(pulses[0] - 5000) <= 10
     ways = [abs(b - a) for a, b in zip(pulses, pulses[1:], strict=False)]
@@ -174,5 +174,5 @@ def test_a_pca9685_that_restarts_on_the_way_gives_no_pulses_and_is_told():
             bench.board.faults.command("brown-out")
 
     gone = walk(bench.driver, LID, PLACES, sleep_and_restart)
-    assert gone[0] == Place(5000, 5000) and gone[-1] == Place(5000, 0)
+    assert gone[0] == ChannelPosition(5000, 5000) and gone[-1] == ChannelPosition(5000, 0)
     assert bench.board.faults.reports()[2]["target"] == 0
