@@ -1,5 +1,8 @@
 """Findings: each thing that can be wrong with a port or a servo is found, named and remedied."""
 
+from dataclasses import replace
+from functools import cache
+
 import pytest
 
 from gazerig.drivers.errors import PortError
@@ -14,10 +17,9 @@ from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Fix, worst
 from gazerig.robot.bringup.doctor.families import CHECKS
 from gazerig.robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
 from gazerig.robot.bringup.doctor.run import apply_fixes, check, check_all, fix_latency, look
-from gazerig.robot.bringup.doctor.subject import ServoState
 from gazerig.robot.bringup.doctor.text import grouped, summed_up, together
 from gazerig.robot.bringup.scan_report import remarks
-from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH
+from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -108,63 +110,37 @@ def one(findings, level, where, words):
     return named[0]
 
 
-NUMBER = {"dynamixel": 1190, "feetech": 777}
 FIRMWARE = {"dynamixel": 53, "feetech": 353}
 
 
+@cache
+def healthy(name):
+    """Return the first servo of an emulated rig of a kind as the doctor reads it."""
+    kind = KINDS[name]
+    rig = Rig(kind)
+    if kind is DYNAMIXEL:
+        rig.set(1, shutdown=52)  # as from the factory it is worth a note
+    found = ping(rig.port, kind.family, 1, BAUD)
+    registers = Registers(rig.port, kind.family)
+    state = take(registers, CHECKS[kind.name], rig.setups[0], found, 0)
+    assert None not in state.values.values() and worst(examine(state)) == "ok"
+    return state
+
+
 def found_as(kind, **other):
-    number = other.pop("number", NUMBER[kind.name])
-    model = kind.family.model_name(number)
-    return Found(1, number, FIRMWARE[kind.name], BAUD, model)._replace(**other)
+    return healthy(kind.name).found._replace(**other)
 
 
 def servo_state(kind, setup=None, found=None, corrupt=0, **values):
     """Return a healthy servo with some registers otherwise."""
-    setup = setup or setups_of(kind)[0]
-    both = {
-        "return_delay_time": 0,
-        "min_position_limit": setup.min_steps,
-        "max_position_limit": setup.max_steps,
-        "temperature_limit": 70,
-        "torque_enable": 0,
-        "present_position": 2048,
-        "present_temperature": 30,
-    }
-    own = {
-        "dynamixel": {
-            **dict.fromkeys(CHECKS["dynamixel"].registers, 0),
-            "status_return_level": 2,
-            "baud_rate": 3,
-            "operating_mode": 3,
-            "secondary_id": 255,
-            "protocol_type": 2,
-            "max_voltage_limit": 70,
-            "min_voltage_limit": 35,
-            "velocity_limit": 1620,
-            "shutdown": 52,
-            "present_input_voltage": 50,
-        },
-        "feetech": {
-            "id": setup.id,
-            "baud_rate": 0,
-            "status_return_level": 1,
-            "max_voltage_limit": 80,
-            "min_voltage_limit": 40,
-            "max_torque": 1000,
-            "phase": 12,
-            "unloading_condition": 44,
-            "angular_resolution": 1,
-            "position_offset": 0,
-            "operating_mode": 0,
-            "protection_time": 200,
-            "overload_torque": 80,
-            "lock": 1,
-            "present_input_voltage": 74,
-            "status": 0,
-        },
-    }[kind.name]
-    whole = {**own, **both, **values}
-    return ServoState(CHECKS[kind.name], setup, found or found_as(kind), whole, corrupt)
+    state = healthy(kind.name)
+    return replace(
+        state,
+        setup=setup or state.setup,
+        found=found or state.found,
+        corrupt=corrupt,
+        values={**state.values, **values},
+    )
 
 
 BOTH_RULES = [
@@ -337,6 +313,8 @@ def test_every_rule_stands_registers_that_were_not_read(kind):
 @each
 def test_a_servo_that_does_not_tell(kind):
     rig = Rig(kind)
+    if kind is DYNAMIXEL:
+        rig.set(1, shutdown=52)  # as from the factory it is worth a note
     found = ping(rig.port, kind.family, 1, BAUD, 1)
     rig.command("lose 1")
     checks = CHECKS[kind.name]
