@@ -1,4 +1,4 @@
-"""Servos without a watchdog are let go of when the loop that drives them dies or hangs."""
+"""Servos without a watchdog are released when the loop that drives them dies or hangs."""
 
 import os
 import signal
@@ -260,7 +260,7 @@ def test_a_port_that_is_gone_is_told_once_and_not_waited_for(capfd):
     guardian.leave(0)  # still armed: it could not be switched off
     os.waitpid(pid, 0)
     told = capfd.readouterr().err
-    assert told.count("not let go yet") == 1 and "no serial port /tmp/no such port" in told
+    assert told.count("not released yet") == 1 and "no serial port /tmp/no such port" in told
 
 
 def test_without_a_guardian_there_is_no_torque(monkeypatch):

@@ -1,7 +1,9 @@
 """The emulated servos of a rig: built into joints as the rig's YAML says."""
 
+from collections.abc import Callable
 from math import pi, radians
 
+from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig
 from gazerig.drivers.servo_models import HOBBY_KINDS
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
@@ -11,7 +13,7 @@ from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 _CROOKED_DEG = {"left_eye_pan": 6.0, "right_eye_pan": -4.0, "neck_yaw": -12.0, "neck_pitch": -8.0}
-"""Emulated joints start a little crooked, as a head that somebody has moved by hand does."""
+"""Emulated joints start a little crooked, as a head that was moved by hand does."""
 
 _STOP_BEYOND_DEG = 4.0
 """Emulated joints have mechanical stops so far beyond their configured range."""
@@ -43,20 +45,27 @@ def place_of(rig: Rig, joint: str) -> int:
 
 def _line(rig: Rig, name: str) -> Emulated:
     config, joints = rig.bus_named(name), joints_on(rig, name)
-    if config.kind == "maestro":
-        board = config.maestro
-        servos = tuple(_hobby(rig.joints[joint], joint) for joint in joints)
-        return MaestroLine(board.channels, board.device, board.crc, servos)
-    if config.kind == "pca9685":
-        boards = config.pca9685
-        servos = tuple(_hobby(rig.joints[joint], joint) for joint in joints)
-        return Pca9685Line(boards.addresses, boards.oscillator_hz, servos)
-    specs = tuple(emulated_servo(rig, joint) for joint in joints)
-    return (
-        FeetechLine(specs, config.baud)
-        if config.kind == "feetech"
-        else DynamixelLine(specs, config.baud)
-    )
+    if config.kind in CHAINS:
+        specs = tuple(emulated_servo(rig, joint) for joint in joints)
+        return CHAINS[config.kind](specs, config.baud)
+    return BOARDS[config.kind](config, tuple(_hobby(rig.joints[one], one) for one in joints))
+
+
+CHAINS: dict[str, type[DynamixelLine] | type[FeetechLine]] = {
+    "dynamixel": DynamixelLine,
+    "feetech": FeetechLine,
+}
+"""Emulated smart servos by the kind of bus."""
+
+BOARDS: dict[str, Callable[[BusConfig, tuple[HobbySpec, ...]], Emulated]] = {
+    "maestro": lambda bus, servos: MaestroLine(
+        bus.maestro.channels, bus.maestro.device, bus.maestro.crc, servos
+    ),
+    "pca9685": lambda bus, servos: Pca9685Line(
+        bus.pca9685.addresses, bus.pca9685.oscillator_hz, servos
+    ),
+}
+"""Emulated boards with their hobby servos by the kind of bus."""
 
 
 def _hobby(joint: JointParams, name: str) -> HobbySpec:

@@ -73,7 +73,7 @@ class Placer(Protocol):
     joint: JointParams
 
     def begin(self) -> None:
-        """Take hold of it, or let go of it."""
+        """Begin: hold it where it is, or switch its torque off."""
         ...
 
     def mark(self, where: str) -> float:
@@ -85,7 +85,7 @@ class Placer(Protocol):
         ...
 
     def leave(self, place: float) -> None:
-        """Bring it to a place to be let go of there, where it moves by itself."""
+        """Bring it to a place and leave it there, where it moves by itself."""
         ...
 
     def live(self) -> str:

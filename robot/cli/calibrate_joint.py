@@ -8,6 +8,8 @@ from typing import NamedTuple
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.i2c.port import port_of
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.calibration.endstop_search import StopSearchParams
@@ -189,8 +191,11 @@ def _hobby(bench: CalibrationJob, name: str, bus: str) -> Made:
     beat = guardian.beat if guardian is not None else None
     port = port_of(bench.wire.paths[bus], on_traffic=beat)
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
-    params = config.pca9685 if config.kind == "pca9685" else config.maestro
-    hobby = OneHobby(name, joint, port, params, RealClock(), bench.stopped, how.pulses_us, guardian)
+    boards: dict[str, MaestroParams | Pca9685Params]
+    boards = {"maestro": config.maestro, "pca9685": config.pca9685}
+    hobby = OneHobby(
+        name, joint, port, boards[config.kind], RealClock(), bench.stopped, how.pulses_us, guardian
+    )
     person.hand = None
     with _off_after(hobby.who, hobby.disable, bench.stopped):
         return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)

@@ -13,6 +13,7 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.app.bus_wiring import bus_names
+from gazerig.robot.app.emulation import CHAINS
 from gazerig.robot.bringup import servo_setup
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.bringup.servo_family import ServoKind
@@ -22,7 +23,6 @@ from gazerig.robot.cli.setup_maestro import set_up_board, write_settings
 from gazerig.robot.cli.setup_pca9685 import set_up_boards
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
 from gazerig.robot.model.joint import JointParams
-from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()
@@ -103,13 +103,6 @@ def _known_joints(names: list[str], known: tuple[str, ...]) -> tuple[str, ...]:
 # --- servos with ids
 
 
-EMULATED: dict[str, type[DynamixelLine] | type[FeetechLine]] = {
-    "dynamixel": DynamixelLine,
-    "feetech": FeetechLine,
-}
-"""Lines of emulated servos by the kind of bus."""
-
-
 def _chain(task: _Task) -> list[str]:
     """Set the servos of one bus up; return the joints that were skipped."""
     count = len(task.setups)
@@ -130,7 +123,7 @@ def _step(task: _Task, one: ServoSetup) -> bool:
     bus, kind, yes = task.bus, KINDS[task.config.kind], task.yes
     # As it comes from the factory.
     spec = ServoSpec(FACTORY_ID, one.model, task.rig.joints[one.name].zero)
-    fresh = {bus: EMULATED[kind.name]((spec,), kind.family.factory_baud)}
+    fresh = {bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}
     while True:
         if not yes and not _go_on("   Enter: it is connected; s: skip this one; Ctrl-C: end "):
             return False

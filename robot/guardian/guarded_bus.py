@@ -1,4 +1,4 @@
-"""A servo bus whose servos a guardian lets go of, should the loop that drives it die or hang."""
+"""A servo bus whose servos a guardian releases, should the loop that drives it die or hang."""
 
 from collections.abc import Sequence
 
@@ -75,7 +75,7 @@ class GuardedBus:
         return goals
 
     def write(self, goals_steps: Sequence[int]) -> None:
-        """Send one goal to every servo; nothing to servos that the guardian has let go of.
+        """Send one goal to every servo; nothing to servos that the guardian has released.
 
         Raises:
             ValueError: a goal is not a number, or there are not as many as servos.
@@ -86,7 +86,7 @@ class GuardedBus:
         self._bus.write(goals_steps)
 
     def release(self) -> None:
-        """Torque off on every servo; after that the guardian has nothing to let go of.
+        """Torque off on every servo; after that the guardian has nothing to release.
 
         Raises:
             BusLost: the port is gone; the guardian keeps trying.
@@ -122,7 +122,7 @@ class GuardedBus:
         return self._bus.health()
 
     def _take_hold_again(self, now_s: float) -> None:
-        """Bring servos that the guardian has let go of back as after a restart."""
+        """Bring servos that the guardian has released back as after a restart."""
         if not self._lost_hold:
             self._guardian.acknowledge(self._plan)
             if not self._holding:

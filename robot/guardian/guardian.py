@@ -32,7 +32,7 @@ class Guardian:
     """One process for all ports of a rig whose servos have no watchdog of their own.
 
     Args:
-        plans: what it lets go of, by port.
+        plans: what it releases, by port.
 
     Raises:
         ValueError: more ports than its memory has room for.
@@ -85,7 +85,7 @@ class Guardian:
                 self._ready = bool(os.read(stdout.fileno(), 1))
         if not self._ready:
             raise SetupError(
-                "the guardian, which lets go of the servos should this program die, did not start: "
+                "the guardian, which releases the servos should this program die, did not start: "
                 "see the lines above"
             )
 
@@ -109,7 +109,7 @@ class Guardian:
         return self._heartbeat.state(plan) == RELEASING
 
     def released(self, plan: int) -> bool:
-        """Return whether it has let go of a plan's servos, or is about to."""
+        """Return whether it has released a plan's servos, or is about to."""
         return self._heartbeat.state(plan) != IDLE
 
     def acknowledge(self, plan: int) -> None:
@@ -147,7 +147,7 @@ class Guardian:
     def leave(self, plan: int) -> None:
         """Say goodbye for one port; after the last the guardian ends.
 
-        Where servos of the port are still armed, as they could not be let go of, it goes on
+        Where servos of the port are still armed, as they could not be released, it goes on
         trying for some seconds by itself.
         """
         self._users.discard(plan)
@@ -179,7 +179,7 @@ class Guardian:
         )
 
     def _end_unfinished(self) -> None:
-        """Take what a guardian that died on its way was letting go of for let go of."""
+        """Take what a guardian that died was releasing as released."""
         for i in range(len(self.plans)):
             if self.releasing(i):
                 self._heartbeat.set_state(i, RELEASED)

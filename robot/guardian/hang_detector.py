@@ -1,7 +1,7 @@
 """When a control loop counts as hung: numbers in, a verdict out."""
 
 HANG_S = 0.4
-"""Silence of a loop after which its servos are let go of.
+"""Silence of a loop after which its servos are released.
 
 A loop on a busy machine has been seen up to 0.3 s late. Letting go may take 0.1 s more, so
 that servos are limp half a second after the last sign of life."""

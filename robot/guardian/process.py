@@ -1,4 +1,4 @@
-"""The guardian itself: lets go of servos that have no watchdog when their program dies or hangs.
+"""The guardian itself: releases servos that have no watchdog when their program dies or hangs.
 
 Run by gazerig.robot.guardian.guardian as
 
@@ -39,29 +39,29 @@ ALONE_S = 1.0
 """From so long after the program's death another one may have taken the port: its own now."""
 
 
-class Guard:
+class ProgramWatch:
     """Watches one program.
 
     Args:
         heartbeat: the memory shared with it.
-        plans: what to let go of, one record of the memory each.
+        plans: what to release, one record of the memory each.
         parent: process id of the program.
     """
 
     def __init__(self, heartbeat: Heartbeat, plans: tuple[ReleasePlan, ...], parent: int) -> None:
         self._heartbeat, self._plans, self._parent = heartbeat, plans, parent
         # All is imported now: when it is needed, the disk may be gone with the rest.
-        self._release = [releaser(plan) for plan in plans]
+        self._releasers = [releaser(plan) for plan in plans]
         self._complained: set[int] = set()
         self._clock = RealClock()
         self._hang = HangDetector(heartbeat.beats, self._clock.now_s())
         self._retry_s = 0.0
 
     def run(self) -> None:
-        """Watch until the program is gone or says goodbye, and let go of what is armed then."""
+        """Watch until the program is gone or says goodbye, and release what is armed then."""
         while not self._gone():
             self._watch(self._clock.now_s())
-        self._let_go_for_good()
+        self._release_all()
 
     def _gone(self) -> bool:
         """Wait a moment; return whether the program is gone or has said goodbye."""
@@ -70,7 +70,7 @@ class Guard:
         return bool(readable) or os.getppid() != self._parent
 
     def _watch(self, now_s: float) -> None:
-        """Let go of what is armed where the loop hangs."""
+        """Release what is armed where the loop hangs."""
         armed = self._armed()
         if not armed:
             self._hang.reset()
@@ -78,28 +78,28 @@ class Guard:
             return
         for i in armed:
             if self._heartbeat.state(i) == IDLE:
-                self._let_go_of_hung(i)
+                self._release_hung(i)
 
     def _armed(self) -> list[int]:
         return [i for i in range(len(self._plans)) if self._heartbeat.armed(i)]
 
-    def _let_go_of_hung(self, i: int) -> None:
-        """Let go of one plan's servos beside a program that has the port open."""
+    def _release_hung(self, i: int) -> None:
+        """Release one plan's servos beside a program that has the port open."""
         # Before the first byte: a loop that wakes now keeps its hands off until this is over.
         self._heartbeat.set_state(i, RELEASING)
         why = f"no sign of life of the control loop for {self._hang.silent_s:.1f} s"
-        done = self._let_go(i, why, exclusive=False)
+        done = self._release(i, why, exclusive=False)
         self._heartbeat.set_state(i, RELEASED if done else IDLE)
         if not done:
             self._retry_s = self._clock.now_s() + RETRY_S
 
-    def _let_go_for_good(self) -> None:
-        """Let go of what the program left, waiting a while for adaptors that are unplugged."""
+    def _release_all(self) -> None:
+        """Release what the program left, waiting a while for adaptors that are unplugged."""
         began_s = self._clock.now_s()
         left = self._armed()
         while left:
             since_s = self._clock.now_s() - began_s
-            left = [i for i in left if not self._let_go(i, "the program died", since_s > ALONE_S)]
+            left = [i for i in left if not self._release(i, "the program died", since_s > ALONE_S)]
             # Only an adaptor can come back; an emulated port ends with its program.
             left = [i for i in left if self._plans[i].port.startswith("/dev/")]
             if since_s > UNPLUGGED_S:
@@ -107,15 +107,15 @@ class Guard:
             if left:
                 self._clock.sleep_until(self._clock.now_s() + RETRY_S)
 
-    def _let_go(self, i: int, why: str, exclusive: bool) -> bool:
-        """Let go of one plan's servos; return False where the port cannot be used."""
+    def _release(self, i: int, why: str, exclusive: bool) -> bool:
+        """Release one plan's servos; return False where the port cannot be used."""
         plan = self._plans[i]
         port = port_of(plan.port, exclusive)
         try:
-            mute = self._release[i](port)
+            mute = self._releasers[i](port)
         except DriverError as error:
             if i not in self._complained:
-                say(f"guardian: {why}; not let go yet: {error}")
+                say(f"guardian: {why}; not released yet: {error}")
             self._complained.add(i)
             return False
         finally:
@@ -138,10 +138,10 @@ def main(heartbeat_fd: int, plans: str) -> None:
     parent = os.getppid()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
-    guard = Guard(Heartbeat(heartbeat_fd), decode(plans), parent)
+    watch = ProgramWatch(Heartbeat(heartbeat_fd), decode(plans), parent)
     with contextlib.suppress(BrokenPipeError):
         os.write(sys.stdout.fileno(), b".")
-    guard.run()
+    watch.run()
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What must be known to let go of the servos of one port: data that fits on a command line."""
+"""What must be known to release the servos of one port: data that fits on a command line."""
 
 import json
 from collections.abc import Callable
@@ -50,7 +50,7 @@ Releaser = Callable[[BusPort], tuple[int, ...]]
 
 
 def releaser(plan: ReleasePlan) -> Releaser:
-    """Return what lets go of the servos of a plan through a port of its path.
+    """Return what releases the servos of a plan through a port of its path.
 
     It opens the port and returns the ids that did not confirm; it raises PortError where the
     port cannot be opened, BusLost where it went away. All that it needs is imported here, and of

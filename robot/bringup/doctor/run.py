@@ -241,7 +241,7 @@ def examine_guardian(plan: ReleasePlan) -> Diagnostic:
     """Start a guardian, let it end again, and return what it would do; nothing is sent.
 
     Args:
-        plan: what it would let go of.
+        plan: what it would release.
     """
     guardian = Guardian((plan,))
     try:
