@@ -317,7 +317,7 @@ def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
         sitting.types(b"w")
         sitting.reads("5 mm left, 5 mm up")
         # Nothing else leads the head meanwhile: it would leave the face that is measured.
-        visitor.ask({"order": "look_at", "p_world_m": [1.0, 0.5, 0.0]})
+        visitor.ask({"do": "look_at", "p_world_m": [1.0, 0.5, 0.0]})
         sitting.enters(lambda: visitor.ask({"steer": "enter"}), "2/8 your left eye")
         visitor.ask({"steer": "down"})
         sitting.reads("0 mm across, 5 mm down")

@@ -99,26 +99,26 @@ def test_orders_cross_processes_as_json(order: Command) -> None:
     ("data", "words"),
     [
         (None, "there is ask, look_at"),
-        ({"order": "dance"}, "there is ask, look_at"),
-        ({"order": "ask", "menu": "lids"}, "takes menu, choice"),
-        ({"order": "ask", "menu": "lids", "choice": "sleepy", "x": 1}, "takes menu, choice"),
-        ({"order": "look_at", "p_world_m": [1e200, 0.0, 0.0]}, "none beyond .-1000 m"),
-        ({"order": "look_at", "p_world_m": [0.0, 10**400, 0.0]}, "none beyond .-1000 m"),
-        ({"order": "look_at", "p_world_m": None, "stay": 1}, "true or false"),
-        ({"order": "jog", "angles_rad": [["neck_yaw", 7.0]]}, "within .-360 deg"),
-        ({"order": "jog", "angles_rad": [["neck_yaw", 0.0]] * 99}, "one a joint"),
-        ({"order": "stop", "why": "x" * 999}, "at most 200"),
-        ({"order": "renew", "who": 3}, "text"),
-        ({"order": "resume", "confirmed": "yes"}, "true or false"),
-        ({"order": "ask", "menu": 1, "choice": "sleepy"}, "names"),
-        ({"order": "look_at", "p_world_m": [1.0, 2.0]}, "three finite numbers"),
-        ({"order": "look_at", "p_world_m": [1.0, nan, 2.0]}, "three finite numbers"),
-        ({"order": "look_at", "p_world_m": [1.0, True, 2.0]}, "three finite numbers"),
-        ({"order": "jog", "angles_rad": [["nose", 0.1]]}, "known are left_eye_pan"),
-        ({"order": "jog", "angles_rad": [["neck_yaw", inf]]}, "finite angle"),
-        ({"order": "jog", "angles_rad": "neck"}, "pairs"),
-        ({"order": "stop", "why": None}, "text"),
-        ({"order": "tune", "changes": [["a", 1, 2]]}, "pairs"),
+        ({"do": "dance"}, "there is ask, look_at"),
+        ({"do": "ask", "menu": "lids"}, "takes menu, choice"),
+        ({"do": "ask", "menu": "lids", "choice": "sleepy", "x": 1}, "takes menu, choice"),
+        ({"do": "look_at", "p_world_m": [1e200, 0.0, 0.0]}, "none beyond .-1000 m"),
+        ({"do": "look_at", "p_world_m": [0.0, 10**400, 0.0]}, "none beyond .-1000 m"),
+        ({"do": "look_at", "p_world_m": None, "stay": 1}, "true or false"),
+        ({"do": "jog", "angles_rad": [["neck_yaw", 7.0]]}, "within .-360 deg"),
+        ({"do": "jog", "angles_rad": [["neck_yaw", 0.0]] * 99}, "one a joint"),
+        ({"do": "stop", "why": "x" * 999}, "at most 200"),
+        ({"do": "renew", "who": 3}, "text"),
+        ({"do": "resume", "confirmed": "yes"}, "true or false"),
+        ({"do": "ask", "menu": 1, "choice": "sleepy"}, "names"),
+        ({"do": "look_at", "p_world_m": [1.0, 2.0]}, "three finite numbers"),
+        ({"do": "look_at", "p_world_m": [1.0, nan, 2.0]}, "three finite numbers"),
+        ({"do": "look_at", "p_world_m": [1.0, True, 2.0]}, "three finite numbers"),
+        ({"do": "jog", "angles_rad": [["nose", 0.1]]}, "known are left_eye_pan"),
+        ({"do": "jog", "angles_rad": [["neck_yaw", inf]]}, "finite angle"),
+        ({"do": "jog", "angles_rad": "neck"}, "pairs"),
+        ({"do": "stop", "why": None}, "text"),
+        ({"do": "tune", "changes": [["a", 1, 2]]}, "pairs"),
     ],
 )
 def test_what_is_no_order_is_refused_with_the_rule(data: object, words: str) -> None:
@@ -132,7 +132,7 @@ def test_what_is_no_order_is_refused_with_the_rule(data: object, words: str) -> 
         lambda inner: (
             st.lists(inner, max_size=3)
             | st.dictionaries(
-                st.sampled_from(["order", "menu", "choice", "why"]), inner, max_size=3
+                st.sampled_from(["do", "order", "menu", "choice", "why"]), inner, max_size=3
             )
         ),
         max_leaves=8,

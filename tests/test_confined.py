@@ -60,20 +60,20 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     made = assemble(load_rig(str(rig)), RunOptions(True, True, 0, "visitor"))
     tuning = ParamStore(made.live, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
     hear = PageRequestHandler(
-        made.robot.order, tuning, refusals=(ConfigError,), confined=tuning.confined
+        made.robot.order, tuning, refusals=(ConfigError,), paths=tuning.confined
     )  # fmt: skip
     before = sorted(os.listdir(tmp_path))
     for asked in (
-        {"character": "/etc/shadow"},
-        {"save": str(tmp_path / "made.yaml")},
-        {"save": "~/made.yaml"},
-        {"set": {"gaze.scanpath.transition_matrix": "/etc/shadow"}},
-        {"set": {"detector.model_file": "/etc/shadow"}},
+        {"do": "character", "name": "/etc/shadow"},
+        {"do": "save", "path": str(tmp_path / "made.yaml")},
+        {"do": "save", "path": "~/made.yaml"},
+        {"do": "set", "changes": {"gaze.scanpath.transition_matrix": "/etc/shadow"}},
+        {"do": "set", "changes": {"detector.model_file": "/etc/shadow"}},
     ):
-        words = hear({"tune": asked})
+        words = hear(asked)
         assert words is not None and words.startswith("refused") and "root:" not in words
         assert "only files in" in words and len(words.splitlines()) == 1
     assert sorted(os.listdir(tmp_path)) == before and not (Path.home() / "made.yaml").exists()
-    assert hear({"tune": {"save": "copy.yaml"}}) == f"saved in {home / 'copy.yaml'}"
-    assert hear({"tune": {"character": "shy"}}) is not None
+    assert hear({"do": "save", "path": "copy.yaml"}) == f"saved in {home / 'copy.yaml'}"
+    assert hear({"do": "character", "name": "shy"}) is not None
     made.close()

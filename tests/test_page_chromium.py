@@ -453,7 +453,7 @@ def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> 
     hear, lost = rig.audience._page._hear, []
 
     def deaf_at_first(asked: dict[str, object]) -> str | None:
-        if asked.get("order") == "stop" and len(lost) < 3:
+        if asked.get("do") == "stop" and len(lost) < 3:
             lost.append(asked)
             return "refused: not now"
         return hear(asked)

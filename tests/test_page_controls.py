@@ -20,6 +20,7 @@ from six_joints import SIX, of_six
 from gazerig.config.knobs import knobs, values
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
+from gazerig.robot.control.command_handler import plain
 from gazerig.robot.dashboard.control_tabs import LeadView
 from gazerig.robot.dashboard.inbox import (
     MESSAGE_BYTES,
@@ -57,7 +58,6 @@ from gazerig.robot.dashboard.param_panel import found, group_of
 from gazerig.robot.dashboard.request_handler import PAGE, PageRequestHandler
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value, as_json, from_json
 from gazerig.robot.model.types import Snapshot
-from gazerig.robot.remote.request_handler import plain
 
 PATIENCE_S = 20.0
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -133,9 +133,9 @@ def test_a_request_that_goes_wrong_leaves_ears_for_a_stop() -> None:
     heard: list[object] = []
 
     def hear(data: dict[str, object]) -> str | None:
-        if "order" not in data:
+        if "do" not in data:
             raise RuntimeError("a fault in this program")
-        heard.append(data["order"])
+        heard.append(data["do"])
         return None
 
     with linked(hear) as (_, theirs):
@@ -143,7 +143,7 @@ def test_a_request_that_goes_wrong_leaves_ears_for_a_stop() -> None:
         teller.ask({"pick": {}}, "7")
         kind, (who, words) = sent(theirs)
         assert (kind, who) == (WORDS, "7") and "a fault in this program" in words
-        theirs.send(telling("7", b'{"order": no JSON'))
+        theirs.send(telling("7", b'{"do": no JSON'))
         theirs.send(TELL + b"7 no JSON either")
         teller.order(Stop("a test"), "7")
         wait_for(lambda: heard == ["stop"], "the stop")
@@ -153,19 +153,19 @@ def test_a_stop_does_not_wait_behind_what_takes_long() -> None:
     done, heard = threading.Event(), []
 
     def hear(data: dict[str, object]) -> str | None:
-        if "tune" in data:
+        if data["do"] == "revert":
             assert done.wait(PATIENCE_S)
-        heard.append(next(iter(data)))
+        heard.append(data["do"])
         return None
 
     with linked(hear) as (_, theirs):
         teller = Outbox(theirs)
-        teller.ask({"tune": {"revert": True}}, "7")
+        teller.ask({"do": "revert"}, "7")
         teller.order(Stop("a test"), "7")
         wait_for(lambda: heard, "the stop")
-        assert heard == ["order"]
+        assert heard == ["stop"]
         done.set()
-        wait_for(lambda: heard == ["order", "tune"], "the rest")
+        wait_for(lambda: heard == ["stop", "revert"], "the rest")
 
 
 def test_of_a_slider_that_is_dragged_the_last_word_counts() -> None:
@@ -173,32 +173,32 @@ def test_of_a_slider_that_is_dragged_the_last_word_counts() -> None:
 
     def hear(data: dict[str, object]) -> str | None:
         assert go_on.wait(PATIENCE_S)
-        values.append(data["tune"])
+        values.append(data)
         return None
 
     with linked(hear) as (_, theirs):
         teller = Outbox(theirs)
         for value in range(50):
-            teller.ask({"tune": {"set": {"gaze.head.lag_ms": value}}}, "7")
-        teller.ask({"tune": {"save": None}}, "7")
+            teller.ask({"do": "set", "changes": {"gaze.head.lag_ms": value}}, "7")
+        teller.ask({"do": "save", "path": None}, "7")
         time.sleep(0.3)
         go_on.set()
-        wait_for(lambda: {"save": None} in values, "the last request")
-    assert values[-2] == {"set": {"gaze.head.lag_ms": 49}}
+        wait_for(lambda: {"do": "save", "path": None} in values, "the last request")
+    assert values[-2] == {"do": "set", "changes": {"gaze.head.lag_ms": 49}}
     assert len(values) < 10
 
 
 def test_only_the_same_change_by_the_same_person_is_overtaken() -> None:
     def change(who: str, key: str) -> bytes:
-        return telling(who, b'{"tune":{"set":{"%s":1}}}' % key.encode())
+        return telling(who, b'{"do":"set","changes":{"%s":1}}' % key.encode())
 
     assert overtaken(change("7", "a"), change("7", "a"))
     assert not overtaken(change("7", "a"), change("8", "a"))
     assert not overtaken(change("7", "a"), change("7", "b"))
-    assert not overtaken(telling("7", b'{"tune":{"save":null}}'), change("7", "a"))
+    assert not overtaken(telling("7", b'{"do":"save","path":null}'), change("7", "a"))
     assert told(telling("7:tuning", b'{"a":"b c"}')) == ("7:tuning", b'{"a":"b c"}')
-    assert urgent(telling("7", b'{"order":"stop","why":""}'))
-    assert not urgent(telling("7", b'{"tune":{"revert":true}}'))
+    assert urgent(telling("7", b'{"do":"stop","why":""}'))
+    assert not urgent(telling("7", b'{"do":"revert"}'))
 
 
 def test_answers_wait_until_the_page_has_room() -> None:
@@ -347,9 +347,9 @@ def test_orders_are_obeyed(heard: Heard) -> None:
 
 
 def test_what_is_no_order_is_refused_with_the_rule(heard: Heard) -> None:
-    words = heard.hear({"order": "jog", "angles_rad": [["tail", 0.1]]})
+    words = heard.hear({"do": "jog", "angles_rad": [["tail", 0.1]]})
     assert words is not None and words.startswith("refused: unknown joint 'tail'")
-    unchecked = {"order": "tune", "changes": [["guard.max_speed", 1e9]]}
+    unchecked = {"do": "tune", "changes": [["guard.max_speed", 1e9]]}
     words = heard.hear(unchecked)
     assert words is not None and words.startswith("refused") and heard.orders == []
     for nonsense in ({}, {"pick": {"x": "1"}}, {"replay": {"play": True}}, {"tune": 3}):
@@ -365,22 +365,22 @@ def test_a_click_in_the_picture_is_looked_at(heard: Heard) -> None:
 
 
 def test_parameters_are_put_in_force_or_refused(heard: Heard) -> None:
-    words = heard.hear({"tune": {"set": {"a.b": [1, 2]}}})
+    words = heard.hear({"do": "set", "changes": {"a.b": [1, 2]}})
     assert heard.tuning.value == (1, 2)
     assert words == "a.c = 3 (next start: it is so)"  # what did work is seen in the controls
-    assert heard.hear({"tune": {"set": {"a.b": 99}}}) == "refused: a.b: 99 is above 10"
-    assert heard.hear({"tune": {"character": "mad"}}) == "refused: unknown character mad"
-    assert heard.hear({"tune": {"revert": True}}) is not None and heard.tuning.value == 1.0
+    assert heard.hear({"do": "set", "changes": {"a.b": 99}}) == "refused: a.b: 99 is above 10"
+    assert heard.hear({"do": "character", "name": "mad"}) == "refused: unknown character mad"
+    assert heard.hear({"do": "revert"}) is not None and heard.tuning.value == 1.0
     assert heard.hear({"steer": "left"}) == "went left"
 
 
 def test_saving_says_where(heard: Heard) -> None:
-    words = heard.hear({"tune": {"save": None}})
+    words = heard.hear({"do": "save", "path": None})
     assert words == "saved in /rigs/mine.yaml, what was there is in /rigs/mine.yaml.1"
     assert heard.tuning.saved_as is None and heard.saved == [Path("/rigs/mine.yaml")]
-    heard.hear({"tune": {"save": "~/other.yaml"}})
+    heard.hear({"do": "save", "path": "~/other.yaml"})
     assert heard.tuning.saved_as == Path.home() / "other.yaml"
-    words = heard.hear({"tune": {"save": "other.yaml"}})
+    words = heard.hear({"do": "save", "path": "other.yaml"})
     assert words is not None and "whole path" in words and len(heard.saved) == 2
 
 
@@ -460,7 +460,7 @@ def test_menus_become_buttons_that_ask(server: viser.ViserServer) -> None:
     assert mouth.told == [
         (Ask("behaviour", "guard"), "5"),
         ({"steer": "left"}, "5"),
-        ({"tune": {"character": "calm"}}, "5"),
+        ({"do": "character", "name": "calm"}, "5"),
     ]
     lead.show(replace(SNAPSHOT, behaviour="<b>"))
     assert "behaviour <b>&lt;b&gt;</b>" in lead._words.content

@@ -157,7 +157,7 @@ def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(rig: Rig) -> No
         rig.snapshot = replace(SNAPSHOT, target_name="the target of later", stopped="a test")
         wait_for(lambda: listener.reads(b"the target of later"), "the newest words")
         assert visitor.ask(as_json(Stop("a test"))) == 204
-        wait_for(lambda: [asked["order"] for asked in rig.heard] == ["stop"], "the stop")
+        wait_for(lambda: [asked["do"] for asked in rig.heard] == ["stop"], "the stop")
         wait_for(lambda: visitor.state()["stopped"] == "a test", "the button's news")
         # It was deaf indeed: what it was owed was not all kept for it.
         rig.feed_no_more()

@@ -202,7 +202,7 @@ def test_rebinding_a_name_to_this_machine_gets_no_websocket(near: Rig) -> None:
 @pytest.mark.parametrize("origin", [ELSEWHERE, "null", None])
 def test_a_page_of_another_origin_cannot_ask_for_anything(near: Rig, origin: str | None) -> None:
     before = len(near.asked)
-    status, _, _ = near.post(b'{"order": "stop", "why": "x"}', Origin=origin)
+    status, _, _ = near.post(b'{"do": "stop", "why": "x"}', Origin=origin)
     assert status == 403 and len(near.asked) == before and near.stops == []
 
 
@@ -211,8 +211,8 @@ def test_what_is_asked_goes_to_the_rig_with_the_name_of_who_asks(near: Rig) -> N
     bob = {"Cookie": f"{near.cookie}; {near.door._name_cookie}=bob"}
     named = []
     for who in (ana, bob, ana):
-        assert near.post(b'{"confirmed": true, "who": "me", "order": "resume"}', **who)[0] == 204
-        assert list(near.asked[-1]) == ["order", "confirmed", "who"]
+        assert near.post(b'{"confirmed": true, "who": "me", "do": "resume"}', **who)[0] == 204
+        assert list(near.asked[-1]) == ["do", "confirmed", "who"]
         named.append(near.asked[-1]["who"])
     assert named[0] == named[2] != named[1] and named[0].startswith("browser ")
     assert near.post(b'{"pick": {"x": 0.5, "y": 0.5}}', **bob)[0] == 204
@@ -224,11 +224,11 @@ def test_a_lead_is_renewed_while_the_browser_that_leads_is_there(near: Rig) -> N
     who = near.door.browsers.name("ana")
 
     def renewed() -> int:
-        return near.asked.count({"order": "renew", "who": who})
+        return near.asked.count({"do": "renew", "who": who})
 
     near.asked.clear()
     with near.knock("/rig/line", Cookie=ana):
-        body = b'{"order": "look_at", "p_world_m": [1, 0, 0]}'
+        body = b'{"do": "look_at", "p_world_m": [1, 0, 0]}'
         assert near.post(body, Cookie=ana)[0] == 204 and near.asked[0]["who"] == who
         for _ in range(400):
             if renewed() > 2:
@@ -290,7 +290,7 @@ def test_the_stop_button_is_told_of_every_change(near: Rig) -> None:
 
 def stop_by_line(line: ClientConnection, why: str) -> int:
     """Press STOP over a connection that stands; the answer's status."""
-    line.send(json.dumps({"order": "stop", "why": why}))
+    line.send(json.dumps({"do": "stop", "why": why}))
     while True:
         said = json.loads(line.recv(timeout=PATIENCE_S))
         if "answer" in said:
@@ -301,13 +301,13 @@ def test_a_stop_has_a_way_of_its_own_and_is_answered_by_the_rig(near: Rig) -> No
     near.stops.clear()
     near.takes = False  # the way of all else is full
     try:
-        assert near.post(b'{ "order": "stop",\n "why": "a test" }')[0] == 204
-        assert near.stops == [{"order": "stop", "why": "a test (the page)", "who": "the page"}]
+        assert near.post(b'{ "do": "stop",\n "why": "a test" }')[0] == 204
+        assert near.stops == [{"do": "stop", "why": "a test (the page)", "who": "the page"}]
         with near.knock("/rig/line") as line:
             assert stop_by_line(line, "by line") == 204
         assert near.stops[-1]["why"] == "by line (the page)"
         near.stop_answer = "refused: it has ended"
-        status, _, text = near.post(b'{"order": "stop", "why": "late"}')
+        status, _, text = near.post(b'{"do": "stop", "why": "late"}')
         assert (status, text) == (503, "refused: it has ended\n")
     finally:
         near.takes, near.stop_answer = True, ""
@@ -324,11 +324,11 @@ def test_a_stop_that_the_rig_does_not_answer_is_said_and_the_next_one_is_sent() 
 
         rig.stop = stalls  # type: ignore[method-assign]
         rig._listener._take = stalls
-        status, _, text = rig.post(b'{"order": "stop", "why": "x"}')
+        status, _, text = rig.post(b'{"do": "stop", "why": "x"}')
         assert status == 503 and "does not answer" in text
         stall[0] = False
         for _ in range(100):
-            if rig.post(b'{"order": "stop", "why": "x"}')[0] == 204:
+            if rig.post(b'{"do": "stop", "why": "x"}')[0] == 204:
                 break
         else:
             raise AssertionError("no stop was taken")
@@ -357,7 +357,7 @@ def test_without_the_token_nothing_moves(either: Rig, cookie: str | None) -> Non
     either.asked.clear()
     either.stops.clear()
     given = None if cookie is None else f"{either.door._cookie}={cookie}"
-    for body in (b'{"order":"resume"}', b'{"order":"stop","why":"x"}'):
+    for body in (b'{"do":"resume"}', b'{"do":"stop","why":"x"}'):
         assert either.post(body, Cookie=given)[0] == 403
     for path in ("/", "/rig/line"):
         with pytest.raises(InvalidStatus) as refused:
@@ -394,7 +394,7 @@ def test_the_token_does_not_help_another_origin(either: Rig) -> None:
     either.asked.clear()
     with pytest.raises(InvalidStatus):
         either.knock(origin=ELSEWHERE)
-    assert either.post(b'{"order":"resume"}', Origin=ELSEWHERE)[0] == 403
+    assert either.post(b'{"do":"resume"}', Origin=ELSEWHERE)[0] == 403
     assert either.asked == []
 
 
@@ -428,7 +428,7 @@ def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
         silent = [socket.create_connection((host, int(port))) for _ in range(200)]
         near.stops.clear()
         assert stop_by_line(ana, "by line") == 204
-        assert near.post(b'{"order": "stop", "why": "by a request"}')[0] == 204
+        assert near.post(b'{"do": "stop", "why": "by a request"}')[0] == 204
         assert len(near.stops) == 2
         for gone in greedy[:3]:
             with pytest.raises(ConnectionClosed):
@@ -551,6 +551,6 @@ def test_a_browser_cannot_publish_the_page(near: Rig) -> None:
 def test_only_small_objects_are_asked_for() -> None:
     assert from_browser(b'{"a": [1, 2]}', "me") == {"a": [1, 2]}
     assert from_browser(b"[]", "me") is None and from_browser(b"{", "me") is None
-    assert from_browser('{"order": "stop", "why": "x", "who": "you"}', "me") == {
-        "order": "stop", "why": "x", "who": "me",
+    assert from_browser('{"do": "stop", "why": "x", "who": "you"}', "me") == {
+        "do": "stop", "why": "x", "who": "me",
     }  # fmt: skip

@@ -238,7 +238,7 @@ def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
     slow = threading.Event()
 
     def hear(asked: dict[str, object]) -> str | None:
-        if asked.get("order") == "stop":
+        if asked.get("do") == "stop":
             heard.append(asked["why"])
         else:
             slow.wait(PATIENCE_S)  # what is asked for takes for ever
@@ -248,9 +248,9 @@ def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
     page.open()
     try:
         visitor = Visitor(wait_for(page.url, "the page's address"))
-        answers = [visitor.ask({"order": "resume", "pad": "x" * 1500}) for _ in range(60)]
+        answers = [visitor.ask({"do": "resume", "pad": "x" * 1500}) for _ in range(60)]
         assert 429 in answers  # and no more than the rig can be told
-        assert visitor.ask({"order": "stop", "why": "a test"}) == 204 and len(heard) == 1
+        assert visitor.ask({"do": "stop", "why": "a test"}) == 204 and len(heard) == 1
     finally:
         slow.set()
         page.close()

@@ -398,8 +398,8 @@ def test_an_error_of_the_program_is_told_to_both_sides_and_the_rest_goes_on(
         (b'{"do": "get", "prefix": "", "more": 1}\n', "not understood"),
         (b'{"do": "set", "changes": [["a", 1]]}\n', "not understood"),
         (b'{"do": "save", "path": "my.yaml"}\n', "whole path"),
-        (b'{"do": "order", "order": {"order": "fly"}}\n', "no order; there is ask"),
-        (b'{"do": "order", "order": {"order": []}}\n', "no order|unhashable"),
+        (b'{"do": "order", "order": {"order": "fly"}}\n', "no command; there is ask"),
+        (b'{"do": "order", "order": {"order": []}}\n', "no command|unhashable"),
         (b'{"do": "order", "order": {"order": "tune", "changes": [["a", 1]]}}\n', "request set"),
     ],
 )
@@ -536,7 +536,7 @@ def test_the_socket_is_the_owners_alone(rig: RobotClient, folder: Path) -> None:
 
 
 def open_server() -> RemoteServer:
-    beat_less = RequestHandler(None, None, Pulse(RealClock()), {})  # type: ignore[arg-type]
+    beat_less = RequestHandler(None, None, Pulse(RealClock()), {"rig": "other"})  # type: ignore[arg-type]
     return RemoteServer(beat_less, lambda _: None)
 
 
@@ -626,7 +626,7 @@ import os, sys
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote.request_handler import Pulse, RequestHandler
 from gazerig.robot.remote.socket_server import RemoteServer
-server = RemoteServer(RequestHandler(None, None, Pulse(RealClock()), {}), print)
+server = RemoteServer(RequestHandler(None, None, Pulse(RealClock()), {"rig": "other"}), print)
 server.open()
 print("open", flush=True)
 sys.stdin.read()

@@ -333,7 +333,7 @@ def test_requests_are_obeyed_or_refused_in_words(frames: SnapshotIndex) -> None:
     assert replay.hear({"replay": {"step": "next saccade"}}) is None
     assert "between 0.05 and 8" in (replay.hear({"replay": {"speed": 100}}) or "")
     assert "cannot be meant" in (replay.hear({"replay": None}) or "")
-    assert replay.hear({"order": "stop", "why": ""}) == "this is a recording: nothing moves here"
+    assert replay.hear({"do": "stop", "why": ""}) == "this is a recording: nothing moves here"
 
 
 # --- the page's side

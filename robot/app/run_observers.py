@@ -94,13 +94,13 @@ class RunObservers:
         order, steer = self._made.robot.order, self._steer
         hear = PageRequestHandler(
             order if steer is None else only_stops(order),
-            tuning=self._tuning,
+            params=self._tuning,
             point=self._picking.point,
             steer=steer.press if steer is not None else None,
             refusals=(ConfigError,) if self._tuning is not None else (),
             saved=self._live.saved if self._live is not None else None,
             depth=self._show_depth,
-            confined=self._tuning.confined if self._tuning is not None else None,
+            paths=self._tuning.confined if self._tuning is not None else None,
         )
         return PageProcess(*address, hear)
 

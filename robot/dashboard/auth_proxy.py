@@ -246,7 +246,7 @@ class AuthProxy:
         asked = from_browser(body, who)
         if asked is None:
             return 400, "not a JSON object that can be asked for"
-        if asked.get("order") == "stop":
+        if asked.get("do") == "stop":
             try:
                 words = await self._stop.send(f"{asked.get('why', '')!s:.100} ({who})", who)
             except OSError as error:
@@ -309,7 +309,7 @@ class AuthProxy:
         while True:
             await asyncio.sleep(_RENEWED_EVERY_S)
             if who := self.browsers.leading():
-                self._ask(compact({"order": "renew", "who": who}))
+                self._ask(compact({"do": "renew", "who": who}))
 
     # --- the server behind the door -------------------------------------------------------
 

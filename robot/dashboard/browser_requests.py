@@ -4,13 +4,13 @@ import json
 from collections.abc import Mapping
 from typing import NoReturn
 
-from gazerig.robot.model.commands import KINDS
+from gazerig.robot.model.commands import COMMANDS
 
 ASKED_BYTES = 2048
 """Longest request; a stop with its reason has a hundred bytes."""
 
-_SAY_WHO = tuple(name for name, kind in KINDS.items() if "who" in kind._fields)
-"""Orders that carry who asks."""
+_SAY_WHO = tuple(name for name, kind in COMMANDS.items() if "who" in kind._fields)
+"""Commands that carry who asks."""
 
 
 def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
@@ -26,8 +26,10 @@ def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
         return None
     if not isinstance(asked, dict):
         return None
-    if (name := asked.get("order")) in _SAY_WHO:
-        asked = {"order": name, **asked, "who": who}
+    if "order" in asked and "do" not in asked:  # a page from before this version
+        asked["do"] = asked.pop("order")
+    if (name := asked.get("do")) in _SAY_WHO:
+        asked = {"do": name, **asked, "who": who}
     if isinstance(pick := asked.get("pick"), dict):
         asked["pick"] = {**pick, "who": who}
     return asked
@@ -35,11 +37,11 @@ def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
 
 def leads(asked: Mapping[str, object]) -> bool:
     """Return whether a request makes who asks the one that leads the head."""
-    return "pick" in asked or asked.get("order") in ("look_at", "jog")
+    return "pick" in asked or asked.get("do") in ("look_at", "jog")
 
 
 def compact(asked: Mapping[str, object]) -> bytes:
-    """Return a request as JSON without blanks, an order's "order" first."""
+    """Return a request as JSON without blanks, its "do" first."""
     return json.dumps(asked, separators=(",", ":")).encode()
 
 

@@ -145,7 +145,7 @@ class LeadView:
 
         @group.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-            asked = {"tune": {"character": event.target.value}}
+            asked = {"do": "character", "name": event.target.value}
             self._teller.ask(asked, str(event.client_id))
 
         self._characters = group

@@ -1,6 +1,6 @@
 """Listens to the page beside the control loop: what is urgent is heard at once.
 
-One thread waits on the socket and hears orders the moment they come, so that a stop is
+One thread waits on the socket and hears commands the moment they come, so that a stop is
 obeyed at the next tick. What may take long, such as checking a changed parameter, is
 heard by a second thread, and a stop never waits behind it.
 """
@@ -13,13 +13,15 @@ import socket
 import threading
 from collections.abc import Callable
 
+from gazerig.robot.model.commands import COMMANDS
+
 TELL = b"t"
 """First byte of a message from a person at the page."""
 MESSAGE_BYTES = 200_000
 """No message is longer: a socket's default send buffer in Linux holds 212,992 bytes."""
 
-_URGENT = b'{"order":'
-_CHANGE = b'{"tune":{"set":'
+_URGENT = tuple(f'{{"do":"{name}"'.encode() for name in COMMANDS if name != "tune")
+_CHANGE = b'{"do":"set",'
 _OVER = b""
 _MOST_WAITING = 100
 """Requests that wait for the slow thread; one more is refused."""
@@ -32,7 +34,7 @@ def telling(who: str, data: bytes) -> bytes:
     """Return the message for what a person asks for.
 
     who: a word that comes back with the answer
-    data: a JSON object, compact (no blanks between its parts), an order's "order" first
+    data: a JSON object, compact (no blanks between its parts), its "do" first
     """
     return TELL + who.encode() + b" " + data
 
@@ -49,8 +51,8 @@ def overtaken(earlier: bytes, later: bytes) -> bool:
     again, second = told(later)
     if who != again or not (first.startswith(_CHANGE) and second.startswith(_CHANGE)):
         return False
-    keys: set[str] = set(json.loads(first)["tune"]["set"])
-    return keys <= set(json.loads(second)["tune"]["set"])
+    keys: set[str] = set(json.loads(first)["changes"])
+    return keys <= set(json.loads(second)["changes"])
 
 
 def urgent(message: bytes) -> bool:

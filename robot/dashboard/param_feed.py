@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
+from gazerig.robot.control.command_handler import ChangedParam, DescribedParam, plain
 from gazerig.robot.dashboard.page_process import KNOBS, VALUES
 from gazerig.robot.model.commands import Value
-from gazerig.robot.remote.request_handler import ChangedParam, DescribedParam, plain
 
 _PIECE = 40  # parameters a message: some 20 kB, a tenth of what a message may be
 

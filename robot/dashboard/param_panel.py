@@ -140,11 +140,12 @@ class ParamPanel:
 
         @self._buttons.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-            self._ask({"save": None} if event.target.value == SAVE else {"revert": True})
+            save = {"do": "save", "path": None}
+            self._ask(save if event.target.value == SAVE else {"do": "revert"})
 
         @self._form.on_submit
         async def _(event: viser.GuiEvent[viser.GuiFormHandle]) -> None:
-            self._ask({"save": self._file.value.strip() or None})
+            self._ask({"do": "save", "path": self._file.value.strip() or None})
 
     def offer(self, knobs: Mapping[str, PageParam]) -> None:
         """Take the parameters there are."""
@@ -179,14 +180,14 @@ class ParamPanel:
                         self._controls[key] = self._control(key, control.order)
 
     def _ask(self, what: Mapping[str, object]) -> None:
-        if not self._teller.ask({"tune": what}, self._who):
+        if not self._teller.ask(what, self._who):
             _notify(self._client, "refused: the rig takes nothing now")
             self._refresh()
 
     def _put(self, key: str, value: object) -> None:
         with self._lock:
             self._unanswered += 1
-            if not self._teller.ask({"tune": {"set": {key: value}}}, self._who):
+            if not self._teller.ask({"do": "set", "changes": {key: value}}, self._who):
                 self._unanswered -= 1
                 _notify(self._client, "refused: the rig takes nothing now")
                 self._refresh()

@@ -66,7 +66,7 @@
     confirming = false;
     failed = "";
     const first = !stopping;
-    stopping = { order: "stop", why: by };
+    stopping = { do: "stop", why: by };
     draw();
     if (first) push(1);
   }
@@ -104,7 +104,7 @@
 
   function resume() {
     confirming = false;
-    ask({ order: "resume", confirmed: true }) // a person said yes to the question
+    ask({ do: "resume", confirmed: true }) // a person said yes to the question
       .catch((error) => { failed = `resume did not reach the rig (${error.message})`; })
       .finally(draw);
   }

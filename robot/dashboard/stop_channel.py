@@ -48,7 +48,7 @@ class StopSender:
 
     def _sent(self, why: str, who: str) -> asyncio.Future[str]:
         self._number += 1
-        stop = {"number": self._number, "order": "stop", "why": why, "who": who}
+        stop = {"number": self._number, "do": "stop", "why": why, "who": who}
         # It may be full of stops, which a rig that hangs will find when it wakes.
         with contextlib.suppress(BlockingIOError):
             self._link.send(json.dumps(stop).encode())
@@ -76,7 +76,7 @@ class StopListener:
     def __init__(self, link: socket.socket, take: Callable[[Mapping[str, object]], str]) -> None:
         """Listen at once.
 
-        take: obeys {"order": "stop", "why": words, "who": words}; what it returns is answered
+        take: obeys {"do": "stop", "why": words, "who": words}; what it returns is answered
         """
         self._link = link
         self._take = take

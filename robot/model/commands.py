@@ -91,32 +91,38 @@ MAX_ANGLE_RAD = 2.0 * pi
 MAX_WORDS = 200
 """Longest name or reason that an order may carry, in characters."""
 
-KINDS: dict[str, type[Command]] = {
+COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "jog": Jog, "renew": Renew, "stop": Stop, "resume": Resume,
     "tune": Tune,
 }  # fmt: skip
-_NAMES = {kind: name for name, kind in KINDS.items()}
+_NAMES = {kind: name for name, kind in COMMANDS.items()}
 
 
-def as_json(order: Command) -> dict[str, object]:
-    """Return an order as plain JSON: its name under "order", and its fields."""
-    return {"order": _NAMES[type(order)], **order._asdict()}
+def as_json(command: Command) -> dict[str, object]:
+    """Return a command as plain JSON: its name under "do", and its fields."""
+    return {"do": _NAMES[type(command)], **command._asdict()}
+
+
+def as_recorded(command: Command) -> dict[str, object]:
+    """Return a command as recordings hold it: its name under "order", and its fields."""
+    return {"order": _NAMES[type(command)], **command._asdict()}
 
 
 def from_json(data: object) -> Command:
-    """Read what ``as_json`` gave, from wherever it comes; fields with defaults may be left out.
+    """Read what ``as_json`` or ``as_recorded`` gave; fields with defaults may be left out.
 
     Raises:
-        ValueError: it is no order; the message says what is wrong and what there is.
+        ValueError: it is no command; the message says what is wrong and what there is.
     """
-    name = data.get("order") if isinstance(data, dict) else None
-    kind = KINDS.get(name) if isinstance(name, str) else None
+    key = "order" if isinstance(data, dict) and "order" in data else "do"
+    name = data.get(key) if isinstance(data, dict) else None
+    kind = COMMANDS.get(name) if isinstance(name, str) else None
     if kind is None or not isinstance(data, dict):
-        raise ValueError(f"no order; there is {', '.join(KINDS)}")
-    fields = {key: _frozen(value) for key, value in data.items() if key != "order"}
+        raise ValueError(f"no command; there is {', '.join(COMMANDS)}")
+    fields = {field: _frozen(value) for field, value in data.items() if field != key}
     needed = set(kind._fields).difference(kind._field_defaults)
     if not needed <= set(fields) <= set(kind._fields):
-        raise ValueError(f"order {name} takes {', '.join(kind._fields)}; given {', '.join(fields)}")
+        raise ValueError(f"{name} takes {', '.join(kind._fields)}; given {', '.join(fields)}")
     order = kind(**fields)  # type: ignore[arg-type]
     check(order)
     return order

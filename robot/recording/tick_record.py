@@ -23,7 +23,7 @@ from gazerig.gaze.types import (
     Target,
 )
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.commands import as_json as order_as_json
+from gazerig.robot.model.commands import as_recorded
 from gazerig.robot.model.commands import from_recording as order_from_json
 from gazerig.robot.model.types import JOINTS, GuardResult, JointAngles, JointState
 
@@ -111,7 +111,7 @@ def flat(
         # Nearly always the very same value: written once.
         (*verdict[:3], None if verdict.wish_rad == tick.wish_rad else verdict[3], *verdict[4:]),
         tick.events,
-        [order_as_json(order) for order in tick.orders],
+        [as_recorded(order) for order in tick.orders],
         tick.stopped,
         tick.led,
         [(_HEARD_NAMES[type(one)], _plain(one)) for one in before],

@@ -332,7 +332,8 @@ class RobotClient:
             check(order)
         except ValueError as error:
             raise RequestRejected(str(error)) from None
-        said = self._asked("order", order=as_json(order))
+        words = as_json(order)
+        said = self._asked(str(words.pop("do")), **words)
         match said:
             case {"reply": dict(reply)}:
                 return CommandReply.from_json(reply)

@@ -26,7 +26,7 @@ class LeadHeartbeat:
 
     def __init__(self, dial: Callable[[], Wire], who: str) -> None:
         self._wire = dial()
-        self._request = {"do": "order", "order": as_json(Renew(who))}
+        self._request = as_json(Renew(who))
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
         self._thread.start()

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Protocol
 
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.control.command_handler import Commandable, ParamAccess
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.remote.file_watch import FileWatch
-from gazerig.robot.remote.request_handler import Commandable, ParamAccess, Pulse, RequestHandler
+from gazerig.robot.remote.request_handler import Pulse, RequestHandler
 from gazerig.robot.remote.socket_server import RemoteServer
 
 

@@ -6,17 +6,28 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import partial
 from math import degrees
 from pathlib import Path
-from typing import Protocol
 
-from gazerig.drivers.errors import DriverError
+from gazerig.robot.control.command_handler import (
+    FIXED,
+    Answered,
+    Commandable,
+    CommandGiven,
+    CommandHandler,
+    Outcome,
+    ParamAccess,
+    ParamsChanged,
+    ParamsSaved,
+    as_changes,
+)
 from gazerig.robot.control.feedback_basis import reckoned_joints
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_text import lead_words, target_name
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Command, Renew, Tune, Value, from_json, signed
+from gazerig.robot.model.commands import Command, Renew, signed
 from gazerig.robot.model.reply import Ticket
 
 _TAKEN_UP_S = 1.0
@@ -28,119 +39,6 @@ _HANGS = (
     f"the control loop has not taken it up within {_TAKEN_UP_S:g} s: it hangs, "
     "starts or ends; what moves is stopped by the emergency stop"
 )
-
-REQUESTS = (
-    'status', 'menus', 'knobs, "prefix"', 'get, "prefix"', 'set, "changes": {key: value}',
-    'unsaved', 'differs', 'save, "path": absolute path or null', 'revert', 'characters',
-    'character, "name"', 'order, "order": an order as JSON',
-)  # fmt: skip
-"""All that can be asked for, in words."""
-
-
-class DescribedParam(Protocol):
-    """A parameter that can be tuned, with its rule; a NamedTuple."""
-
-    @property
-    def key(self) -> str:
-        """Return the dotted key."""
-        ...
-
-    def _asdict(self) -> dict[str, object]: ...
-
-
-class ChangedParam(Protocol):
-    """A value that differs from another."""
-
-    @property
-    def key(self) -> str:
-        """Return the dotted key."""
-        ...
-
-    @property
-    def old(self) -> object:
-        """Return what it is compared with."""
-        ...
-
-    @property
-    def new(self) -> object:
-        """Return what is in force."""
-        ...
-
-
-class SavedParams(Protocol):
-    """What was written where."""
-
-    @property
-    def path(self) -> Path:
-        """Return the file."""
-        ...
-
-    @property
-    def backup(self) -> Path | None:
-        """Return where the old file was kept, None where nothing was written."""
-        ...
-
-    @property
-    def changes(self) -> Sequence[ChangedParam]:
-        """Return what was written."""
-        ...
-
-
-class ParamAccess(Protocol):
-    """The parameters of a running rig."""
-
-    @property
-    def version(self) -> int:
-        """Count the changes."""
-        ...
-
-    def knobs(self) -> Iterable[DescribedParam]:
-        """Return all parameters."""
-        ...
-
-    def get(self, prefix: str) -> Mapping[str, Value]:
-        """Return the values in force whose keys begin so."""
-        ...
-
-    def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
-        """Put values in force from the next tick on; give what a person should know."""
-        ...
-
-    def unsaved(self) -> Iterable[ChangedParam]:
-        """Return what is in force and not in the file."""
-        ...
-
-    def differs(self) -> Iterable[ChangedParam]:
-        """Return what differs from the defaults."""
-        ...
-
-    def save(self, path: Path | None = None) -> SavedParams:
-        """Write what is in force."""
-        ...
-
-    def revert(self) -> object:
-        """Put in force what the file says."""
-        ...
-
-    def characters(self) -> Sequence[str]:
-        """Return the characters there are."""
-        ...
-
-    def character(self, name: str) -> object:
-        """Lay another character over the rig."""
-        ...
-
-
-class Commandable(Protocol):
-    """A robot that takes orders, as gazerig.robot.control.loop.Robot does."""
-
-    def order(self, order: Command) -> Ticket | None:
-        """Ask for something from the next tick on; raises ValueError with the rule."""
-        ...
-
-    def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return what there is to ask for."""
-        ...
 
 
 class Pulse:
@@ -207,105 +105,71 @@ class Pulse:
 
 
 class RequestHandler:
-    """Carries out what another program asks of the running rig."""
+    """Answers what another program asks of the running rig: {"ok": ...} or {"refused": ...}."""
 
     def __init__(
         self,
         robot: Commandable,
-        tuning: ParamAccess,
+        params: ParamAccess | None,
         pulse: Pulse,
         about: Mapping[str, object],
         refusals: tuple[type[Exception], ...] = (),
         saved: Callable[[Path], None] | None = None,
+        fixed: str = FIXED,
     ) -> None:
         """Take the rig.
 
-        about: what does not change, as {"rig": name, "pid": process}
-        refusals: what ``tuning`` raises where a value breaks a rule, besides ValueError
-        saved: is told each file that was written
+        Args:
+            robot: takes commands.
+            params: the parameters; None where nobody may see or change them.
+            pulse: whether the loop lives.
+            about: what does not change, as {"rig": name, "pid": process}.
+            refusals: what ``params`` raises where a value breaks a rule, besides ValueError.
+            saved: is told each file that was written.
+            fixed: why parameters cannot be changed, where they cannot.
         """
-        self._robot = robot
-        self._tuning = tuning
+        self._params = params
         self._pulse = pulse
         self._about = dict(about)
-        self._refusals: tuple[type[Exception], ...] = (
-            ValueError, DriverError, OSError, *refusals,
-        )  # fmt: skip
-        self._saved = saved
+        self._handler = CommandHandler(robot, params, self._status, refusals, saved, fixed=fixed)
         self._unsaved = -1, 0
-        self._knobs: tuple[Iterable[DescribedParam], list[tuple[str, object]]] = (), []
 
     def answer(self, request: object, peer: str = "") -> dict[str, object]:
         """Carry out one request: {"ok": what came of it} or {"refused": every rule broken}.
 
-        peer: who is at the other end, as "process 123", "" where nobody knows
+        Args:
+            request: {"do": verb, ...}.
+            peer: who is at the other end, as "process 123", "" where nobody knows.
         """
         try:
-            return {"ok": self._done(request, peer)}
-        except self._refusals as error:
+            return {"ok": self._told(self._handler.do(request, partial(_signed, peer)))}
+        except self._handler.refusals as error:
             return {"refused": str(error)}
 
-    def _done(self, request: object, peer: str) -> object:
-        """Find what is meant; the patterns are the protocol."""
-        tuning = self._tuning
-        match request:
-            case {"do": "status", **rest} if not rest:
-                return self._status()
-            case {"do": "menus", **rest} if not rest:
-                return {menu: list(choices) for menu, choices in self._robot.menus().items()}
-            case {"do": "knobs", "prefix": str(prefix), **rest} if not rest:
-                return [words for key, words in self._all_knobs() if key.startswith(prefix)]
-            case {"do": "get", "prefix": str(prefix), **rest} if not rest:
-                return plain(tuning.get(prefix))
-            case {"do": "set", "changes": dict(changes), **rest} if not rest:
-                return self._in_force(tuning.set({k: _frozen(v) for k, v in changes.items()}))
-            case {"do": "unsaved", **rest} if not rest:
-                return _changes(tuning.unsaved())
-            case {"do": "differs", **rest} if not rest:
-                return _changes(tuning.differs())
-            case {"do": "save", "path": str() | None as path, **rest} if not rest:
-                return self._save(path)
-            case {"do": "revert", **rest} if not rest:
-                return self._in_force(tuning.revert())
-            case {"do": "characters", **rest} if not rest:
-                return list(tuning.characters())
-            case {"do": "character", "name": str(name), **rest} if not rest:
-                return self._in_force(tuning.character(name))
-            case {"do": "order", "order": dict(order), **rest} if not rest:
-                return self._order(from_json(order), peer)
-        raise ValueError(f"not understood; there is {'; '.join(REQUESTS)}")
-
-    def _all_knobs(self) -> list[tuple[str, object]]:
-        """Return key and plain values of every parameter; writing them all takes 4 ms."""
-        knobs = self._tuning.knobs()
-        if knobs is not self._knobs[0]:
-            self._knobs = knobs, [(knob.key, plain(knob._asdict())) for knob in knobs]
-        return self._knobs[1]
+    def _told(self, outcome: Outcome) -> object:
+        """Return an outcome as JSON, once the loop has it."""
+        match outcome:
+            case Answered(value):
+                return value
+            case ParamsChanged(notes):
+                return self._in_force(notes)
+            case ParamsSaved(saved):
+                backup = None if saved.backup is None else str(saved.backup)
+                changes = as_changes(saved.changes)
+                return {"path": str(saved.path), "backup": backup, "changes": changes}
+            case CommandGiven(command, ticket):
+                return self._replied(command, ticket)
 
     def _status(self) -> dict[str, object]:
-        version = self._tuning.version
+        version = self._params.version if self._params is not None else 0
         if version != self._unsaved[0]:  # else a program that polls would have it counted
-            self._unsaved = version, len(tuple(self._tuning.unsaved()))
+            unsaved = self._params.unsaved() if self._params is not None else ()
+            self._unsaved = version, len(tuple(unsaved))
         about = {**self._about, "version": version, "unsaved": self._unsaved[1]}
         return {**about, **self._pulse.words()}
 
-    def _save(self, path: str | None) -> dict[str, object]:
-        if path is not None and not Path(path).is_absolute():
-            raise ValueError(f"{path}: give the whole path; this program has another folder")
-        saved = self._tuning.save(Path(path) if path is not None else None)
-        if self._saved is not None:
-            self._saved(saved.path)
-        backup = None if saved.backup is None else str(saved.backup)
-        return {"path": str(saved.path), "backup": backup, "changes": _changes(saved.changes)}
-
-    def _order(self, order: Command, peer: str) -> object:
-        """Hand on an order; parameters go through ``set``, which knows their rules."""
-        if isinstance(order, Tune):
-            raise ValueError("parameters are changed by the request set, which checks them")
-        who = str(getattr(order, "who", ""))
-        if peer:  # nobody can give himself out as another process, or as the page
-            order = signed(order, f"{who} ({peer})" if who else peer)
-        ticket = self._robot.order(order)
+    def _replied(self, command: Command, ticket: Ticket | None) -> object:
+        """Wait for the tick that takes a command up; return its reply."""
         if ticket is None:
             return self._in_force(())
         reply = ticket.wait(_TAKEN_UP_S)
@@ -313,44 +177,26 @@ class RequestHandler:
             raise ValueError(_HANGS)
         if reply.refused:
             raise ValueError(reply.refused)
-        if not isinstance(order, Renew):
+        if not isinstance(command, Renew):
             self._pulse.taken_up(ticks=1)  # so that the status tells of it
         return {"notes": [], "reply": reply.as_json()}
 
-    def _in_force(self, notes: object) -> dict[str, object]:
+    def _in_force(self, notes: tuple[str, ...]) -> dict[str, object]:
         """Wait for the tick that obeys; pass on what a person should know."""
-        words = [str(note) for note in notes] if isinstance(notes, tuple | list) else []
         if not self._pulse.taken_up():
             raise ValueError(_HANGS)
-        return {"notes": words}
+        return {"notes": list(notes)}
+
+
+def _signed(peer: str, command: Command) -> Command:
+    """Return a command with the process that asks: nobody can pose as another, or as the page."""
+    who = str(getattr(command, "who", ""))
+    return signed(command, f"{who} ({peer})" if who else peer) if peer else command
 
 
 def is_stop(request: object) -> bool:
     """True if a request is to stop: nothing may hold that up."""
     match request:
-        case {"do": "order", "order": {"order": "stop"}}:
+        case {"do": "stop"} | {"do": "order", "order": {"order": "stop"}}:
             return True
     return False
-
-
-def plain(value: object) -> object:
-    """Make lists and dicts of tuples and mappings, as JSON has them."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, tuple | list):
-        return [plain(item) for item in value]
-    return value
-
-
-def _changes(changes: Iterable[ChangedParam]) -> list[dict[str, object]]:
-    return [{"key": c.key, "old": plain(c.old), "new": plain(c.new)} for c in changes]
-
-
-def _frozen(value: object) -> Value:
-    """Make tuples of JSON's lists, as the reader of files does."""
-    if isinstance(value, list):
-        return tuple(_frozen(item) for item in value)
-    if isinstance(value, dict):
-        return {key: _frozen(item) for key, item in value.items()}
-    assert value is None or isinstance(value, bool | int | float | str)
-    return value

@@ -4,22 +4,17 @@ While a person calibrates, parameters stay as they are and nobody else leads the
 ``gazerig stop`` must reach whatever moves.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Command, Resume, Stop, Value
+from gazerig.robot.model.commands import Command, Resume, Stop
 from gazerig.robot.model.reply import CommandTaker, Ticket
-from gazerig.robot.remote.request_handler import (
-    ChangedParam,
-    DescribedParam,
-    Pulse,
-    RequestHandler,
-    SavedParams,
-)
+from gazerig.robot.remote.request_handler import Pulse, RequestHandler
 from gazerig.robot.remote.socket_server import RemoteServer
+
+_FIXED = "it is being calibrated: its parameters stay as they are until that is over"
 
 
 class StopOnlyServer:
@@ -40,7 +35,8 @@ class StopOnlyServer:
     ) -> None:
         self._say = say
         self._pulse = Pulse(clock)
-        requests = RequestHandler(_OnlyStops(order), _Fixed(), self._pulse, about)
+        only = _OnlyStops(order)
+        requests = RequestHandler(only, None, self._pulse, about, fixed=_FIXED)
         self._server = RemoteServer(requests, say)
 
     def open(self) -> None:
@@ -78,49 +74,3 @@ class _OnlyStops:
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Offer nothing."""
         return {}
-
-
-class _Fixed:
-    """Parameters that nobody can see or change; implements ``request_handler.Tuning``."""
-
-    version = 0
-
-    def knobs(self) -> Iterable[DescribedParam]:
-        """Return none."""
-        return ()
-
-    def get(self, prefix: str) -> Mapping[str, Value]:
-        """Return none."""
-        return {}
-
-    def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
-        """Refuse."""
-        raise _refused()
-
-    def unsaved(self) -> Iterable[ChangedParam]:
-        """Return none: nothing was changed."""
-        return ()
-
-    def differs(self) -> Iterable[ChangedParam]:
-        """Refuse: what is in force is not known here."""
-        raise _refused()
-
-    def save(self, path: Path | None = None) -> SavedParams:
-        """Refuse."""
-        raise _refused()
-
-    def revert(self) -> object:
-        """Refuse."""
-        raise _refused()
-
-    def characters(self) -> Sequence[str]:
-        """Return none."""
-        return ()
-
-    def character(self, name: str) -> object:
-        """Refuse."""
-        raise _refused()
-
-
-def _refused() -> ValueError:
-    return ValueError("it is being calibrated: its parameters stay as they are until that is over")

@@ -77,17 +77,17 @@ def stranger_posts(visitor: Visitor) -> None:
 
 def orders(visitor: Visitor) -> None:
     """Points to look at."""
-    post(visitor, b'{"order": "look_at", "p_world_m": [1.0, 0.2, 0.3]}')
+    post(visitor, b'{"do": "look_at", "p_world_m": [1.0, 0.2, 0.3]}')
 
 
 def parameters(visitor: Visitor) -> None:
     """Changes of a parameter."""
-    post(visitor, b'{"tune": {"set": {"gaze.head.align": 0.7}}}')
+    post(visitor, b'{"do": "set", "changes": {"gaze.head.align": 0.7}}')
 
 
 def stops(visitor: Visitor) -> None:
     """Other people's stops."""
-    post(visitor, b'{"order": "stop", "why": "a flood"}')
+    post(visitor, b'{"do": "stop", "why": "a flood"}')
 
 
 def silent(visitor: Visitor) -> None:
@@ -274,9 +274,9 @@ def press(visitor: Visitor, standing: ClientConnection) -> tuple[list[float], in
         began = time.monotonic()
         try:
             if number % 2:
-                taken = visitor.ask({"order": "stop", "why": "attack"}) == 204
+                taken = visitor.ask({"do": "stop", "why": "attack"}) == 204
             else:
-                standing.send('{"order": "stop", "why": "attack"}')
+                standing.send('{"do": "stop", "why": "attack"}')
                 while "answer" not in (said := json.loads(standing.recv(timeout=10.0))):
                     pass
                 taken = said["answer"] == 204

@@ -307,13 +307,13 @@ def stop_ms(bench: Bench, url: str) -> np.ndarray:
     """From a stop at the door to the tick that has taken the torque off."""
     took, visitor = [], Visitor(url)
     for _ in range(TRIES):
-        for order in ({"order": "stop", "why": "bench"}, {"order": "resume"}):
+        for order in ({"do": "stop", "why": "bench"}, {"do": "resume"}):
             before = len(bench.obeyed)
             start_s = time.monotonic()
             visitor.ask(order)
             while len(bench.obeyed) == before:
                 time.sleep(0.0005)
-            if order["order"] == "stop":
+            if order["do"] == "stop":
                 took.append(1e3 * (bench.obeyed[before][0] - start_s))
     return np.array(took)
 
