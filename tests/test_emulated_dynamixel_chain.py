@@ -6,7 +6,7 @@ import pytest
 from fastcrc.crc16 import umts
 from hypothesis import given
 from hypothesis import strategies as st
-from servo_bench import READ, DynamixelBench
+from servo_bench import READ, REBOOT, DynamixelBench
 
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
@@ -34,30 +34,78 @@ def test_the_crc_is_the_protocols():
     assert umts(b"123456789") == 0xFEE8
 
 
-def test_ping():
-    bench = DynamixelBench((1, "xm430-w210", 2048, 38))
-    assert bench.chain.receive(PING) == vector("FF FF FD 00 01 07 00 55 00 06 04 26 65 5D")
+ONE = [(1, "xm430-w210", 166, 38)]
+TWO = [(2, "xm430-w210", 2079, 38), *ONE]
+THREE = [(3, "xm430-w210", 166), (7, "xm430-w210", 2079), (4, "xm430-w210", 1023)]
+DONE = "FF FF FD 00 01 04 00 55 00 A1 0C"
+MANUALS = {
+    "ping": (ONE, PING.hex(), "FF FF FD 00 01 07 00 55 00 06 04 26 65 5D"),
+    "ping to all": (
+        TWO,
+        "FF FF FD 00 FE 03 00 01 31 42",
+        "FF FF FD 00 01 07 00 55 00 06 04 26 65 5D FF FF FD 00 02 07 00 55 00 06 04 26 6F 6D",
+    ),
+    "read": (
+        ONE,
+        "FF FF FD 00 01 07 00 02 84 00 04 00 1D 15",
+        "FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0",
+    ),
+    "write": (ONE, "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89", DONE),
+    "reboot": (ONE, "FF FF FD 00 01 03 00 08 2F 4E", DONE),
+    "sync read": (
+        TWO,
+        "FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA",
+        "FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0"
+        "FF FF FD 00 02 08 00 55 00 1F 08 00 00 BA BE",
+    ),
+    "sync write": (
+        TWO, "FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87", ""
+    ),
+    "fast sync read": (
+        THREE,
+        "FF FF FD 00 FE 0A 00 8A 84 00 04 00 03 07 04 20 F2",
+        "FF FF FD 00 FE 19 00 55 00 03 A6 00 00 00 84 08 00 07 1F 08 00 00 16 CA"
+        "00 04 FF 03 00 00 D1 9E",
+    ),
+    "bulk read": (
+        TWO,
+        "FF FF FD 00 FE 0D 00 92 01 90 00 02 00 02 92 00 01 00 1A 05",
+        (status(1, 0, b"\x78\x00") + status(2, 0, b"\x1e")).hex(),
+    ),
+    "bulk write": (
+        TWO, "FF FF FD 00 FE 10 00 93 01 20 00 02 00 A0 00 02 1F 00 01 00 50 B7 68", ""
+    ),
+}  # fmt: skip
+"""Examples of the manual: servos, what is sent, what is answered."""
+
+WRITTEN = {
+    "write": [(1, 116, 4, 512)],
+    "sync write": [(1, 116, 4, 150), (2, 116, 4, 170)],
+    "bulk write": [(1, 32, 2, 160), (2, 31, 1, 80)],
+}
+"""Id, address, size and value of what these have written."""
 
 
-def test_broadcast_ping_answers_in_the_order_of_ids():
-    bench = DynamixelBench((7, "xm430-w210"), (1, "xm430-w210", 2048, 38))
-    answer = bench.chain.receive(vector("FF FF FD 00 FE 03 00 01 31 42"))
-    assert answer[:14] == vector("FF FF FD 00 01 07 00 55 00 06 04 26 65 5D")
-    assert answer[14 + 4] == 7
-    assert len(answer) == 28
+@pytest.mark.parametrize("name", MANUALS)
+def test_examples_of_the_manual_to_the_byte(name):
+    servos, sent, answered = MANUALS[name]
+    bench = DynamixelBench(*servos)
+    assert bench.chain.receive(vector(sent)).hex(" ") == vector(answered).hex(" ")
+    for servo_id, address, size, value in WRITTEN.get(name, ()):
+        assert bench.read(servo_id, address, size) == value
 
 
-def test_read():
-    bench = DynamixelBench((1, "xm430-w210", 166))
-    answer = bench.chain.receive(vector("FF FF FD 00 01 07 00 02 84 00 04 00 1D 15"))
-    assert answer == vector("FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0")
-
-
-def test_write():
-    bench = DynamixelBench((1, "xm430-w210"))
-    answer = bench.chain.receive(vector("FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89"))
-    assert answer == vector("FF FF FD 00 01 04 00 55 00 A1 0C")
-    assert bench.read(1, 116, 4) == 512
+def test_after_a_reboot_the_goal_is_where_it_is():
+    bench = DynamixelBench((1, "xl330-m288", 1000))
+    bench.engage(1, 1500)
+    bench.write(1, 112, 50, 4)
+    bench.ask(1, REBOOT)
+    bench.now_s = 0.399
+    assert bench.chain.receive(PING) == b""
+    bench.now_s = 0.4
+    assert bench.chain.receive(PING) != b""
+    assert (bench.read(1, 64, 1), bench.read(1, 112, 4)) == (0, 0)
+    assert bench.read(1, 116, 4) == bench.read(1, 132, 4)
 
 
 def test_registered_write_waits_for_action():
@@ -69,52 +117,6 @@ def test_registered_write_waits_for_action():
     assert bench.chain.receive(action)[8] == 0
     assert (bench.read(1, 69, 1), bench.read(1, 104, 4)) == (0, 200)
     assert bench.chain.receive(action)[8] == 2
-
-
-def test_reboot_is_confirmed_then_deaf_for_0_4_s():
-    bench = DynamixelBench((1, "xl330-m288", 1000))
-    bench.engage(1, 1500)
-    bench.write(1, 112, 50, 4)
-    answer = bench.chain.receive(vector("FF FF FD 00 01 03 00 08 2F 4E"))
-    assert answer == vector("FF FF FD 00 01 04 00 55 00 A1 0C")
-    bench.now_s = 0.39
-    assert bench.chain.receive(PING) == b""
-    bench.now_s = 0.4
-    assert bench.chain.receive(PING) != b""
-    assert (bench.read(1, 64, 1), bench.read(1, 112, 4)) == (0, 0)
-    assert bench.read(1, 116, 4) == bench.read(1, 132, 4)
-
-
-def test_sync_read_gives_one_status_a_servo_in_the_order_asked():
-    bench = DynamixelBench((1, "xm430-w210", 166), (2, "xm430-w210", 2079))
-    answer = bench.chain.receive(vector("FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA"))
-    assert answer[:15] == vector("FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0")
-    assert answer[15:] == status(2, 0, struct.pack("<i", 2079))
-
-
-def test_sync_write_answers_nothing():
-    bench = DynamixelBench((1, "xm430-w210"), (2, "xm430-w210"))
-    packet = vector("FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87")
-    assert bench.chain.receive(packet) == b""
-    assert (bench.read(1, 116, 4), bench.read(2, 116, 4)) == (150, 170)
-
-
-def test_fast_sync_read_is_one_packet_with_running_crcs():
-    bench = DynamixelBench((3, "xm430-w210", 166), (7, "xm430-w210", 2079), (4, "xm430-w210", 1023))
-    answer = bench.chain.receive(vector("FF FF FD 00 FE 0A 00 8A 84 00 04 00 03 07 04 20 F2"))
-    assert answer == vector(
-        "FF FF FD 00 FE 19 00 55 00 03 A6 00 00 00 84 08 00 07 1F 08 00 00 16 CA"
-        "00 04 FF 03 00 00 D1 9E"
-    )
-
-
-def test_bulk_read_and_write():
-    bench = DynamixelBench((1, "xm430-w210"), (2, "xm430-w210"))
-    read = vector("FF FF FD 00 FE 0D 00 92 01 90 00 02 00 02 92 00 01 00 1A 05")
-    assert bench.chain.receive(read) == status(1, 0, b"\x78\x00") + status(2, 0, b"\x1e")
-    write = vector("FF FF FD 00 FE 10 00 93 01 20 00 02 00 A0 00 02 1F 00 01 00 50 B7 68")
-    assert bench.chain.receive(write) == b""
-    assert (bench.read(1, 32, 2), bench.read(2, 31, 1)) == (160, 80)
 
 
 def test_fast_bulk_read():
