@@ -66,6 +66,7 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
             )
         elif joint.model in SERVOS:
             yield from _channel(name, joint, rig.bus_of(name))
+    yield from _series(rig)
     used = {joint.bus for joint in rig.joints.values()}
     for name in rig.buses:
         if name not in used:
@@ -82,6 +83,19 @@ def _channel(name: str, joint: JointParams, bus: BusConfig) -> Iterable[tuple[st
     except ValueError as error:
         what = str(error).removeprefix(f"channel {joint.id}: ")
         yield f"joints.{name}{'' if what.startswith('its range') else '.id'}", what
+
+
+def _series(rig: Rig) -> Iterable[tuple[str, str]]:
+    """See that servos of one bus have their numbers the same way round."""
+    first: dict[str, str] = {}
+    for name, joint in rig.joints.items():
+        known, facts = SERVOS.get(first.setdefault(joint.bus, joint.model)), SERVOS.get(joint.model)
+        if known and facts and known.bus == facts.bus and known.family != facts.family:
+            yield (
+                f"joints.{name}.model",
+                f"a {joint.model} cannot be on one bus with a {first[joint.bus]}: their numbers "
+                "have another byte first; give each series a port of its own under buses",
+            )
 
 
 def _lid_ranges(rig: Rig) -> Iterable[tuple[str, str]]:

@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_TURN
+from gazerig.drivers.dynamixel.control_table import Model as DynamixelModel
 from gazerig.drivers.event_log import servo_label as label_with
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
+from gazerig.drivers.feetech.memory_table import SCS_MODELS, SCS_STEPS, FeetechModel
 from gazerig.drivers.hobby_board.models import HOBBY, US_STEPS
 
 if TYPE_CHECKING:
@@ -18,6 +20,9 @@ HOBBY_KINDS: tuple[BusKind, ...] = ("maestro", "pca9685")
 """Boards that send pulses to hobby servos: any of them moves any."""
 
 
+SmartModel = DynamixelModel | FeetechModel
+
+
 class ServoFacts(NamedTuple):
     """What people and joints must know of a servo model.
 
@@ -26,6 +31,7 @@ class ServoFacts(NamedTuple):
     unit, unit_steps: what people measure its place in, "steps" or "us", and how many steps
         that is
     middle: of its travel, in that unit
+    family: of a smart servo, by its name; "" for a hobby servo
     measured: it tells its position; one that does not has no other readings either
     hottest_c, lowest_v, highest_v: where it switches itself off, as far as it does
     """
@@ -41,37 +47,32 @@ class ServoFacts(NamedTuple):
     hottest_c: float = 70.0
     lowest_v: float = 0.0
     highest_v: float = inf
+    family: str = ""
 
     def fits(self, kind: str) -> bool:
         """Return whether it can be on a bus of this kind: any board moves a hobby servo."""
         return kind == self.bus or (self.bus in HOBBY_KINDS and kind in HOBBY_KINDS)
 
 
+def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoFacts:
+    """Return the facts of a smart servo that counts so many steps."""
+    return ServoFacts(
+        bus,
+        model.steps_per_turn,
+        0,
+        steps - 1,
+        middle=steps // 2,
+        hottest_c=float(model.temperature_limit),
+        lowest_v=0.1 * model.min_voltage,
+        highest_v=0.1 * model.max_voltage,
+        family=family,
+    )
+
+
 SERVOS: dict[str, ServoFacts] = {
-    **{
-        name: ServoFacts(
-            "dynamixel",
-            STEPS_PER_TURN,
-            0,
-            STEPS_PER_TURN - 1,
-            hottest_c=float(model.temperature_limit),
-            lowest_v=0.1 * model.min_voltage,
-            highest_v=0.1 * model.max_voltage,
-        )
-        for name, model in DYNAMIXEL.items()
-    },
-    **{
-        name: ServoFacts(
-            "feetech",
-            model.steps_per_turn,
-            0,
-            model.steps_per_turn - 1,
-            hottest_c=float(model.temperature_limit),
-            lowest_v=0.1 * model.min_voltage,
-            highest_v=0.1 * model.max_voltage,
-        )
-        for name, model in FEETECH.items()
-    },
+    **{n: _smart("dynamixel", "dynamixel", m, STEPS_PER_TURN) for n, m in DYNAMIXEL.items()},
+    **{n: _smart("feetech", "feetech", m, m.steps_per_turn) for n, m in FEETECH.items()},
+    **{n: _smart("feetech", "feetech scs", m, SCS_STEPS) for n, m in SCS_MODELS.items()},
     **{
         name: ServoFacts(
             "maestro",

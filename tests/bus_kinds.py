@@ -8,9 +8,7 @@ from typing import NamedTuple
 
 from servo_rows import Row, rows
 
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
-from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
@@ -20,6 +18,7 @@ from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
+from gazerig.drivers.servo_families import FAMILY_OF
 from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
@@ -40,6 +39,7 @@ NAMES = ("eye", "jaw", "neck", "lid", "brow", "ear")
 PLACES: dict[str, dict[str, tuple[int, ...]]] = {
     "dynamixel": {"dynamixel": (0, 1, 2, 3)},
     "feetech": {"feetech": (0, 1, 2, 3)},
+    "scs": {"scs": (0, 1, 2, 3)},
     "maestro": {"maestro": (0, 1, 2, 3)},
     "pca9685": {"pca9685": (0, 1, 2, 3)},
     # Neighbours are on different buses, so that a mistaken place shows.
@@ -50,12 +50,26 @@ KINDS = tuple(PLACES)
 IDS = (3, 1, 11, 7)
 SHARES = (0.4, 0.5, 0.65, 0.55)
 """Where servos stand at first, as a share of their range."""
-SPEED_STEPS_S = {"dynamixel": 4000.0, "feetech": 3000.0, "maestro": 12_000.0, "pca9685": 12_000.0}
+SPEED_STEPS_S = {
+    "dynamixel": 4000.0,
+    "feetech": 3000.0,
+    "scs": 1500.0,
+    "maestro": 12_000.0,
+    "pca9685": 12_000.0,
+}
 RANGES = {
     "dynamixel": (1000, 3000),
     "feetech": (1000, 3000),
+    "scs": (200, 900),
     "maestro": (4400, 7600),
     "pca9685": (4400, 7600),
+}
+MODELS = {
+    "dynamixel": "xl330-m077",
+    "feetech": "sts3215",
+    "scs": "scs0009",
+    "maestro": "hobby",
+    "pca9685": "hobby",
 }
 BOARDS = ("maestro", "pca9685")
 """Kinds of which nobody measures a servo, and whose board answers for all."""
@@ -110,13 +124,10 @@ class Twin:
             return Pca9685Bus(port, setups, Pca9685Params(**patience, **quick))
         if self._patient:
             patience["prompt_timeout_ms"] = 200.0
-        if name == "feetech":
-            return SmartServoBus(
-                FEETECH, port, setups, FeetechParams(**patience, give_up_s=give_up_s)
-            )
-        return SmartServoBus(
-            DYNAMIXEL, port, setups, DynamixelParams(**patience, watchdog_ms=0, give_up_s=give_up_s)
-        )
+        params = DynamixelParams(**patience, watchdog_ms=0, give_up_s=give_up_s)
+        if name != "dynamixel":
+            params = FeetechParams(**patience, give_up_s=give_up_s)
+        return SmartServoBus(FAMILY_OF[MODELS[name]], port, setups, params)
 
     # --- shares and steps
 
@@ -237,12 +248,7 @@ class Twin:
 
 def _setups(kind: str, name: str) -> dict[int, ServoSetup]:
     """Return the setups of one bus by their place in the whole."""
-    model = {
-        "dynamixel": "xl330-m077",
-        "feetech": "sts3215",
-        "maestro": "hobby",
-        "pca9685": "hobby",
-    }[name]
+    model = MODELS[name]
     low, high = RANGES[name]
     rest = (low + high) // 2 if name in BOARDS else None
     return {
@@ -265,9 +271,8 @@ def line(kind: str, name: str) -> Emulated:
         # The board's own ranges are as wide as such servos go.
         hobby = [HobbySpec(c, x, min_steps=2000, max_steps=10_000) for c, x in starts.items()]
         return MaestroLine(12, servos=tuple(hobby))
-    model = "sts3215" if name == "feetech" else "xl330-m077"
-    specs = tuple(ServoSpec(i, model, round(x)) for i, x in starts.items())
-    return FeetechLine(specs) if name == "feetech" else DynamixelLine(specs)
+    specs = tuple(ServoSpec(i, MODELS[name], round(x)) for i, x in starts.items())
+    return DynamixelLine(specs) if name == "dynamixel" else FeetechLine(specs)
 
 
 class InProcess(NamedTuple):

@@ -28,6 +28,7 @@ LEFT = {
         "voltage {i} 16", "collide {i}",
     },
     "feetech": {"overheat {i}", "collide {i}", "reset {i}"},
+    "scs": {"overheat {i}", "collide {i}", "reset {i}"},
     "maestro": set[str](),
     "pca9685": set[str](),
 }  # fmt: skip
@@ -147,6 +148,7 @@ def test_what_befalls_one_bus_leaves_the_joints_of_the_others_moving(
 STRUCK = {
     "dynamixel": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
     "feetech": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
+    "scs": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
     "maestro": ("lose all for 0.3", "error protocol", "unplug for 0.3", "brown-out"),
     "pca9685": ("lose all for 0.3", "nack for 0.3", "unplug for 0.3", "brown-out"),
 }

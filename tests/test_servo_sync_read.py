@@ -8,11 +8,9 @@ from functools import partial
 
 import pytest
 
-from gazerig.drivers.dynamixel import protocol as dynamixel_protocol
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.read_plan import DIRECT, direct_windows
 from gazerig.drivers.dynamixel.sync_packets import FastSyncRead
-from gazerig.drivers.feetech import protocol as feetech_protocol
 from gazerig.drivers.feetech.family import FEETECH, window
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import checksum
@@ -31,8 +29,8 @@ PLACES = {4: 1000, 1: 2000, 9: 3000}
 BLOCK = struct.pack("<HHHBBBBB2xH", 0x8006, 0x8064, 0x052C, 74, 31, 0, 0x20, 1, 0x8002)
 SENSED, ARMED = window(56), window(40)
 
-dynamixel_read = partial(SyncRead, dynamixel_protocol)
-feetech_read = partial(SyncRead, feetech_protocol)
+dynamixel_read = partial(SyncRead, DYNAMIXEL)
+feetech_read = partial(SyncRead, FEETECH)
 
 READS = {
     "dynamixel": (dynamixel_read, (DIRECT, *direct_windows()._spare)),

@@ -113,6 +113,11 @@ class Model(NamedTuple):
     no_load_rpm: float
 
     @property
+    def steps_per_turn(self) -> int:
+        """Return the steps of its encoder."""
+        return STEPS_PER_TURN
+
+    @property
     def no_load_steps_s(self) -> float:
         """Return the speed without load at the rated voltage."""
         return self.no_load_rpm / 60.0 * STEPS_PER_TURN

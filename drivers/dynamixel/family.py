@@ -79,6 +79,7 @@ DYNAMIXEL = Family(
     speed_units=speed_units,
     acceleration_units=acceleration_units,
     goals=goal_packets,
+    sync_read=True,
     baud_rates=BAUD_RATES,
     usual_rates=USUAL_RATES,
     factory_baud=57_600,

@@ -91,6 +91,22 @@ MODELS = {
     )
 }
 
+SCS_STEPS = 1024
+"""Of the potentiometer of an SCS servo."""
+
+SCS_BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 57_600, 38_400, 19_200)
+"""Bit/s by the value of their Baud Rate (6)."""
+
+SCS_MODELS = {
+    model.name: model
+    for model in (
+        # 1024 steps over 300 and 200 deg: so many would be a turn.
+        FeetechModel("scs0009", 1284, 1229, 70, 40, 80, 0.226, 6.0, 1.0, 100.0),
+        # Number and stall current of the SCS15 are assumed.
+        FeetechModel("scs15", 1295, 1843, 70, 40, 80, 1.47, 6.0, 2.0, 62.5),
+    )
+}
+
 
 class Register(NamedTuple):
     """One entry of the control table.
@@ -99,6 +115,7 @@ class Register(NamedTuple):
         device itself decides
     low, high: what may be written; None where there is no range of its own
     sign: the bit that says "below 0"; None where there is no sign
+    order: which byte of two comes first
     """
 
     name: str
@@ -109,6 +126,7 @@ class Register(NamedTuple):
     low: int | None = None
     high: int | None = None
     sign: int | None = None
+    order: Literal["little", "big"] = "little"
 
     @property
     def area(self) -> Literal["eeprom", "ram"]:
@@ -124,11 +142,11 @@ class Register(NamedTuple):
         raw = value if self.sign is None else to_sign_magnitude(value, self.sign)
         if not 0 <= raw < 1 << 8 * self.size:
             raise ValueError(f"{self.name}: {value} does not fit into {self.size} byte")
-        return raw.to_bytes(self.size, "little")
+        return raw.to_bytes(self.size, self.order)
 
     def decode(self, data: bytes) -> int:
         """Return the value that bytes stand for."""
-        raw = int.from_bytes(data, "little")
+        raw = int.from_bytes(data, self.order)
         return raw if self.sign is None else from_sign_magnitude(raw, self.sign)
 
 

@@ -16,6 +16,7 @@ Source: Feetech, communication protocol of the SCS and STS series.
 
 import struct
 from collections.abc import Iterable, Sequence
+from typing import Literal
 from zlib import adler32
 
 from gazerig.drivers.servo_bus.family import Identity, Status
@@ -39,6 +40,9 @@ ECHO_LENGTH = 2
 
 IDENTITY_LENGTH = 9
 """Registers 0..8: firmware, model, id, baud rate, return delay, status level."""
+
+SCS_SERIES = 5
+"""First byte of the model number (3) of the servos whose high byte comes first."""
 
 LONGEST_STATUS = 128
 """Length of a status with more than the whole table: noise."""
@@ -81,12 +85,14 @@ def identify(servo_id: int) -> bytes:
 def identity(status: Status) -> Identity | None:
     """Return what a servo's first registers say it is, None where these are others.
 
-    The firmware is a hundred times the major version and the minor one, 310 for 3.10.
+    The firmware is a hundred times the major version and the minor one, 310 for 3.10. The model
+    number of an SCS servo has the high byte first.
     """
     data = status.params
     if len(data) != IDENTITY_LENGTH or data[5] != status.id:
         return None
-    return Identity(data[3] | data[4] << 8, 100 * data[0] + data[1])
+    order: Literal["little", "big"] = "big" if data[3] == SCS_SERIES else "little"
+    return Identity(int.from_bytes(data[3:5], order), 100 * data[0] + data[1])
 
 
 def read(servo_id: int, address: int, length: int) -> bytes:
@@ -122,11 +128,11 @@ MOST_GOALS = 35
 class GoalWrite:
     """Builds the packets that write goal, time and speed (42..47) of several servos at once."""
 
-    ADDRESS, SIZE = 42, 6
+    ADDRESS, SIZE, ORDER = 42, 6, "<"
 
     def __init__(self, ids: Sequence[int]) -> None:
         self._head = bytes((BROADCAST, 4 + 7 * len(ids), SYNC_WRITE, self.ADDRESS, self.SIZE))
-        self._rows = struct.Struct("<" + "BHHH" * len(ids))
+        self._rows = struct.Struct(self.ORDER + "BHHH" * len(ids))
         self._row = [number for servo_id in ids for number in (servo_id, 0, 0, 0)]
 
     def packet(self, goals: Sequence[int], speeds: Sequence[int]) -> bytes:

@@ -70,6 +70,7 @@ def scan(
     thorough: bool = False,
     progress: Progress | None = None,
     ids: Sequence[int] | None = None,
+    family_of: Mapping[str, Family] | None = None,
 ) -> Iterator[BaudScan]:
     """Ask at one baud rate after the other who is there; the port is left open at the last.
 
@@ -80,6 +81,7 @@ def scan(
         thorough: wait long; ask every id even where no servo answers a ping to all.
         progress: called for every id that is asked alone.
         ids: those that are asked where ids are asked alone; all where None.
+        family_of: families of models whose packets are the same and whose table is another.
 
     Raises:
         PortError: the port cannot be opened.
@@ -95,8 +97,8 @@ def scan(
         quiet_s = family.thorough_s if thorough else family.quiet_s
         found, junk = scan_ids(port, family, baud, quiet_s, progress, ids)
         old = family.protocol_1(port) if family.protocol_1 and not found else ()
-        each = {one.id: 0 for one in found}
-        shared = tuple(i for i in each if corrupt(port, family, i) >= SHARED)
+        each = {one.id: (family_of or {}).get(one.model, family) for one in found}
+        shared = tuple(i for i, its in each.items() if corrupt(port, its, i) >= SHARED)
         yield BaudScan(baud, True, found, junk, shared, old)
 
 

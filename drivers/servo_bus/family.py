@@ -192,6 +192,7 @@ class Family:
         speed_units: from steps/s to the register of speed limits; at least 1
         acceleration_units: likewise from steps/s^2, None for no limit
         goals: packets of goals for some servos
+        sync_read: one request asks several servos; else each is asked by itself
         baud_rates: bit/s by the value of the servo's register
         usual_rates: all of them, the usual ones first
         factory_baud: of a new servo
@@ -242,6 +243,7 @@ class Family:
     speed_units: Callable[[float], int]
     acceleration_units: Callable[[float | None], int]
     goals: Callable[[Sequence[int]], GoalPackets]
+    sync_read: bool
     baud_rates: tuple[int, ...]
     usual_rates: tuple[int, ...]
     factory_baud: int
@@ -277,6 +279,19 @@ class Family:
     def __deepcopy__(self, memo: object) -> "Family":
         """Return itself: it never changes, and its codec is a module."""
         return self
+
+    def request(self, ids: Sequence[int], address: int, length: int) -> bytes:
+        """Return a request for the same registers of servos; of one where each is asked alone."""
+        if self.sync_read:
+            return self.codec.sync_read(ids, address, length)
+        (servo_id,) = ids
+        return self.codec.read(servo_id, address, length)
+
+    def asked_together(self, ids: Sequence[int]) -> Iterable[tuple[int, ...]]:
+        """Return which of some servos go into one request."""
+        if not self.sync_read:
+            return [(servo_id,) for servo_id in ids]
+        return [tuple(ids)] if ids else []
 
     def model_name(self, number: int) -> str:
         """Return the name of a model, "model number 350" where it is not known."""

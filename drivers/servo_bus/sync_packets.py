@@ -8,7 +8,7 @@ import struct
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
-from gazerig.drivers.servo_bus.family import Codec
+from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.read_windows import Columns, ReadWindow, Sample
 
 Values = tuple[Any, ...]
@@ -47,13 +47,16 @@ class GroupRead(Protocol):
 
 
 class SyncRead:
-    """A sync read: one status a servo; see ``GroupRead``."""
+    """A sync read, one status a servo; of one servo a plain read where there is no other.
 
-    def __init__(self, codec: Codec, ids: Sequence[int], window: ReadWindow) -> None:
-        self._codec = codec
+    See ``GroupRead``.
+    """
+
+    def __init__(self, family: Family, ids: Sequence[int], window: ReadWindow) -> None:
+        codec = self._codec = family.codec
         self.ids, self.window = tuple(ids), window
         self._size = window.length + codec.STATUS_OVERHEAD
-        self.request = codec.sync_read(ids, window.address, window.length)
+        self.request = family.request(ids, window.address, window.length)
         self.reply_length = self._size * len(ids)
         self._heads = tuple(codec.status_head(i, window.length) for i in ids)
         one = f"{len(codec.status_head(0, 0))}sB{window.layout}{codec.CHECK}"

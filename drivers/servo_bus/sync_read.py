@@ -71,9 +71,9 @@ class Reader:
         roll = self.roll
         if self._together.troubled:
             self._together.calm(now_s)
-        if roll.troubled:
+        if roll.troubled or not self._line.family.sync_read:
             return self._with_care(now_s)
-        group = self._group(roll.group, self._together)
+        group = self._group(roll.group, self._together.next())
         raw, at_s = self._line.exchange(group.request, group.reply_length)
         self._until_s = self._line.whole_s + self._line.most_s
         values = group.whole(raw)
@@ -102,22 +102,30 @@ class Reader:
         Raises:
             BusLost: the port is gone.
         """
-        group = self._group(tuple(ids), self._second)
-        raw, at_s = self._line.exchange(group.request, group.reply_length)
-        raw = self._line.complete(raw, group.missing, self._line.deadline_s)
-        samples = group.pieces(raw).samples
-        if len(samples) < len(group.ids) and not self._line.quiet:
-            self._line.drain(self._line.timeout.seconds)
-        return {servo_id: Heard(sample, at_s) for servo_id, sample in samples.items()}
+        heard: dict[int, Heard] = {}
+        window = self._second.next()
+        for asked in self._line.family.asked_together(ids):
+            group = self._group(asked, window)
+            raw, at_s = self._line.exchange(group.request, group.reply_length)
+            raw = self._line.complete(raw, group.missing, self._line.deadline_s)
+            samples = group.pieces(raw).samples
+            if len(samples) < len(group.ids) and not self._line.quiet:
+                self._line.drain(self._line.timeout.seconds)
+            heard |= {servo_id: Heard(sample, at_s) for servo_id, sample in samples.items()}
+        return heard
 
     def _with_care(self, now_s: float) -> dict[int, Heard]:
         """Read the group, and one of those who are out of it."""
         heard: dict[int, Heard] = {}
         together, due = self.roll.group, self.roll.due(now_s)
         self._until_s = inf
-        self._read(together, heard, now_s, self._together)
+        if together:
+            window = self._together.next()
+            for asked in self._line.family.asked_together(together):
+                if self._line.port.now_s() < self._until_s:
+                    self._read(asked, heard, now_s, self._together, window)
         if due is not None and self._line.port.now_s() < self._until_s:
-            self._read((due,), heard, now_s, self._alone)
+            self._read((due,), heard, now_s, self._alone, self._alone.next())
         return heard
 
     def _read(
@@ -126,10 +134,9 @@ class Reader:
         heard: dict[int, Heard],
         now_s: float,
         turns: WindowSchedule,
+        window: ReadWindow,
     ) -> None:
-        if not ids:
-            return
-        group = self._group(ids, turns)
+        group = self._group(ids, window)
         # Who has been silent already is not worth the reserve.
         reserve = turns is self._together
         raw, at_s = self._line.exchange(group.request, group.reply_length, reserve)
@@ -137,9 +144,8 @@ class Reader:
         self._until_s = min(self._until_s, self._line.whole_s + self._line.most_s)
         self._save(group, raw, at_s, heard, now_s, turns)
 
-    def _group(self, ids: tuple[int, ...], turns: WindowSchedule) -> GroupRead:
+    def _group(self, ids: tuple[int, ...], window: ReadWindow) -> GroupRead:
         """Return the prepared exchange for some servos."""
-        window = turns.next()
         # By identity: hashing ids and windows in every tick costs as much as reading the answer.
         if ids is not self._prepared_ids:
             self._prepared_ids, self._prepared = ids, {}
@@ -158,7 +164,7 @@ class Reader:
             if self._packets is not None:
                 group = self._packets(ids, window)
             else:
-                group = SyncRead(self._line.family.codec, ids, window)
+                group = SyncRead(self._line.family, ids, window)
             self._groups[key] = group
         return group
 
@@ -190,7 +196,7 @@ class Reader:
             left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
             if not left or self._line.port.now_s() >= self._until_s:
                 return
-            group = self._group(left, turns)
+            group = self._group(left, turns.next())
             raw, at_s = self._line.exchange(group.request, group.reply_length)
 
     def _blame(

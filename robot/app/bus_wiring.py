@@ -1,20 +1,19 @@
 """The buses of a rig: which joints are on which, and one bus made of them all."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 from gazerig.config.schema import Rig
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.i2c.port import port_of
 from gazerig.drivers.maestro.bus import MaestroBus
 from gazerig.drivers.multi_bus import MixedBus, Share
 from gazerig.drivers.pca9685.bus import Pca9685Bus
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.servo_models import BUS_KINDS, BusKind
+from gazerig.drivers.servo_bus.params import BusParams
+from gazerig.drivers.servo_families import FAMILY_OF
+from gazerig.drivers.servo_models import BUS_KINDS, SERVOS, BusKind
 from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.control.body import setups
@@ -22,9 +21,15 @@ from gazerig.robot.guardian.guarded_bus import GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan
 
+
+def _smart(port: BusPort, own: Sequence[ServoSetup], params: BusParams) -> ServoBus:
+    """Make the bus of smart servos of one family."""
+    return SmartServoBus(FAMILY_OF[own[0].model], port, own, params)
+
+
 BUSES: Mapping[BusKind, Callable[[BusPort, Sequence[ServoSetup], Any], ServoBus]] = {
-    "dynamixel": partial(SmartServoBus, DYNAMIXEL),
-    "feetech": partial(SmartServoBus, FEETECH),
+    "dynamixel": _smart,
+    "feetech": _smart,
     "maestro": MaestroBus,
     "pca9685": Pca9685Bus,
 }
@@ -135,6 +140,7 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
         board.crc,
         board.channels,
         config.pca9685.addresses,
+        SERVOS[rig.joints[joints_on(rig, name)[0]].model].family,
     )
 
 

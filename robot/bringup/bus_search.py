@@ -24,6 +24,7 @@ from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
 from gazerig.drivers.servo_bus.discovery import Found, scan
+from gazerig.drivers.servo_families import FAMILY_OF
 from gazerig.drivers.servo_models import BUS_KINDS, BusKind
 from gazerig.robot.bringup.servo_families import KINDS
 
@@ -114,7 +115,7 @@ def search(
 def _look(port: BusPort, usb: str, kind: BusKind, baud: int, thorough: bool) -> SearchRound:
     if kind == "maestro":
         return _board(port, usb, baud)
-    (one,) = scan(port, KINDS[kind].family, (baud,), thorough)
+    (one,) = scan(port, KINDS[kind].family, (baud,), thorough, family_of=FAMILY_OF)
     return SearchRound(kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1)
 
 

@@ -8,6 +8,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.feetech import homing
 from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
+from gazerig.drivers.feetech.scs import FEETECH_SCS
 from gazerig.drivers.servo_models import SERVOS
 from gazerig.robot.bringup.servo_family import Driving, ServoKind, Setting
 
@@ -89,8 +90,20 @@ FEETECH = ServoKind(
     set_middle=homing.set_middle,
 )
 
+SCS = FEETECH._replace(
+    title="Feetech SCS",
+    family=FEETECH_SCS,
+    no_reply="is the servo supply on, and its voltage that of the servos (6 V)? is the first "
+    "cable in, and the adaptor's jumper set to USB?",
+    notes=tuple(note.replace("STS", "SCS") for note in FEETECH.notes),
+    driving=None,
+    set_middle=None,
+)
+
 KINDS: dict[str, ServoKind] = {kind.name: kind for kind in (DYNAMIXEL, FEETECH)}
-"""By the name that a rig's YAML gives them."""
+"""By the name that a rig's YAML gives a bus; its servos are searched for as this kind."""
+
+_KIND_OF = {kind.family.name: kind for kind in (*KINDS.values(), SCS)}
 
 
 def kind_of(model: str) -> ServoKind:
@@ -99,7 +112,7 @@ def kind_of(model: str) -> ServoKind:
     Raises:
         SetupError: it is no smart servo.
     """
-    kind = KINDS.get(SERVOS[model].bus)
+    kind = _KIND_OF.get(SERVOS[model].family)
     if kind is None:
         raise SetupError(f"{model} is no servo that answers: name a joint with a smart servo")
     return kind

@@ -53,6 +53,7 @@ class ServoKind(NamedTuple):
     family: what the engine must know of it
     no_reply: what to look at where no servo answers
     notes: what must be known of all of them
+    driving: None where this program does not drive one by itself
     set_middle: makes the present position the middle, None where a kind cannot
     """
 
@@ -61,5 +62,5 @@ class ServoKind(NamedTuple):
     family: Family
     no_reply: str
     notes: tuple[str, ...]
-    driving: Driving
+    driving: Driving | None
     set_middle: Callable[[BusPort, Family, int], int] | None = None

@@ -56,7 +56,13 @@ class SingleServo:
     ) -> None:
         self.who = f"{name} (servo {servo_id})"
         self._kind = kind_of(model)
-        self._family = self._kind.family
+        if self._kind.driving is None:
+            raise SetupError(
+                f"{self.who}: {self._kind.title} servos are not calibrated by this program: turn "
+                "the joint by hand, read its steps with gazerig monitor, and write zero_step, min_deg "
+                "and max_deg into the YAML"
+            )
+        self._driving, self._family = self._kind.driving, self._kind.family
         self.alone = ""
         if self._family.watchdog_unit_s is None:
             self.alone = (
@@ -81,7 +87,7 @@ class SingleServo:
         # A servo may be set to answer questions alone; this takes no answer and ends that.
         self._registers.write_all((self._id,), "status_return_level", self._family.answer_level)
         firmware = self._refuse_another()
-        value, driving = self._value, self._kind.driving
+        value, driving = self._value, self._driving
         self._refuse_errors(value(self._family.error_register))
         low, high = (value(name) for name in LIMITS)
         for setting in driving.settings:
@@ -124,7 +130,7 @@ class SingleServo:
 
     def clear_offset(self) -> int:
         """Set the offset of its position to 0, torque off; return what it was."""
-        register = self._kind.driving.offset
+        register = self._driving.offset
         was = self._value(register)
         if was:
             self._torque_off()
@@ -173,7 +179,7 @@ class SingleServo:
 
     def load(self) -> float:
         """Return the present current as a share of the stall current."""
-        return self._kind.driving.load(self._model, self._value("present_current"))
+        return self._driving.load(self._model, self._value("present_current"))
 
     def enable_torque(self, strength: float, speed_steps_s: float) -> None:
         """Switch the torque on where it is, weak and slow; goals may lead anywhere in the turn.
@@ -214,7 +220,7 @@ class SingleServo:
 
     def _borrow(self, strength: float, speed_steps_s: float) -> None:
         """Let goals lead anywhere in the turn, weak and slow; the stops alone are to be found."""
-        value, driving = self._value, self._kind.driving
+        value, driving = self._value, self._driving
         wanted = {
             **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),
             **driving.gentle(value, strength, speed_steps_s),

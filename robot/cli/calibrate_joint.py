@@ -11,7 +11,7 @@ from gazerig.drivers.i2c.port import port_of
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
-from gazerig.robot.bringup.servo_families import KINDS
+from gazerig.robot.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.calibration.endstop_search import StopSearchParams
 from gazerig.robot.calibration.hobby_access import OneHobby
 from gazerig.robot.calibration.joint_access import SingleJoint
@@ -111,7 +111,11 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
             "stop can be found: leave --by away and steer them yourself"
         )
     able = [kind for kind in KINDS.values() if kind.set_middle is not None]
-    other = [name for name in names if KINDS.get(rig.bus_of(name).kind) not in able]
+    other = [
+        name
+        for name in names
+        if not rig.joints[name].facts.measured or kind_of(rig.joints[name].model).set_middle is None
+    ]
     if how.set_middle and other:
         titles = " and ".join(kind.title for kind in able)
         raise SetupError(

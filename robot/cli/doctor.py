@@ -18,7 +18,7 @@ from gazerig.robot.bringup.doctor.checks import apply_fix
 from gazerig.robot.bringup.doctor.diagnostics import BOARD, Diagnostic, Fix, worst
 from gazerig.robot.bringup.doctor.run import AppliedFix
 from gazerig.robot.bringup.doctor.text import as_plain, grouped, summed_up
-from gazerig.robot.bringup.servo_families import KINDS
+from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.cli import progress as bench
 from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports, setups_on
 from gazerig.robot.cli.progress import JsonOption, console, progress, wipe
@@ -85,7 +85,7 @@ def _examine(rig: Rig, bus: str, line: BusPort) -> list[Diagnostic]:
         board = BOARDS.get(config.kind)
         if board is not None:
             return board(line, config, setups)
-        return checkup.check(line, KINDS[config.kind], setups, config.baud, progress)
+        return checkup.check(line, kind_of(setups[0].model), setups, config.baud, progress)
 
     return checkup.check_all(line, bench.host, behind)
 
@@ -139,7 +139,7 @@ def _apply(rig: Rig, bus: str, line: BusPort, findings: Sequence[Diagnostic]) ->
     def write(one: Fix) -> str:
         if one.servo_id == BOARD:
             return doctor_maestro.apply_fix(line, config.maestro, one)
-        return apply_fix(line, KINDS[config.kind], one)
+        return apply_fix(line, kind_of(setups_on(rig, bus)[0].model), one)
 
     return list(checkup.apply_fixes(write, findings))
 

@@ -16,7 +16,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.serial.port import BusPort
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.bringup.monitor import Monitor, TelemetrySample, as_json
-from gazerig.robot.bringup.servo_families import KINDS
+from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.bringup.telemetry import (
     MaestroTelemetry,
     Pca9685Telemetry,
@@ -24,7 +24,7 @@ from gazerig.robot.bringup.telemetry import (
     Telemetry,
     TelemetryReader,
 )
-from gazerig.robot.cli.ports import MockOption, PortOption, RigPorts, opened, rig_ports
+from gazerig.robot.cli.ports import MockOption, PortOption, RigPorts, opened, rig_ports, setups_on
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, signals
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.joint import JointParams
@@ -84,7 +84,7 @@ def _readers(rig: Rig, wire: RigPorts) -> Iterator[dict[str, TelemetryReader]]:
         readers = {}
         for name in bus_names(rig):
             port, config = ports.enter_context(opened(rig, wire, name)), rig.bus_named(name)
-            kind = KINDS.get(config.kind)
+            kind = None if config.kind in BOARDS else kind_of(setups_on(rig, name)[0].model)
             readers[name] = (
                 BOARDS[config.kind](port, config)
                 if kind is None

@@ -13,9 +13,9 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.bringup import servo_reboot
 from gazerig.robot.bringup.channel_test import sent_home
-from gazerig.robot.bringup.servo_families import KINDS
+from gazerig.robot.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.bringup.servo_family import ServoKind
-from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports
+from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports, setups_on
 from gazerig.robot.cli.progress import YesOption, to_open
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say
@@ -55,7 +55,7 @@ def reboot(
                     if config.kind in BOARDS:
                         BOARDS[config.kind](model, bus, line, yes)
                         continue
-                    kind = KINDS[config.kind]
+                    kind = kind_of(setups_on(model, bus)[0].model)
                     again += [_reboot(line, kind, model, bus, one, yes) for one in ids]
     if any(again):
         raise typer.Exit(FAULT)

@@ -19,11 +19,12 @@ from gazerig.drivers.pca9685.probe import probe
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU, is_i2c
+from gazerig.drivers.servo_families import FAMILY_OF
 from gazerig.drivers.servo_models import BusKind
 from gazerig.robot.bringup.bus_search import RATES, SearchRound, found_of, known_kinds, plan, search
 from gazerig.robot.bringup.doctor.port import name_ports
 from gazerig.robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
-from gazerig.robot.bringup.servo_families import KINDS
+from gazerig.robot.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.cli import progress as bench
 from gazerig.robot.cli.ports import MockOption, rig_ports
 from gazerig.robot.cli.progress import JsonOption, console
@@ -232,8 +233,9 @@ def _show(
     if found:
         table = Table("id", "model", "firmware", "baud", "kind")
         for kind, servo in found:
-            version = KINDS[kind].family.version(servo.firmware)
-            table.add_row(str(servo.id), servo.model, version, str(servo.baud), KINDS[kind].title)
+            made = kind_of(servo.model) if servo.model in FAMILY_OF else KINDS[kind]
+            version = made.family.version(servo.firmware)
+            table.add_row(str(servo.id), servo.model, version, str(servo.baud), made.title)
         out.print(table)
     for one in boards:
         for line in board_words(one):

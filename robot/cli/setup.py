@@ -15,7 +15,7 @@ from gazerig.drivers.types import ServoSetup
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.emulation import CHAINS
 from gazerig.robot.bringup import servo_setup
-from gazerig.robot.bringup.servo_families import KINDS
+from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.bringup.servo_family import ServoKind
 from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports, setups_on
 from gazerig.robot.cli.progress import YesOption, progress, to_open, wipe
@@ -120,7 +120,7 @@ def _chain(task: _Task) -> list[str]:
 
 def _step(task: _Task, one: ServoSetup) -> bool:
     """Set one joint's servo up, again and again until it is done or skipped."""
-    bus, kind, yes = task.bus, KINDS[task.config.kind], task.yes
+    bus, kind, yes = task.bus, kind_of(one.model), task.yes
     # As it comes from the factory.
     spec = ServoSpec(FACTORY_ID, one.model, task.rig.joints[one.name].zero)
     fresh = {bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}

@@ -9,7 +9,7 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
 
 if TYPE_CHECKING:  # a guardian loads no more than one driver
-    from gazerig.drivers.servo_bus.family import Family
+    pass
 
 
 class ReleasePlan(NamedTuple):
@@ -20,6 +20,7 @@ class ReleasePlan(NamedTuple):
     ids: of the servos; channels of a Maestro
     protocol, device, crc, channels: of a Maestro, as in gazerig.drivers.maestro.params
     addresses: of PCA9685 boards
+    family: of smart servos, by its name
     """
 
     kind: BusKind
@@ -31,6 +32,7 @@ class ReleasePlan(NamedTuple):
     crc: bool = False
     channels: int = 12
     addresses: tuple[int, ...] = ()
+    family: str = ""
 
 
 def encode(plans: tuple[ReleasePlan, ...]) -> str:
@@ -53,27 +55,16 @@ def releaser(plan: ReleasePlan) -> Releaser:
     """Return what releases the servos of a plan through a port of its path.
 
     It opens the port and returns the ids that did not confirm; it raises PortError where the
-    port cannot be opened, BusLost where it went away. All that it needs is imported here, and of
-    the drivers no more than one.
+    port cannot be opened, BusLost where it went away. All that it needs is imported here.
     """
     return RELEASERS[plan.kind](plan)
 
 
-def _dynamixel(plan: ReleasePlan) -> Releaser:
-    from gazerig.drivers.dynamixel.family import DYNAMIXEL
-
-    return _smart(plan, DYNAMIXEL)
-
-
-def _feetech(plan: ReleasePlan) -> Releaser:
-    from gazerig.drivers.feetech.family import FEETECH
-
-    return _smart(plan, FEETECH)
-
-
-def _smart(plan: ReleasePlan, family: "Family") -> Releaser:
+def _smart(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.servo_bus.release import disable_torque
+    from gazerig.drivers.servo_families import FAMILIES
 
+    family = FAMILIES[plan.family or plan.kind]
     return lambda port: disable_torque(port, family, plan.baud, plan.ids)
 
 
@@ -94,12 +85,12 @@ def _pca9685(plan: ReleasePlan) -> Releaser:
 
 
 RELEASERS: dict[BusKind, Callable[[ReleasePlan], Releaser]] = {
-    "dynamixel": _dynamixel,
-    "feetech": _feetech,
+    "dynamixel": _smart,
+    "feetech": _smart,
     "maestro": _maestro,
     "pca9685": _pca9685,
 }
-"""By the kind of bus; each imports its own driver alone."""
+"""By the kind of bus; each imports what it needs alone."""
 
 
 def describe(plan: ReleasePlan) -> str:

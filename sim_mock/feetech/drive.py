@@ -23,7 +23,7 @@ from gazerig.sim_mock.feetech.packets import signed
 from gazerig.sim_mock.feetech.tables import PWM, SERVO, STEP, WHEEL
 from gazerig.sim_mock.smart_servo.drive import Drive
 from gazerig.sim_mock.smart_servo.motor import DISABLED, Loop, flicker
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 CURRENT_UNIT_A = CURRENT_UNIT_MA / 1000.0
@@ -73,7 +73,10 @@ class FeetechDrive(Drive):
         self._top = model.no_load_rpm / 60.0 * TURN / 1000.0
         self._current_full = model.stall_current_a / CURRENT_UNIT_A
         self._timed = True
-        super().__init__(memory, model, spec, self._scale)
+        physics, scale = Physics(*spec.physics), self._scale
+        steps = ("upright_steps", "stop_low_steps", "stop_high_steps")
+        here = {name: getattr(physics, name) / scale for name in steps}
+        super().__init__(memory, model, spec._replace(physics=physics._replace(**here)), scale)
 
     def boot(self) -> None:
         """Reset to power-on: torque off, position within one turn."""

@@ -11,7 +11,15 @@ of the SCS0009. Start values marked [A] are assumed, [R] are those that owners r
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
-from gazerig.drivers.feetech.memory_table import BAUD_RATES, HIGHEST_ID, MODELS, FeetechModel
+from gazerig.drivers.feetech.memory_table import (
+    BAUD_RATES,
+    HIGHEST_ID,
+    MODELS,
+    SCS_BAUD_RATES,
+    SCS_MODELS,
+    SCS_STEPS,
+    FeetechModel,
+)
 
 SERVO, WHEEL, PWM, STEP = 0, 1, 2, 3
 """Operating modes (33)."""
@@ -149,36 +157,24 @@ STS = Table(
     highest={5: HIGHEST_ID, 6: len(BAUD_RATES) - 1, 33: STEP},
 )
 
-_SCS_STEPS = 1024
-_SCS_BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 57_600, 38_400, 19_200)
 
-
-def _scs(
-    name: str, number: int, travel_deg: float, stall_nm: float, stall_a: float, rpm: float
-) -> tuple[FeetechModel, Table]:
-    """Return a model that is rated at 6 V, and its registers."""
-    turn_steps = _SCS_STEPS * 360.0 / travel_deg
-    model = FeetechModel(name, number, round(turn_steps), 70, 40, 80, stall_nm, 6.0, stall_a, rpm)
-    table = Table(
+def _scs(travel_deg: float) -> Table:
+    """Return the registers of a model."""
+    return Table(
         kept=_SCS_KEPT,
         ram=(*_RAM, FeetechRegister("lock", 48, initial=1)),
         lock_at=48,
-        highest={5: HIGHEST_ID, 6: len(_SCS_BAUD_RATES) - 1},
+        highest={5: HIGHEST_ID, 6: len(SCS_BAUD_RATES) - 1},
         absent=_ABSENT_FROM_SCS,
         order="big",
-        turn_steps=turn_steps,
-        last_step=_SCS_STEPS - 1,
+        turn_steps=SCS_STEPS * 360.0 / travel_deg,
+        last_step=SCS_STEPS - 1,
         sync_read=False,
-        baud_rates=_SCS_BAUD_RATES,
+        baud_rates=SCS_BAUD_RATES,
     )
-    return model, table
 
 
-SCS = {
-    "scs0009": _scs("scs0009", 1284, 300.0, 0.226, 1.0, 100.0),
-    # Number and stall current of the SCS15 are assumed [A].
-    "scs15": _scs("scs15", 1295, 200.0, 1.47, 2.0, 62.5),
-}
+SCS = {"scs0009": _scs(300.0), "scs15": _scs(200.0)}
 
 
 def model_and_table(model: str) -> tuple[FeetechModel, Table]:
@@ -188,7 +184,7 @@ def model_and_table(model: str) -> tuple[FeetechModel, Table]:
         ValueError: there is no such model.
     """
     if model in SCS:
-        return SCS[model]
+        return SCS_MODELS[model], SCS[model]
     if model not in MODELS:
         raise ValueError(f"model {model!r}: Feetech servos are {', '.join((*MODELS, *SCS))}")
     return MODELS[model], STS

@@ -27,7 +27,9 @@ def visit(
     Raises:
         BusLost: the port is gone.
     """
-    return examine(take(Registers(port, kind.family), CHECKS[kind.name], setup, found, corrupt))
+    return examine(
+        take(Registers(port, kind.family), CHECKS[kind.family.name], setup, found, corrupt)
+    )
 
 
 def take(

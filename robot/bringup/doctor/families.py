@@ -4,6 +4,7 @@ Sources: ROBOTIS e-Manual, X series; Feetech, memory table STS3215.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from gazerig.drivers.dynamixel import control_table as dynamixel
 from gazerig.drivers.feetech import memory_table as feetech
@@ -13,7 +14,7 @@ from gazerig.robot.bringup.doctor.subject import (
     ServoChecks,
     WantedSetting,
 )
-from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH
+from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH, SCS
 from gazerig.robot.bringup.servo_family import ServoKind
 
 COMMON = (
@@ -201,5 +202,15 @@ _FEETECH = ServoChecks(
     firmware_notes=lambda model: (),
 )  # fmt: skip
 
-CHECKS: dict[str, ServoChecks] = {one.kind.name: one for one in (_DYNAMIXEL, _FEETECH)}
-"""By the name that a rig's YAML gives a kind."""
+_SCS = replace(
+    _FEETECH,
+    kind=SCS,
+    registers=tuple(name for name in _FEETECH.registers if name in SCS.family.registers),
+    wanted=tuple(one for one in _FEETECH.wanted if one.register in SCS.family.registers),
+    protection=_FEETECH.protection._replace(
+        errors={bit: feetech.STATUS_ERRORS[bit] for bit in (0x04, 0x20)}
+    ),
+)
+
+CHECKS: dict[str, ServoChecks] = {one.kind.family.name: one for one in (_DYNAMIXEL, _FEETECH, _SCS)}
+"""By the name of the family."""

@@ -1,0 +1,120 @@
+"""Feetech SCS servos as a family of the servo bus: the small servos of many little heads.
+
+They speak the packets of the STS series with the high byte of two first. Their position comes from
+a potentiometer of 1024 steps over less than a turn, so no position is ambiguous. They have neither
+sync read (each is asked by itself), nor an offset, nor a torque limit that is not kept, nor a
+present current. What is marked [A] is assumed: no public document tells.
+Sources: Feetech, SCSCL of its SDK (addresses); rustypot's table of the SCS0009.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from gazerig.drivers.feetech.family import FEETECH, SIGN_BITS, wanted_settings
+from gazerig.drivers.feetech.memory_table import (
+    REGISTERS,
+    SCS_BAUD_RATES,
+    SCS_MODELS,
+    SCS_STEPS,
+    TORQUE_FULL,
+    Register,
+)
+from gazerig.drivers.feetech.params import FeetechParams
+from gazerig.drivers.feetech.protocol import GoalWrite
+from gazerig.drivers.servo_bus.family import Arming
+from gazerig.drivers.servo_bus.read_plan import ReadPlan
+from gazerig.drivers.servo_bus.read_windows import ReadWindow, WindowSchedule
+
+if TYPE_CHECKING:  # the guardian starts without numpy
+    from gazerig.drivers.types import ServoSetup
+
+_ABSENT = {
+    *("protection_current", "angular_resolution", "position_offset", "operating_mode"),
+    *("velocity_p_gain", "velocity_i_gain", "overcurrent_time", "torque_limit", "present_current"),
+    *("velocity_unit_factor", "max_acceleration", "acceleration_factor", "max_velocity_limit"),
+    *("moving_threshold", "dts", "hts", "phase"),
+}
+_ELSEWHERE = {"protective_torque": 37, "protection_time": 38, "overload_torque": 39, "lock": 48}
+_OTHERWISE: dict[str, dict[str, Any]] = {
+    "baud_rate": {"high": len(SCS_BAUD_RATES) - 1},
+    "min_position_limit": {"high": SCS_STEPS - 1},
+    "max_position_limit": {"initial": SCS_STEPS - 1, "high": SCS_STEPS - 1},
+    "unloading_condition": {"initial": 0x24},  # [A]: overheating, overload
+}
+
+SCS_REGISTERS: dict[str, Register] = {
+    name: register._replace(
+        address=_ELSEWHERE.get(name, register.address), order="big", **_OTHERWISE.get(name, {})
+    )
+    for name, register in REGISTERS.items()
+    if name not in _ABSENT
+}
+"""Registers by name."""
+
+_SENSED_AT, _ARMED_AT, _END = 56, 40, 67
+
+
+class ScsGoalWrite(GoalWrite):
+    """Builds the packets of goals, high byte first."""
+
+    ORDER = ">"
+
+
+def window(address: int) -> ReadWindow:
+    """Return a window up to Moving (66).
+
+    address: 56 or below; from 40 or below the torque is told too
+    """
+    armed = address <= _ARMED_AT
+    pad = (_ARMED_AT if armed else _SENSED_AT) - address
+    layout = f"{pad}x" + ("B15x" if armed else "") + "HHHBBxBx"
+    fields = ("position", "velocity", "effort", "voltage", "temperature", "status")
+    told = ("torque", *fields) if armed else fields
+    return ReadWindow(address, _END - address, layout, told, ">", tuple(SIGN_BITS.items()))
+
+
+def read_plan(
+    setups: "Sequence[ServoSetup]", params: FeetechParams, firmware: Mapping[int, int] | None
+) -> ReadPlan:
+    """Return how servos are read: as STS servos, but one by one."""
+    armed, sensed = window(_ARMED_AT), (window(_SENSED_AT), window(_SENSED_AT - 1))
+    usual = [armed, *sensed * params.torque_every][: params.torque_every]
+    alone = [window(_ARMED_AT - more) for more in range(1, 11)]
+    second = [window(_SENSED_AT - more) for more in range(7, 11)]
+    return ReadPlan(
+        WindowSchedule(usual, [window(_SENSED_AT - more) for more in range(2, 7)]),
+        WindowSchedule(alone, alone),
+        WindowSchedule(second, second),
+        armed=armed,
+    )
+
+
+def scs_settings(setup: "ServoSetup") -> dict[str, int]:
+    """Return the registers a servo must have; its share of full drive is Max Torque (16), kept."""
+    wanted = {name: v for name, v in wanted_settings(setup).items() if name in SCS_REGISTERS}
+    if setup.strength is not None:
+        wanted["max_torque"] = round(setup.strength * TORQUE_FULL)
+    return wanted
+
+
+FEETECH_SCS = replace(
+    FEETECH,
+    name="feetech scs",
+    registers=SCS_REGISTERS,
+    models=SCS_MODELS,
+    steps_per_turn=SCS_MODELS["scs0009"].steps_per_turn,
+    acceleration_units=lambda accel_steps_s2: 0,  # [A]: 41 is not documented
+    goals=ScsGoalWrite,
+    sync_read=False,
+    baud_rates=SCS_BAUD_RATES,
+    usual_rates=SCS_BAUD_RATES,
+    read_plan=read_plan,
+    armed=lambda setup: {},
+    spans=(("return_delay_time", "position_i_gain"), ("lock", "lock")),
+    wanted=scs_settings,
+    torque_faults=0x24,
+    single_turn=False,
+    telling=("present_position", "moving"),
+    arming=Arming("acceleration", speed=False),
+)

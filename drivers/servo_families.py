@@ -1,0 +1,15 @@
+"""Every family of smart servos, by its name and by the models in it."""
+
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.scs import FEETECH_SCS
+from gazerig.drivers.servo_bus.family import Family
+from gazerig.drivers.servo_models import SERVOS
+
+FAMILIES: dict[str, Family] = {one.name: one for one in (DYNAMIXEL, FEETECH, FEETECH_SCS)}
+"""By name."""
+
+FAMILY_OF: dict[str, Family] = {
+    model: FAMILIES[facts.family] for model, facts in SERVOS.items() if facts.family
+}
+"""By the name that a rig's YAML gives a model."""

@@ -1,0 +1,129 @@
+"""A rig of Feetech SCS servos: found, examined, set up, moved, run and let go like any other."""
+
+import json
+
+import pytest
+from command_line import invoked
+from scs_rig import scs_text
+from served_rigs import hide_real_ports, served
+
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig
+from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.feetech.scs import FEETECH_SCS, SCS_REGISTERS
+from gazerig.drivers.servo_bus.discovery import corrupt, scan_ids
+from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.servo_families import FAMILY_OF
+from gazerig.drivers.servo_models import SERVOS
+from gazerig.robot.guardian.release_plan import ReleasePlan, decode, encode, releaser
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+
+@pytest.fixture(autouse=True)
+def no_real_ports(monkeypatch, tmp_path):
+    hide_real_ports(monkeypatch, tmp_path)
+
+
+@pytest.fixture
+def rig(tmp_path):
+    path = tmp_path / "scs.yaml"
+    path.write_text(scs_text(), encoding="utf-8")
+    return str(path)
+
+
+class Bench:
+    """Two SCS servos and an STS one on a line, which only bring-up ever meets."""
+
+    def __init__(self):
+        self.now_s = 0.0
+        specs = [ServoSpec(1, "scs0009", 511), ServoSpec(2, "scs15", 300), ServoSpec(3, "sts3215")]
+        self.chain = build_feetech(specs, lambda: self.now_s)
+        self.port = InProcessPort(self.chain, sleep_until=self.sleep_until)
+        self.port.setBaudRate(1_000_000)
+
+    def sleep_until(self, t_s):
+        self.now_s = max(self.now_s, t_s)
+
+
+def test_both_series_are_known_by_one_search():
+    bench = Bench()
+    found, _ = scan_ids(bench.port, FEETECH, 1_000_000, ids=range(5))
+    assert [(one.id, one.number, one.model) for one in found] == [
+        (1, 1284, "scs0009"), (2, 1295, "scs15"), (3, 777, "sts3215"),
+    ]  # fmt: skip
+    assert corrupt(bench.port, FEETECH_SCS, 1) == 0
+    bench.chain.faults.command("collide 1")
+    assert corrupt(bench.port, FEETECH_SCS, 1) >= 2
+
+
+def test_registers_have_the_high_byte_first_and_their_own_lock():
+    bench = Bench()
+    registers = Registers(bench.port, FEETECH_SCS)
+    assert registers.read(2, "present_position") == 300
+    assert registers.write_lasting(1, "max_position_limit", 900)
+    bench.chain[1].restart()
+    bench.now_s += 1.0
+    assert registers.read(1, "max_position_limit") == 900
+    assert registers.read(1, "lock") == 1
+    assert (SCS_REGISTERS["lock"].address, "torque_limit" in SCS_REGISTERS) == (48, False)
+
+
+def test_the_guardian_lets_go_of_servos_without_sync_read():
+    bench = Bench()
+    for servo_id in (1, 2):
+        assert Registers(bench.port, FEETECH_SCS).write(servo_id, "torque_enable", 1)
+    plan = ReleasePlan("feetech", "", 1_000_000, (1, 2), family="feetech scs")
+    (again,) = decode(encode((plan,)))
+    assert releaser(again)(bench.port) == ()
+    assert [bench.chain[i].read(40, 1) for i in (1, 2)] == [b"\x00", b"\x00"]
+
+
+def test_models_say_where_their_steps_end():
+    facts = SERVOS["scs0009"]
+    assert (facts.bus, facts.lowest, facts.highest, facts.middle) == ("feetech", 0, 1023, 512)
+    assert facts.steps_per_turn == 1229
+    assert FAMILY_OF["scs15"] is FEETECH_SCS and FAMILY_OF["sts3215"] is FEETECH
+
+
+def test_a_place_beyond_the_potentiometer_and_a_mixture_of_series_are_refused(tmp_path):
+    path = tmp_path / "scs.yaml"
+    path.write_text(scs_text().replace("zero_step: 512", "zero_step: 1000"), encoding="utf-8")
+    with pytest.raises(ConfigError, match="1023"):
+        load_rig(str(path))
+    path.write_text(scs_text(neck="sts3215"), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"a sts3215 cannot be on one bus with a scs0009"):
+        load_rig(str(path))
+
+
+def test_it_is_scanned_for_examined_and_mended(rig):
+    with served(rig) as (given, paths, command):
+        code, out, _ = invoked("scan", "--port", paths[""], "--kind", "feetech", "--json")
+        servos = json.loads(out)["servos"]
+        assert code == 0 and [s["model"] for s in servos[:7]] == ["scs0009"] * 6 + ["scs15"]
+        code, out, _ = invoked("doctor", rig, "--port", given)
+        assert "Return Delay Time 250" in out and "an SCS has no bus watchdog" in out
+        code, out, _ = invoked("doctor", rig, "--port", given, "--fix")
+        assert "its own position limits" in out
+        code, out, _ = invoked("doctor", rig, "--port", given)
+        assert code == 0 and "Return Delay Time" not in out and "own position limits" not in out
+        command("overload 7", "")
+        code, out, _ = invoked("doctor", rig, "--port", given)
+        assert code != 0 and "overload" in out
+
+
+def test_it_is_set_up_jogged_watched_and_run(rig):
+    code, out, err = invoked("setup", rig, "--mock", "--yes", "--joint", "neck_yaw")
+    assert code == 0 and "id 1 -> 7" in out + err
+    code, out, _ = invoked("monitor", rig, "--mock", "--once")
+    assert code == 0 and "left_eye_pan" in out and "0 of 9 unanswered" in out
+    code, out, err = invoked("calibrate", rig, "--mock", "--joint", "neck_yaw")
+    assert code != 0 and "read its steps with gazerig monitor" in out + err
+    code, out, err = invoked("jog", rig, "neck_yaw", "20", "--mock")
+    assert code == 0 and "arrived" in out + err
+    code, out, err = invoked(
+        "run", rig, "--mock", "--fast", "--no-page", "--seconds", "4", "--summary", "-"
+    )
+    assert code == 0 and "parked, torque off" in out + err
+    assert json.loads(out[out.index("{") :])["bus"]["errors"] == {}
