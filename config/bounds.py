@@ -37,7 +37,7 @@ _TURNS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # left to rig
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Shape:
-    """What may stand at one place of a file.
+    """What may stand at one position in a file.
 
     inner: shape of the items of a list or mapping
     params: the dataclass, for form "params"
@@ -57,8 +57,8 @@ class Shape:
     says: str = ""
 
 
-def judge(into: type[T], data: object) -> tuple[T | None, list[ErrorDetails]]:
-    """Turn plain values into the frozen dataclass, or list every error.
+def validate(into: type[T], data: object) -> tuple[T | None, list[ErrorDetails]]:
+    """Return the frozen dataclass that plain values make, or None and every error.
 
     ``data`` holds dicts, tuples, str, int, float, bool and None only.
     """
@@ -68,8 +68,10 @@ def judge(into: type[T], data: object) -> tuple[T | None, list[ErrorDetails]]:
         return None, [one for one in error.errors(include_url=False) if not _miscounted(one)]
 
 
-def filled(into: type[T], data: object, faulty: Container[tuple[Step, ...]], high: bool) -> T:
-    """Make the dataclass with stand-ins at the faulty paths, without its own rules.
+def with_stand_ins(
+    into: type[T], data: object, faulty: Container[tuple[Step, ...]], high: bool
+) -> T:
+    """Return the dataclass with stand-ins at the faulty paths, its own rules unchecked.
 
     A stand-in lies at the low or the high end of what may stand there. Lists and
     mappings have none: reading such a field raises AttributeError.
@@ -79,7 +81,7 @@ def filled(into: type[T], data: object, faulty: Container[tuple[Step, ...]], hig
 
 @cache
 def model_of(params: type) -> type[BaseModel]:
-    """Build the strict pydantic model of a Params dataclass.
+    """Return the strict pydantic model of a Params dataclass.
 
     Raises:
         TypeError: a field is declared in a way that this module does not know.
@@ -162,7 +164,7 @@ def _single(form: Form, bounds: Bounds | None, place: str) -> Shape:
 
 
 def _annotation(shape: Shape) -> Any:
-    """Write a shape as a pydantic type."""
+    """Return a shape as a pydantic type."""
     kind: Any
     match shape:
         case Shape(form="number"):
@@ -188,7 +190,7 @@ def _annotation(shape: Shape) -> Any:
 
 
 def _frozen(params: type) -> Any:
-    """Write a dataclass as a pydantic type whose value is the dataclass itself."""
+    """Return a dataclass as a pydantic type whose value is the dataclass itself."""
     return Annotated[model_of(params), WrapValidator(partial(_build, params))]
 
 
@@ -221,7 +223,7 @@ def _exact(shape: Shape, value: object) -> object:
 
 
 def _build(params: type, value: object, validate: Callable[[object], BaseModel]) -> object:
-    """Make the dataclass; its ``__post_init__`` speaks through ValueError."""
+    """Return the dataclass; its ``__post_init__`` may raise ValueError."""
     if isinstance(value, params):  # a default made by the declaring dataclass
         return value
     model = validate(value)
@@ -230,23 +232,23 @@ def _build(params: type, value: object, validate: Callable[[object], BaseModel])
 
 @cache
 def _adapter(params: type) -> TypeAdapter[Any]:
-    """Keep the validator of a whole file."""
+    """Return the validator of a whole file."""
     return TypeAdapter(_frozen(params))
 
 
 def _first_line(params: type) -> str:
-    """Take the first docstring line, leaving out the one dataclass makes up."""
+    """Return the first docstring line, "" where dataclass made it up."""
     doc = (params.__doc__ or "").strip()
     return "" if doc.startswith(f"{params.__name__}(") else doc.partition("\n")[0]
 
 
 def _described(shape: Shape) -> str:
-    """Say what a value is, with its unit, for an editor's hover text."""
+    """Return the description of a value with its unit, for an editor's hover text."""
     return f"{shape.says} [{shape.unit}]".strip() if shape.unit else shape.says
 
 
 def _miscounted(details: ErrorDetails) -> bool:
-    """Tell a length complaint that only counts the items that were right."""
+    """Return whether an error of length only counts the items that were right."""
     return details["type"] in ("too_short", "too_long") and (
         len(details["input"]) != details["ctx"]["actual_length"]
     )
@@ -258,7 +260,7 @@ _LEFT_OUT: Any = object()
 def _fill(
     shape: Shape, data: Any, path: tuple[Step, ...], faulty: Container[tuple[Step, ...]], high: bool
 ) -> Any:
-    """Build what stands at a path, all but its faulty parts from ``data``."""
+    """Return what stands at a path, all but its faulty parts from ``data``."""
     if path in faulty:
         return _stand_in(shape, high)
     if data is None:
@@ -309,7 +311,7 @@ def _default(declared: dataclasses.Field[Any]) -> Any:
 
 
 def _bare(params: type, parts: Mapping[str, Any]) -> Any:
-    """Make a dataclass without its ``__post_init__``."""
+    """Return a dataclass made without its ``__post_init__``."""
     made: object = object.__new__(params)
     for name, part in parts.items():
         if part is not _LEFT_OUT:

@@ -1,4 +1,4 @@
-"""One YAML file to entries that know their lines, strictly, with every fault of the text."""
+"""One YAML file as entries that know their lines, with every fault of the text."""
 
 import re
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -15,7 +15,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from ruamel.yaml.reader import ReaderError
 
 from gazerig.config.bounds import Step
-from gazerig.config.export import closest, shown
+from gazerig.config.export import abbreviated, suggestion
 from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
 
 Scalar = str | int | float | bool | None
@@ -27,7 +27,7 @@ _QUOTED = re.compile(r" *('[^']*'|\"[^\"]*\")")  # what a parser shows of the te
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class ConfigFault:
     """One thing to change in a file.
 
     line, column: from 1, None where the file could not be read at all
@@ -43,16 +43,16 @@ class Fault:
     column: int | None = None
 
     def __str__(self) -> str:
-        """Write ``file:line: key: rule`` on one line, whatever the key holds."""
+        """Return ``file:line: key: rule`` on one line, whatever the key holds."""
         place = [self.file, *(str(n) for n in (self.line, self.column) if n is not None)]
         words = ": ".join(part for part in (":".join(place), self.key, self.rule) if part)
         return " ".join(words.splitlines())
 
 
 class ConfigError(Exception):
-    """A configuration cannot be used; the message lists every fault, one a line."""
+    """An unusable configuration; the message lists every fault, one a line."""
 
-    def __init__(self, faults: Iterable[Fault]) -> None:
+    def __init__(self, faults: Iterable[ConfigFault]) -> None:
         """Keep the faults; there is at least one."""
         self.faults = tuple(faults)
         super().__init__("\n".join(map(str, self.faults)))
@@ -60,7 +60,7 @@ class ConfigError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A value and the place it stands at; mappings and lists hold entries."""
+    """A value with its file and line; mappings and lists hold entries."""
 
     value: "Scalar | dict[str, Entry] | tuple[Entry, ...]"
     file: str
@@ -89,8 +89,10 @@ class Entry:
         return entry
 
 
-def read(path: Path, faults: list[Fault], known: Collection[str] = ()) -> tuple[str, Entry | None]:
-    """Read a file; no entry where nothing of it can be used.
+def read(
+    path: Path, faults: list[ConfigFault], known: Collection[str] = ()
+) -> tuple[str, Entry | None]:
+    """Return a file's text and its top entry, None where nothing of it can be used.
 
     known: keys of such a file's top level. What has none of them is something else, and
         nothing of it is shown: anybody who may choose a character could read it.
@@ -100,13 +102,13 @@ def read(path: Path, faults: list[Fault], known: Collection[str] = ()) -> tuple[
         text = read_limited(path, _LARGEST).decode("utf-8-sig")
         node = _composed(text)
     except OSError as error:
-        faults.append(Fault(file, None, "", "", _unreadable(path, error)))
+        faults.append(ConfigFault(file, None, "", "", _unreadable(path, error)))
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         rule = f"is not UTF-8 text (byte 0x{error.object[error.start]:02x}); save it as UTF-8"
-        faults.append(Fault(file, line, "", "", rule))
+        faults.append(ConfigFault(file, line, "", "", rule))
     except RecursionError:
-        faults.append(Fault(file, None, "", "", _TOO_DEEP))
+        faults.append(ConfigFault(file, None, "", "", _TOO_DEEP))
     except (YAMLError, ValueError, ArithmeticError, LookupError) as error:
         # ruamel lets others out: characters past U+10FFFF, "%YAML 9.9"
         faults.append(_syntax(file, text, error))
@@ -114,12 +116,12 @@ def read(path: Path, faults: list[Fault], known: Collection[str] = ()) -> tuple[
         if isinstance(node, MappingNode):
             if known and not _has_one_of(node, known):
                 rule = f"is no such configuration: none of its keys is one of {', '.join(known)}"
-                faults.append(Fault(file, _line(node), "", "", rule))
+                faults.append(ConfigFault(file, _line(node), "", "", rule))
                 return text, None
             return text, _Reader(file, faults).whole(node)
         rule = "is empty" if node is None else "the top level is no mapping"
         line = 1 if node is None else _line(node)
-        faults.append(Fault(file, line, "", "", f"{rule}; write 'key: value' lines"))
+        faults.append(ConfigFault(file, line, "", "", f"{rule}; write 'key: value' lines"))
     return text, None
 
 
@@ -134,7 +136,7 @@ class _TooMany(MarkedYAMLError):
 
 
 class _BoundedComposer(Composer):
-    """Composes so many nodes and no more: all the time of loading goes into them."""
+    """A composer with a limit of nodes: all the time of loading goes into them."""
 
     _composed = 0
 
@@ -147,7 +149,7 @@ class _BoundedComposer(Composer):
 
 @lru_cache(maxsize=16)
 def _composed(text: str) -> Node | None:
-    """Parse YAML as far as nodes, which know their lines and are only read.
+    """Return YAML parsed as far as nodes, which know their lines and are only read.
 
     The parser takes nearly all the time of loading, and a rig loads the same layers again
     with each tuning, saving and checking.
@@ -161,11 +163,11 @@ def _composed(text: str) -> Node | None:
 
 
 def _unreadable(path: Path, error: OSError) -> str:
-    """Say why a file cannot be opened, and the cure."""
+    """Return why a file cannot be opened, and the remedy."""
     match error:
         case FileNotFoundError():
             beside = [p.name for p in path.parent.glob("*.yaml")] if path.parent.is_dir() else []
-            return f"no such file{closest(path.name, beside) or ';'} check the name"
+            return f"no such file{suggestion(path.name, beside) or ';'} check the name"
         case IsADirectoryError():
             return "is a directory; name a file in it"
         case PermissionError():
@@ -175,29 +177,31 @@ def _unreadable(path: Path, error: OSError) -> str:
     return f"cannot be read ({error.strerror}); check the path"
 
 
-def _syntax(file: str, text: str, error: Exception) -> Fault:
-    """Say where the text stops being YAML."""
+def _syntax(file: str, text: str, error: Exception) -> ConfigFault:
+    """Return the fault of a text that is not YAML, with its position."""
     if isinstance(error, ReaderError):
         before = text[: error.position]
         column = len(before) - before.rfind("\n")
         code = f"U+{ord(text[error.position]):04X}"
         rule = f"not valid YAML: character {code} is not allowed; take it out"
-        return Fault(file, before.count("\n") + 1, "", "", rule, column)
+        return ConfigFault(file, before.count("\n") + 1, "", "", rule, column)
     if not isinstance(error, MarkedYAMLError) or error.problem_mark is None:
         words = _unquoted(" ".join(str(error).split()))
-        return Fault(file, None, "", "", f"not valid YAML: {words}")
+        return ConfigFault(file, None, "", "", f"not valid YAML: {words}")
     mark = error.problem_mark
     if isinstance(error, _TooMany):
-        return Fault(file, mark.line + 1, "", "", _TOO_MANY)
+        return ConfigFault(file, mark.line + 1, "", "", _TOO_MANY)
     words = _unquoted(", ".join(filter(None, (error.context, error.problem))))
     if "max_depth" in words:
-        return Fault(file, mark.line + 1, "", "", _TOO_DEEP, mark.column + 1)
+        return ConfigFault(file, mark.line + 1, "", "", _TOO_DEEP, mark.column + 1)
     cure = "; indent with spaces" if "'\\t'" in words else "; check this line and the one above"
-    return Fault(file, mark.line + 1, "", "", f"not valid YAML: {words}{cure}", mark.column + 1)
+    return ConfigFault(
+        file, mark.line + 1, "", "", f"not valid YAML: {words}{cure}", mark.column + 1
+    )
 
 
 def _unquoted(words: str) -> str:
-    """Leave out what the parser quotes of a text that may be no configuration at all."""
+    """Return a parser's message without what it quotes of the text."""
     kept = ("' '", "'\\t'")  # one character, or a parser's own name for what it met
     return _QUOTED.sub(
         lambda m: m[0] if len(m[1]) == 3 or m[1] in kept or m[1][1] == "<" else "", words
@@ -210,14 +214,14 @@ _TOO_MANY = f"holds more than {_VALUES} values; write less"
 
 
 def _line(node: Node) -> int:
-    """Count a node's line from 1."""
+    """Return a node's line, from 1."""
     return int(node.start_mark.line) + 1
 
 
 class _Reader:
-    """Turns the nodes of one file into entries and notes what a file may not hold."""
+    """Converts the nodes of one file into entries and records what a file may not hold."""
 
-    def __init__(self, file: str, faults: list[Fault]) -> None:
+    def __init__(self, file: str, faults: list[ConfigFault]) -> None:
         """Remember the file and where its faults go."""
         self._file = file
         self._faults = faults
@@ -225,12 +229,12 @@ class _Reader:
         self._endless = False
 
     def whole(self, node: MappingNode) -> Entry | None:
-        """Turn the top node into an entry, or None where it has no end or no meaning."""
+        """Return the top node as an entry, None where it is too deep, too large or no mapping."""
         root = self._entry(node, _line(node), ())
         return root if isinstance(root.value, dict) and not self._endless else None
 
     def _entry(self, node: Node, line: int, path: tuple[Step, ...]) -> Entry:
-        """Turn a node into an entry."""
+        """Return a node as an entry."""
         self._values += 1
         if self._endless or len(path) > _DEPTH or self._values > _VALUES:
             if not self._endless:
@@ -249,7 +253,7 @@ class _Reader:
         return Entry(tuple(items), self._file, line)
 
     def _mapping(self, node: MappingNode, path: tuple[Step, ...]) -> dict[str, Entry]:
-        """Read the entries of a mapping, each under the line of its key."""
+        """Return the entries of a mapping, each with the line of its key."""
         entries: dict[str, Entry] = {}
         for key, value in node.value:
             line = _line(key)
@@ -263,20 +267,20 @@ class _Reader:
         return entries
 
     def _note(self, line: int, path: tuple[Step, ...], rule: str) -> None:
-        """Note a fault."""
-        self._faults.append(Fault(self._file, line, ".".join(map(str, path)), "", rule))
+        """Record a fault."""
+        self._faults.append(ConfigFault(self._file, line, ".".join(map(str, path)), "", rule))
 
 
 def _bad_key(key: Node) -> str:
-    """Say why a key is none."""
+    """Return why a key is not accepted."""
     if str(key.tag) == f"{_TAG}merge":
         return "merge keys (<<) are not read; write the keys out"
-    name = shown(key.value) if isinstance(key, ScalarNode) else "this"
+    name = abbreviated(key.value) if isinstance(key, ScalarNode) else "this"
     return f"key {name} is not text; put it in quotes"
 
 
 def _whole(text: str) -> int | str:
-    """Read an integer of YAML 1.2: decimal, 0o or 0x; what is no servo's number stays text."""
+    """Return an integer of YAML 1.2 (decimal, 0o, 0x); one of 40 digits or more stays text."""
     digits = text.replace("_", "")
     for base in (0, 10):  # 10: "007" is 7
         try:
@@ -287,7 +291,7 @@ def _whole(text: str) -> int | str:
 
 
 def _real(text: str) -> float | str:
-    """Read a float of YAML 1.2, .inf and .nan among them."""
+    """Return a float of YAML 1.2, .inf and .nan among them."""
     try:
         return float(text.replace("_", "").lower().replace(".inf", "inf").replace(".nan", "nan"))
     except ValueError:

@@ -1,4 +1,4 @@
-"""What a Params dataclass tells the outside: a schema to editors, words to people."""
+"""JSON Schema of a Params dataclass, and its errors as text for people."""
 
 import difflib
 import reprlib
@@ -21,8 +21,8 @@ _TYPE_WORDS: dict[type, str] = {
 }
 
 
-class Complaint(NamedTuple):
-    """One fault in plain values: where, what stands there, and the rule in words."""
+class Violation(NamedTuple):
+    """One error in plain values: path, value and the rule as text."""
 
     path: tuple[Step, ...]
     value: str
@@ -38,23 +38,23 @@ def json_schema(into: type) -> dict[str, Any]:
     return {"$schema": DIALECT, **model_of(into).model_json_schema()}
 
 
-def complaint(into: type, details: ErrorDetails) -> Complaint:
-    """Put one pydantic error into words."""
+def violation(into: type, details: ErrorDetails) -> Violation:
+    """Return one pydantic error as text for people."""
     root = Shape("params", params=into)
     path = details["loc"]
     if path[-1:] == ("[key]",):  # of a mapping's key, not of what it holds
-        return Complaint(path[:-1], "", _rule(Shape("text"), details))
+        return Violation(path[:-1], "", _rule(Shape("text"), details))
     if details["type"] == "extra_forbidden":
-        return Complaint(path, shown(details["input"]), _unknown(_at(root, path[:-1]), path))
+        return Violation(path, abbreviated(details["input"]), _unknown(_at(root, path[:-1]), path))
     shape = _at(root, path)
     if details["type"] == "missing":
         says = f" ({shape.says})" if shape.says else ""
-        return Complaint(path, "", f"missing; wanted {wanted(shape)}{says}")
-    return Complaint(path, shown(details["input"]), _rule(shape, details))
+        return Violation(path, "", f"missing; wanted {expected(shape)}{says}")
+    return Violation(path, abbreviated(details["input"]), _rule(shape, details))
 
 
-def wanted(shape: Shape) -> str:
-    """Say what may stand at a place."""
+def expected(shape: Shape) -> str:
+    """Return what may stand at a position, as text."""
     match shape:
         case Shape(form="number"):
             text = f"a number{_range(shape)}"
@@ -66,9 +66,9 @@ def wanted(shape: Shape) -> str:
             text = f"one of {', '.join(map(repr, shape.choices))}"
         case Shape(form="list", inner=Shape() as inner):
             count = f" of {shape.length}" if shape.length is not None else ""
-            text = f"a list{count}, each {wanted(inner)}"
+            text = f"a list{count}, each {expected(inner)}"
         case Shape(form="mapping", inner=Shape() as inner):
-            text = f"a mapping, each key with {wanted(inner)}"
+            text = f"a mapping, each key with {expected(inner)}"
         case Shape(params=type() as params):
             text = f"a mapping with the keys {', '.join(shapes_of(params))}"
         case _:
@@ -76,14 +76,14 @@ def wanted(shape: Shape) -> str:
     return f"{text} or null" if shape.optional else text
 
 
-def closest(word: str, words: Iterable[str]) -> str:
-    """Ask "; did you mean 'x'?" where a known word is near, else say nothing."""
+def suggestion(word: str, words: Iterable[str]) -> str:
+    """Return "; did you mean 'x'?" where a known word is similar, else ""."""
     near = difflib.get_close_matches(word, list(words), n=1)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
-def shown(value: object) -> str:
-    """Write a value for a message, cut where it is long."""
+def abbreviated(value: object) -> str:
+    """Return a value for a message, cut where it is long."""
     writer = reprlib.Repr()
     writer.maxlevel, writer.maxstring, writer.maxother = 2, 60, 60
     writer.maxdict = writer.maxtuple = 6
@@ -91,40 +91,40 @@ def shown(value: object) -> str:
 
 
 def _number(value: float) -> str:
-    """Write a bound as a person would: 2000, not 2000.0 or 2e+03."""
+    """Return a bound as a person would write it: 2000, not 2000.0 or 2e+03."""
     return format(value, ".12g")
 
 
 def _rule(shape: Shape, details: ErrorDetails) -> str:
-    """Say which rule a value breaks."""
+    """Return the rule that a value breaks, as text."""
     value, unit = details["input"], f" (unit {shape.unit})" if shape.unit else ""
     match details["type"]:
         case "greater_than_equal" if shape.low is not None:
-            return f"{shown(value)} is below {_number(shape.low)}{unit}"
+            return f"{abbreviated(value)} is below {_number(shape.low)}{unit}"
         case "less_than_equal" if shape.high is not None:
-            return f"{shown(value)} is above {_number(shape.high)}{unit}"
+            return f"{abbreviated(value)} is above {_number(shape.high)}{unit}"
         case "finite_number":
-            return f"{shown(value)} is not a finite number"
+            return f"{abbreviated(value)} is not a finite number"
         case "too_short" | "too_long":
             return f"has length {len(value)}, wanted {shape.length}"
         case "value_error":
             return " ".join(str(details["ctx"]["error"]).split())
         case "literal_error" if isinstance(value, str):
-            return f"{shown(value)} is not {wanted(shape)}{closest(value, map(str, shape.choices))}"
-    return f"{_named(value)}, wanted {wanted(shape)}{_hint(shape, value)}"
+            return f"{abbreviated(value)} is not {expected(shape)}{suggestion(value, map(str, shape.choices))}"
+    return f"{_named(value)}, wanted {expected(shape)}{_hint(shape, value)}"
 
 
 def _named(value: object) -> str:
-    """Say what stands there and of which type it is."""
+    """Return a value and its type, as text."""
     if value is None:
         return "is empty"
     if isinstance(value, dict | tuple):
         return f"is {_TYPE_WORDS[type(value)]}"
-    return f"{shown(value)} is {_TYPE_WORDS.get(type(value), type(value).__name__)}"
+    return f"{abbreviated(value)} is {_TYPE_WORDS.get(type(value), type(value).__name__)}"
 
 
 def _hint(shape: Shape, value: object) -> str:
-    """Say how a value of the wrong type is mended, where that is plain."""
+    """Return how a value of the wrong type is corrected, where that is plain, else ""."""
     if shape.form == "text" and isinstance(value, bool | int | float):
         return "; put it in quotes"
     if shape.form in ("number", "whole") and isinstance(value, str):
@@ -134,14 +134,14 @@ def _hint(shape: Shape, value: object) -> str:
 
 
 def _unknown(holder: Shape, path: tuple[Step, ...]) -> str:
-    """Say which keys would have been right."""
+    """Return the text for an unknown key: the keys that there are."""
     names = tuple(shapes_of(holder.params)) if holder.params else ()
-    near = closest(str(path[-1]), names) or ";"
-    return f"unknown key {shown(path[-1])}{near} allowed: {', '.join(names) or 'none'}"
+    near = suggestion(str(path[-1]), names) or ";"
+    return f"unknown key {abbreviated(path[-1])}{near} allowed: {', '.join(names) or 'none'}"
 
 
 def _range(shape: Shape) -> str:
-    """Say the bounds and the unit."""
+    """Return the bounds and the unit, as text."""
     unit = f" {shape.unit}" if shape.unit else ""
     if shape.low is not None and shape.high is not None:
         return f", {_number(shape.low)} to {_number(shape.high)}{unit}"
@@ -149,7 +149,7 @@ def _range(shape: Shape) -> str:
 
 
 def _at(shape: Shape, path: tuple[Step, ...]) -> Shape:
-    """Follow a path through nested shapes."""
+    """Return the shape at a path through nested shapes."""
     for step in path:
         if shape.params is not None:
             shape = shapes_of(shape.params)[str(step)]

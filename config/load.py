@@ -1,4 +1,4 @@
-"""YAML to frozen values, strictly: every fault of every layer in one message.
+"""YAML files in layers to frozen values, with every fault of every layer in one message.
 
 A rig is read in layers, the later over the earlier. Each value remembers the file and
 line it came from, so that a fault found after the layers were merged, or by a rule
@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from gazerig.config.bounds import Step, filled, judge, shapes_of
+from gazerig.config.bounds import Step, shapes_of, validate, with_stand_ins
 from gazerig.config.entries import ConfigError as ConfigError
+from gazerig.config.entries import ConfigFault as ConfigFault
 from gazerig.config.entries import Entry as Entry
-from gazerig.config.entries import Fault as Fault
 from gazerig.config.entries import read
-from gazerig.config.export import Complaint, closest, complaint, shown
+from gazerig.config.export import Violation, abbreviated, suggestion, violation
 from gazerig.config.renamed import renamed
 
 T = TypeVar("T")
@@ -51,7 +51,7 @@ def load(
     checks: Sequence[Check[T]] = (),
     report: bool = True,
 ) -> T:
-    """Read ``path`` over its ``defaults`` (the earliest lowest) into a frozen dataclass.
+    """Return the frozen dataclass that ``path`` over its ``defaults`` (the earliest lowest) makes.
 
     Checks are asked about the whole value; where fields are at fault, what they find
     is listed if it holds whatever right values take their place.
@@ -62,7 +62,7 @@ def load(
         ConfigError: with every fault of every file.
     """
     files = (*defaults, path)
-    faults: list[Fault] = []
+    faults: list[ConfigFault] = []
     known = tuple(shapes_of(cast(Any, into)))
     layers = [read(file, faults, known)[1] for file in files]
     whole = [renamed(layer, into, faults, report) for layer in layers if layer is not None]
@@ -71,7 +71,7 @@ def load(
     root = whole[0]
     for layer in whole[1:]:
         root = _merged(root, layer)
-    outcome = weighed(into, root, checks)
+    outcome = validate_entries(into, root, checks)
     value, found = outcome
     faults += found
     if faults or value is None:
@@ -80,15 +80,15 @@ def load(
     return value
 
 
-def weighed(
+def validate_entries(
     into: type[T], root: Entry, checks: Sequence[Callable[[T], Iterable[tuple[str, str]]]] = ()
-) -> tuple[T | None, list[Fault]]:
-    """Turn merged entries into a frozen dataclass; give it, where it can be made, and every fault.
+) -> tuple[T | None, list[ConfigFault]]:
+    """Return the frozen dataclass that merged entries make, None where impossible, and every fault.
 
     What checks find is a fault as well, so a value may come with some.
     """
-    value, errors = judge(into, root.plain())
-    complaints = [complaint(into, error) for error in errors]
+    value, errors = validate(into, root.plain())
+    complaints = [violation(into, error) for error in errors]
     if value is not None:
         complaints += [_contradiction(root, *found) for c in checks for found in c(value)]
     else:
@@ -100,14 +100,14 @@ def weighed(
 
 
 def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
-    """Read one YAML 1.2 file whose top level is a mapping.
+    """Return one YAML 1.2 file whose top level is a mapping.
 
     known: keys of the top level; a file with none of them is refused and nothing of it shown
 
     Raises:
         ConfigError: unreadable, not UTF-8, not YAML, empty, keys twice, no mapping.
     """
-    faults: list[Fault] = []
+    faults: list[ConfigFault] = []
     text, root = read(path, faults, known)
     if faults or root is None:
         raise ConfigError(faults)
@@ -115,7 +115,7 @@ def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
 
 
 def shipped(kind: str, name: str) -> Path:
-    """Find a file that comes with the package, e.g. ``shipped("rigs", "nod")``.
+    """Return the path of a file that comes with the package, e.g. ``shipped("rigs", "desk")``.
 
     Raises:
         ConfigError: there is none of that name; lists those that exist.
@@ -124,12 +124,12 @@ def shipped(kind: str, name: str) -> Path:
     if name in names:
         return Path(str(importlib.resources.files("gazerig.config"))) / kind / f"{name}.yaml"
     known = f"there are {', '.join(names)}" if names else "there are none of this kind"
-    rule = f"nothing named {name!r} is shipped{closest(name, names) or ';'} {known}"
-    raise ConfigError([Fault(f"config/{kind}", None, "", repr(name), rule)])
+    rule = f"nothing named {name!r} is shipped{suggestion(name, names) or ';'} {known}"
+    raise ConfigError([ConfigFault(f"config/{kind}", None, "", repr(name), rule)])
 
 
 def shipped_names(kind: str) -> tuple[str, ...]:
-    """List the names that ``shipped`` knows of a kind, sorted."""
+    """Return the names that ``shipped`` knows of a kind, sorted."""
     folder = importlib.resources.files("gazerig.config") / kind
     if not folder.is_dir():
         return ()
@@ -138,12 +138,12 @@ def shipped_names(kind: str) -> tuple[str, ...]:
 
 
 def _steps(key: str) -> tuple[str, ...]:
-    """Split a dotted key path."""
+    """Return the steps of a dotted key path."""
     return tuple(key.split(".")) if key else ()
 
 
 def _merged(low: Entry, high: Entry) -> Entry:
-    """Lay one entry over another; a mapping keeps its place in the lowest file."""
+    """Return one entry laid over another; a mapping keeps the line of the lowest file."""
     if not (isinstance(low.value, dict) and isinstance(high.value, dict)):
         return high
     below = low.value
@@ -151,24 +151,26 @@ def _merged(low: Entry, high: Entry) -> Entry:
     return Entry({**below, **over}, low.file, low.line)
 
 
-def _placed(root: Entry, complaint: Complaint) -> Fault:
+def _placed(root: Entry, violation: Violation) -> ConfigFault:
     """Return a complaint its file and line."""
-    entry = root.nearest(complaint.path)
-    key = ".".join(map(str, complaint.path))
-    return Fault(entry.file, entry.line, key, complaint.value, complaint.rule)
+    entry = root.nearest(violation.path)
+    key = ".".join(map(str, violation.path))
+    return ConfigFault(entry.file, entry.line, key, violation.value, violation.rule)
 
 
-def _contradiction(root: Entry, key: str, rule: str) -> Complaint:
-    """Put what a check found into the shape of all complaints."""
+def _contradiction(root: Entry, key: str, rule: str) -> Violation:
+    """Return what a check found as a violation."""
     stands = root.nearest(_steps(key)).value
-    return Complaint(_steps(key), "" if isinstance(stands, dict | tuple) else shown(stands), rule)
+    return Violation(
+        _steps(key), "" if isinstance(stands, dict | tuple) else abbreviated(stands), rule
+    )
 
 
 def _certain(
     root: Entry, into: type[T], wrong: set[tuple[Step, ...]], checks: Sequence[Check[T]]
 ) -> list[tuple[str, str]]:
     """Return what the checks find whichever right values take the place of the wrong ones."""
-    low, high = (filled(into, root.plain(), wrong, end) for end in (False, True))
+    low, high = (with_stand_ins(into, root.plain(), wrong, end) for end in (False, True))
     found: list[tuple[str, str]] = []
     for check in checks:
         also = set(_as_far_as_possible(check, high))
@@ -178,6 +180,6 @@ def _certain(
 
 
 def _as_far_as_possible(check: Check[T], value: T) -> Iterator[tuple[str, str]]:
-    """Ask a check until it needs what is missing or cannot do with a stand-in."""
+    """Return what a check finds until a stand-in makes it fail."""
     with contextlib.suppress(ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         yield from check(value)

@@ -8,7 +8,7 @@ import logging
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from gazerig.config.entries import Entry, Fault
+from gazerig.config.entries import ConfigFault, Entry
 from gazerig.config.rig import Rig
 from gazerig.gaze.top_down import TopDownParams
 
@@ -79,7 +79,7 @@ _LOG = logging.getLogger("gazerig.config")
 _reported: set[str] = set()
 
 
-def renamed(root: Entry, into: type, faults: list[Fault], report: bool = True) -> Entry:
+def renamed(root: Entry, into: type, faults: list[ConfigFault], report: bool = True) -> Entry:
     """Return a file's entries under the names of now.
 
     Args:
@@ -143,7 +143,7 @@ def _names(table: _Table, above: Sequence[str]) -> Mapping[str, str]:
 
 
 def _renamed(
-    entry: Entry, table: _Table, path: tuple[str, ...], faults: list[Fault], report: bool
+    entry: Entry, table: _Table, path: tuple[str, ...], faults: list[ConfigFault], report: bool
 ) -> Entry:
     if not isinstance(entry.value, dict):
         return entry
@@ -153,7 +153,7 @@ def _renamed(
         old_path, new_path = ".".join((*path, key)), ".".join((*path, new))
         if new != key and new in entry.value:
             rule = f"is the old name of {new}, which stands there as well; take one of them out"
-            faults.append(Fault(below.file, below.line, old_path, "", rule))
+            faults.append(ConfigFault(below.file, below.line, old_path, "", rule))
             continue
         if new != key and report:
             report_once(_line(f"{below.file}:{below.line}", old_path, new_path))

@@ -133,7 +133,7 @@ class GazeConfig:
 
 @dataclass(frozen=True)
 class Rig:
-    """One head: its wires, its build, its limits and its manners."""
+    """One head: buses, geometry, joints, limits and gaze."""
 
     # fmt: off
     name: Annotated[str, "name of the rig"]

@@ -1,4 +1,4 @@
-"""The files that a running rig is made of: read together, and written so that they stay good.
+"""The files of a running rig: read together, and written only if they can be loaded again.
 
 What is written starts from the text that was last read without a fault: a rig's file that
 somebody has spoilt by hand meanwhile is kept beside it, and is never the base of what is saved.
@@ -11,16 +11,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.config.load import ConfigError, Fault, shipped_names
-from gazerig.config.save import Saved, copy_shipped, rig_file, save
+from gazerig.config.load import ConfigError, ConfigFault, shipped_names
+from gazerig.config.save import SaveResult, copy_shipped, rig_file, save
 from gazerig.config.schema import Rig, layers_of, load_rig
 from gazerig.drivers.file_input import read_limited
 
 _LARGEST = 1_000_000  # bytes, as gazerig.config.entries reads
 
 
-class Layers(NamedTuple):
-    """What a rig was asked for by, each a shipped name or a path."""
+class RigLayers(NamedTuple):
+    """The files of a rig as asked for, each a shipped name or a path."""
 
     name: str
     character: str | None
@@ -46,8 +46,8 @@ class RigFiles(NamedTuple):
             return True
 
 
-def read_all(layers: Layers) -> tuple[Rig, RigFiles]:
-    """Read a rig, and return it with the files that it is made of.
+def read_all(layers: RigLayers) -> tuple[Rig, RigFiles]:
+    """Return a rig with the files that it is made of.
 
     Raises:
         gazerig.config.load.ConfigError: see gazerig.config.schema.load_rig.
@@ -58,8 +58,8 @@ def read_all(layers: Layers) -> tuple[Rig, RigFiles]:
 
 
 def save_over(
-    layers: Layers, good: bytes, wanted: Mapping[str, Any], now: datetime
-) -> tuple[Saved, RigFiles]:
+    layers: RigLayers, good: bytes, wanted: Mapping[str, Any], now: datetime
+) -> tuple[SaveResult, RigFiles]:
     """Write values into a rig's file; each must hold with character and profile laid over it.
 
     Args:
@@ -82,8 +82,8 @@ def save_over(
 
 
 def save_copy(
-    layers: Layers, good: bytes, to: str, wanted: Mapping[str, Any], now: datetime
-) -> tuple[Saved, RigFiles]:
+    layers: RigLayers, good: bytes, to: str, wanted: Mapping[str, Any], now: datetime
+) -> tuple[SaveResult, RigFiles]:
     """Write values into a new copy of a rig's file, which is not there if that fails.
 
     Returns:
@@ -94,7 +94,7 @@ def save_copy(
             YAML file.
     """
     if not to.endswith((".yaml", ".yml")):
-        raise ConfigError([Fault(to, None, "", "", "a rig's file ends in .yaml; name it so")])
+        raise ConfigError([ConfigFault(to, None, "", "", "a rig's file ends in .yaml; name it so")])
     if layers.name in shipped_names("rigs"):
         copy_shipped(layers.name, to)
     else:
@@ -105,12 +105,14 @@ def save_copy(
         os.unlink(to)
         source = str(rig_file(layers.name))
         raise ConfigError(
-            f if f.file != to else Fault(source, f.line, f.key, f.value, f"{f.rule}; no {to} made")
+            f
+            if f.file != to
+            else ConfigFault(source, f.line, f.key, f.value, f"{f.rule}; no {to} made")
             for f in error.faults
         ) from None
 
 
-def _is_good(layers: Layers) -> bool:
+def _is_good(layers: RigLayers) -> bool:
     """Whether a rig's file, as it is now, can be loaded."""
     try:
         load_rig(*layers)
@@ -132,7 +134,7 @@ def _copy(text: bytes, to: Path) -> None:
             new.write(text)
     except FileExistsError:
         rule = "is there already and is not overwritten; choose another name"
-        raise ConfigError([Fault(str(to), None, "", "", rule)]) from None
+        raise ConfigError([ConfigFault(str(to), None, "", "", rule)]) from None
     except OSError as error:
         rule = f"cannot be written: {error.strerror}; check it and its folder"
-        raise ConfigError([Fault(str(to), None, "", "", rule)]) from error
+        raise ConfigError([ConfigFault(str(to), None, "", "", rule)]) from error

@@ -1,4 +1,4 @@
-"""What no single section of a rig can know: the rules between them."""
+"""Rules between the sections of a rig."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""Writing values into somebody's YAML file: nothing of theirs is lost, whatever goes wrong.
+"""Writing values into a user's YAML file, in one step and with a backup.
 
 The new text is checked as a file of its own before it takes the old one's place, in one
 step; the old file stays beside it under a name with the time.
@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from gazerig.config.bounds import shapes_of
-from gazerig.config.load import ConfigError, Document, Fault, read_yaml, shipped
+from gazerig.config.load import ConfigError, ConfigFault, Document, read_yaml, shipped
 from gazerig.config.renamed import renamed_changes
-from gazerig.config.save_text import Unchangeable, Value, edited, with_new_names, written
+from gazerig.config.save_text import EditRefused, Value, edited, with_new_names, written
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.file_input import read_limited
 
@@ -28,7 +28,7 @@ Check = Callable[[str], Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ValueChange:
     """One value that differs; ``old`` is None where the key was not in the file.
 
     key: dotted key path; old, new: as YAML
@@ -39,20 +39,20 @@ class Change:
     new: str
 
     def __str__(self) -> str:
-        """Write ``key: old -> new``."""
+        """Return ``key: old -> new``."""
         return f"{self.key}: {'(not in the file)' if self.old is None else self.old} -> {self.new}"
 
 
 @dataclass(frozen=True, slots=True)
-class Saved:
+class SaveResult:
     """What was done: ``backup`` is None and the file untouched where nothing differed."""
 
     path: Path
     backup: Path | None
-    changes: tuple[Change, ...]
+    changes: tuple[ValueChange, ...]
 
 
-def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> Saved:
+def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> SaveResult:
     """Write values into a rig file: ``save_rig("my.yaml", {"loop.rate_hz": 100.0}, now)``.
 
     path: the file; the name of a shipped rig is understood too, to be refused with the cure
@@ -82,7 +82,7 @@ def save(
     check: Check,
     into: type,
     base: bytes | None = None,
-) -> Saved:
+) -> SaveResult:
     """Write values at dotted key paths into a YAML file and keep the old file beside it.
 
     Keys that are not there are added with a comment; old names of keys become those of now, as
@@ -103,7 +103,7 @@ def save(
     _refuse_shipped(target)
     before, text, found = _proposal(target, changes, into, base)
     if text == before:
-        return Saved(target, None, ())
+        return SaveResult(target, None, ())
     with _errors_named(target), _beside(target, text) as fresh:
         _check_new(target, fresh, changes, check)
         if _held(target) != before:
@@ -112,11 +112,13 @@ def save(
         if before is not None:
             shutil.copymode(target, fresh)
         os.replace(fresh, target)
-    return Saved(target, backup, found)
+    return SaveResult(target, backup, found)
 
 
-def propose(path: Path | str, changes: Mapping[str, Value], into: type = Rig) -> tuple[Change, ...]:
-    """List what ``save`` would change; nothing is written.
+def propose(
+    path: Path | str, changes: Mapping[str, Value], into: type = Rig
+) -> tuple[ValueChange, ...]:
+    """Return what ``save`` would change; nothing is written.
 
     Raises:
         gazerig.config.load.ConfigError: the file cannot be read, or a value cannot be written.
@@ -139,7 +141,7 @@ def copy_shipped(name: str, to: Path | str, kind: str = "rigs") -> Path:
 
 def _proposal(
     target: Path, changes: Mapping[str, Value], into: type, base: bytes | None = None
-) -> tuple[bytes | None, bytes, tuple[Change, ...]]:
+) -> tuple[bytes | None, bytes, tuple[ValueChange, ...]]:
     """Return the file as it is, None where there is none, as it would be, and the difference."""
     known, changes = tuple(shapes_of(into)), renamed_changes(changes, into)
     if base is None:
@@ -154,11 +156,11 @@ def _proposal(
     try:
         text = edited(before.text, changes, into)
         _refuse_side_effects(before.data, text, changes)
-    except Unchangeable as error:
+    except EditRefused as error:
         raise _fault(target, str(error)) from None
     old = {key: _follow(before.data, key) for key in changes}
     found = tuple(
-        Change(key, None if old[key] is _ABSENT else written(old[key]), written(value))
+        ValueChange(key, None if old[key] is _ABSENT else written(old[key]), written(value))
         for key, value in changes.items()
         if old[key] is _ABSENT or written(old[key]) != written(value)
     )
@@ -175,7 +177,7 @@ def _held(target: Path) -> bytes | None:
 
 
 def _document(text: bytes) -> Document:
-    """Read a text as a file of its own."""
+    """Return a text read as a file of its own."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "new.yaml"
         file.write_bytes(text)
@@ -188,7 +190,7 @@ _ANY_WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
 def _follow(value: Any, key: str) -> Any:
-    """Follow a dotted path through mappings or through the attributes of frozen values."""
+    """Return the value at a dotted path through mappings or attributes of frozen values."""
     for step in key.split("."):
         if isinstance(value, Mapping):
             value = value.get(step, _ABSENT)
@@ -198,7 +200,7 @@ def _follow(value: Any, key: str) -> Any:
 
 
 def _refuse_side_effects(before: dict[str, Any], text: str, changes: Mapping[str, Value]) -> None:
-    """See that the new text differs in the values asked for and in nothing else.
+    """Check that the new text differs in the values asked for and in nothing else.
 
     An anchor lends its value to other places, which must not change unseen.
     """
@@ -207,14 +209,14 @@ def _refuse_side_effects(before: dict[str, Any], text: str, changes: Mapping[str
     for key in sorted({*kept, *found}):
         wished = key in changes or any(c.startswith(f"{key}.") for c in changes)
         if not wished and kept.get(key, _ABSENT) != found.get(key, _ABSENT):
-            raise Unchangeable(
+            raise EditRefused(
                 f"{key} would change as well, as an anchor (&) ties it to "
                 f"{', '.join(changes)}; write its value out first"
             )
 
 
 def _leaves(value: Any, path: str = "") -> dict[str, Any]:
-    """List all that is no mapping, or an empty one, by dotted path."""
+    """Return all that is not a mapping, or an empty one, by dotted path."""
     if not isinstance(value, dict) or not value:
         return {path: value}
     found: dict[str, Any] = {}
@@ -224,7 +226,7 @@ def _leaves(value: Any, path: str = "") -> dict[str, Any]:
 
 
 def _check_new(target: Path, fresh: Path, changes: Mapping[str, Value], check: Check) -> None:
-    """Load the new file and see that every value is in force."""
+    """Load the new file and check that every value is in force."""
     try:
         loaded = check(str(fresh))
     except ConfigError as error:
@@ -277,7 +279,7 @@ def _beside(target: Path, text: bytes) -> Iterator[Path]:
 
 
 def _backup(target: Path, before: bytes, now: datetime) -> Path:
-    """Keep the old file under a name that nobody has yet."""
+    """Keep the old file under a new name and return that."""
     stem = f"{target}.bak-{now:%Y%m%d-%H%M%S}"
     for number in range(1, 100):
         path = Path(stem if number == 1 else f"{stem}-{number}")
@@ -290,7 +292,7 @@ def _backup(target: Path, before: bytes, now: datetime) -> Path:
 
 @contextlib.contextmanager
 def _errors_named(target: Path) -> Iterator[None]:
-    """Say in one line what the disk refuses."""
+    """Turn errors of the file system into a ConfigError of one line."""
     try:
         yield
     except FileExistsError:
@@ -304,4 +306,4 @@ def _errors_named(target: Path) -> Iterator[None]:
 
 
 def _fault(target: Path, rule: str, key: str = "") -> ConfigError:
-    return ConfigError([Fault(str(target), None, key, "", rule)])
+    return ConfigError([ConfigFault(str(target), None, key, "", rule)])

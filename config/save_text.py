@@ -1,4 +1,4 @@
-"""Changing values inside YAML text: every byte that is not part of a change stays as it is.
+"""Changing values inside YAML text; every other byte stays as it is.
 
 The text is parsed only to learn where each value stands. Comments, order, indentation,
 quotes, anchors and line ends survive because nobody writes them anew.
@@ -28,7 +28,7 @@ _PLAIN_TEXT = re.compile(r"[A-Za-z/][\w./-]*")
 _NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
 
 
-class Unchangeable(ValueError):
+class EditRefused(ValueError):
     """A value cannot be changed in place; the message says which one, why, and the cure."""
 
 
@@ -77,7 +77,7 @@ def with_new_names(text: str, into: type) -> str:
 
 
 def written(value: Value) -> str:
-    """Write a value as YAML on one line.
+    """Return a value as YAML on one line.
 
     Raises:
         Unchangeable: not finite, or no scalar or list.
@@ -93,12 +93,12 @@ def written(value: Value) -> str:
         return f"[{', '.join(map(written, value))}]"
     if isinstance(value, float):
         if not isfinite(value):
-            raise Unchangeable(f"{value} is not a finite number and is never written")
+            raise EditRefused(f"{value} is not a finite number and is never written")
         return repr(float(value))
     try:
         return str(operator.index(value))
     except TypeError:
-        raise Unchangeable(f"{value!r} is no number, text, truth value or list of those") from None
+        raise EditRefused(f"{value!r} is no number, text, truth value or list of those") from None
 
 
 @lru_cache(maxsize=2)
@@ -106,43 +106,43 @@ def _composed(text: str) -> MappingNode:
     """Parse the text as far as nodes, which know where they stand; nobody changes them."""
     node = YAML(typ="safe", pure=True).compose(text)
     if not isinstance(node, MappingNode):
-        raise Unchangeable("the top level is no mapping; write 'key: value' lines")
+        raise EditRefused("the top level is no mapping; write 'key: value' lines")
     return node
 
 
 # --- finding
 
 
-class _Place(NamedTuple):
+class _KeyAndValue(NamedTuple):
     """A value with the node (a key, or the list itself) that stands before it."""
 
     before: Node
     node: Node
 
 
-def _find(root: MappingNode, steps: list[str]) -> _Place | None:
-    """Find the value at a path, None where it or a mapping above it is missing."""
-    place = _Place(root, root)
+def _find(root: MappingNode, steps: list[str]) -> _KeyAndValue | None:
+    """Return the value at a path, None where it or a mapping above it is missing."""
+    place = _KeyAndValue(root, root)
     for step in steps:
         if not isinstance(place.node, MappingNode):
             return None
         for key, value in place.node.value:
             if key.value == step:
-                place = _Place(key, value)
+                place = _KeyAndValue(key, value)
                 break
         else:
             return None
     return place
 
 
-def _span(text: str, place: _Place) -> tuple[int, int]:
+def _span(text: str, place: _KeyAndValue) -> tuple[int, int]:
     """Return where a value stands: after its anchor and tag; an alias stands for the whole."""
     before, node = place
     at = before.start_mark.index if isinstance(before, SequenceNode) else before.end_mark.index
     if node.start_mark.index < at:  # the value itself stands at its anchor, further up
         alias = _ALIAS.match(text, at)
         if alias is None:
-            raise Unchangeable("stands behind an alias that cannot be followed; write it out")
+            raise EditRefused("stands behind an alias that cannot be followed; write it out")
         return alias.span(1)
     if node.start_mark.index == node.end_mark.index:  # nothing but "key:"
         colon = text.index(":", at) + 1
@@ -152,32 +152,32 @@ def _span(text: str, place: _Place) -> tuple[int, int]:
     return start, node.end_mark.index
 
 
-def _end(text: str, place: _Place) -> int:
+def _end(text: str, place: _KeyAndValue) -> int:
     """Return where the last character of a value stands, comments after it left out."""
     node = place.node
     inside = isinstance(node, MappingNode | SequenceNode) and not node.flow_style
     if not inside or node.start_mark.index < place.before.start_mark.index:
         return _span(text, place)[1]
     if isinstance(node, MappingNode):
-        return _end(text, _Place(*node.value[-1]))
-    return _end(text, _Place(node, node.value[-1]))
+        return _end(text, _KeyAndValue(*node.value[-1]))
+    return _end(text, _KeyAndValue(node, node.value[-1]))
 
 
 # --- replacing
 
 
-def _replaced(text: str, key: str, place: _Place, value: Value) -> list[_Edit]:
-    """Replace a value that is there."""
+def _replaced(text: str, key: str, place: _KeyAndValue, value: Value) -> list[_Edit]:
+    """Return the edits that replace a value."""
     node = place.node
     if isinstance(node, MappingNode):
-        raise Unchangeable(f"{key} is a mapping; name one of its keys")
+        raise EditRefused(f"{key} is a mapping; name one of its keys")
     start, end = _span(text, place)
     block = isinstance(node, SequenceNode) and not node.flow_style and text[start] != "*"
     if block and isinstance(value, list | tuple) and len(value) == len(node.value):
         items = zip(node.value, value, strict=True)
-        return [e for item, v in items for e in _replaced(text, key, _Place(node, item), v)]
+        return [e for item, v in items for e in _replaced(text, key, _KeyAndValue(node, item), v)]
     if block or getattr(node, "style", None) in ("|", ">"):
-        raise Unchangeable(f"{key} is spread over several lines; write it on one line first")
+        raise EditRefused(f"{key} is spread over several lines; write it on one line first")
     new = written(value)
     if start == end:
         new = f" {new}"
@@ -188,26 +188,26 @@ def _replaced(text: str, key: str, place: _Place, value: Value) -> list[_Edit]:
 
 
 def _added(text: str, root: MappingNode, key: str, value: Value, into: type) -> _Edit:
-    """Add a key, and the mappings above it that are not there, with a comment for each."""
+    """Return the edit that adds a key and missing mappings above it, each with a comment."""
     steps = key.split(".")
     depth = next(n for n in range(len(steps) - 1, -1, -1) if _find(root, steps[:n]) is not None)
     holder = _find(root, steps[:depth])
     if holder is None or holder.node.start_mark.index < holder.before.start_mark.index:
-        raise Unchangeable(f"{key}: its mapping is an alias (*); write it out first")
+        raise EditRefused(f"{key}: its mapping is an alias (*); write it out first")
     node, newline = holder.node, "\r\n" if "\r\n" in text else "\n"
     if isinstance(node, MappingNode) and node.flow_style:
         new = ": {".join(steps[depth:]) + f": {written(value)}" + "}" * (len(steps) - depth - 1)
         if not node.value:
             at = text.index("{", node.start_mark.index) + 1
             return _Edit(at, at, new)
-        at = _end(text, _Place(*node.value[-1]))
+        at = _end(text, _KeyAndValue(*node.value[-1]))
         return _Edit(at, at, f", {new}")
     if isinstance(node, MappingNode):
-        at, indent = _end(text, _Place(*node.value[-1])), node.value[0][0].start_mark.column
+        at, indent = _end(text, _KeyAndValue(*node.value[-1])), node.value[0][0].start_mark.column
     elif isinstance(node, ScalarNode) and node.start_mark.index == node.end_mark.index:
         at, indent = _span(text, holder)[1], holder.before.start_mark.column + 2
     else:
-        raise Unchangeable(f"{key}: {'.'.join(steps[:depth])} is no mapping; make it one")
+        raise EditRefused(f"{key}: {'.'.join(steps[:depth])} is no mapping; make it one")
     at = _end_of_line(text, at)
     lines = _block(steps, depth, indent, value, into)
     return _Edit(at, at, "".join(f"{newline}{line}" for line in lines))
@@ -221,7 +221,7 @@ def _end_of_line(text: str, at: int) -> int:
 
 
 def _block(steps: list[str], depth: int, indent: int, value: Value, into: type) -> list[str]:
-    """Write the lines of a new key and of the new mappings above it."""
+    """Return the lines of a new key and of the new mappings above it."""
     lines = []
     for n in range(depth, len(steps)):
         body = f"{steps[n]}:" if n < len(steps) - 1 else f"{steps[n]}: {written(value)}"
@@ -230,7 +230,7 @@ def _block(steps: list[str], depth: int, indent: int, value: Value, into: type) 
 
 
 def _explained(body: str, says: str, indent: str) -> list[str]:
-    """Put a comment behind a line, or above it where it is too long."""
+    """Return a line with a comment behind it, or above it where it is too long."""
     line = f"{indent}{body}"
     if not says:
         return [line]
@@ -241,7 +241,7 @@ def _explained(body: str, says: str, indent: str) -> list[str]:
 
 
 def comment(into: type, steps: list[str]) -> str:
-    """Say unit, range and meaning of the key at a path; "" where the file may hold no such key."""
+    """Return unit, range and meaning of the key at a path; "" where there is no such key."""
     shape: Shape | None = Shape("params", params=into)
     for step in steps:
         if shape is None:

@@ -1,4 +1,4 @@
-"""Rigs, rule sets and walks by name or by path: read, laid over each other, checked."""
+"""Rigs, rule sets and face walks by name or path: read, merged and checked."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from gazerig.gaze.top_down import TopDownParams
 
 
 def load_rig(name_or_path: str, character: str | None = None, profile: str | None = None) -> Rig:
-    """Read a rig by shipped name or by path, with every rule checked.
+    """Return a rig by shipped name or path, with every rule checked.
 
     profile: name or path of a style of gaze, instead of the one that the rig names
     character: name or path of a file with differences, laid over both
@@ -27,7 +27,7 @@ def load_rig(name_or_path: str, character: str | None = None, profile: str | Non
 def layers_of(
     name_or_path: str, character: str | None = None, profile: str | None = None
 ) -> list[Path]:
-    """List the files that ``load_rig`` lays one over the other, the rig's own first.
+    """Return the files that ``load_rig`` lays one over the other, the rig's own first.
 
     Raises:
         gazerig.config.load.ConfigError: none of that name is shipped, or the rig cannot be read.
@@ -42,7 +42,7 @@ def layers_of(
 
 
 def load_rules(name_or_path: str) -> TopDownParams:
-    """Read a rule set, behaviour -> what to look at, by shipped name or by path.
+    """Return a rule set, behaviour -> what to look at, by shipped name or path.
 
     Raises:
         gazerig.config.load.ConfigError: with every fault.
@@ -51,7 +51,7 @@ def load_rules(name_or_path: str) -> TopDownParams:
 
 
 def load_walk(name_or_path: str) -> Walk:
-    """Read a scanpath walk by shipped name or by path.
+    """Return the statistics of a face walk by shipped name or path.
 
     Raises:
         gazerig.config.load.ConfigError: with every fault.
@@ -60,7 +60,7 @@ def load_walk(name_or_path: str) -> Walk:
 
 
 def _find(kind: str, name_or_path: str) -> Path:
-    """Take anything with a slash or a YAML ending as a path, anything else as a name."""
+    """Return the path of a file given by path (a slash or a YAML ending) or by shipped name."""
     looks_like_path = "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
     if looks_like_path:
         return Path(name_or_path)

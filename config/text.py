@@ -1,4 +1,4 @@
-"""A configuration written as one YAML text that stands for all its layers.
+"""A configuration as one YAML text that stands for all its layers.
 
 It is read back with ``gazerig.config.load.load``; values come back exactly.
 """
@@ -6,18 +6,18 @@ It is read back with ``gazerig.config.load.load``; values come back exactly.
 from collections.abc import Iterator
 from typing import Any
 
-from gazerig.config.knobs import plain
+from gazerig.config.parameters import plain
 from gazerig.config.save_text import written
 from gazerig.config.schema import Rig, load_walk
 
 
 def rig_text(rig: Rig) -> str:
-    """Write everything that is in force of a rig: rig, profile, character and changes."""
+    """Return everything that is in force of a rig as YAML: rig, profile, character and changes."""
     return "".join(_lines(plain(rig)))
 
 
 def walk_text(name_or_path: str) -> str:
-    """Write the walk over a face that a rig names.
+    """Return the face walk that a rig names as YAML.
 
     Raises:
         gazerig.config.load.ConfigError: the walk is at fault.
@@ -26,7 +26,7 @@ def walk_text(name_or_path: str) -> str:
 
 
 def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:
-    """Write mappings as YAML, one key a line."""
+    """Return mappings as YAML, one key a line."""
     for key, value in values.items():
         start = f"{'  ' * depth}{written(key)}:"
         if isinstance(value, dict) and value:
@@ -37,7 +37,7 @@ def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:
 
 
 def _flow(value: Any) -> str:
-    """Write a value on one line."""
+    """Return a value as YAML on one line."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{written(k)}: {_flow(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list | tuple):

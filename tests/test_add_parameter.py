@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 TRY = """
 import json
 from gazerig.config.export import json_schema
-from gazerig.config.knobs import changed, knobs
+from gazerig.config.parameters import changed, knobs
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.saccade import SaccadeModel

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from gazerig.config.apart import apart
 from gazerig.config.load import ConfigError
 from gazerig.config.save import copy_shipped, save_rig
 from gazerig.config.schema import load_rig
+from gazerig.config.subprocess_call import in_subprocess
 
 
 def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     copy_shipped("desk", tmp_path / "my.yaml")
     monkeypatch.chdir(tmp_path)  # a relative path means the same there
-    assert apart(load_rig, "my.yaml", "shy", profile="robot") == load_rig(
+    assert in_subprocess(load_rig, "my.yaml", "shy", profile="robot") == load_rig(
         "my.yaml", "shy", profile="robot"
     )
 
@@ -29,7 +29,7 @@ def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as here:
         load_rig(str(file))
     with pytest.raises(ConfigError) as there:
-        apart(load_rig, str(file))
+        in_subprocess(load_rig, str(file))
     assert there.value.faults == here.value.faults and len(here.value.faults) == 2
     assert str(there.value) == str(here.value)
 
@@ -37,7 +37,7 @@ def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
 def test_saving_works_there(tmp_path: Path) -> None:
     file = copy_shipped("desk", tmp_path / "my.yaml")
     now = datetime(2026, 1, 31, 23, 59, 59)
-    saved = apart(save_rig, file, {"loop.rate_hz": 100.0}, now)
+    saved = in_subprocess(save_rig, file, {"loop.rate_hz": 100.0}, now)
     assert saved.path == file and saved.backup is not None and saved.backup.exists()
     assert [str(change) for change in saved.changes] == ["loop.rate_hz: 200.0 -> 100.0"]
     assert load_rig(str(file)).loop.rate_hz == 100.0
@@ -70,7 +70,7 @@ def importable(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_it_is_another_process_that_ctrl_c_does_not_reach(importable: None) -> None:
-    pid, session = apart(here)
+    pid, session = in_subprocess(here)
     assert pid != os.getpid() and session == pid
 
 
@@ -78,12 +78,12 @@ def test_a_process_that_fails_is_an_error_in_one_line(
     importable: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(ConfigError, match="process for fails: ended by itself: KeyError"):
-        apart(fails)
+        in_subprocess(fails)
     with pytest.raises(ConfigError, match="process for ends: ended by itself: -9"):
-        apart(ends)
-    monkeypatch.setattr("gazerig.config.apart._LONGEST_S", 0.5)
+        in_subprocess(ends)
+    monkeypatch.setattr("gazerig.config.subprocess_call._LONGEST_S", 0.5)
     with pytest.raises(ConfigError, match="took more than 0.5 s"):
-        apart(sleeps)
+        in_subprocess(sleeps)
     monkeypatch.setattr(sys, "executable", "/nonexistent/python")
     with pytest.raises(ConfigError, match="cannot be started: No such file"):
-        apart(here)
+        in_subprocess(here)

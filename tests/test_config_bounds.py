@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 import pytest
 
-from gazerig.config.bounds import filled, judge, model_of
-from gazerig.config.export import DIALECT, complaint, json_schema
+from gazerig.config.bounds import model_of, validate, with_stand_ins
+from gazerig.config.export import DIALECT, json_schema, violation
 from gazerig.params import Bounds, Choices
 
 
@@ -46,9 +46,9 @@ class Eye:
 
 def refused(data: dict[str, Any]) -> list[str]:
     """Judge an Eye and give its faults as "path: rule"."""
-    value, errors = judge(Eye, {"id": 1, **data})
+    value, errors = validate(Eye, {"id": 1, **data})
     assert (value is None) == bool(errors)
-    complaints = [complaint(Eye, error) for error in errors]
+    complaints = [violation(Eye, error) for error in errors]
     return [f"{'.'.join(map(str, c.path))}: {c.rule}" for c in complaints]
 
 
@@ -73,7 +73,7 @@ def test_right_values_are_taken(data: dict[str, Any]) -> None:
 
 
 def test_the_value_is_the_dataclass_with_floats_tuples_and_its_own_defaults() -> None:
-    value, _ = judge(
+    value, _ = validate(
         Eye, {"id": 3, "offset_m": (1, 2, 3), "lid": {"shut_ms": 50}, "lids": {"upper": {}}}
     )
     assert value == Eye(
@@ -143,8 +143,8 @@ def test_wrong_values_are_refused_in_words(data: dict[str, Any], fault: str) -> 
 
 
 def test_a_missing_key_is_named_with_its_range_and_meaning() -> None:
-    _, errors = judge(Eye, {})
-    assert [complaint(Eye, error).rule for error in errors] == [
+    _, errors = validate(Eye, {})
+    assert [violation(Eye, error).rule for error in errors] == [
         "missing; wanted a whole number, 0 to 252 (servo id)"
     ]
 
@@ -159,8 +159,8 @@ def test_a_default_outside_its_own_bounds_is_found() -> None:
     class Slip:
         rate_hz: Annotated[float, Bounds(0, 200)] = 500.0
 
-    _, errors = judge(Slip, {})
-    assert [complaint(Slip, error).rule for error in errors] == ["500.0 is above 200 (unit Hz)"]
+    _, errors = validate(Slip, {})
+    assert [violation(Slip, error).rule for error in errors] == ["500.0 is above 200 (unit Hz)"]
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ def test_stand_ins_lie_at_the_ends_of_what_may_stand_there(
 ) -> None:
     faulty = {("id",), ("name",), ("kind",), ("lid", "shut_ms"), ("gains", "a"), ("offset_m", 1)}
     data = {"lid": {"shut_ms": 0}, "gains": {"a": "x", "b": 0}, "offset_m": (1, "y", 3)}
-    eye = filled(Eye, data, faulty, high)
+    eye = with_stand_ins(Eye, data, faulty, high)
     assert (eye.id, eye.name, eye.kind, eye.lid.shut_ms) == (id_, name, kind, shut_ms)
     assert eye.gains == {"a": gain, "b": 0.0}
     assert eye.offset_m == (1.0, float(high), 3.0)
@@ -222,7 +222,7 @@ def test_stand_ins_lie_at_the_ends_of_what_may_stand_there(
 
 
 def test_a_faulty_list_or_mapping_has_no_stand_in() -> None:
-    eye = filled(Eye, {"matrix": ((1,), 3), "gains": 5}, {("matrix", 1), ("gains",)}, False)
+    eye = with_stand_ins(Eye, {"matrix": ((1,), 3), "gains": 5}, {("matrix", 1), ("gains",)}, False)
     for name in ("matrix", "gains"):
         with pytest.raises(AttributeError):
             getattr(eye, name)
@@ -230,7 +230,7 @@ def test_a_faulty_list_or_mapping_has_no_stand_in() -> None:
 
 def test_beside_an_unknown_key_what_is_absent_may_have_been_meant() -> None:
     low, high = (
-        filled(Eye, {"id": 1, "lid": {"shut": 60, "blinks": True}}, {("lid", "shut")}, end)
+        with_stand_ins(Eye, {"id": 1, "lid": {"shut": 60, "blinks": True}}, {("lid", "shut")}, end)
         for end in (False, True)
     )
     assert (low.lid.shut_ms, high.lid.shut_ms) == (40.0, 200.0)
@@ -314,7 +314,7 @@ def fits(schema: dict[str, Any], value: Any, root: dict[str, Any]) -> bool:
 )
 def test_the_schema_agrees_with_the_loader(data: dict[str, Any]) -> None:
     schema = json_schema(Eye)
-    value, _ = judge(Eye, data)
+    value, _ = validate(Eye, data)
     assert fits(schema, data, schema) == (value is not None)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import pytest
 
-from gazerig.config.load import ConfigError, Fault, load
+from gazerig.config.load import ConfigError, ConfigFault, load
 from gazerig.params import Bounds, Unit
 
 
@@ -256,7 +256,7 @@ def test_a_fault_is_also_there_in_parts(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as caught:
         load(file, Rig)
     assert caught.value.faults == (
-        Fault(
+        ConfigFault(
             str(file),
             7,
             "joints.pan.max_speed_deg_s",

@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.load import ConfigError, load, read_yaml, shipped
-from gazerig.config.save import Change, copy_shipped, propose, rig_file, save, save_rig
-from gazerig.config.save_text import Unchangeable, edited, written
+from gazerig.config.save import ValueChange, copy_shipped, propose, rig_file, save, save_rig
+from gazerig.config.save_text import EditRefused, edited, written
 from gazerig.config.schema import Rig, load_rig
 from gazerig.params import Bounds, Unit
 
@@ -79,7 +79,7 @@ def test_a_value_changes_and_every_other_byte_stays(small):
             "        zero_step:    2051   # by hand, 3 May",
         )
     ]
-    assert saved.changes == (Change("joints.tilt.zero_step", "2048", "2051"),)
+    assert saved.changes == (ValueChange("joints.tilt.zero_step", "2048", "2051"),)
     assert str(saved.changes[0]) == "joints.tilt.zero_step: 2048 -> 2051"
     assert saved.backup == small.with_name("head.yaml.bak-20260131-235958")
     assert saved.backup.read_text() == SMALL
@@ -105,7 +105,7 @@ def test_missing_keys_are_added_with_what_they_mean(small):
     assert "spare:  # one on the shelf\n  id: 9  # 0..252; servo id\n  # long long" in text
     assert '\n        note: "y"\nspare:  #' in text  # behind the list, indented as its mapping
     assert all(len(line) <= 100 for line in text.splitlines())
-    assert saved.changes[1] == Change("spare.id", None, "9")
+    assert saved.changes[1] == ValueChange("spare.id", None, "9")
     assert str(saved.changes[1]) == "spare.id: (not in the file) -> 9"
     assert check(small).spare.id == 9
 
@@ -356,7 +356,7 @@ def test_any_path_into_any_tree(tmp_path_factory, tree, path, value, flow_below)
     file = tmp_path_factory.getbasetemp() / "any.yaml"
     try:
         new = edited(text, {key: value}, Head)
-    except Unchangeable:
+    except EditRefused:
         assert not possible
         return
     assert possible

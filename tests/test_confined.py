@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gazerig.config.confined import Confined
+from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
@@ -25,7 +25,7 @@ def home(tmp_path: Path) -> Path:
 
 
 def test_files_beside_the_rig_and_shipped_names(home: Path) -> None:
-    confined = Confined(home)
+    confined = AllowedFolder(home)
     for given in ("mine.yaml", "below/mine.yaml", f"{home}/mine.yaml", "./x/../mine.yaml"):
         path = Path(confined.file(given))
         assert path.is_absolute() and path.is_relative_to(home)
@@ -46,12 +46,12 @@ def test_files_beside_the_rig_and_shipped_names(home: Path) -> None:
 )  # fmt: skip
 def test_files_elsewhere_are_refused(home: Path, given: str) -> None:
     with pytest.raises(ConfigError, match="only files in|no such name"):
-        Confined(home).file(given, "characters" if given else "")
+        AllowedFolder(home).file(given, "characters" if given else "")
     if given not in ("", ".", ".."):
         with pytest.raises(ConfigError):
-            Confined(home).changes({"gaze.scanpath.transition_matrix": given})
+            AllowedFolder(home).changes({"gaze.scanpath.transition_matrix": given})
         with pytest.raises(ConfigError):
-            Confined(home).changes({"gaze.scanpath": {"walk": given}})
+            AllowedFolder(home).changes({"gaze.scanpath": {"walk": given}})
 
 
 def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:

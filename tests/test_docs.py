@@ -14,8 +14,8 @@ from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, each_of_papers, pro
 from ruamel.yaml import YAML
 
 from gazerig.config.bounds import Shape, shapes_of
-from gazerig.config.knobs import NEXT_TICK, changed, knobs, value_of
 from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.parameters import NEXT_TICK, changed, parameters, value_of
 from gazerig.config.renamed import RIG as RENAMED
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
@@ -93,7 +93,7 @@ def test_values_set_in_the_papers_are_allowed() -> None:
 
 def test_what_waits_for_the_next_start_is_told() -> None:
     text = (ROOT / "docs/tuning.md").read_text(encoding="utf-8")
-    every = knobs(RIGS["desk"], RIGS["desk"])
+    every = parameters(RIGS["desk"], RIGS["desk"])
     later = [knob.key for knob in every if knob.live != NEXT_TICK]
     now = len(every) - len(later)
     assert f"{len(every)} keys {now} work so. The other {len(later)} are" in text

@@ -7,24 +7,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.knobs import (
+from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.parameters import (
     NEXT_START,
     NEXT_TICK,
     changed,
     differences,
     flattened,
-    knobs,
+    parameters,
     value_of,
     values,
     values_after,
 )
-from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.joint import JointParams
 
 RIG = load_rig("desk")
-KNOBS = knobs(RIG, RIG)
+KNOBS = parameters(RIG, RIG)
 LENS = {"width_px": 640, "height_px": 480, "fx_px": 500.0, "fy_px": 500.0}
 WHOLE_LENS = {**LENS, "cx_px": 320.0, "cy_px": 240.0}
 

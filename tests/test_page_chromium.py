@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
-from gazerig.config.confined import Confined
+from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
@@ -393,7 +393,7 @@ def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
     person.click(saying("tuning"))
     wait_for(lambda: person.reads("not saved"), "the mark")
     file = tmp_path / "tuned at midnight.yaml"
-    rig.audience._page._hear._confined = Confined(tmp_path)  # as if the rig's file lay there
+    rig.audience._page._hear._confined = AllowedFolder(tmp_path)  # as if the rig's file lay there
     person.click(beside("save as", "input"))
     person.type(str(file))
     person.press("\r", "Enter", 13)

@@ -17,7 +17,7 @@ import viser
 from desk import JOINTS
 from six_joints import SIX, of_six
 
-from gazerig.config.knobs import knobs, values
+from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
 from gazerig.robot.control.command_handler import plain
@@ -605,7 +605,9 @@ def test_every_parameter_of_every_rig_becomes_a_control(
 ) -> None:
     rig = load_rig(name)
     now, texts = values(rig), {}
-    sent = json.loads(json.dumps([plain(knob._asdict()) for knob in knobs(rig, load_rig("desk"))]))
+    sent = json.loads(
+        json.dumps([plain(knob._asdict()) for knob in parameters(rig, load_rig("desk"))])
+    )
     places = [knob_from(data) for data in sent]
     assert {knob.key for knob in places} == set(now)
     tab = server.gui.add_tab_group().add_tab(name)
@@ -638,9 +640,9 @@ def ignore(key: str, value: object) -> None:
 
 
 def test_search_takes_every_word() -> None:
-    knobs = (KNOB, KNOB._replace(key="guard.speed", group="guard", says="how fast"))
-    assert found("how FAR", knobs) == ["a.b"]
-    assert found("how", knobs) == ["a.b", "guard.speed"] and found("how not", knobs) == []
+    parameters = (KNOB, KNOB._replace(key="guard.speed", group="guard", says="how fast"))
+    assert found("how FAR", parameters) == ["a.b"]
+    assert found("how", parameters) == ["a.b", "guard.speed"] and found("how not", parameters) == []
     assert group_of(KNOB._replace(group="joints.neck_yaw.more")) == "joints.neck_yaw"
     assert group_of(KNOB._replace(group="")) == "rig"
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from gazerig.config import renamed
+from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.bounds import shapes_of
-from gazerig.config.confined import Confined
-from gazerig.config.knobs import changed, value_of
 from gazerig.config.load import ConfigError
+from gazerig.config.parameters import changed, value_of
 from gazerig.config.rig import Rig
 from gazerig.config.save import save_rig
 from gazerig.config.schema import load_rig, load_rules
@@ -103,7 +103,7 @@ def test_no_file_elsewhere_can_be_named_by_an_old_key(tmp_path: Path) -> None:
         {"gaze": {"scanpath": {"walk": "/etc/passwd.yaml"}}},
     ):
         with pytest.raises(ConfigError, match="only files in"):
-            Confined(tmp_path).changes(changes)
+            AllowedFolder(tmp_path).changes(changes)
 
 
 def test_the_table_leads_from_keys_that_are_gone_to_keys_that_are_there() -> None:

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
-from gazerig.config.knobs import NEXT_START, Knob, changed, knobs, value_of
 from gazerig.config.load import ConfigError, shipped, shipped_names
+from gazerig.config.parameters import NEXT_START, Parameter, changed, parameters, value_of
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
@@ -111,7 +111,7 @@ class Judge:
 
 
 def some_changes(
-    knob: Knob, rig: Rig, dice: np.random.Generator, walk: str
+    knob: Parameter, rig: Rig, dice: np.random.Generator, walk: str
 ) -> Iterator[dict[str, Value]]:
     """Return changes to low, high and random values of a knob; ``walk``: another walk."""
     key, now = knob.key, value_of(rig, knob.key)
@@ -174,9 +174,9 @@ def walk(tmp_path: Path) -> str:
 ABSENT = ("lid_joints.left_lower", "lid_joints.right_lower")
 
 
-def live_knobs() -> tuple[Knob, ...]:
+def live_knobs() -> tuple[Parameter, ...]:
     # The desk rig has no lower lids, so nothing obeys their angles.
-    there = (k for k in knobs(RIG, RIG) if not k.key.startswith(ABSENT))
+    there = (k for k in parameters(RIG, RIG) if not k.key.startswith(ABSENT))
     return tuple(k for k in there if not k.live.startswith(NEXT_START))
 
 
@@ -258,7 +258,7 @@ OF_BODY = ("guard", "body", "kinematics", "head", "oculomotor")
 OF_SIGHT = ("mount", "perception", "tracker", "kinematics", "head", "oculomotor")
 
 
-def parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]:
+def running_parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]:
     """Return what some of the running parts, the loop and the parking go by."""
     parts = made.live.parts
     held = inside({name: getattr(parts, name) for name in names}, "", {})
@@ -273,7 +273,7 @@ IN_PICTURES = ("detector.", "motion.")
 SECTIONS = [("gaze", OF_GAZE), ("joints", OF_BODY), ("guard", OF_BODY), ("", OF_SIGHT)]
 
 
-def of_section(section: str) -> list[Knob]:
+def of_section(section: str) -> list[Parameter]:
     """List the live knobs of a section, "" for all that is in none."""
     named = {name for name, _ in SECTIONS}
     return [
@@ -295,12 +295,12 @@ def test_every_live_knob_has_an_effect_on_the_running_parts(
         base = changed(RIG, in_use(knob.key))
         other = acceptable(knob, base, dice, walk)
         put(made, base)
-        first = parameters(made, names)
+        first = running_parameters(made, names)
         said = put(made, other)
         assert any(knob.key in line for line in said), said
-        assert parameters(made, names) != first, f"{knob.key} changes nothing"
+        assert running_parameters(made, names) != first, f"{knob.key} changes nothing"
         put(made, base)
-        left = parameters(made, names)
+        left = running_parameters(made, names)
         assert left == first, f"{knob.key} leaves something behind"
 
 
@@ -325,7 +325,7 @@ def test_parts_retuned_go_by_what_new_parts_would_go_by(
     made = fresh(RIG)
     put(made, other)
     assert made.live.rig == other != RIG
-    got, wanted = parameters(made, names), parameters(fresh(other), names)
+    got, wanted = running_parameters(made, names), running_parameters(fresh(other), names)
     assert {k: got[k] for k in got if got[k] != wanted.get(k)} == {}
     assert got.keys() == wanted.keys()
 
@@ -342,7 +342,7 @@ def in_use(key: str) -> dict[str, Value]:
     return {}
 
 
-def acceptable(knob: Knob, base: Rig, dice: np.random.Generator, walk: str) -> Rig:
+def acceptable(knob: Parameter, base: Rig, dice: np.random.Generator, walk: str) -> Rig:
     """Return the rig with another value of a knob."""
     for changes in some_changes(knob, base, dice, walk):
         try:

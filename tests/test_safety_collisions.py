@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from desk import JOINTS
 
-from gazerig.config.bounds import judge
+from gazerig.config.bounds import validate
 from gazerig.robot.model.forbidden_range import CollisionParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint_limit import JointLimit
@@ -235,7 +235,7 @@ def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
         "second_min_deg": 10,
         "second_max_deg": 25,
     }
-    params, errors = judge(GuardParams, {"collisions": (pair,)})
+    params, errors = validate(GuardParams, {"collisions": (pair,)})
     assert errors == [] and params is not None and params.collisions == (LID,)
     wrong: list[tuple[dict[str, object], str]] = [
         ({"first": "ear"}, "neck_pitch"),
@@ -244,7 +244,7 @@ def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
         ({"second_min_deg": 26}, "second_min_deg 26.0 must be below second_max_deg 25.0"),
     ]
     for change, says in wrong:
-        params, errors = judge(GuardParams, {"collisions": ({**pair, **change},)})
+        params, errors = validate(GuardParams, {"collisions": ({**pair, **change},)})
         assert params is None and len(errors) == 1
         assert says in str(errors[0].get("ctx"))
     with pytest.raises(ValueError, match="unknown joint 'ear'; known are left_eye_pan"):

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from gazerig.config.knobs import values
 from gazerig.config.load import ConfigError
+from gazerig.config.parameters import values
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions

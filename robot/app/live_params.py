@@ -2,15 +2,15 @@
 
 Each part has a ``retune`` that takes its parameters and keeps what it knows. Only parts
 whose parameters differ are touched. What cannot change while the rig runs (see
-gazerig.config.knobs) keeps the value it started with until the next start.
+gazerig.config.parameters) keeps the value it started with until the next start.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from gazerig.config.knobs import NEXT_START, changed, differences, live
 from gazerig.config.load import ConfigError
+from gazerig.config.parameters import NEXT_START, changed, differences, live
 from gazerig.config.schema import Rig, load_walk
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention import Attention

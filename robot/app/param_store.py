@@ -16,11 +16,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.config.apart import apart
-from gazerig.config.confined import Confined
-from gazerig.config.knobs import (
+from gazerig.config.allowed_folder import AllowedFolder
+from gazerig.config.load import ConfigError, ConfigFault, shipped_names
+from gazerig.config.parameters import (
     NEXT_START,
-    Knob,
+    Parameter,
     changed,
     differences,
     flattened,
@@ -29,13 +29,13 @@ from gazerig.config.knobs import (
     values,
     values_after,
 )
-from gazerig.config.knobs import knobs as knobs_of
-from gazerig.config.load import ConfigError, Fault, shipped_names
+from gazerig.config.parameters import parameters as knobs_of
 from gazerig.config.renamed import renamed_key
-from gazerig.config.rig_files import Layers, RigFiles, read_all, save_copy, save_over
-from gazerig.config.save import Change, Saved, rig_file
-from gazerig.config.save_text import Unchangeable, written
+from gazerig.config.rig_files import RigFiles, RigLayers, read_all, save_copy, save_over
+from gazerig.config.save import SaveResult, ValueChange, rig_file
+from gazerig.config.save_text import EditRefused, written
 from gazerig.config.schema import Rig, load_rig
+from gazerig.config.subprocess_call import in_subprocess
 from gazerig.robot.app.live_params import LiveParams
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.reply import CommandTaker
@@ -78,7 +78,7 @@ class ParamStore:
         character: str | None = None,
         profile: str | None = None,
         now: Callable[[], datetime] = datetime.now,
-        elsewhere: Callable[..., Any] = apart,
+        elsewhere: Callable[..., Any] = in_subprocess,
     ) -> None:
         """Take a rig as it was assembled, and the names of the files it was made of.
 
@@ -95,14 +95,14 @@ class ParamStore:
         self._changing = threading.Lock()
         self._defaults = _defaults(live_params.rig)
         # What the command line says otherwise stays in force whatever the files say.
-        read, files = read_all(Layers(rig, character, profile))
+        read, files = read_all(RigLayers(rig, character, profile))
         whole, found = live_params.rig, values(live_params.rig)
         self._options = differences(read, whole)
         self._state = _ParamState(whole, whole, rig, character, files, found, found, 0)
         self._knobs = knobs_of(whole, self._defaults)
         # A shipped rig's own folder is the package's, where nobody has files.
         at_home = rig in shipped_names("rigs")
-        self.confined = Confined(Path.cwd() if at_home else self.path.parent)
+        self.confined = AllowedFolder(Path.cwd() if at_home else self.path.parent)
 
     @property
     def version(self) -> int:
@@ -128,7 +128,7 @@ class ParamStore:
         """Return the files in use: the rig's, and those laid over it."""
         return self._state.files.paths
 
-    def knobs(self) -> tuple[Knob, ...]:
+    def knobs(self) -> tuple[Parameter, ...]:
         """Return all parameters in the order of the file."""
         state, made = self._state, self._knobs
         # All but which entries there are stays as it is.
@@ -161,12 +161,12 @@ class ParamStore:
         with self._changing:
             return self._put(self._state, changed(self._state.rig, changes))
 
-    def unsaved(self) -> tuple[Change, ...]:
+    def unsaved(self) -> tuple[ValueChange, ...]:
         """Return what is in force and not in the files."""
         state = self._state
         return _changes(state.saved, state.rig, state.was)
 
-    def differs(self) -> tuple[Change, ...]:
+    def differs(self) -> tuple[ValueChange, ...]:
         """Return what differs from the defaults, those of the shipped rig."""
         return _changes(self._defaults, self._state.rig, values(self._defaults))
 
@@ -175,7 +175,7 @@ class ParamStore:
         with self._changing:
             return self._put(self._state, self._state.saved)
 
-    def save(self, path: Path | str | None = None) -> Saved:
+    def save(self, path: Path | str | None = None) -> SaveResult:
         """Write what is in force into the rig's file, or into a copy of it at a new path.
 
         From then on the copy is this rig's file. A file that was spoilt by hand meanwhile is
@@ -201,7 +201,7 @@ class ParamStore:
             else:
                 layers = layers._replace(name=str(target))
                 done = self._elsewhere(save_over, layers, good, wanted, self._now())
-            saved: Saved
+            saved: SaveResult
             saved, files = done
             self._state = state._replace(
                 saved=state.rig, was=state.values, files=files, version=state.version + 1
@@ -249,8 +249,8 @@ class ParamStore:
         }
         return self._put(state, changed(state.saved, kept))
 
-    def _layers(self, state: _ParamState) -> Layers:
-        return Layers(state.name, state.character, self._profile)
+    def _layers(self, state: _ParamState) -> RigLayers:
+        return RigLayers(state.name, state.character, self._profile)
 
     def _read(self, state: _ParamState) -> _ParamState:
         """Read the files, with the options over them; what is in force stays."""
@@ -282,7 +282,7 @@ def _defaults(rig: Rig) -> Rig:
 def _refuse_lists(wanted: Mapping[str, Value]) -> None:
     """Refuse what no single line can hold."""
     faults = [
-        Fault("", None, key, "", "holds mappings: change it in the file, which is read again")
+        ConfigFault("", None, key, "", "holds mappings: change it in the file, which is read again")
         for key, value in wanted.items()
         if isinstance(value, tuple) and any(isinstance(item, Mapping) for item in value)
     ]
@@ -290,11 +290,11 @@ def _refuse_lists(wanted: Mapping[str, Value]) -> None:
         raise ConfigError(faults)
 
 
-def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[Change, ...]:
+def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[ValueChange, ...]:
     """Return each value that differs, as YAML; was: those before."""
     found = flattened(after, differences(before, after))
     return tuple(
-        Change(key, _text(was[key]) if key in was else None, _text(value))
+        ValueChange(key, _text(was[key]) if key in was else None, _text(value))
         for key, value in found.items()
     )
 
@@ -307,7 +307,7 @@ def _text(value: Value) -> str:
         return f"[{', '.join(map(_text, value))}]"
     try:
         return written(value)
-    except Unchangeable:
+    except EditRefused:
         return str(value)
 
 

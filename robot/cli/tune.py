@@ -31,11 +31,11 @@ def complete_key(incomplete: str) -> list[str]:
             return list(rig.get(incomplete))
     except DriverError:
         # Only here: the other commands leave all keys and rules to the rig that runs.
-        from gazerig.config.knobs import knobs
+        from gazerig.config.parameters import parameters
         from gazerig.config.schema import load_rig
 
         desk = load_rig("desk")
-        return [knob.key for knob in knobs(desk, desk) if knob.key.startswith(incomplete)]
+        return [knob.key for knob in parameters(desk, desk) if knob.key.startswith(incomplete)]
 
 
 def complete_pair(context: typer.Context, incomplete: str) -> list[str]:

@@ -18,7 +18,7 @@ _FAR = 20.0
 
 
 class PageParam(NamedTuple):
-    """A parameter as gazerig.config.knobs describes it, read from JSON."""
+    """A parameter as gazerig.config.parameters describes it, read from JSON."""
 
     key: str
     group: str

@@ -1,4 +1,4 @@
-"""Which files may be named from outside, by a browser: shipped ones, and those beside the rig.
+"""Files that a browser may name: shipped ones, and those in the rig's folder.
 
 Whoever steers a running rig from a page names characters, walks, profiles and files to save
 in. The program reads and writes them with the rights of its own user, so that only those in
@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from gazerig.config.load import ConfigError, Fault, shipped_names
+from gazerig.config.load import ConfigError, ConfigFault, shipped_names
 from gazerig.config.renamed import renamed_changes
 
 _KIND_OF_KEY = {
@@ -22,8 +22,8 @@ _KIND_OF_KEY = {
 _YAML = (".yaml", ".yml")
 
 
-class Confined:
-    """One folder, with all below it, in which files may be named."""
+class AllowedFolder:
+    """A folder and all below it, in which files may be named."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = os.path.realpath(folder)
@@ -45,7 +45,7 @@ class Confined:
                 return given
             there = ", ".join(shipped_names(kind))
             raise ConfigError(
-                [Fault("", None, key, repr(given), f"no such name; there is {there}")]
+                [ConfigFault("", None, key, repr(given), f"no such name; there is {there}")]
             )
         if given and "\0" not in given:
             begin = self._folder if start is None else str(start)
@@ -53,17 +53,17 @@ class Confined:
             if path.startswith(self._folder.rstrip("/") + "/"):
                 return path
         rule = f"from the page only files in {self._folder} and below can be named"
-        raise ConfigError([Fault("", None, key, repr(given), rule)])
+        raise ConfigError([ConfigFault("", None, key, repr(given), rule)])
 
     def changes(self, changes: Mapping[str, object]) -> None:
-        """See that the files that new values of a rig's keys name may be named.
+        """Check the files that new values of a rig's keys name.
 
         Relative paths begin in the working folder, as they do where they are opened.
 
         Raises:
             gazerig.config.load.ConfigError: with every file that may not.
         """
-        faults: list[Fault] = []
+        faults: list[ConfigFault] = []
         for key, value in _leaves("", renamed_changes(changes)):
             if isinstance(value, str) and value and key in _KIND_OF_KEY:
                 try:

@@ -1,4 +1,4 @@
-"""Reading and writing rig files in a process of its own, beside a running control loop.
+"""Function calls in a process of their own: rig files are read and written beside a control loop.
 
 Reading a rig takes 130 ms of pure Python. In another thread of the loop's process that made
 ticks last up to 90 ms instead of 1, as every answer of a servo was waited for behind the
@@ -12,20 +12,20 @@ import sys
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
-from gazerig.config.load import ConfigError, Fault
+from gazerig.config.load import ConfigError, ConfigFault
 from gazerig.config.renamed import report_once
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _LONGEST_S = 30.0
-_CHILD = "from gazerig.config.apart import serve; serve()"
+_CHILD = "from gazerig.config.subprocess_call import serve; serve()"
 
 
-def apart(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
-    """Call ``work``, a function of a module, in another process and give what it gives.
+def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
+    """Return what ``work``, a function of a module, returns when called in another process.
 
-    ``apart(load_rig, "my.yaml", "shy")`` blocks for half a second and leaves this process's
+    ``in_subprocess(load_rig, "my.yaml", "shy")`` blocks for half a second and leaves this process's
     interpreter free. Paths mean the same there; values are copied both ways.
 
     Raises:
@@ -57,7 +57,7 @@ def apart(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
 
 
 def serve() -> None:
-    """Be that other process: one call from standard input, what it gave to standard output."""
+    """Run as the other process: one call from standard input, its result to standard output."""
     os.nice(5)  # whoever waits for servos goes first
     work, words, named = pickle.load(sys.stdin.buffer)
     pickle.dump(_outcome(work, words, named), sys.stdout.buffer)
@@ -65,7 +65,7 @@ def serve() -> None:
 
 def _outcome(
     work: Callable[..., Any], words: tuple[Any, ...], named: dict[str, Any]
-) -> tuple[Any, tuple[Fault, ...]]:
+) -> tuple[Any, tuple[ConfigFault, ...]]:
     try:
         return work(*words, **named), ()
     except ConfigError as error:
@@ -73,4 +73,4 @@ def _outcome(
 
 
 def _failed(work: Callable[..., Any], rule: str) -> ConfigError:
-    return ConfigError([Fault(f"process for {work.__name__}", None, "", "", rule)])
+    return ConfigError([ConfigFault(f"process for {work.__name__}", None, "", "", rule)])

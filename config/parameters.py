@@ -1,4 +1,4 @@
-"""Every parameter of a rig as a knob: what it is, what it may be, what it would be else.
+"""Every parameter of a rig: meaning, bounds, default, and when a change takes effect.
 
 A key is the dotted path of the YAML. A rig is changed by keys as a file would change it:
 what is wrong is said in the same words, and nothing is changed then. Pure.
@@ -14,9 +14,9 @@ from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from gazerig.config.bounds import Form, Shape, judge, shapes_of
-from gazerig.config.export import closest, shown
-from gazerig.config.load import ConfigError, Entry, Fault, weighed
+from gazerig.config.bounds import Form, Shape, shapes_of, validate
+from gazerig.config.export import abbreviated, suggestion
+from gazerig.config.load import ConfigError, ConfigFault, Entry, validate_entries
 from gazerig.config.renamed import renamed_changes, renamed_key
 from gazerig.config.schema import RULES, Rig
 from gazerig.gaze.types import PARTS
@@ -51,7 +51,7 @@ _LEFT_OUT: dict[str, Value] = {"park_deg": 0.0}
 """What a left-out entry stands for; None where no value of its own does."""
 
 
-class Knob(NamedTuple):
+class Parameter(NamedTuple):
     """One parameter.
 
     key: dotted path in the YAML; group: the path above it, "" at the top
@@ -78,8 +78,8 @@ class Knob(NamedTuple):
     items: Form | None = None
 
 
-def knobs(rig: Rig, defaults: Rig) -> tuple[Knob, ...]:
-    """List the parameters of a rig in the order of its file."""
+def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
+    """Return the parameters of a rig in the order of its file."""
     return tuple(
         _knob(key, shape, _at(defaults, key))
         for key, shape, _ in _leaves(_ROOT, rig, (), _unlisted(rig))
@@ -102,9 +102,11 @@ def value_of(rig: Rig, key: str) -> Value:
         if step in _unlisted(rig).get(over, ()) and done == len(steps) - 1:
             return _LEFT_OUT.get(over)
         names = tuple(held or ())
-        near = closest(step, names) or ";"
+        near = suggestion(step, names) or ";"
         there = f"there is {', '.join(names)}" if names else f"{over} has no keys"
-        raise ConfigError([Fault("", None, key, "", f"unknown key {shown(step)}{near} {there}")])
+        raise ConfigError(
+            [ConfigFault("", None, key, "", f"unknown key {abbreviated(step)}{near} {there}")]
+        )
     found: Value = plain(value)
     return found
 
@@ -148,7 +150,7 @@ def _judged(rig: Rig, changes: Mapping[str, Value]) -> Rig | None:
     data = _opened(rig, [tuple(key.split(".")) for key in changes])
     if any([_put(data, key, _frozen(value)) for key, value in changes.items()]):
         return None
-    made, _ = judge(Rig, data)
+    made, _ = validate(Rig, data)
     if made is None or any(True for rule in RULES for _ in rule(made)):
         return None
     return made
@@ -159,7 +161,7 @@ def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     data, faults = plain(rig), []
     for key, value in changes.items():
         faults += _put(data, key, _frozen(value))
-    outcome = weighed(Rig, _entries(data), RULES)
+    outcome = validate_entries(Rig, _entries(data), RULES)
     made, found = outcome
     faults += [dataclasses.replace(fault, line=None) for fault in found]
     if faults or made is None:
@@ -231,7 +233,7 @@ def _unlisted(rig: Rig) -> _Unlisted:
 def _leaves(
     shape: Shape, value: Any, path: tuple[str, ...], unlisted: _Unlisted
 ) -> Iterator[tuple[str, Shape, Value]]:
-    """Walk down to where values stand, with what may stand there."""
+    """Return key, shape and value of every leaf below a position."""
     key = ".".join(path)
     if shape.params is not None and value is not None:
         for name, field in shapes_of(shape.params).items():
@@ -244,13 +246,13 @@ def _leaves(
         yield key, shape, plain(value)
 
 
-def _knob(key: str, shape: Shape, default: Value) -> Knob:
+def _knob(key: str, shape: Shape, default: Value) -> Parameter:
     inner = shape.inner or shape
     while inner.inner is not None:
         inner = inner.inner
     entry = key.rpartition(".")[0]
     choices: tuple[Value, ...] = tuple(inner.choices)  # type: ignore[arg-type]
-    return Knob(
+    return Parameter(
         key,
         entry,
         shape.unit,
@@ -269,7 +271,7 @@ def _knob(key: str, shape: Shape, default: Value) -> Knob:
 
 @lru_cache(maxsize=1024)
 def live(key: str) -> str:
-    """Say when a change of a key takes effect, and why no sooner."""
+    """Return when a change of a key takes effect, and why no sooner."""
     for pattern, reason in _AT_START.items():
         if fnmatchcase(key, pattern):
             return f"{NEXT_START}: {reason}"
@@ -314,8 +316,8 @@ def _differing(
         yield ".".join(path), plain(after)
 
 
-def _put(data: dict[str, Any], key: str, value: Value) -> list[Fault]:
-    """Lay a value over plain data at a dotted key."""
+def _put(data: dict[str, Any], key: str, value: Value) -> list[ConfigFault]:
+    """Set a value in plain data at a dotted key; return the faults."""
     *over, last = key.split(".")
     held: Any = data
     shape: Shape | None = _ROOT
@@ -325,8 +327,8 @@ def _put(data: dict[str, Any], key: str, value: Value) -> list[Fault]:
             held[step] = {}
         held = held.setdefault(step, {}) if isinstance(held, dict) else None
     if not isinstance(held, dict):
-        rule = f"unknown key {shown(last)}; {'.'.join(over)} is a single value"
-        return [Fault("", None, key, shown(value), rule)]
+        rule = f"unknown key {abbreviated(last)}; {'.'.join(over)} is a single value"
+        return [ConfigFault("", None, key, abbreviated(value), rule)]
     entry = shape is not None and shape.form == "mapping" and shape.inner is not None
     if value is None and entry and shape is not None and not _may_be_null(shape.inner):
         held.pop(last, None)
@@ -356,7 +358,7 @@ def _laid_over(low: dict[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _frozen(value: Any) -> Any:
-    """Make tuples of lists and plain dicts of mappings."""
+    """Return a value with lists as tuples and mappings as dicts."""
     if isinstance(value, list | tuple):
         return tuple(_frozen(item) for item in value)
     if isinstance(value, Mapping):
@@ -365,7 +367,7 @@ def _frozen(value: Any) -> Any:
 
 
 def _entries(value: Any) -> Entry:
-    """Make entries, as if read from a file that has no name."""
+    """Return values as entries, as if read from a file without a name."""
     if isinstance(value, dict):
         return Entry({key: _entries(item) for key, item in value.items()}, "", 0)
     if isinstance(value, tuple):
