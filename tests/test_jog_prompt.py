@@ -1,25 +1,18 @@
 """A servo steered at a terminal: keys as they are pressed, lines of a file, and numbers."""
 
-import contextlib
-import os
-import pty
-import re
-import select
-import signal
-import sys
 import time
 from pathlib import Path
 
 import pytest
+from command_line import answers_in
+from commands_started import OnTerminal
+from served_rigs import rig_files
 
-from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.cli.jog_prompt import SteeringPerson
 from gazerig.robot.cli.prompts import Lines
-
-ROOT = Path(__file__).parents[1]
 
 
 class Servo:
@@ -42,9 +35,7 @@ class Servo:
 
 
 def person(tmp_path: Path, *lines: str) -> SteeringPerson:
-    file = tmp_path / "answers"
-    file.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    return SteeringPerson(Lines(file), lambda: None, False)
+    return SteeringPerson(Lines(Path(answers_in(tmp_path, *lines))), lambda: None, False)
 
 
 def test_lines_move_a_servo_until_enter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -72,58 +63,24 @@ def test_q_and_the_end_of_the_answers_end_it(tmp_path: Path) -> None:
         person(tmp_path).number("how far?", 1.0, str)
 
 
-class Terminal:
-    """gazerig calibrate on a pseudo-terminal."""
-
-    def __init__(self, *words: str) -> None:
-        self.said = ""
-        code = "from gazerig.robot.cli.main import main; main()"
-        self.pid, self.fd = pty.fork()
-        if self.pid == 0:
-            os.chdir(ROOT)
-            os.execv(sys.executable, [sys.executable, "-c", code, "calibrate", *words])
-
-    def reads(self, pattern: str) -> re.Match[str]:
-        """Wait for what has not been waited for."""
-        end_s = time.monotonic() + 60.0
-        while (found := re.search(pattern, self.said)) is None:
-            assert time.monotonic() < end_s, self.said[-300:]
-            if select.select([self.fd], [], [], 0.2)[0]:
-                self.said += os.read(self.fd, 4096).decode(errors="replace")
-        self.said = self.said[found.end() :]
-        return found
-
-    def types(self, keys: bytes) -> None:
-        os.write(self.fd, keys)
-
-    def __enter__(self) -> "Terminal":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(self.pid, signal.SIGKILL)
-        os.waitpid(self.pid, 0)
-        os.close(self.fd)
-
-
 def test_keys_steer_a_hobby_servo_at_the_terminal(tmp_path: Path) -> None:
-    rig = tmp_path / "mine.yaml"
-    rig.write_text(shipped("rigs", "maker").read_text("utf-8"), encoding="utf-8")
-    words = (str(rig), "--mock", "--yes", "--joint", "eyes_tilt", "--more", "0", "--margin", "0")
-    with Terminal(*words) as terminal:
-        terminal.reads(r"shall it begin\? \[1510\]")
+    rig = rig_files(tmp_path)["maker"]
+    words = (rig, "--mock", "--yes", "--joint", "eyes_tilt", "--more", "0", "--margin", "0")
+    with OnTerminal("calibrate", *words) as terminal:
+        terminal.reads("shall it begin? [1510]")
         terminal.types(b"\n")
         terminal.reads("straight ahead, then press Enter")
-        terminal.reads(r"1510 us .*step 10 us")
+        terminal.reads("1510 us")
+        terminal.reads("step 10 us")
         terminal.types(b"\x1b[A\x1b[C")  # a larger step, then one of those to the right
         terminal.reads("1530 us")
         terminal.types(b"\r")
         terminal.reads("to its UPPER end")
         terminal.reads("step 10 us")
         terminal.types(b"\x1b[A\x1b[Ad")
-        terminal.reads(r"1580 us")
+        terminal.reads("1580 us")
         terminal.types(b"\r")
-        terminal.reads(r"eyes_tilt at 1580 us: how many degrees \(UPPER is \+\)\?")
+        terminal.reads("eyes_tilt at 1580 us: how many degrees (UPPER is +)?")
         terminal.types(b"8\n")
         terminal.reads("to its LOWER end")
         terminal.reads("step 10 us")
@@ -136,7 +93,7 @@ def test_keys_steer_a_hobby_servo_at_the_terminal(tmp_path: Path) -> None:
         terminal.reads("at 1480 us: how many degrees")
         terminal.types(b"-7\n")
         terminal.reads("written into")
-    assert load_rig(str(rig)).joints["eyes_tilt"].transmission_points == (
+    assert load_rig(rig).joints["eyes_tilt"].transmission_points == (
         (-7, 1480),
         (0, 1530),
         (8, 1580),

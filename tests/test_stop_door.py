@@ -5,7 +5,9 @@ import time
 from pathlib import Path
 
 import pytest
-from test_cli_calibrate_face import DESK, PATIENCE_S, Sitting
+from commands_started import PATIENCE_S
+from served_rigs import rig_files
+from test_cli_calibrate_face import sitting_at
 
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.remote.client import RequestRejected, RobotClient
@@ -25,11 +27,10 @@ def goes_on(running: RobotClient) -> None:
 def test_a_head_that_is_steered_over_a_face_can_be_stopped_and_told_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rig = tmp_path / "mine.yaml"
-    rig.write_text(DESK.read_text("utf-8"), encoding="utf-8")
+    rig = Path(rig_files(tmp_path)["desk"])
     # Both processes look there; a path of its own keeps other rigs that run here out of it.
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    with Sitting(rig, "--no-page") as sitting:
+    with sitting_at(rig, "--no-page") as sitting:
         sitting.reads("1/8 the tip of your nose: 0 mm")
         with RobotClient.connect() as running:
             assert running.pid == sitting.pid
