@@ -32,8 +32,10 @@ def signed(raw: int, bit: int) -> int:
 
 def unsigned(value: int, bit: int) -> int:
     """Write sign and magnitude; what does not fit below ``bit`` becomes the largest that does."""
-    magnitude = min(abs(value), (1 << bit) - 1)
-    return magnitude | 1 << bit if value < 0 else magnitude
+    largest = (1 << bit) - 1
+    if value >= 0:
+        return value if value <= largest else largest
+    return (-value if -value <= largest else largest) | 1 << bit
 
 
 class FeetechFraming(Framing):
