@@ -33,7 +33,10 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_run.py
 	$(BIN)/python tests/bench/bench_gaze.py
 	$(BIN)/python tests/bench/bench_bus.py
+	$(BIN)/python tests/bench/bench_bus_peers.py
+	$(BIN)/python tests/bench/bench_bus_layers.py
 	$(BIN)/python tests/bench/bench_bus_kinds.py
+	$(BIN)/python tests/bench/bench_pca9685.py
 	$(BIN)/python tests/bench/bench_faults.py
 	$(BIN)/python tests/bench/bench_emulator.py
 	$(BIN)/python tests/bench/bench_motion.py

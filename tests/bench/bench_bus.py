@@ -1,26 +1,24 @@
 """What the servo driver costs and survives: python tests/bench/bench_bus.py [--seconds 20]
 
-One run, nine emulated servos, side by side with the maker's SDK and rustypot on the same
-bus: loop rate against the wire's own limit, processor time a cycle, a silent servo, an
-unplugged adapter, and faults by the dice with a count of stale values. Nothing here passes
-or fails: machines differ and are shared, so compare figures of one run with each other.
+One run, nine emulated servos: the rate against the wire's own limit and a silent servo on a
+simulated line; a silent servo side by side with the maker's SDK and rustypot; an unplugged
+adapter, and faults by the dice with a count of stale values. Rates and processor time beside
+the others are in bench_bus_peers.py. Nothing here passes or fails: machines differ and are
+shared, so compare figures of one run with each other.
 """
 
 import argparse
 import os
 import random
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from itertools import count
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from math import isfinite
 from statistics import fmean, median
-from typing import NamedTuple
 
-from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler, PortHandler
+from bus_clients import Cycle, ours, robotis, rustypot
 from rich.console import Console
 from rich.table import Table
-from rustypot import Xl330PyController
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
@@ -39,9 +37,6 @@ SETUPS = [ServoSetup(i, MODEL, 1000, 3000, 6000.0, f"joint_{i}") for i in IDS]
 WIRE_BYTES = 59 + 23 + 134
 """Sync write of nine goals, fast sync read of 10 bytes from nine servos, and its answer."""
 
-Cycle = Callable[[int], int]
-"""Reads all servos and writes goals; takes a number, gives how many values came."""
-
 out = Console(width=110)
 
 
@@ -51,142 +46,13 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0, help="for all parts together")
     share = parser.parse_args().seconds / 40.0
     out.print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.2f} at the start")
-    rates(2.0 * share)
     line_alone()
     silent_servo(max(500, int(3000 * share)))
     unplug(max(2, int(4 * share)))
     dice(int(60 * 100 * share))
 
 
-# --- the three clients
-
-
-@contextmanager
-def ours(path: str, baud: int, **chosen: object) -> Iterator[Cycle]:
-    """Our driver, its torque on."""
-    params = DynamixelParams(baud=baud, **chosen)  # type: ignore[arg-type]
-    bus = SmartServoBus(DYNAMIXEL, BlockingPort(path), SETUPS, params)
-    bus.open()
-    bus.engage()
-
-    def cycle(k: int) -> int:
-        feedback = bus.read(time.monotonic())
-        bus.write([2048 + k % 8] * len(IDS))
-        return len(IDS) - len(feedback.missing)
-
-    try:
-        yield cycle
-    finally:
-        bus.release()
-        bus.close()
-
-
-@contextmanager
-def sdk(path: str, baud: int) -> Iterator[Cycle]:
-    """The maker's SDK: fast sync read of 10 bytes, sync write."""
-    port, packets = PortHandler(path), PacketHandler(2.0)
-    port.openPort()
-    port.setBaudRate(baud)
-    reads, writes = GroupSyncRead(port, packets, 126, 10), GroupSyncWrite(port, packets, 116, 4)
-    for servo_id in IDS:
-        reads.addParam(servo_id)
-
-    def cycle(k: int) -> int:
-        reads.fastSyncRead()
-        values = [reads.getData(i, 132, 4) for i in IDS if reads.isAvailable(i, 132, 4)]
-        writes.clearParam()
-        for servo_id in IDS:
-            writes.addParam(servo_id, (2048 + k % 8).to_bytes(4, "little"))
-        writes.txPacket()
-        return len(values)
-
-    try:
-        yield cycle
-    finally:
-        port.closePort()
-
-
-@contextmanager
-def rusty(path: str, baud: int) -> Iterator[Cycle]:
-    """rustypot: fast sync read of the position alone (it reads one register), sync write."""
-    client = Xl330PyController(path, baud, 0.05)
-    client.set_fast_sync_read(True)
-    ids = list(IDS)
-
-    def cycle(k: int) -> int:
-        try:
-            values = len(client.sync_read_raw_present_position(ids))
-        except (OSError, RuntimeError, ValueError):
-            values = 0
-        client.sync_write_raw_goal_position(ids, [2048 + k % 8] * len(ids))
-        return values
-
-    yield cycle
-
-
-# --- (a) and (b): rate and processor time
-
-
-class Figures(NamedTuple):
-    """Of one client: cycles a second, median cycle and processor time a cycle."""
-
-    rate_hz: float
-    median_us: float
-    cpu_us: float
-
-
-def measure(cycle: Cycle, seconds: float) -> Figures:
-    """Run cycles without a pause."""
-    for k in range(300):
-        cycle(k)
-    spans = []
-    cpu, start = time.process_time(), time.perf_counter()
-    now = start
-    for k in count():
-        cycle(k)
-        before, now = now, time.perf_counter()
-        spans.append(now - before)
-        if now - start >= seconds:
-            break
-    used = time.process_time() - cpu
-    return Figures(len(spans) / (now - start), median(spans) * 1e6, used / len(spans) * 1e6)
-
-
-def rates(seconds: float) -> None:
-    """Print rate and processor time, without wire time and at two speeds of the wire."""
-    for baud, wire in ((1_000_000, False), (1_000_000, True), (4_000_000, True)):
-        limit_hz = baud / (10.0 * WIRE_BYTES)
-        what = f"wire at {baud // 1_000_000} Mbaud, limit {limit_hz:.0f} Hz" if wire else "no wire"
-        table = Table("client", "reads", "Hz", "of limit", "p50 us", "CPU us", title=what)
-        clients: list[tuple[str, str, Callable[[str], object]]] = [
-            ("ours", "10 B", lambda path, b=baud: ours(path, b, indirect_block=False)),
-            ("ours, indirect", "13 or 14 B", lambda path, b=baud: ours(path, b)),
-            ("rustypot", "4 B", lambda path, b=baud: rusty(path, b)),
-            ("SDK", "10 B", lambda path, b=baud: sdk(path, b)),
-        ]
-        for name, reads, client in clients:
-            with PtyBus() as server:
-                path = server.start(SPECS, baud=baud if wire else None, wire_time=wire)
-                _no_return_delay(path, baud)
-                with client(path) as cycle:  # type: ignore[attr-defined]
-                    got = measure(cycle, seconds)
-            part = f"{got.rate_hz / limit_hz:.1%}" if wire else "-"
-            row = f"{got.rate_hz:.0f}", part, f"{got.median_us:.0f}", f"{got.cpu_us:.1f}"
-            table.add_row(name, reads, *row)
-        out.print(table)
-
-
-def _no_return_delay(path: str, baud: int) -> None:
-    """Let all servos answer at once, as our driver does, for the other clients."""
-    port = PortHandler(path)
-    port.openPort()
-    port.setBaudRate(baud)
-    for servo_id in IDS:
-        PacketHandler(2.0).write1ByteTxRx(port, servo_id, 9, 0)
-    port.closePort()
-
-
-# --- (c) a silent servo
+# --- a silent servo
 
 
 def silent_servo(cycles: int) -> None:
@@ -194,16 +60,17 @@ def silent_servo(cycles: int) -> None:
     table = Table(
         "client", "healthy ms", "first extra ms", "mean extra", "values kept", title="silent servo"
     )
-    clients: list[tuple[str, Callable[[str], object]]] = [
-        ("ours", lambda path: ours(path, 1_000_000)),
-        ("rustypot", lambda path: rusty(path, 1_000_000)),
-        ("SDK", lambda path: sdk(path, 1_000_000)),
-    ]
-    for name, client in clients:
+    clients: dict[str, Callable[[str], AbstractContextManager[Cycle]]] = {
+        "ours": lambda path: ours("dynamixel", path, 1_000_000),
+        "rustypot": lambda path: rustypot("dynamixel", path, 1_000_000, wait_s=0.05),
+        "SDK": lambda path: robotis(path, 1_000_000),
+    }
+    for name, client in clients.items():
         with PtyBus() as server:
             path = server.start(SPECS, baud=1_000_000, wire_time=True)
-            _no_return_delay(path, 1_000_000)
-            with client(path) as cycle:  # type: ignore[attr-defined]
+            with ours("dynamixel", path, 1_000_000):  # lets all servos answer at once
+                pass
+            with client(path) as cycle:
                 for k in range(400):
                     cycle(k)
                 healthy, first, ill = [], [], []
@@ -276,7 +143,7 @@ def _line_cycles(bus: SmartServoBus, now: list[float], cycles: int) -> tuple[flo
     return (now[0] - began) / cycles, values / cycles
 
 
-# --- (d) unplugged
+# --- unplugged
 
 
 def unplug(times: int) -> None:
@@ -315,7 +182,7 @@ def _cycles(bus: SmartServoBus, done: Callable[[Feedback], bool], most_s: float)
     return (time.perf_counter() - start) * 1e3
 
 
-# --- (e) faults by the dice
+# --- faults by the dice
 
 FAULTS = (
     "lose {i} count {n}", "delay {i} {ms} count {n}", "truncate {i} {k} count {n}",

@@ -44,15 +44,20 @@ class Client(NamedTuple):
     opened: Callable[[str, int], AbstractContextManager[Cycle]]
 
 
-def ours(kind: str, path: str, baud: int, **chosen: object) -> AbstractContextManager[Cycle]:
-    """Return our driver, its torque on."""
+def driver(kind: str, path: str, baud: int, **chosen: object) -> SmartServoBus:
+    """Make our driver of one bus."""
     port = BlockingPort(path)
     setups = [ServoSetup(i, MODELS[kind], 1000, 3000, 3000.0, f"joint_{i}") for i in IDS]
     if kind == "dynamixel":
         # While others have their turn it is silent for longer than servos bear.
         params = DynamixelParams(baud=baud, watchdog_ms=0, **chosen)  # type: ignore[arg-type]
-        return _driven(SmartServoBus(DYNAMIXEL, port, setups, params))
-    return _driven(SmartServoBus(FEETECH, port, setups, FeetechParams(baud=baud)))
+        return SmartServoBus(DYNAMIXEL, port, setups, params)
+    return SmartServoBus(FEETECH, port, setups, FeetechParams(baud=baud))
+
+
+def ours(kind: str, path: str, baud: int, **chosen: object) -> AbstractContextManager[Cycle]:
+    """Return our driver, its torque on."""
+    return _driven(driver(kind, path, baud, **chosen))
 
 
 @contextmanager
@@ -170,13 +175,13 @@ def robotis(path: str, baud: int) -> Iterator[Cycle]:
 
 
 @contextmanager
-def rustypot(kind: str, path: str, baud: int) -> Iterator[Cycle]:
+def rustypot(kind: str, path: str, baud: int, wait_s: float = WAIT_S) -> Iterator[Cycle]:
     """rustypot: (fast) sync read of the position alone, as it reads one register; sync write."""
     client: Sts3215PyController | Xl330PyController
     if kind == "feetech":
-        client = Sts3215PyController(path, baud, WAIT_S)
+        client = Sts3215PyController(path, baud, wait_s)
     else:
-        client = fast = Xl330PyController(path, baud, WAIT_S)
+        client = fast = Xl330PyController(path, baud, wait_s)
         fast.set_fast_sync_read(True)
     ids = list(IDS)
 
