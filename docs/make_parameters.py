@@ -13,7 +13,7 @@ PAPER = Path(__file__).parent / "parameters.md"
 _HEAD = """# Every parameter of a rig
 
 Written by `python docs/make_parameters.py` from the declarations in the code, the same that the loader,
-the page and `gazerig set` read. A star stands for a name that you choose: a joint's, a rule's, a bus's.
+the page and `gazerig ctl set` read. A star stands for a name that you choose: a joint's, a rule's, a bus's.
 A default is the program's own; the shipped rigs and profiles set their values over it, and a dash
 means that a rig file must give one. [tuning.md](tuning.md) says how to change them while the head moves
 and how to add one.

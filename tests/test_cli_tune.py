@@ -1,4 +1,4 @@
-"""Tuning a running rig from a shell: gazerig get, set, save ... on a rig in another process.
+"""Tuning a running rig from a shell: gazerig ctl get, set, save ... on a rig in another process.
 
 ``python tests/test_cli_tune.py RIG`` is that process: a loop before an emulated bus, in simulated
 time that passes slower than real, so that it leaves the processor to the commands.
@@ -29,11 +29,11 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.cli.entry_point import QUICK, is_quick
+from gazerig.robot.cli.entry_point import MOVED, QUICK, as_now, is_quick
 from gazerig.robot.cli.entry_point import main as quick_main
 from gazerig.robot.cli.lead import app as lead_app
 from gazerig.robot.cli.lead import read_point
-from gazerig.robot.cli.tune import app, read_pairs, read_value, state_lines
+from gazerig.robot.cli.tune import app, ctl, read_pairs, read_value, state_lines
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.loop import run as run_loop
 from gazerig.robot.model import stop_latch
@@ -172,39 +172,39 @@ def held(key: str) -> Any:
 
 
 def test_get_shows_all_and_marks_what_is_not_saved() -> None:
-    everything = gazerig("get").stdout.splitlines()
+    everything = gazerig("ctl", "get").stdout.splitlines()
     assert len(everything) > 300 and everything[0].split() == ["key", "value", "unit", "default"]
-    assert gazerig("set", RATE, "150").returncode == 0
-    table = gazerig("get", "loop").stdout.splitlines()
+    assert gazerig("ctl", "set", RATE, "150").returncode == 0
+    table = gazerig("ctl", "get", "loop").stdout.splitlines()
     (row,) = (line for line in table if RATE in line)
     assert row.split() == ["*", RATE, "150.0", "Hz", "200.0"]
     (other,) = (line for line in table if "loop.park_s" in line)
     assert not other.startswith("*")
-    alone = gazerig("get", RATE).stdout
+    alone = gazerig("ctl", "get", RATE).stdout
     assert "control rate; 20 .. 1000 Hz; changes at the next tick" in alone
 
 
 def test_get_differs_and_json() -> None:
-    assert gazerig("get", "--differs").stdout.splitlines()[1:] == []
-    gazerig("set", RATE, "150", "park_deg.neck_pitch", "-3")
-    rows = gazerig("get", "--differs").stdout.splitlines()[1:]
+    assert gazerig("ctl", "get", "--differs").stdout.splitlines()[1:] == []
+    gazerig("ctl", "set", RATE, "150", "park_deg.neck_pitch", "-3")
+    rows = gazerig("ctl", "get", "--differs").stdout.splitlines()[1:]
     assert [row.split()[1] for row in rows] == ["park_deg.neck_pitch", RATE]
-    assert json.loads(gazerig("get", RATE, "--json").stdout) == {RATE: 150.0}
+    assert json.loads(gazerig("ctl", "get", RATE, "--json").stdout) == {RATE: 150.0}
 
 
 def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it() -> None:
-    done = gazerig("set", RATE, "150", "gaze.scanpath.model", "random")
+    done = gazerig("ctl", "set", RATE, "150", "gaze.scanpath.model", "random")
     assert done.returncode == 0, done.stderr
     assert sorted(done.stdout.splitlines()) == [
         "gaze.scanpath.model = random",
         f"{RATE} = 150.0",
     ]
-    assert "in force already" in gazerig("set", RATE, "150.0").stderr
+    assert "in force already" in gazerig("ctl", "set", RATE, "150.0").stderr
     assert "not saved yet: 2 values" in done.stderr
 
 
 def test_what_takes_effect_later_is_said() -> None:
-    done = gazerig("set", "bus.port", "/dev/ttyUSB7")
+    done = gazerig("ctl", "set", "bus.port", "/dev/ttyUSB7")
     assert "bus.port = /dev/ttyUSB7 (next start: " in done.stdout
 
 
@@ -225,31 +225,31 @@ def test_what_takes_effect_later_is_said() -> None:
 def test_what_is_wrong_is_refused_with_the_rule_and_exit_code_2(
     words: tuple[str, ...], rule: str
 ) -> None:
-    done = gazerig("set", *words)
+    done = gazerig("ctl", "set", *words)
     assert done.returncode == 2 and rule in done.stderr and "Traceback" not in done.stderr
     assert done.stdout == "" and held(RATE) == 200.0
 
 
 def test_every_rule_is_listed_and_no_value_taken() -> None:
-    done = gazerig("set", RATE, "1e9", "gaze.scanpath.model", "markof", "loop.park_s", "2")
+    done = gazerig("ctl", "set", RATE, "1e9", "gaze.scanpath.model", "markof", "loop.park_s", "2")
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 2
     assert held("loop.park_s") == 4.0
 
 
 def test_save_keeps_comments_and_the_old_file(rig: Running) -> None:
     before = rig.path.read_text(encoding="utf-8")
-    gazerig("set", RATE, "150")
-    done = gazerig("save")
+    gazerig("ctl", "set", RATE, "150")
+    done = gazerig("ctl", "save")
     assert f"{RATE}: 200.0 -> 150.0" in done.stdout and str(rig.path) in done.stderr
     assert load_rig(str(rig.path)).loop.rate_hz == 150.0
     kept = [line for line in before.splitlines() if line.lstrip().startswith("#")]
     assert all(line in rig.path.read_text(encoding="utf-8") for line in kept)
     (backup,) = rig.path.parent.glob("my.yaml.bak-*")
     assert backup.read_text(encoding="utf-8") == before and str(backup) in done.stderr
-    assert "nothing to save" in gazerig("save").stderr
+    assert "nothing to save" in gazerig("ctl", "save").stderr
     backup.unlink()
-    gazerig("set", RATE, "200")
-    gazerig("save")
+    gazerig("ctl", "set", RATE, "200")
+    gazerig("ctl", "save")
 
 
 def test_save_takes_a_path_from_the_folder_it_is_typed_in(
@@ -258,8 +258,8 @@ def test_save_takes_a_path_from_the_folder_it_is_typed_in(
     with a_rig() as rig, monkeypatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(rig.path.parent))
         patch.chdir(tmp_path)
-        gazerig("set", RATE, "150")
-        assert gazerig("save", "other.yaml").returncode == 0
+        gazerig("ctl", "set", RATE, "150")
+        assert gazerig("ctl", "save", "other.yaml").returncode == 0
         other = tmp_path / "other.yaml"
         assert load_rig(str(other)).loop.rate_hz == 150.0
         assert load_rig(str(rig.path)).loop.rate_hz == 200.0
@@ -271,8 +271,8 @@ def test_save_takes_a_path_from_the_folder_it_is_typed_in(
 
 
 def test_revert_tells_what_it_takes_back() -> None:
-    gazerig("set", RATE, "150")
-    done = gazerig("revert")
+    gazerig("ctl", "set", RATE, "150")
+    done = gazerig("ctl", "revert")
     assert f"{RATE} = 200.0" in done.stdout and held(RATE) == 200.0
     assert "1 value taken back" in done.stderr
 
@@ -282,19 +282,19 @@ def test_stop_and_resume() -> None:
     assert done.returncode == 0 and "torque is off" in done.stderr
     with RobotClient.connect() as rig:
         assert rig.status()["stopped"] == "finger"
-    unsure = gazerig("resume")  # nobody there to say that no hand is in it
+    unsure = gazerig("ctl", "resume")  # nobody there to say that no hand is in it
     assert unsure.returncode != 0 and "no hand" in unsure.stdout + unsure.stderr
     with RobotClient.connect() as rig:
         assert rig.status()["stopped"] == "finger"
-    assert gazerig("resume", "--yes").returncode == 0
-    assert "nothing to resume" in gazerig("resume").stderr
+    assert gazerig("ctl", "resume", "--yes").returncode == 0
+    assert "nothing to resume" in gazerig("ctl", "resume").stderr
 
 
 def test_stop_stops_every_rig_that_runs() -> None:
     with a_rig_beside() as other:
         both = {rig.pid: rig for rig in running()}
         assert len(both) == 2
-        refused = gazerig("get", RATE)
+        refused = gazerig("ctl", "get", RATE)
         assert refused.returncode == 2 and "--pid" in refused.stderr
         assert gazerig("stop").returncode == 0
         assert all(rig.status()["stopped"] for rig in both.values())
@@ -323,31 +323,31 @@ def a_rig_beside() -> Iterator[subprocess.Popen[str]]:
 
 
 def test_look_and_character() -> None:
-    done = gazerig("look", "1", "-0.2", "0.3", "--stay")
-    assert done.returncode == 0 and "it looks there, until: gazerig look free" in done.stderr
+    done = gazerig("ctl", "look", "1", "-0.2", "0.3", "--stay")
+    assert done.returncode == 0 and "it looks there, until: gazerig ctl look free" in done.stderr
     with RobotClient.connect() as rig:
         assert rig.status()["why"] == "somebody chose this point"
-    assert gazerig("look", "free").returncode == 0
-    done = gazerig("look", "there")
+    assert gazerig("ctl", "look", "free").returncode == 0
+    done = gazerig("ctl", "look", "there")
     assert done.returncode == 2 and "X Y Z in metres" in done.stderr
-    assert gazerig("character", "shy").returncode == 0
-    done = gazerig("character", "brave")
+    assert gazerig("ctl", "character", "shy").returncode == 0
+    done = gazerig("ctl", "character", "brave")
     assert done.returncode == 2 and "brave" in done.stderr
 
 
 def test_ask_lists_the_menus_and_chooses_from_them() -> None:
     with RobotClient.connect() as rig:
         present, *others = rig.menus()["conversation"]
-    lines = gazerig("ask").stdout.splitlines()
+    lines = gazerig("ctl", "ask").stdout.splitlines()
     assert any(line.startswith("behaviour: ") for line in lines)
     assert f"conversation: {present} (in force), {', '.join(others)}" in lines
     try:
-        done = gazerig("ask", "conversation", others[0])
+        done = gazerig("ctl", "ask", "conversation", others[0])
         assert (done.returncode, done.stderr) == (0, f"conversation {others[0]} is in force\n")
-        (line,) = gazerig("ask", "conversation").stdout.splitlines()
+        (line,) = gazerig("ctl", "ask", "conversation").stdout.splitlines()
         assert line.startswith(f"conversation: {others[0]} (in force), ")
     finally:
-        gazerig("ask", "conversation", present)
+        gazerig("ctl", "ask", "conversation", present)
 
 
 @pytest.mark.parametrize(
@@ -361,22 +361,22 @@ def test_ask_lists_the_menus_and_chooses_from_them() -> None:
 def test_what_cannot_be_asked_for_is_refused_with_what_can(
     words: tuple[str, ...], rule: str
 ) -> None:
-    done = gazerig("ask", *words)
+    done = gazerig("ctl", "ask", *words)
     assert done.returncode == 2 and rule in done.stderr and "Traceback" not in done.stderr
 
 
 def test_status_says_what_the_rig_does() -> None:
-    said = gazerig("status").stdout
+    said = gazerig("ctl", "status").stdout
     with RobotClient.connect() as rig:
         assert f"rig: {rig.status()['rig']}, process {rig.pid}\n" in said
     assert "looks at: " in said and "guard: " in said and "neck_yaw" in said
     assert "all saved" in said and "STOPPED" not in said
-    gazerig("set", RATE, "150")
+    gazerig("ctl", "set", RATE, "150")
     gazerig("stop", "finger")
-    said = gazerig("status").stdout
-    assert "STOPPED, torque off: finger; gazerig resume goes on" in said
+    said = gazerig("ctl", "status").stdout
+    assert "STOPPED, torque off: finger; gazerig ctl resume goes on" in said
     assert "not saved: 1 value" in said and "said: stopped by gazerig stop (process" in said
-    assert json.loads(gazerig("status", "--json").stdout)["stopped"] == "finger"
+    assert json.loads(gazerig("ctl", "status", "--json").stdout)["stopped"] == "finger"
 
 
 def test_a_rig_that_has_just_begun_or_is_held_up_says_so() -> None:
@@ -420,7 +420,8 @@ def there_is_none() -> None:
     none = (2, "", "no rig is running: start one with gazerig run ...\n")
     for words in (("get",), ("set", RATE, "100"), ("stop",), ("look", "free"), ("save",),
                   ("ask",), ("status",)):  # fmt: skip
-        assert gazerig(*words) == none, words
+        assert gazerig("ctl", *words) == none, words
+    assert gazerig("stop") == none
     assert whole_gazerig("stop") == none
     done = gazerig("stop", "--pid", "1")
     assert done.stderr == "no rig runs as process 1: start one with gazerig run ...\n"
@@ -450,16 +451,16 @@ def completed(*words: str) -> list[str]:
 
 def test_a_shell_completes_keys_and_the_values_that_there_are() -> None:
     keys = ["loop.rate_hz", "loop.park_s"]
-    assert whole_gazerig(**completing(("get", "loop."))).stdout.split() == keys
-    assert completed("get", "loop.") == keys
-    assert RATE in completed("set", "loop.r")
-    assert completed("set", "gaze.scanpath.model", "") == list(
+    assert whole_gazerig(**completing(("ctl", "get", "loop."))).stdout.split() == keys
+    assert completed("ctl", "get", "loop.") == keys
+    assert RATE in completed("ctl", "set", "loop.r")
+    assert completed("ctl", "set", "gaze.scanpath.model", "") == list(
         next(k for k in knobs_of_desk() if k.key == "gaze.scanpath.model").choices
     )
-    assert RATE in completed("set", "loop.park_s", "2", "loop.r")
-    assert "shy" in completed("character", "s")
-    assert completed("ask", "beh") == ["behaviour"]
-    assert "listen" in completed("ask", "conversation", "")
+    assert RATE in completed("ctl", "set", "loop.park_s", "2", "loop.r")
+    assert "shy" in completed("ctl", "character", "s")
+    assert completed("ctl", "ask", "beh") == ["behaviour"]
+    assert "listen" in completed("ctl", "ask", "conversation", "")
 
 
 def test_without_a_rig_a_shell_completes_keys_of_the_shipped_one(
@@ -467,7 +468,7 @@ def test_without_a_rig_a_shell_completes_keys_of_the_shipped_one(
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-        assert completed("get", "loop.") == ["loop.rate_hz", "loop.park_s"]
+        assert completed("ctl", "get", "loop.") == ["loop.rate_hz", "loop.park_s"]
 
 
 def knobs_of_desk() -> tuple[knobs.Knob, ...]:
@@ -500,14 +501,33 @@ def test_pairs_and_points() -> None:
 
 
 def test_the_quick_way_knows_all_its_commands_and_no_other() -> None:
-    here = (*app.registered_commands, *lead_app.registered_commands)
-    assert {c.name or c.callback.__name__ for c in here if c.callback} == QUICK
-    assert is_quick(["stop"], {}) and is_quick(["set", "a", "1"], {})
-    for words in ([], ["run"], ["stop", "--help"], ["--debug", "stop"], ["get", "--debug"]):
+    here = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
+    groups = {group.typer_instance.info.name for group in app.registered_groups}
+    assert here | groups == QUICK
+    assert is_quick(["stop"], {}) and is_quick(["ctl", "set", "a", "1"], {})
+    for words in ([], ["run"], ["stop", "--help"], ["--debug", "stop"], ["ctl", "get", "--debug"]):
         assert not is_quick(words, {})
-    for typed, quick in (("gazerig set a", True), ("gazerig se", False), ("gazerig set", False)):
+    for typed, quick in (
+        ("gazerig ctl set a", True),
+        ("gazerig st", False),
+        ("gazerig ctl", False),
+    ):
         environ = {"_GAZERIG_COMPLETE": "complete_bash", "COMP_WORDS": typed}
         assert is_quick([], environ) is quick
+
+
+def test_commands_of_before_work_and_name_their_new_place(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    grouped = (*ctl.registered_commands, *lead_app.registered_commands)
+    names = {c.name or c.callback.__name__ for c in grouped if c.callback}
+    assert names - {"stop"} == MOVED
+    for name in sorted(MOVED):
+        assert as_now([name, "x"]) == ["ctl", name, "x"]
+        assert capfd.readouterr().err == f"gazerig {name} is now gazerig ctl {name}\n"
+    for words in ([], ["stop"], ["run"], ["ctl", "get"], ["--debug", "get"]):
+        assert as_now(words) == words
+    assert not capfd.readouterr().err
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ def test_keys_named_are_keys(paper: Path) -> None:
 
 
 def test_values_set_in_the_papers_are_allowed() -> None:
-    sets = [words.split()[1:] for words in COMMANDS if words.startswith("set ")]
+    sets = [words.split()[2:] for words in COMMANDS if words.startswith("ctl set ")]
     pairs = [
         (key, float(value))
         for words in sets

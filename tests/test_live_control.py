@@ -134,7 +134,7 @@ def test_without_a_socket_it_says_so_and_watches_the_file(folder: Path) -> None:
     rig = Rig(folder)
     rig.live.open()
     try:
-        assert rig.said[0].startswith("gazerig set and stop will not find this rig: ")
+        assert rig.said[0].startswith("gazerig ctl set and stop will not find this rig: ")
         assert "in force" in rig.written("second\n")
     finally:
         rig.live.close()

@@ -31,7 +31,7 @@ GIVEN = {"rig": "my rig.yaml", "port": "/dev/ttyACM3", "mock": False}
         ("run gazerig scan: it", "run gazerig scan --port /dev/ttyACM3: it"),
         ("gazerig calibrate", "gazerig calibrate 'my rig.yaml' --port /dev/ttyACM3"),
         ("gazerig run --mock", "gazerig run --mock"),
-        ("gazerig set a b", "gazerig set a b"),
+        ("gazerig ctl set a b", "gazerig ctl set a b"),
     ],
 )  # fmt: skip
 def test_a_suggestion_names_rig_and_port(said: str, wanted: str) -> None:

@@ -9,13 +9,15 @@ import sys
 from collections.abc import Mapping, Sequence
 from types import FrameType
 
-QUICK = frozenset(
+QUICK = frozenset(("ctl", "stop"))
+"""The commands of gazerig.robot.cli.tune."""
+MOVED = frozenset(
     {
         *("get", "set", "save", "revert", "character"),
-        *("ask", "look", "status", "stop", "resume"),
+        *("ask", "look", "status", "resume"),
     }
 )
-"""The commands of gazerig.robot.cli.tune."""
+"""Commands that stood beside ``stop`` once and are part of ``ctl`` now."""
 _ELSEWHERE = {"--help", "--debug"}
 """Options that the whole program knows more about."""
 
@@ -27,6 +29,7 @@ def main() -> None:
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, _gone)
     hold_standard_files()
+    sys.argv[1:] = as_now(sys.argv[1:])
     try:
         if is_quick(sys.argv[1:], os.environ):
             _quick()
@@ -36,6 +39,17 @@ def main() -> None:
             whole()
     finally:  # all is said: nothing is left to interrupt
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def as_now(words: Sequence[str]) -> list[str]:
+    """Return what was typed with a command of before in its group; one line names the new one.
+
+    words: what stands after ``gazerig``
+    """
+    if not words or words[0] not in MOVED:
+        return list(words)
+    os.write(2, f"gazerig {words[0]} is now gazerig ctl {words[0]}\n".encode())
+    return ["ctl", *words]
 
 
 def _gone(number: int, frame: FrameType | None) -> None:

@@ -57,29 +57,34 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "fit-scanpath": (
         ("fit-scanpath gaze.csv --parts boxes.yaml", "a walk from an eye tracker's samples"),
     ),
-    "get": (
-        ("get", "every parameter of the running rig"),
-        ("get gaze.saccade", "those of the saccades"),
-        ("get --differs", "what differs from the defaults"),
+    "ctl": (
+        ("ctl status", "what the running rig looks at and why, guard, joints"),
+        ("ctl set gaze.saccade.max_speed_deg_s 400", "change a parameter at the next tick"),
+        ("ctl look 1 0.2 0.3", "the running head looks there"),
     ),
-    "set": (("set gaze.saccade.max_speed_deg_s 400", "at the next tick; not yet in the file"),),
-    "save": (("save my.yaml", "keep what was set, comments and order stay"),),
-    "revert": (("revert", "back to what the file says"),),
+    "get": (
+        ("ctl get", "every parameter of the running rig"),
+        ("ctl get gaze.saccade", "those of the saccades"),
+        ("ctl get --differs", "what differs from the defaults"),
+    ),
+    "set": (("ctl set gaze.saccade.max_speed_deg_s 400", "at the next tick; not yet in the file"),),
+    "save": (("ctl save my.yaml", "keep what was set, comments and order stay"),),
+    "revert": (("ctl revert", "back to what the file says"),),
     "stop": (("stop", "torque off at once; the program goes on"),),
-    "resume": (("resume", "torque on again, slowly on"),),
-    "character": (("character shy", "lay a character over the running rig"),),
+    "resume": (("ctl resume", "torque on again, slowly on"),),
+    "character": (("ctl character shy", "lay a character over the running rig"),),
     "ask": (
-        ("ask", "the menus of the running rig, the choices in force first"),
-        ("ask behaviour guard", "another behaviour of its rules"),
-        ("ask conversation listen", "look away as a listener does"),
+        ("ctl ask", "the menus of the running rig, the choices in force first"),
+        ("ctl ask behaviour guard", "another behaviour of its rules"),
+        ("ctl ask conversation listen", "look away as a listener does"),
     ),
     "status": (
-        ("status", "what the running rig looks at and why, guard, joints"),
-        ("status --json", "the same for a program"),
+        ("ctl status", "what the running rig looks at and why, guard, joints"),
+        ("ctl status --json", "the same for a program"),
     ),
     "look": (
-        ("look 1 0.2 0.3", "the running head looks there"),
-        ("look free", "and freely again"),
+        ("ctl look 1 0.2 0.3", "the running head looks there"),
+        ("ctl look free", "and freely again"),
     ),
     "replay": (
         ("replay evening.mcap", "on the page, with a time slider"),
@@ -98,10 +103,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
 """Command -> examples, each with what it is for."""
 
 PANELS: dict[str, tuple[str, ...]] = {
-    "Run": (
-        *("run", "ctl", "get", "set", "save", "revert", "stop", "resume", "character"),
-        *("ask", "status", "look"),
-    ),
+    "Run": ("run", "ctl", "stop"),
     "Look back": ("replay", "report", "compare", "export"),
     "Bring-up": (
         *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),

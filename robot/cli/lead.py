@@ -42,13 +42,13 @@ def look(
     """Let the running head look at a point while this command runs, or freely again."""
     with clear_errors():
         point = read_point(where)
-        with RobotClient.connect(pid, "gazerig look") as rig:
+        with RobotClient.connect(pid, "gazerig ctl look") as rig:
             if point is None:
                 rig.look_freely()
                 say("it looks freely")
                 return
             reply = rig.look_at(*point, stay=stay)
-            until = "gazerig look free" if stay else _until(seconds)
+            until = "gazerig ctl look free" if stay else _until(seconds)
             say(f"{reply.words()}, until: {until}")
             if not stay:
                 _lead_on(rig, inf if seconds is None else seconds)
@@ -93,7 +93,7 @@ def stop(
                 failed = True
                 say(f"{rig.pid}: NOT KNOWN TO HAVE STOPPED, press the emergency stop: {error}")
             else:
-                say(f"{rig.pid}: torque is off; gazerig resume goes on")
+                say(f"{rig.pid}: torque is off; gazerig ctl resume goes on")
     if failed:
         raise typer.Exit(FAULT)
 
@@ -106,7 +106,7 @@ def resume(
     pid: PidOption = None,
 ) -> None:
     """Put the torque on again after a stop, where the joints are, and go on slowly."""
-    with clear_errors(), RobotClient.connect(pid, "gazerig resume") as rig:
+    with clear_errors(), RobotClient.connect(pid, "gazerig ctl resume") as rig:
         now = rig.status()
         if not now["stopped"]:
             say("it was not stopped: nothing to resume")

@@ -22,6 +22,7 @@ from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.cli import report as cli_report
 from gazerig.robot.cli import run as cli_run
 from gazerig.robot.cli import tune as cli_tune
+from gazerig.robot.cli.entry_point import as_now
 from gazerig.robot.cli.examples import PanelGroup, add_examples
 from gazerig.robot.cli.terminal import (
     DEBUG_LOGGER,
@@ -124,7 +125,7 @@ add_examples(app)
 
 def main() -> None:
     """Run the command line: an error is one line, and with --debug also where it comes from."""
-    words = sys.argv[1:]
+    words = as_now(sys.argv[1:])
     if "--debug" in words:  # wherever people put it
         words = [word for word in words if word != "--debug"]
         logging.getLogger(DEBUG_LOGGER).setLevel(logging.DEBUG)

@@ -15,8 +15,15 @@ from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.remote.client import JsonValue, ParamInfo, RobotClient
 
+ctl = typer.Typer(
+    name="ctl",
+    help="Speak to a rig that runs in another terminal: parameters, where it looks, what it does.",
+    no_args_is_help=True,
+)
+ctl.add_typer(cli_lead.app)
 app = typer.Typer()
-app.add_typer(cli_lead.app)
+app.add_typer(ctl)
+app.command()(cli_lead.stop)
 _OLD_S = 1.0
 """A loop that has not ticked for so long does not do as it should."""
 _LAST_SAID = 5
@@ -77,7 +84,7 @@ def _menus() -> dict[str, tuple[str, ...]]:
         return {}
 
 
-@app.command()
+@ctl.command()
 def get(
     prefix: Annotated[
         str,
@@ -99,7 +106,7 @@ def get(
             other = {change.key for change in rig.differs()}
             found = [knob for knob in found if knob.key in other]
         if not found and not differs:
-            raise SetupError(f"{prefix}: no key begins so; gazerig get lists all")
+            raise SetupError(f"{prefix}: no key begins so; gazerig ctl get lists all")
         if as_json:
             print(json.dumps({knob.key: values[knob.key] for knob in found}, indent=2))
             return
@@ -110,7 +117,7 @@ def get(
         print(_rule(found[0]))
 
 
-@app.command("set", context_settings=_NEGATIVE)
+@ctl.command("set", context_settings=_NEGATIVE)
 def put(
     pairs: Annotated[
         list[str],
@@ -132,10 +139,12 @@ def put(
         if not notes:
             say("all of that is in force already")
         if unsaved:
-            say(f"not saved yet: {_count(unsaved)}; gazerig save keeps, gazerig revert takes back")
+            say(
+                f"not saved yet: {_count(unsaved)}; gazerig ctl save keeps, gazerig ctl revert takes back"
+            )
 
 
-@app.command()
+@ctl.command()
 def save(
     path: Annotated[
         Path | None, typer.Argument(help="YAML file; default: the one the rig was started with.")
@@ -156,7 +165,7 @@ def save(
     say(f"{saved.path}: {_count(len(saved.changes))} written{kept}")
 
 
-@app.command()
+@ctl.command()
 def revert(pid: PidOption = None) -> None:
     """Put back in force what the rig's file says."""
     with clear_errors(), RobotClient.connect(pid) as rig:
@@ -165,7 +174,7 @@ def revert(pid: PidOption = None) -> None:
     say(f"{_count(len(notes))} taken back")
 
 
-@app.command()
+@ctl.command()
 def character(
     name: Annotated[
         str, typer.Argument(help="One of the shipped ones.", autocompletion=complete_character)
@@ -178,7 +187,7 @@ def character(
         say(f"character {name} is in force")
 
 
-@app.command()
+@ctl.command()
 def ask(
     menu: Annotated[
         str | None,
@@ -203,7 +212,7 @@ def ask(
         _tell(f"{name}: {_choices(choices)}" for name, choices in shown.items())
 
 
-@app.command()
+@ctl.command()
 def status(
     as_json: Annotated[bool, typer.Option("--json", help="Print all of it as JSON.")] = False,
     pid: PidOption = None,
@@ -224,7 +233,9 @@ def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
         SetupError: a value is missing or no YAML, or a key stands twice.
     """
     if len(pairs) % 2:
-        raise SetupError(f"{pairs[-1]}: a value is missing; gazerig set KEY VALUE [KEY VALUE ...]")
+        raise SetupError(
+            f"{pairs[-1]}: a value is missing; gazerig ctl set KEY VALUE [KEY VALUE ...]"
+        )
     keys = pairs[::2]
     for key in keys:
         if keys.count(key) > 1:
@@ -256,7 +267,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
     if not now["ticks"]:
         return [*lines, "it has just been started: nothing is known yet"]
     if now["stopped"]:
-        lines.append(f"STOPPED, torque off: {now['stopped']}; gazerig resume goes on")
+        lines.append(f"STOPPED, torque off: {now['stopped']}; gazerig ctl resume goes on")
     if now["age_s"] > _OLD_S:
         lines.append(f"the loop is held up: what follows is {now['age_s']:.1f} s old")
     joints = ", ".join(f"{name} {deg:.1f}" for name, deg in now["joints_deg"].items())
@@ -267,7 +278,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         f"looks at: {now['target']} - {now['why']} ({now['phase']})",
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         f"joints in deg: {joints}",
-        f"not saved: {_count(unsaved)}; gazerig save keeps" if unsaved else "all saved",
+        f"not saved: {_count(unsaved)}; gazerig ctl save keeps" if unsaved else "all saved",
         *(f"said: {words}" for words in now["said"][-_LAST_SAID:]),
     ]
 

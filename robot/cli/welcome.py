@@ -24,8 +24,8 @@ def next_steps(ports: Iterable[SerialPort], rigs: Iterable[Path], running: bool)
         lines += _block(
             "A rig is running here:",
             (
-                ("gazerig get", "every parameter, and what is not saved yet"),
-                ("gazerig set gaze.blink... VALUE", "change one; gazerig save keeps it"),
+                ("gazerig ctl get", "every parameter, and what is not saved yet"),
+                ("gazerig ctl set gaze.blink... VALUE", "change one; gazerig ctl save keeps it"),
                 ("gazerig stop", "torque off at once"),
             ),
         )

@@ -43,7 +43,7 @@ def target_name(target: Target) -> str:
 def lead_words(tick: Tick) -> str:
     """Say who leads and how far beside the point the eyes look, "" while nobody leads.
 
-    e.g. "gazerig look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
+    e.g. "gazerig ctl look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
     """
     if not tick.led:
         return ""

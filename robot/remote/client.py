@@ -185,7 +185,7 @@ class RobotClient:
         for knob in self.knobs(key):
             if knob.key == key:
                 return knob
-        raise RequestRejected(f"{key}: unknown key; gazerig get lists all")
+        raise RequestRejected(f"{key}: unknown key; gazerig ctl get lists all")
 
     def set(self, key: str, value: Value) -> tuple[str, ...]:
         """Put a value in force; when this returns, the loop has it. Gives what to know of it.

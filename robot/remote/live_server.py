@@ -58,7 +58,7 @@ class LiveServer:
         try:
             self._server.open()
         except SetupError as error:  # the head runs without
-            self._say(f"gazerig set and stop will not find this rig: {error}")
+            self._say(f"gazerig ctl set and stop will not find this rig: {error}")
         self._watch.start()
 
     def note(self, tick: Tick) -> None:
