@@ -67,9 +67,13 @@ def commands() -> dict[str, typer.core.TyperCommand | TyperGroup]:
 
 
 def test_every_command_has_examples_and_no_example_is_without_command() -> None:
-    assert set(commands()) == set(EXAMPLES)
+    ctl = commands()["ctl"]
+    assert isinstance(ctl, TyperGroup)
+    assert {*commands(), *ctl.commands} == set(EXAMPLES)
     for name, command in commands().items():
         assert f"gazerig {name}" in str(command.epilog), name
+    for name, command in ctl.commands.items():
+        assert f"gazerig {'stop' if name == 'stop' else f'ctl {name}'}" in str(command.epilog), name
 
 
 @pytest.mark.parametrize(

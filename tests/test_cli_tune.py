@@ -21,8 +21,8 @@ from typing import Any, NamedTuple
 import pytest
 from typer.testing import CliRunner
 
-from gazerig.config import knobs
 from gazerig.config.load import ConfigError
+from gazerig.config.parameters import Parameter, parameters
 from gazerig.config.save import copy_shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
@@ -471,9 +471,9 @@ def test_without_a_rig_a_shell_completes_keys_of_the_shipped_one(
         assert completed("ctl", "get", "loop.") == ["loop.rate_hz", "loop.park_s"]
 
 
-def knobs_of_desk() -> tuple[knobs.Knob, ...]:
+def knobs_of_desk() -> tuple[Parameter, ...]:
     desk = load_rig("desk")
-    return knobs.knobs(desk, desk)
+    return parameters(desk, desk)
 
 
 # Without a process
